@@ -79,10 +79,7 @@ def test_a_full_disk(size: int, tmp_path: Path) -> None:
     """No file may grow beyond some bytes, which a write finds out as it would a full disk."""
     status, out, err = run(tmp_path, *FLY, file_bytes=size)
     assert (status, out) == (1, "")
-    assert (
-        err
-        == "wayproof: cannot write the run in run (track.parquet: File too large); it is marked incomplete\n"
-    )
+    assert err == "wayproof: cannot write the run in run (File too large); it is marked incomplete\n"
     with pytest.raises(RunFolderError, match="incomplete"):
         load_run(tmp_path / "run")
     assert run_here(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1

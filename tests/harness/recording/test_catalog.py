@@ -374,11 +374,14 @@ def test_the_table_of_many_is_drawn_worst_first_and_the_worst_opens(many: Path, 
     pytest.importorskip("datafusion")
     worst = worst_first(many, recordings_of(many))[: catalogs.AT_ONCE]
     assert worst[0].parent.name == "19"
-    rows = []
-    for order, name in ((worst, "sorted"), (worst[::-1], "turned")):
-        with driven():
-            table_screenshot("many", order, tmp_path / f"{name}.png")
-        rows.append(rows_of(tmp_path / f"{name}.png"))
+    for _ in range(3):  # on a busy machine rows are still on their way in a picture that looks settled
+        rows = []
+        for order, name in ((worst, "sorted"), (worst[::-1], "turned")):
+            with driven():
+                table_screenshot("many", order, tmp_path / f"{name}.png")
+            rows.append(rows_of(tmp_path / f"{name}.png"))
+        if alike(*rows):
+            break
     assert alike(*rows), "the order of the rows is that of the files"
     assert len(rows[0].getcolors(1 << 24) or ()) > 20, "there are rows"
     with window(worst, tmp_path) as client:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import urllib.request
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -738,16 +739,21 @@ def test_a_browser_is_served_on_this_machine_only_until_the_viewer_ends(
 def test_the_page_in_a_browser_talks_to_this_machine_only(
     recording: tuple[Path, Flight], tmp_path: Path
 ) -> None:
-    with served(recording[0], tmp_path) as (_, address):
+    def asked_for(address: str) -> list[str]:
+        with browser() as chromium:
+            page = chromium.new_page()
+            asked: list[str] = []
+            page.on("request", lambda request: asked.append(request.url))
+            with page.expect_response("**/*.wasm") as wasm:
+                page.goto(address)
+            assert wasm.value.ok
+            page.wait_for_timeout(5000)
+            return asked
+
+    with served(recording[0], tmp_path) as (_, address), ThreadPoolExecutor(1) as thread:
         try:
-            with browser() as chromium:
-                page = chromium.new_page()
-                asked: list[str] = []
-                page.on("request", lambda request: asked.append(request.url))
-                with page.expect_response("**/*.wasm") as wasm:
-                    page.goto(address)
-                assert wasm.value.ok
-                page.wait_for_timeout(5000)
+            # Another test may have left an event loop in this thread.
+            asked = thread.submit(asked_for, address).result()
         except NoBrowserError as missing:
             pytest.skip(str(missing))
     hosts = {urlsplit(url).hostname for url in asked if not url.startswith(("data:", "blob:"))}
