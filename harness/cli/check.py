@@ -20,6 +20,8 @@ from harness.cli.options import (
     settings_of,
     tell_interrupted,
     told_apart,
+    turbulence_of,
+    wind_of,
 )
 from harness.cli.standard_output import say
 
@@ -133,7 +135,7 @@ def check(
         "aircraft": _given(model=aircraft, airspeed_mps=airspeed_mps),
         "planner": _given(clearance_m=clearance_m),
         "trackability": _given(cross_track_m=tolerance_m, altitude_m=altitude_tolerance_m),
-        "environment": _given(wind=_wind(wind), turbulence=_turbulence(turbulence)),
+        "environment": _given(wind=wind_of(wind), turbulence=turbulence_of(turbulence)),
     }
     overrides = chosen(seed=seed, guidance=guidance, conditions=conditions)
     replaced = settings_of(settings, [*overrides, *chosen(aircraft=aircraft)])
@@ -212,23 +214,6 @@ def _name(path: Path) -> str:
 def _given(**keys: Any) -> dict[str, Any]:
     """The keys that have a value."""
     return {name: value for name, value in keys.items() if value is not None}
-
-
-def _wind(text: str | None) -> dict[str, float] | None:
-    if text is None:
-        return None
-    try:
-        speed, direction = (float(part) for part in text.split(","))
-    except ValueError:
-        raise typer.BadParameter(f"{text!r} is not SPEED,FROM such as 8,270", param_hint="--wind") from None
-    return {"speed_mps": speed, "from_deg": direction}
-
-
-def _turbulence(text: str | None) -> dict[str, str] | None:
-    if text is None:
-        return None
-    model, colon, intensity = text.rpartition(":")
-    return {"model": model if colon else "tustin", "intensity": intensity}
 
 
 def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> CheckedPath:

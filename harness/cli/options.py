@@ -186,13 +186,18 @@ def air(wind: str | None, turbulence: str | None, conditions: str | None = None)
     import json
 
     given = {
-        "environment.wind": _wind(wind),
-        "environment.turbulence": _turbulence(turbulence),
+        "environment.wind": wind_of(wind),
+        "environment.turbulence": turbulence_of(turbulence),
     }
     return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
 
 
-def _wind(text: str | None) -> dict[str, float] | None:
+def wind_of(text: str | None) -> dict[str, float] | None:
+    """The key `environment.wind` that --wind SPEED,FROM means; None where it is not given.
+
+    Raises:
+        typer.BadParameter: it is no such text.
+    """
     if text is None:
         return None
     try:
@@ -202,7 +207,8 @@ def _wind(text: str | None) -> dict[str, float] | None:
     return {"speed_mps": speed, "from_deg": direction}
 
 
-def _turbulence(text: str | None) -> dict[str, str] | None:
+def turbulence_of(text: str | None) -> dict[str, str] | None:
+    """The key `environment.turbulence` that --turbulence [MODEL:]INTENSITY means; None where it is not given."""
     if text is None:
         return None
     model, colon, intensity = text.rpartition(":")
