@@ -40,9 +40,6 @@ ALLOWED = {
         "yaml",
         "matplotlib",
         "jinja2",
-        "foxglove_schemas_protobuf",
-        "mcap_protobuf",
-        "mcap",
         "aerofiles",
         "pymavlink",
         "pyulog",
@@ -85,9 +82,7 @@ ONLY_IN = {
     "distributed": ("harness/campaign/workers.py",),
     "gymnasium": ("harness/learning/environments.py", "harness/front_door/wayproof/environments.py"),
     "datafusion": ("harness/recording/catalog.py",),
-    "mcap_protobuf": ("harness/run_files/exports/recordings.py", "harness/run_files/flight_logs.py"),
     "aerofiles": ("harness/run_files/igc_path.py",),
-    "foxglove_schemas_protobuf": ("harness/run_files/exports/recordings.py",),
     "numba": (
         "planner/compiled.py",
         "planner/kernel_cache.py",
@@ -116,12 +111,9 @@ LATE = {
     "distributed": (),
     "gymnasium": ("harness/learning/environments.py",),
     "aerofiles": (),
-    "mcap_protobuf": (),
     "pyulog": (),
     "pymavlink": (),
-    "mcap": (),
     "datafusion": (),
-    "foxglove_schemas_protobuf": (),
     "rasterio": (),
     "osmium": (),
     "pyogrio": (),
@@ -341,7 +333,7 @@ def test_outputs_are_written_by_one_writer() -> None:
     scratch = {
         "harness/api/paths.py",
         "harness/recording/viewer.py",
-        "harness/run_files/flight_logs.py",
+        "harness/replays/logs.py",
         "harness/cli/standard_output.py",
     }
     assert found == scratch

@@ -13,7 +13,7 @@ from harness.analysis.smoothness import CORNER_RAD, window_m
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 
 if TYPE_CHECKING:
-    from harness.run_files.plans_table import PlanRow
+    from harness.run_files.run_tables import PlanRow
 
 SAME_TURN = 1e-3
 """Curvatures that differ by no more than this share of them are equal."""

@@ -47,8 +47,7 @@ class FlightResult:
         """The result of a flight without a run folder."""
         from harness.analysis.metrics import metrics
         from harness.run.scenario_flight import flight_limits
-        from harness.run_files.plans_table import plans_table
-        from harness.run_files.run_folder import track_table
+        from harness.run_files.run_tables import plans_table, track_table
 
         figures = Metrics.of(metrics(flight, flight_limits(scenario)))
         return cls(scenario, figures, track_table(flight.track), plans_table(flight.plans))

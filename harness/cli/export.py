@@ -15,8 +15,8 @@ from harness.cli.standard_output import say, to_nowhere
 def export(
     run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A run folder.")],
     form: Annotated[
-        Literal["plan", "waypoints", "geojson", "kml", "gpx", "csv", "mcap"],
-        typer.Option("--format", metavar="FORMAT", help="plan, waypoints, geojson, kml, gpx, csv or mcap."),
+        Literal["plan", "waypoints", "geojson", "kml"],
+        typer.Option("--format", metavar="FORMAT", help="plan, waypoints, geojson or kml."),
     ],
     what: Annotated[
         Literal["flown", "planned"],
@@ -28,16 +28,9 @@ def export(
             metavar="T", min=0.0, help="Leaves out points nearer than this to the path, seen from above."
         ),
     ] = 0.25,
-    ground_m: Annotated[
-        float | None,
-        typer.Option(
-            metavar="G",
-            help="Altitude of the ground at both ends; adds a takeoff and a landing to a plan or waypoints file.",
-        ),
-    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: standard output.")] = None,
 ) -> int:
-    """Writes a run for QGroundControl, MAVLink, maps, GPS tools, spreadsheets or Foxglove (mcap).
+    """Writes a run for QGroundControl (plan), MAVLink (waypoints) or maps (geojson, kml).
 
     For example: wayproof export runs/my_run --format plan --out way.plan
     """
@@ -48,7 +41,7 @@ def export(
     from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
 
     try:
-        file = exported(load_run(run_dir), form, what, tolerance_m, ground_m)
+        file = exported(load_run(run_dir), form, what, tolerance_m)
     except InputError:
         raise
     except RunFolderError as error:

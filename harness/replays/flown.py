@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +13,19 @@ from numpy.typing import NDArray
 from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
+from harness.replays.logs import MAX_BYTES, READERS, read_log
+from harness.run_files.csv_path import ALTITUDES, DEGREES, LOCAL
 
-REQUIRED = ("time_s", "east_m", "north_m")
-OPTIONAL = (
-    *("up_m", "ve_mps", "vn_mps", "roll_deg", "p_degps", "airspeed_tas_mps", "airspeed_ias_mps"),
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+OPTIONAL: Final = (
+    *("ve_mps", "vn_mps", "roll_deg", "airspeed_tas_mps", "airspeed_ias_mps"),
     *("baro_height_m", "lap", "autonomous", "target_index"),
 )
-"""Columns that are read of a table: SI units and degrees in their names, east, north, up of one plane."""
-MOST_BYTES = 1_000_000_000
+"""Columns that are read of a table beside time, place and height: SI units and degrees in their names."""
+AIRSPEEDS: Final = ("airspeed_tas_mps", "airspeed_ias_mps")
+TABLES: Final = (".parquet", ".csv")
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +34,8 @@ class FlownFlight:
 
     Attributes:
         source: the file.
-        columns: (n,) float64 each: those of `REQUIRED`, `up_m`, `ve_mps`, `vn_mps`, and those of `OPTIONAL` that the
-            file has.
+        columns: (n,) float64 each: `time_s`, `east_m`, `north_m`, `up_m`, `ve_mps`, `vn_mps`, and those of `OPTIONAL`
+            that the file has.
         notes: what was inferred, a sentence each.
     """
 
@@ -45,88 +51,97 @@ class FlownFlight:
 
     def rows(self, chosen: NDArray[np.intp]) -> FlownFlight:
         """Some of its rows."""
-        return FlownFlight(
-            self.source, {name: each[chosen] for name, each in self.columns.items()}, self.notes
-        )
+        return replace(self, columns={name: each[chosen] for name, each in self.columns.items()})
 
     @property
     def airspeed_mps(self) -> FloatArray | None:
         """(n,) true airspeed, or else the indicated one; None where neither is there."""
-        return next(
-            (self.columns[name] for name in ("airspeed_tas_mps", "airspeed_ias_mps") if name in self.columns),
-            None,
-        )
+        return next((self.columns[name] for name in AIRSPEEDS if name in self.columns), None)
 
 
 def read_flown(path: Path, plane: LocalPlane) -> FlownFlight:
     """Reads a flown flight; rows by hand, before the autopilot was on, are left out where the file tells them.
 
     Args:
-        path: .parquet or .csv with the columns that this module names, or a log that `wayproof view --log` takes.
+        path: .parquet or .csv with the columns that this module names, or a log of `harness.replays.logs`.
         plane: positions in degrees are put into it.
 
     Raises:
         InputError: it cannot be read or has no track.
     """
-    if path.suffix.lower() == ".parquet" or (path.suffix.lower() == ".csv" and _heads(path) >= set(REQUIRED)):
-        columns, notes = _table(path), []
-    else:
-        from harness.run_files.flight_logs import read_log
-
-        log = read_log(path, plane)
-        columns = {"time_s": log.time_s, "east_m": log.east_m, "north_m": log.north_m, "up_m": log.up_m}
-        notes = [
-            *log.notes,
-            "airspeed: not read of this kind of log; taken to be constant where wind is fitted",
-        ]
+    suffix = path.suffix.lower()
+    if suffix not in (*TABLES, *READERS):
+        raise InputError(
+            f"{path}: is no flight log that is read; must end in {', '.join((*TABLES, *READERS))}"
+        )
+    columns, notes = (_of_table(path, plane), []) if suffix in TABLES else read_log(path, plane)
+    if suffix in READERS and not any(name in columns for name in AIRSPEEDS):
+        notes.append("airspeed: the log has none; taken to be constant where wind is fitted")
     if len(columns["time_s"]) < 3 or not (np.diff(columns["time_s"]) > 0.0).all():
         raise InputError(f"{path}: time_s: must have at least 3 rows, each later than the one before")
     if "ve_mps" not in columns or "vn_mps" not in columns:
         notes.append("velocity over the ground: from the positions")
         for name, position in (("ve_mps", "east_m"), ("vn_mps", "north_m")):
             columns[name] = np.gradient(columns[position], columns["time_s"])
-    columns.setdefault("up_m", np.zeros_like(columns["time_s"]))
+    if "up_m" not in columns:
+        notes.append("altitude: the table has none; taken to be 0 m")
+        columns["up_m"] = np.zeros_like(columns["time_s"])
     flight = FlownFlight(path, columns, tuple(notes))
-    on = columns["autonomous"] > 0 if "autonomous" in columns else columns.get("lap", np.ones(1)) > 0
-    if "autonomous" in columns or "lap" in columns:
-        if not on.any():
-            raise InputError(f"{path}: autonomous, lap: no row is flown by the autopilot")
-        flight = flight.rows(np.flatnonzero(on))
-    return flight
+    switch = columns.get("autonomous", columns.get("lap"))
+    if switch is None:
+        return flight
+    if not (switch > 0).any():
+        raise InputError(f"{path}: autonomous, lap: no row is flown by the autopilot")
+    return flight.rows(np.flatnonzero(switch > 0))
 
 
-def _heads(path: Path) -> set[str]:
-    try:
-        with path.open(encoding="utf-8-sig") as file:
-            return {head.strip().strip('"') for head in file.readline().split(",")}
-    except (OSError, UnicodeDecodeError):
-        return set()
+def _of_table(path: Path, plane: LocalPlane) -> dict[str, FloatArray]:
+    """Columns of a table, without the rows that have no place."""
+    table = _table(path)
+    names = table.column_names
+    place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
+    if "time_s" not in names or place is None:
+        east, north = LOCAL[1]
+        missing = next((name for name in ("time_s", east, north) if name not in names), "")
+        raise InputError(
+            f"{path}: has no column {missing}; must have time_s, and east_m, north_m or latitude_deg, longitude_deg"
+        )
+    height = next((name for name in ("up_m", *ALTITUDES) if name in names), None)
+    wanted = {"time_s": "time_s", place[0]: "east_m", place[1]: "north_m"}
+    wanted |= {height: "up_m"} if height else {}
+    wanted |= {name: name for name in OPTIONAL if name in names}
+    columns = {new: _numbers(table, name, path) for name, new in wanted.items()}
+    known = np.isfinite([columns[name] for name in ("time_s", "east_m", "north_m")]).all(axis=0)
+    columns = {name: each[known] for name, each in columns.items()}
+    if place in DEGREES:
+        pairs = np.column_stack((columns["east_m"], columns["north_m"])).tolist()
+        placed = np.array([plane.plane(*pair) for pair in pairs]).reshape(-1, 2)
+        columns["east_m"], columns["north_m"] = placed.T
+    return columns
 
 
-def _table(path: Path) -> dict[str, FloatArray]:
+def _table(path: Path) -> pa.Table:
     import pyarrow as pa
     import pyarrow.csv
     import pyarrow.parquet
 
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    if path.stat().st_size > MOST_BYTES:
-        raise InputError(f"{path}: has more than {MOST_BYTES / 1e6:g} MB")
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(f"{path}: has more than {MAX_BYTES / 1e6:g} MB")
     try:
         table = pa.parquet.read_table(path) if path.suffix.lower() == ".parquet" else pa.csv.read_csv(path)
     except (pa.ArrowException, OSError) as error:
-        raise InputError(
-            f"{path}: cannot be read as a table ({' '.join(str(error).split())[:200]})"
-        ) from error
-    missing = [name for name in REQUIRED if name not in table.column_names]
-    if missing:
-        raise InputError(f"{path}: has no column {missing[0]}; must have {', '.join(REQUIRED)}")
-    columns = {}
-    for name in (*REQUIRED, *OPTIONAL):
-        if name in table.column_names:
-            try:
-                columns[name] = table[name].cast("float64", safe=False).to_numpy()
-            except pa.ArrowException as error:
-                raise InputError(f"{path}: {name}: must be numbers") from error
-    known = np.isfinite([columns[name] for name in REQUIRED]).all(axis=0)
-    return {name: each[known] for name, each in columns.items()}
+        text = " ".join(str(error).split())[:200]
+        raise InputError(f"{path}: cannot be read as a table ({text})") from error
+    return table.rename_columns([name.strip() for name in table.column_names])
+
+
+def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:
+    import pyarrow as pa
+
+    try:
+        values: FloatArray = table[name].cast("float64", safe=False).to_numpy()
+    except pa.ArrowException as error:
+        raise InputError(f"{path}: {name}: must be numbers ({' '.join(str(error).split())[:120]})") from error
+    return values

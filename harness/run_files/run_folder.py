@@ -1,10 +1,8 @@
 """The folder of one run: complete only when the manifest says so.
 
-The order of writing carries the meaning. The manifest comes first and says `complete: false`; every other
-file is written under a temporary name and renamed when it is whole; the manifest that says `complete: true`
-replaces the first one last of all, with checksums of tables and recording. A process killed at any point leaves
-a folder that cannot be taken for a complete run, and one that was damaged afterwards is found out. One process
-at a time writes to a folder.
+The manifest comes first and says `complete: false`; every other file is written under a temporary name and renamed when
+it is whole; the manifest that says `complete: true` comes last, with checksums. A process killed at any point leaves a
+folder that cannot be taken for a complete run. One process at a time writes to a folder.
 """
 
 from __future__ import annotations
@@ -27,16 +25,8 @@ from harness.files.folder_lock import FolderLock
 from harness.files.input_file import MAX_JSON_BYTES, read_index, read_text
 from harness.files.versions import FLOWN_WITH, versions
 from harness.files.whole_file import PARTIAL, replace_text, replacing
-from harness.flight.record import (
-    BELIEVED_FIELDS,
-    TRACK_COLUMNS,
-    TRACK_FIELDS,
-    TRACK_OPTIONAL,
-    AcceptedPlan,
-    Track,
-)
-from harness.run_files.columns import numbers
-from harness.run_files.plans_table import PlanRow, plan_rows, plans_table
+from harness.flight.record import AcceptedPlan, Track
+from harness.run_files.run_tables import PlanRow, plan_rows, plans_table, track_of, track_table
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -50,14 +40,9 @@ RECORDING = "flight.rrd"
 OVERLAY: Final = "overlay.rrd"
 """What a comparison writes for each of its scenarios: the recordings of its runs in one."""
 REPORT = "report.html"
-REPORT_FILES = tuple(
-    f"{stem}.{kind}"
-    for stem, kinds in {
-        "report": ("html", "csv", "md"),
-        "path": ("svg", "png"),
-        "profiles": ("svg", "png"),
-    }.items()
-    for kind in kinds
+REPORT_FILES = (
+    *("report.html", "report.csv", "report.md"),
+    *("path.svg", "path.png", "profiles.svg", "profiles.png"),
 )
 """What `wayproof report` adds to a run folder."""
 MAX_BYTES = 64_000_000
@@ -121,8 +106,7 @@ class RunFolder:
             scenario_yaml: the scenario as flown, all defaults filled in.
             command: command line, for the manifest.
             sources: path and SHA-256 of each file that obstacles were made of, for the manifest.
-            turn_radius_m: smallest radius that a plan may ask for, for the manifest: to find it out anew the guidance
-                law may have to be flown.
+            turn_radius_m: smallest radius that a plan may ask for, for the manifest.
 
         Raises:
             RunFolderError: the path is a file, a folder with other things in it or that another process is
@@ -199,24 +183,6 @@ class RunFolder:
         self._lock.release()
 
 
-def track_table(track: Track) -> pa.Table:
-    """A track as the table that `track.parquet` holds."""
-    import pyarrow as pa
-
-    columns = {name: TRACK_COLUMNS[name] for name in _fields_of(track)}
-    return pa.table(
-        [numbers(getattr(track, name), column.dtype) for name, column in columns.items()],
-        pa.schema(
-            pa.field(name, pa.from_numpy_dtype(column.dtype), metadata={"description": column.doc})
-            for name, column in columns.items()
-        ),
-    )
-
-
-def _fields_of(track: Track) -> tuple[str, ...]:
-    return (*TRACK_FIELDS, *BELIEVED_FIELDS) if track.has_beliefs else TRACK_FIELDS
-
-
 def tables(path: Path) -> tuple[pa.Table, pa.Table]:
     """Track and plans of a run folder that `load_run` has read without a fault, all their columns."""
     import pyarrow.parquet as pq
@@ -243,17 +209,11 @@ def load_run(path: Path) -> Run:
     try:
         for name in (TRACK, PLANS, METRICS, SCENARIO):
             _check(path / name, manifest)
-        table = pq.read_table(path / TRACK)
-        columns = {
-            name: table[name].to_numpy()
-            for name in TRACK_COLUMNS
-            if name not in TRACK_OPTIONAL or name in table.column_names
-        }
         return Run(
             folder=path,
             scenario_yaml=read_text(path / SCENARIO, MAX_BYTES, "a scenario, in YAML"),
             manifest=manifest,
-            track=Track(**columns),
+            track=track_of(pq.read_table(path / TRACK)),
             plans=plan_rows(pq.read_table(path / PLANS)),
             metrics=json.loads(read_text(path / METRICS, MAX_JSON_BYTES, "metrics, in JSON")),
         )

@@ -4,30 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from typing import Final
 
 import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.flight.record import FloatArray, IntArray
-from harness.run_files.plans_table import PlanRow
 from harness.run_files.run_folder import Run
+from harness.run_files.run_tables import PlanRow
 from harness.scenario.scenario import Scenario, parse_scenario
 
-FORWARD_M = 0.5
+FORWARD_M: Final = 0.5
 """A planned point closer than this to the one before is left out; where a plan takes over, progress restarts."""
-
-ATTRIBUTES = (
-    "course_deg",
-    "heading_deg",
-    "roll_deg",
-    "pitch_deg",
-    "airspeed_mps",
-    "groundspeed_mps",
-    "cross_track_m",
-    "clearance_m",
-    "plan_index",
-)
-"""Columns of the track that go with every point of a flown path."""
+DIGITS: Final = 9
+"""Decimal places of degrees in files: a tenth of a millimetre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,36 +27,26 @@ class ExportedPath:
     Attributes:
         name: of the run's scenario.
         what: "flown" or "planned".
-        latitude_deg: (n,) geodetic.
-        longitude_deg: (n,).
-        altitude_m: (n,) above mean sea level.
         points_m: (n, 2) east, north in the local plane.
-        plane: the local plane.
+        degrees: (n, 2) geodetic latitude and longitude, rounded for a file.
+        altitude_m: (n,) above mean sea level.
         time_s: (n,) simulated time at which the aircraft was there, or followed the plan there.
         started: date and time of `time_s` 0.
-        attributes: columns of the track by name, (n,) each; empty for a planned path.
-        held_altitude_m: the altitude to be held.
-        airspeed_mps: the true airspeed to be held.
-        turn_radius_m: of the tightest turn of the run's plans; infinite where none turns.
     """
 
     name: str
     what: str
-    latitude_deg: FloatArray
-    longitude_deg: FloatArray
-    altitude_m: FloatArray
     points_m: FloatArray
-    plane: LocalPlane
+    degrees: FloatArray
+    altitude_m: FloatArray
     time_s: FloatArray
     started: datetime
-    attributes: dict[str, FloatArray]
-    held_altitude_m: float
-    airspeed_mps: float
-    turn_radius_m: float
 
-    def date(self, time_s: float) -> datetime:
-        """Date and time of a simulated time."""
-        return self.started + timedelta(seconds=time_s)
+    @property
+    def dates(self) -> list[str]:
+        """Date and time of every point, ISO 8601 in UTC, to a millisecond."""
+        every = (self.started + timedelta(seconds=time) for time in self.time_s.tolist())
+        return [each.isoformat(timespec="milliseconds").replace("+00:00", "Z") for each in every]
 
 
 def scenario_of_run(run: Run) -> Scenario:
@@ -74,54 +54,39 @@ def scenario_of_run(run: Run) -> Scenario:
     return parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"), as_flown=True)
 
 
-def plane_of(scenario: Scenario) -> LocalPlane:
-    """The local plane of a scenario."""
-    return LocalPlane(scenario.area.origin.latitude_deg, scenario.area.origin.longitude_deg)
-
-
-def path_of(run: Run, what: str, tolerance_m: float) -> ExportedPath:
+def path_of(run: Run, scenario: Scenario, what: str, tolerance_m: float) -> ExportedPath:
     """The path of a run with no more points than it takes.
 
     Args:
         run: the run.
+        scenario: that it flew.
         what: "flown": the track; "planned": of every plan the part that was in effect.
         tolerance_m: how far a point that is left out may be from the path, seen from above.
     """
-    scenario = scenario_of_run(run)
-    held, track = scenario.mission.altitude_m, run.track
+    track = run.track
     if what == "planned":
         points, rows = planned_points(run)
-        places = np.column_stack((points, np.full(len(points), held)))
+        places = np.column_stack((points, np.full(len(points), scenario.mission.altitude_m)))
     else:
         places = np.column_stack((track.east_m, track.north_m, track.up_m))
         rows = np.arange(len(track))
     kept = _simplified(places, tolerance_m)
-    places, rows = places[kept], rows[kept]
-    plane = plane_of(scenario)
-    degrees = geodetic(plane, places[:, :2])
-    curvature = max((plan.max_curvature_1pm for plan in run.plans), default=0.0)
     return ExportedPath(
         name=scenario.name,
         what=what,
-        latitude_deg=degrees[:, 0],
-        longitude_deg=degrees[:, 1],
-        altitude_m=places[:, 2],
-        points_m=places[:, :2],
-        plane=plane,
-        time_s=track.time_s[rows],
+        points_m=places[kept, :2],
+        degrees=geodetic(scenario, places[kept, :2]),
+        altitude_m=places[kept, 2].round(3),
+        time_s=track.time_s[rows[kept]],
         started=datetime.fromisoformat(str(run.manifest["started_utc"])),
-        attributes={}
-        if what == "planned"
-        else {name: np.asarray(getattr(track, name)[rows], dtype=np.float64) for name in ATTRIBUTES},
-        held_altitude_m=held,
-        airspeed_mps=scenario.aircraft.airspeed_mps,
-        turn_radius_m=1.0 / curvature if curvature > 0.0 else np.inf,
     )
 
 
-def geodetic(plane: LocalPlane, points_m: FloatArray) -> FloatArray:
-    """(n, 2) latitude and longitude, degrees, of (n, 2) points in a plane."""
-    return np.array([plane.geodetic(east, north) for east, north in points_m.tolist()]).reshape(-1, 2)
+def geodetic(scenario: Scenario, points_m: FloatArray) -> FloatArray:
+    """(n, 2) latitude and longitude, rounded for a file, of (n, 2) points in a scenario's plane."""
+    plane = LocalPlane(scenario.area.origin.latitude_deg, scenario.area.origin.longitude_deg)
+    degrees = [plane.geodetic(east, north) for east, north in points_m.tolist()]
+    return np.array(degrees).reshape(-1, 2).round(DIGITS)
 
 
 def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
@@ -158,11 +123,7 @@ def _simplified(places_m: FloatArray, tolerance_m: float) -> IntArray:
 
     if len(places_m) < 2:
         return np.arange(len(places_m))
-    simple = shapely.simplify(shapely.LineString(places_m), tolerance_m, preserve_topology=False)
-    kept, row = [], 0
-    for place in shapely.get_coordinates(simple, include_z=True):
-        while not np.array_equal(places_m[row], place):
-            row += 1
-        kept.append(row)
-        row += 1
-    return np.array(kept, dtype=np.int64)
+    numbered = shapely.LineString(np.column_stack((places_m[:, :2], np.arange(len(places_m)))))
+    simple = shapely.simplify(numbered, tolerance_m, preserve_topology=False)
+    kept: IntArray = shapely.get_coordinates(simple, include_z=True)[:, 2].astype(np.int64)
+    return kept

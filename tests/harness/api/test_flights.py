@@ -246,7 +246,7 @@ def test_a_run_of_a_planner_that_is_not_here_is_read_and_shown_all_the_same(
     back = wayproof.load_run(folder)
     assert (back.digest, back.scenario.planner.kind) == (flown.digest, "planner.py:Beeline")
     assert main(["report", str(folder)]) == 0
-    for form in ("csv", "gpx", "kml", "geojson", "plan"):
+    for form in ("waypoints", "kml", "geojson", "plan"):
         assert main(["export", str(folder), "--format", form, "--out", str(tmp_path / f"a.{form}")]) == 0
     with pytest.raises(
         wayproof.PlannerError, match=r"the planner planner.py:Beeline is not here; give it anew"

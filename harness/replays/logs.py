@@ -1,0 +1,219 @@
+"""Flight logs of autopilots and gliders' loggers as rows of positions: ULog (PX4), DataFlash (ArduPilot), IGC."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import mmap
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from aircraft.frames import LocalPlane
+from harness.files.input_file import InputError
+from harness.files.wording import counted
+from harness.flight.record import FloatArray
+from harness.run_files.igc_path import NEEDS_LOGS, igc_fixes
+
+MAX_BYTES: Final = 1_000_000_000
+LONGEST_S: Final = 1e7
+"""No flight is longer; where a clock was set meanwhile, times are."""
+LEAST_ROWS: Final = 2
+FIX_3D: Final = 3
+"""`Status` of a receiver with a three-dimensional fix, in DataFlash."""
+ULOG_HEADER: Final = 16
+ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")
+"""Bytes before the messages of a ULog, and the kinds of those."""
+DATAFLASH: Final = b"\xa3\x95\x80"
+"""What a DataFlash log begins with: a message that describes formats."""
+LAST_PAGE: Final = 528
+"""Bytes at the end of a DataFlash log that may hold anything: it is written in pages."""
+DAMAGED: Final = "damaged: what cannot be read of it is passed over"
+AIRSPEED_TOPICS: Final = {"airspeed_validated": "true_airspeed_m_s", "airspeed": "true_airspeed_m_s"}
+"""Topics of PX4 with the true airspeed, the better one first."""
+
+
+class Series(NamedTuple):
+    """What a log holds.
+
+    Attributes:
+        places: (n, 4) time in s, latitude and longitude in degrees, altitude in m.
+        others: (m, 2) time in s and value, by the name of a column of `harness.replays.flown`.
+    """
+
+    places: FloatArray
+    others: dict[str, FloatArray]
+
+
+def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list[str]]:
+    """Reads a flight log; the name's ending says which kind it is.
+
+    Args:
+        path: .ulg (PX4), .bin (ArduPilot DataFlash) or .igc.
+        plane: positions are put into it.
+
+    Returns:
+        Columns of `harness.replays.flown`, and notes on what of the log cannot be read.
+
+    Raises:
+        InputError: the file is none of these, cannot be read, or holds no track; or a package is missing.
+    """
+    reader = READERS[path.suffix.lower()]
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(
+            f"{path}: has {path.stat().st_size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:g} MB are read"
+        )
+    notes: list[str] = []
+    try:
+        with _silent():  # of a damaged file libraries print a line for each byte
+            found = reader(path, notes)
+    except ImportError as error:
+        raise InputError(f"{path}: {NEEDS_LOGS} ({error.name})") from error
+    except InputError:
+        raise
+    except Exception as error:  # whatever a library says of a damaged file
+        text = " ".join(str(error).split())[:200] or type(error).__name__
+        raise InputError(f"{path}: cannot be read as {path.suffix} ({text})") from error
+    return _columns(found, plane, path), notes
+
+
+def _columns(found: Series, plane: LocalPlane, path: Path) -> dict[str, FloatArray]:
+    """One row for each place on earth, in order of time; other series are interpolated there."""
+    places = found.places.reshape(-1, 4)
+    times, latitude, longitude, _ = places.T
+    known = np.isfinite(places).all(axis=1) & (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)
+    places = places[known & ((latitude != 0.0) | (longitude != 0.0))]  # a receiver without a fix says 0, 0
+    places = places[np.unique(places[:, 0], return_index=True)[1]]
+    if len(places) < LEAST_ROWS:
+        raise InputError(f"{path}: has {len(places)} rows with a position; a track has at least {LEAST_ROWS}")
+    times = places[:, 0]
+    if times[-1] - times[0] > LONGEST_S:
+        raise InputError(
+            f"{path}: its times reach from {times[0]:g} to {times[-1]:g} s; a flight may take {LONGEST_S:g} s at most"
+        )
+    east, north = np.array([plane.plane(*place) for place in places[:, 1:3].tolist()]).T
+    columns = {"time_s": times - times[0], "east_m": east, "north_m": north, "up_m": places[:, 3]}
+    for name, series in found.others.items():
+        if len(series):
+            columns[name] = np.interp(times, *series.T)
+    return columns
+
+
+def _ulog(path: Path, notes: list[str]) -> Series:
+    """PX4: the estimator's global position, https://docs.px4.io (ULog file format), airspeed and roll where logged."""
+    from pyulog import ULog
+
+    with path.open("rb") as file:
+        log = ULog(file, ["vehicle_global_position", "vehicle_attitude", *AIRSPEED_TOPICS])
+    if log.file_corruption or not _is_whole(path):
+        notes.append(DAMAGED)
+    topics = {each.name: each.data for each in reversed(log.data_list)}
+    data = topics.get("vehicle_global_position")
+    if data is None:
+        raise InputError(f"{path}: has no topic vehicle_global_position")
+    degrees = 1e-7 if np.issubdtype(np.asarray(data["lat"]).dtype, np.integer) else 1.0
+    places = np.column_stack(
+        (data["timestamp"] / 1e6, data["lat"] * degrees, data["lon"] * degrees, data["alt"])
+    )
+    valid = np.ones(len(places), dtype=bool)
+    for name in ("lat_lon_valid", "alt_valid"):  # since PX4 1.16: else a row is what was known once
+        valid &= np.asarray(data.get(name, valid), dtype=bool)
+    others = {}
+    topic = next((name for name, key in AIRSPEED_TOPICS.items() if key in topics.get(name, {})), None)
+    if topic is not None:
+        speed = topics[topic][AIRSPEED_TOPICS[topic]]
+        known = np.isfinite(speed)
+        others["airspeed_tas_mps"] = np.column_stack((topics[topic]["timestamp"] / 1e6, speed))[known]
+    if "q[3]" in topics.get("vehicle_attitude", {}):
+        attitude = topics["vehicle_attitude"]
+        w, x, y, z = (attitude[f"q[{axis}]"] for axis in range(4))
+        roll = np.degrees(np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)))
+        others["roll_deg"] = np.column_stack((attitude["timestamp"] / 1e6, roll))
+    return Series(places[valid], others)
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a ULog is a row of messages up to its end: two bytes of size, one of kind, and so many more."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        place, end = ULOG_HEADER, len(data)
+        while place + 3 <= end:
+            if data[place + 2] not in ULOG_KINDS:
+                return False
+            place += 3 + data[place] + 256 * data[place + 1]
+    return place == end
+
+
+def _dataflash(path: Path, notes: list[str]) -> Series:
+    """ArduPilot: the estimator's position (POS), or else the receiver's (GPS); airspeed (ARSP) and roll (ATT)."""
+    from pymavlink.DFReader import DFReader_binary
+
+    with path.open("rb") as file:
+        if file.read(len(DATAFLASH)) != DATAFLASH:
+            raise InputError(f"{path}: is no DataFlash log: such a file begins with {DATAFLASH.hex(' ')}")
+    keys = {
+        "POS": ("Lat", "Lng", "Alt"),
+        "GPS": ("Lat", "Lng", "Alt"),
+        "ARSP": ("Airspeed",),
+        "ATT": ("Roll",),
+    }
+    found: dict[str, list[tuple[float, ...]]] = {kind: [] for kind in keys}
+    log: Any = DFReader_binary(str(path), zero_time_base=True)
+    try:
+        while (message := log.recv_match(type=list(keys))) is not None:
+            if getattr(message, "I", 0) or getattr(message, "Status", FIX_3D) < FIX_3D:
+                continue  # a second receiver, some metres from the first, or one without a fix
+            kind = message.get_type()
+            found[kind].append((message._timestamp, *(float(getattr(message, key)) for key in keys[kind])))
+    finally:
+        log.data_map.close()
+        log.filehandle.close()
+    held = sum(len(places) * log.formats[kind].len for kind, places in enumerate(log.offsets) if len(places))
+    if log.data_len - held > LAST_PAGE:
+        notes.append(DAMAGED)
+    others = {"airspeed_ias_mps": np.array(found["ARSP"]), "roll_deg": np.array(found["ATT"])}
+    return Series(np.array(found["POS"] or found["GPS"]), others)
+
+
+def _igc(path: Path, notes: list[str]) -> Series:
+    """Gliders: fixes with the receiver's altitude, or the pressure altitude where that is 0."""
+    fixes, broken = igc_fixes(path.read_text(encoding="latin-1"), str(path))
+    if broken:
+        notes.append(f"{counted(broken, 'B record')} that cannot be read passed over")
+    if any(fix["gps_alt"] for fix in fixes) and not all(fix["gps_alt"] for fix in fixes):
+        notes.append("where its receiver has no altitude, that of its barometer is taken, if there is one")
+    rows = [
+        (fix["datetime"].timestamp(), fix["lat"], fix["lon"], fix["gps_alt"] or fix["pressure_alt"] or 0)
+        for fix in fixes
+    ]
+    return Series(np.array(rows, dtype=np.float64), {})
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Lets nothing through to standard output and error, not of machine code either."""
+    kept = io.StringIO()
+    with (
+        open(os.devnull, "wb") as nothing,
+        contextlib.redirect_stdout(kept),
+        contextlib.redirect_stderr(kept),
+    ):
+        before = os.dup(2)
+        os.dup2(nothing.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(before, 2)
+            os.close(before)
+
+
+READERS: Final[dict[str, Callable[[Path, list[str]], Series]]] = {
+    ".ulg": _ulog,
+    ".bin": _dataflash,
+    ".igc": _igc,
+}
+"""Reader by the ending of a file's name."""

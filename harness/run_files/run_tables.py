@@ -1,0 +1,149 @@
+"""The tables of a run, `track.parquet` and `plans.parquet`: from a flight, and back.
+
+`pyarrow.array` imports pandas, where it is installed, to ask whether it was given an object of pandas. That takes
+longer than writing a flight's tables, so columns are handed over as buffers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from harness.flight.polylines import polylines
+from harness.flight.record import (
+    BELIEVED_FIELDS,
+    TRACK_COLUMNS,
+    TRACK_FIELDS,
+    TRACK_OPTIONAL,
+    AcceptedPlan,
+    FloatArray,
+    Track,
+)
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+@dataclass(frozen=True, eq=False)
+class PlanRow:
+    """One row of `plans.parquet`.
+
+    Attributes:
+        plan_index: 0 for the first plan.
+        time_s: in effect from this simulated time on.
+        status: how the planner's call ended, a value of `planner.interface.PlanStatus`.
+        compute_ms: processor time of the call that found it.
+        waypoints_m: (k, 2) east, north.
+        path_m: (m, 2) dense polyline, east, north.
+        segments: (n, 6) the same path exactly, as in `planner.interface.Path`.
+        loiter: whether its last segment is a full circle, flown for ever.
+        length_m: length of the path.
+        max_curvature_1pm: its largest absolute curvature.
+        reason: the planner's sentence on it; empty in folders of older versions.
+    """
+
+    plan_index: int
+    time_s: float
+    status: str
+    compute_ms: float
+    waypoints_m: FloatArray
+    path_m: FloatArray
+    segments: FloatArray
+    loiter: bool
+    length_m: float
+    max_curvature_1pm: float
+    reason: str = ""
+
+
+def track_table(track: Track) -> pa.Table:
+    """A track as the table that `track.parquet` holds."""
+    import pyarrow as pa
+
+    names = (*TRACK_FIELDS, *BELIEVED_FIELDS) if track.has_beliefs else TRACK_FIELDS
+    columns = {name: TRACK_COLUMNS[name] for name in names}
+    return pa.table(
+        [_numbers(getattr(track, name), column.dtype) for name, column in columns.items()],
+        pa.schema(
+            pa.field(name, pa.from_numpy_dtype(column.dtype), metadata={"description": column.doc})
+            for name, column in columns.items()
+        ),
+    )
+
+
+def track_of(table: pa.Table) -> Track:
+    """The track that such a table holds."""
+    names = [name for name in TRACK_COLUMNS if name not in TRACK_OPTIONAL or name in table.column_names]
+    return Track(**{name: table[name].to_numpy() for name in names})
+
+
+def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
+    """The plans of a flight, a row each."""
+    import pyarrow as pa
+
+    paths = [accepted.plan.path for accepted in plans]
+    return pa.table(
+        {
+            "plan_index": _numbers([accepted.plan_index for accepted in plans], np.int64),
+            "time_s": _numbers([accepted.time_s for accepted in plans]),
+            "status": _texts([accepted.plan.status.value for accepted in plans]),
+            "reason": _texts([accepted.plan.reason for accepted in plans]),
+            "compute_ms": _numbers([accepted.compute_ms for accepted in plans]),
+            "waypoints": _lists([accepted.plan.waypoints_m for accepted in plans], 2),
+            "path": _lists(polylines([accepted.segments for accepted in plans]), 2),
+            "segments": _lists([accepted.segments for accepted in plans], 6),
+            "loiter": _truths([accepted.loiter for accepted in plans]),
+            "length_m": _numbers([path.length_m for path in paths if path]),
+            "max_curvature_1pm": _numbers([path.max_curvature_1pm for path in paths if path]),
+        }
+    )
+
+
+def plan_rows(table: pa.Table) -> tuple[PlanRow, ...]:
+    """The rows of such a table."""
+    rows = []
+    for row in table.to_pylist():
+        row["waypoints_m"] = np.array(row.pop("waypoints"), dtype=np.float64).reshape(-1, 2)
+        row["path_m"] = np.array(row.pop("path"), dtype=np.float64).reshape(-1, 2)
+        row["segments"] = np.array(row["segments"], dtype=np.float64).reshape(-1, 6)
+        rows.append(PlanRow(**row))
+    return tuple(rows)
+
+
+def _numbers(values: ArrayLike, dtype: DTypeLike = np.float64) -> pa.Array:
+    """A column of numbers; not a copy of an array that is contiguous and of this type."""
+    import pyarrow as pa
+
+    array: NDArray[Any] = np.ascontiguousarray(values, dtype)
+    return pa.Array.from_buffers(pa.from_numpy_dtype(array.dtype), len(array), [None, pa.py_buffer(array)])
+
+
+def _truths(values: ArrayLike) -> pa.Array:
+    """A column of true and false."""
+    import pyarrow as pa
+
+    array = np.asarray(values, np.bool_)
+    bits = np.packbits(array, bitorder="little")
+    return pa.Array.from_buffers(pa.bool_(), len(array), [None, pa.py_buffer(bits)])
+
+
+def _texts(values: Sequence[str]) -> pa.Array:
+    """A column of texts."""
+    import pyarrow as pa
+
+    coded = [value.encode() for value in values]
+    ends = np.cumsum([0, *(len(each) for each in coded)], dtype=np.int32)
+    return pa.StringArray.from_buffers(len(coded), pa.py_buffer(ends), pa.py_buffer(b"".join(coded)))
+
+
+def _lists(rows: Sequence[FloatArray], width: int) -> pa.Array:
+    """A column of lists of rows: of each entry (n, width) numbers."""
+    import pyarrow as pa
+
+    flat = np.concatenate([np.zeros((0, width)), *rows]).ravel()
+    ends = np.cumsum([0, *(len(each) for each in rows)])
+    values = pa.FixedSizeListArray.from_arrays(_numbers(flat), width)
+    return pa.ListArray.from_arrays(_numbers(ends, np.int32), values)

@@ -1,0 +1,204 @@
+"""Flight logs and tables written by hand after their specifications, read into the plane of a replay."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aircraft.frames import LocalPlane
+from harness.files.input_file import InputError
+from harness.replays.flown import read_flown
+
+PLANE = LocalPlane(47.0, 8.0)
+ROWS = np.arange(20, dtype=np.float64)
+TIME_S, EAST_M, NORTH_M, UP_M = 0.5 * ROWS, 10.0 * ROWS, 30.0 * ROWS, 400.0 + ROWS
+"""A climb to the north-north-east from the origin."""
+
+
+def degrees() -> list[tuple[float, float]]:
+    return [PLANE.geodetic(east, north) for east, north in zip(EAST_M, NORTH_M, strict=True)]
+
+
+def write_csv(path: Path) -> None:
+    rows = [f"{t},{a!r},{b!r},{up}" for t, (a, b), up in zip(TIME_S, degrees(), UP_M, strict=True)]
+    path.write_text("\n".join(["time_s,latitude_deg,longitude_deg,altitude_m", *rows]) + "\n")
+
+
+def write_igc(path: Path) -> None:
+    """Two rows a minute apart tell a date line from none; B records after the FAI's specification."""
+    lines = ["AXXXABC", "HFDTE010124"]
+    for second, (latitude, longitude) in enumerate(degrees()):
+        at = 12 * 3600 + second
+        parts = [f"{at // 3600:02}{at // 60 % 60:02}{at % 60:02}"]
+        for value, width, sides in ((latitude, 2, "NS"), (longitude, 3, "EW")):
+            minutes = round(abs(value) * 60_000)
+            parts.append(f"{minutes // 60_000:0{width}}{minutes % 60_000:05}{sides[value < 0]}")
+        up = round(float(UP_M[second]))
+        lines.append(f"B{''.join(parts)}A{up:05}{up:05}")
+    path.write_text("\r\n".join(lines) + "\r\n")
+
+
+def message(kind: bytes, body: bytes) -> bytes:
+    """A message of a ULog, after https://docs.px4.io/main/en/dev_log/ulog_file_format.html."""
+    return struct.pack("<H", len(body)) + kind + body
+
+
+def write_ulog(path: Path) -> None:
+    """Positions with their flags of validity, false at rows 3 and 4, and true airspeed."""
+    forms = (
+        b"vehicle_global_position:uint64_t timestamp;double lat;double lon;float alt;"
+        b"bool lat_lon_valid;bool alt_valid;",
+        b"airspeed_validated:uint64_t timestamp;float true_airspeed_m_s;",
+    )
+    data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + message(b"B", bytes(40))
+    data += b"".join(message(b"F", form) for form in forms)
+    for number, form in enumerate(forms):
+        data += message(b"A", struct.pack("<BH", 0, number) + form.partition(b":")[0])
+    for row, (latitude, longitude) in enumerate(degrees()):
+        time_us = int(1e6 * (5.0 + TIME_S[row]))
+        place = struct.pack("<Qddf??", time_us, latitude, longitude, UP_M[row], row != 3, row != 4)
+        data += message(b"D", struct.pack("<H", 0) + place)
+        data += message(b"D", struct.pack("<HQf", 1, time_us, 15.0 + 0.5 * row))
+    path.write_bytes(data)
+
+
+def form(kind: int, name: bytes, size: int, types: bytes, columns: bytes) -> bytes:
+    """A format of a DataFlash log."""
+    return DATAFLASH + struct.pack("<BB4s16s64s", kind, size, name, types, columns)
+
+
+DATAFLASH = b"\xa3\x95\x80"
+FORMATS = form(128, b"FMT", 89, b"BBnNZ", b"Type,Length,Name,Format,Columns")
+
+
+def write_dataflash(path: Path) -> None:
+    """The least DataFlash log: a format of formats, those of POS and ARSP, and rows of them."""
+    data = FORMATS + form(140, b"POS", 3 + 8 + 4 + 4 + 4, b"QLLf", b"TimeUS,Lat,Lng,Alt")
+    data += form(142, b"ARSP", 3 + 8 + 1 + 4, b"QBf", b"TimeUS,I,Airspeed")
+    for row, (latitude, longitude) in enumerate(degrees()):
+        at = (int(1e6 * TIME_S[row]) + 1, round(latitude * 1e7), round(longitude * 1e7), UP_M[row])
+        data += b"\xa3\x95\x8c" + struct.pack("<Qiif", *at)
+        data += b"\xa3\x95\x8e" + struct.pack("<QBf", at[0], 0, 15.0 + 0.5 * row)
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("ending", "write", "near_m", "seconds", "airspeed"),
+    [
+        (".csv", write_csv, 1e-3, 0.5, ""),
+        (".igc", write_igc, 2.0, 1.0, ""),
+        (".ulg", write_ulog, 1e-3, 0.5, "airspeed_tas_mps"),
+        (".bin", write_dataflash, 0.05, 0.5, "airspeed_ias_mps"),
+    ],
+)
+def test_a_log_is_the_track_that_was_written(
+    ending: str, write: Callable[[Path], None], near_m: float, seconds: float, airspeed: str, tmp_path: Path
+) -> None:
+    path = tmp_path / f"flight{ending}"
+    write(path)
+    found = read_flown(path, PLANE)
+    kept = np.setdiff1d(np.arange(20), (3, 4) if ending == ".ulg" else ())
+    assert found["time_s"] == pytest.approx(seconds * kept, abs=1e-3)
+    assert np.hypot(found["east_m"] - EAST_M[kept], found["north_m"] - NORTH_M[kept]).max() < near_m
+    assert found["up_m"] == pytest.approx(UP_M[kept], abs=0.01)
+    course = np.degrees(np.arctan2(found["ve_mps"], found["vn_mps"]))
+    assert course == pytest.approx([math.degrees(math.atan2(1, 3))] * len(kept), abs=5.0)
+    if airspeed:
+        assert found[airspeed] == pytest.approx(15.0 + 0.5 * kept, abs=1e-5)
+        assert found.notes == ("velocity over the ground: from the positions",)
+    else:
+        assert found.airspeed_mps is None
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("a.kmz", b"", "is no flight log that is read; must end in .parquet, .csv, .ulg, .bin, .igc"),
+        ("a.ulg", b"not a log", "cannot be read as .ulg"),
+        (
+            "a.csv",
+            b"a,b\n1,2\n",
+            "has no column time_s; must have time_s, and east_m, north_m or latitude_deg",
+        ),
+        ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1,two,3\n", "a.csv: x_m: must be numbers"),
+        ("a.csv", b"time_s,x_m,y_m\n0,1,2\n", "time_s: must have at least 3 rows"),
+        ("a.csv", b"time_s,x_m,y_m\n2,1,2\n1,1,2\n0,1,2\n", "each later than the one before"),
+        ("a.csv", b"time_s,x_m,y_m\n0,1\n", "Expected 3 columns, got 2"),
+        ("a.parquet", b"PAR1", "cannot be read as a table"),
+        ("a.igc", b"AXXX001\nHFDTE160516\n", "has 0 rows with a position"),
+        ("a.bin", b"not a log", "is no DataFlash log: such a file begins with a3 95 80"),
+    ],
+)
+def test_a_file_that_is_no_log_is_told(name: str, content: bytes, sentence: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError) as raised:
+        read_flown(tmp_path / name, PLANE)
+    assert sentence in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_damaged_dataflash_log_is_told_in_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """pymavlink's machine code prints a line for each byte that it skips."""
+    whole = tmp_path / "a.bin"
+    write_dataflash(whole)
+    whole.write_bytes(whole.read_bytes()[:86] + bytes(300))
+    with pytest.raises(InputError, match=r"has 0 rows with a position|cannot be read as"):
+        read_flown(whole, PLANE)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_row_without_a_place_is_no_row(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(
+        "\ufefftime_s, x_m, y_m\n0,0,10\n1,nan,nan\n2,10,30\n3,20,50\n", encoding="utf-8"
+    )
+    track = read_flown(tmp_path / "a.csv", PLANE)
+    assert track["time_s"].tolist() == [0.0, 2.0, 3.0]
+    assert (track["east_m"].tolist(), track["north_m"].tolist()) == ([0.0, 10.0, 20.0], [10.0, 30.0, 50.0])
+    assert "altitude: the table has none; taken to be 0 m" in track.notes
+
+
+def test_of_two_receivers_the_first_is_taken_where_it_has_a_fix(tmp_path: Path) -> None:
+    data = FORMATS
+    data += form(141, b"GPS", 3 + 8 + 1 + 1 + 4 + 4 + 4, b"QBBLLf", b"TimeUS,I,Status,Lat,Lng,Alt")
+    for row, (latitude, longitude) in enumerate(degrees()):
+        for receiver, off_deg in ((0, 0.0), (1, 1e-4)):
+            at = (round((latitude + off_deg) * 1e7), round(longitude * 1e7), 400.0)
+            fix = (500_000 * row + receiver + 1, receiver, 1 if row < 2 else 3, *at)
+            data += b"\xa3\x95\x8d" + struct.pack("<QBBiif", *fix)
+    (tmp_path / "a.bin").write_bytes(data)
+    found = read_flown(tmp_path / "a.bin", PLANE)
+    assert len(found["time_s"]) == 18
+    assert np.hypot(found["east_m"] - EAST_M[2:], found["north_m"] - NORTH_M[2:]).max() < 0.05
+    assert "airspeed: the log has none; taken to be constant where wind is fitted" in found.notes
+
+
+@pytest.mark.parametrize(
+    ("ending", "write", "row"),
+    [(".ulg", write_ulog, 3 + 2 + 30), (".bin", write_dataflash, 3 + 20), (".igc", write_igc, 37)],
+)
+def test_of_a_damaged_log_it_is_said_that_it_is(
+    ending: str, write: Callable[[Path], None], row: int, tmp_path: Path
+) -> None:
+    def notes_of(name: str) -> list[str]:
+        found = read_flown(tmp_path / name, PLANE)
+        assert len(found["time_s"]) >= 7
+        return [note for note in found.notes if note.endswith("passed over")]
+
+    write(tmp_path / f"a{ending}")
+    assert notes_of(f"a{ending}") == []
+    whole = (tmp_path / f"a{ending}").read_bytes()
+    garbage = b"B99zz\r\n" * (
+        100 if ending == ".bin" else 3
+    )  # more than a page may be at the end of such a log
+    (tmp_path / f"damaged{ending}").write_bytes(whole[: -10 * row] + garbage + whole[-10 * row :])
+    assert len(notes_of(f"damaged{ending}")) == 1
+    if ending == ".ulg":
+        (tmp_path / "torn.ulg").write_bytes(whole[:-9])
+        assert len(notes_of("torn.ulg")) == 1
