@@ -87,14 +87,13 @@ class FlightResult:
         """
         if self.recording is None:
             raise InputError("wayproof: the run has no recording to show; fly it with recording=True")
-        from harness.recording.notebook import NotebookError, in_notebook, viewer_widget
-        from harness.recording.viewer import ViewerError, open_viewer
+        from harness.recording.viewer import ViewerError, in_notebook, open_viewer, viewer_widget
 
         try:
             if in_notebook():
                 return viewer_widget(self.recording, width_px, height_px)
             open_viewer([self.recording.parent])
-        except (NotebookError, ViewerError) as error:
+        except ViewerError as error:
             raise InputError(f"wayproof: {error}") from error
         return None
 

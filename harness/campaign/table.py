@@ -17,7 +17,6 @@ from harness.analysis.causes import is_allowed_for
 from harness.campaign.results import RESULTS, RUNS, TIMINGS
 from harness.files.strict_yaml import InputError
 from harness.flight.record import FloatArray
-from harness.recording.properties import severity
 from harness.run_files.run_folder import RECORDING
 
 if TYPE_CHECKING:
@@ -242,27 +241,6 @@ def recordings_of(folder: Path) -> list[Path]:
     return sorted(kept, key=lambda path: int(path.parent.name))
 
 
-def worst_first(folder: Path, recordings: Sequence[Path]) -> list[Path]:
-    """Recordings of a campaign in the order of how badly their runs went, as far as its results tell.
-
-    Args:
-        folder: of the campaign.
-        recordings: some of it, by the number of the run; those that results tell nothing of come last.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        names = set(pq.read_schema(folder / RESULTS).names)
-        rows = pq.read_table(
-            folder / RESULTS, columns=[name for name in HOW_BAD if name in names]
-        ).to_pylist()
-    except (OSError, pa.ArrowException):
-        return [*recordings]
-    bad = {row["run"]: _how_bad(row) for row in rows}
-    return sorted(recordings, key=lambda path: -bad.get(int(path.parent.name), -1.0))
-
-
 HOW_BAD: Final = (
     "run",
     "outcome",
@@ -274,13 +252,6 @@ HOW_BAD: Final = (
     "navigation_margin_m",
 )
 """Columns of the results that say how badly a run went."""
-
-
-def _how_bad(row: Mapping[str, Any]) -> float:
-    least_m, wanted_m = row["min_clearance_m"], row["wanted_clearance_m"]
-    ratio = least_m / wanted_m if least_m is not None and wanted_m else None
-    fair = bool(row["trackable"]) or allowed_for(row)
-    return severity(str(row["outcome"]), fair, ratio)
 
 
 def allowed_for(row: Mapping[str, Any]) -> bool:

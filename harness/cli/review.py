@@ -189,24 +189,17 @@ def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
 
 def open_campaign(folder: Path, web: bool = False) -> bool:
     """Shows the recordings of a campaign as a table until the viewer is closed; says why, if it cannot start."""
-    from harness.campaign.table import recordings_of, worst_first
+    from harness.campaign.table import recordings_of
     from harness.files.errors import RunFolderError
-    from harness.recording.catalog import AT_ONCE, open_table
+    from harness.recording.catalog import open_table
     from harness.recording.properties import NO_RECORDINGS, severity_told
     from harness.recording.viewer import ViewerError
 
     try:
-        recordings = worst_first(folder, recordings_of(folder))
+        recordings = recordings_of(folder)
         if not recordings:
             raise RunFolderError(NO_RECORDINGS.format(folder))
-        many = len(recordings) > AT_ONCE
-        shows = (
-            "the circular arrow beside the name shows those that have been added"
-            if web
-            else "the others follow"
-        )
-        added = f", the worst {AT_ONCE} first; {shows}"
-        say(f"{len(recordings)} recordings{added if many else ''}", err=True)
+        say(f"{len(recordings)} recordings", err=True)
         say(f"sorted by {severity_told()}", err=True)
         open_table(
             folder.resolve().name,

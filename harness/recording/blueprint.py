@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +25,6 @@ WORLD = "world"
 PLAN = "plan"
 SERIES = "series"
 STATES = "states"
-ATTITUDE = "attitude"
 EVENTS = "events"
 SUMMARY = "summary"
 COLOURS = "colours"
@@ -45,8 +46,6 @@ SENSED = "sensed"
 """Below WORLD and PLAN: places on edges, each when it was sensed first; shown up to the cursor as well."""
 TRUE = "true_obstacles"
 """Below WORLD: the standing obstacles as solids from the start on; hidden but in overlays and thin recordings."""
-DISCS = "discs"
-"""Below PLAN: round obstacles of a thin recording."""
 
 PLANNER_LANE, BANK_LANE, TRACKING_LANE = "planner", "saturation", "tracking"
 """Lanes of the state timeline, below STATES; shown in the order of their names."""
@@ -63,13 +62,11 @@ MOVES: Colour = (255, 150, 96)
 """Colour of obstacles that the map takes to move."""
 MET: Colour = (196, 124, 232)
 MOVING_DIM: Colour = (96, 68, 56)
-START: Colour = (128, 140, 160)
 GOAL: Colour = (52, 160, 92)
-"""Colour of the goal, as START is that of the start: labels in both are legible on black and on white."""
 START_LIGHT: Colour = (222, 230, 244)
 GOAL_LIGHT: Colour = (160, 246, 190)
 END_LIGHT: Colour = (255, 216, 210)
-"""Colour of the label where a flight ends, as the two before are those of start and goal on a dark background."""
+"""Colour of the label where a flight ends, as the two before are those of start and goal."""
 GOAL_DIM: Colour = (48, 112, 72)
 AIRCRAFT: Colour = (255, 255, 255)
 TRACK: Colour = (255, 179, 64)
@@ -86,8 +83,6 @@ CALM: Colour = (58, 64, 74)
 HOLD: Colour = (156, 84, 60)
 MODES: tuple[Colour, ...] = ((36, 98, 130), (88, 76, 148), (34, 112, 104), (122, 66, 116), (96, 104, 52))
 """Colours of the planner's states in the order in which they come up: dark, for white letters."""
-AXES: tuple[Colour, ...] = ((255, 84, 84), (96, 211, 130), (92, 148, 255))
-"""Colours of the body axes: ahead, to the left, up."""
 
 ERROR_COLOURS: tuple[Colour, ...] = ((255, 214, 92), (255, 138, 48), (255, 44, 84))
 """Colours of the flown track: on the plan, at half the error limit, and at or beyond the limit."""
@@ -151,22 +146,19 @@ class Frame:
         altitude_m: altitude to be held, above mean sea level.
         clearance_m: wanted distance from every obstacle edge.
         bank_limit_deg: largest bank command of the guidance; None where several flights are shown.
+        world: hash of the obstacles; empty where they are not known.
     """
 
     bounds_m: tuple[float, float, float, float]
     altitude_m: float
     clearance_m: float
     bank_limit_deg: float | None = None
+    world: str = ""
 
     @property
     def kept(self) -> dict[str, Any]:
         """What a recording keeps of it."""
-        values = {
-            "bounds_m": self.bounds_m,
-            "altitude_m": self.altitude_m,
-            "clearance_m": self.clearance_m,
-        }
-        return {name: value for name, value in values.items() if value is not None}
+        return {name: getattr(self, name) for name in ("bounds_m", "altitude_m", "clearance_m", "world")}
 
     @property
     def span_m(self) -> float:
@@ -244,11 +236,12 @@ class Scene:
         shown |= dict.fromkeys(("search", PLAN_DELAY, RETURNS), self.searches)
         return tuple(name for name, has in shown.items() if not has)
 
-    @property
+    @cached_property
     def frame(self) -> Frame:
         """What the views are framed on."""
         limit_deg = round(math.degrees(self.limits.bank_limit_rad), 1)
-        return Frame(self.mission.bounds_m, self.altitude_m, self.limits.clearance_m, limit_deg)
+        world = hashlib.sha256(repr(self.obstacles).encode()).hexdigest()[:16]
+        return Frame(self.mission.bounds_m, self.altitude_m, self.limits.clearance_m, limit_deg, world)
 
     @property
     def obstacle_top_m(self) -> float:

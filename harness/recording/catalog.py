@@ -22,7 +22,6 @@ from harness.recording.viewer import (
     ViewerError,
     address_of,
     answers,
-    draw_settled,
     free_port,
     need_screen,
     viewer_process,
@@ -53,6 +52,10 @@ LEADING_COLUMNS: Final = 3
 """Number of columns before the varied keys, of which more may be varied than fit a window."""
 
 
+ENDING_S: Final = 2.0
+"""The server has so long to end."""
+
+
 @dataclass(frozen=True)
 class Catalog:
     """A campaign's recordings, being served.
@@ -60,43 +63,27 @@ class Catalog:
     Attributes:
         url: of the dataset: what a viewer opens.
         dataset: rerun's handle of it, for queries.
-        all_there: set when all of the recordings are in it.
     """
 
     url: str
     dataset: Any
-    all_there: threading.Event
 
     def table(self) -> pa.Table:
-        """The runs as a table, one row a recording, worst first; waits until all are there."""
+        """The runs as a table, one row a recording, worst first."""
         from datafusion import col
 
-        self.all_there.wait()
-        runs = self.dataset.segment_table()
-        table: pa.Table = runs.sort(col(f'"{_figure("severity")}"').sort(ascending=False)).to_arrow_table()
+        worst_first = col(f'"{_figure("severity")}"').sort(ascending=False)
+        table: pa.Table = self.dataset.segment_table().sort(worst_first).to_arrow_table()
         return table
 
 
-AT_ONCE: Final = 100
-"""Recordings that rerun's server reads together: about half a second's work."""
-ENDING_S: Final = 2.0
-"""The server has so long to end."""
-OPENING_S: Final = 5.0
-"""The others are added when a viewer has had so long to show the first: both at once would keep it waiting."""
-LOOKING_S: Final = 0.5
-"""Once in so long it is looked whether the others are there."""
-
-
 @contextlib.contextmanager
-def catalog(name: str, recordings: Sequence[Path], opening_s: float = 0.0) -> Iterator[Catalog]:
-    """Serves recordings as one dataset on 127.0.0.1, as long as the block lasts.
-
-    The first of many are there when the block begins, the others follow: to read a thousand takes seconds.
+def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
+    """Serves recordings as one dataset on 127.0.0.1, as long as the block lasts. To read a thousand takes seconds.
 
     Args:
         name: of the campaign.
-        recordings: files of runs, each with an identity of its own, those that matter most first.
-        opening_s: wall time after which the others begin to be added.
+        recordings: files of runs, each with an identity of its own.
 
     Raises:
         RunFolderError: there are none.
@@ -111,15 +98,13 @@ def catalog(name: str, recordings: Sequence[Path], opening_s: float = 0.0) -> It
     from rerun.server import Server
 
     try:
-        first = [str(path.resolve()) for path in recordings[:AT_ONCE]]
-        server = Server(host=LOCALHOST, datasets={name: first})
+        server = Server(host=LOCALHOST, datasets={name: [str(path.resolve()) for path in recordings]})
     except (RuntimeError, ValueError, OSError, ConnectionError) as error:
         raise ViewerError(f"rerun's server does not start: {error}") from error
     with ended_in_time(server), tempfile.TemporaryDirectory(prefix="wayproof-table-") as scratch:
         dataset = server.client().get_dataset(name)
         _lay_out(dataset, Path(scratch))
-        with _followed_by(dataset, recordings[AT_ONCE:], opening_s) as all_there:
-            yield Catalog(f"{server.url()}/entry/{dataset.id}", dataset, all_there)
+        yield Catalog(f"{server.url()}/entry/{dataset.id}", dataset)
 
 
 @contextlib.contextmanager
@@ -131,30 +116,6 @@ def ended_in_time(server: Any) -> Iterator[None]:
         ender = threading.Thread(target=server.shutdown, name="server", daemon=True)
         ender.start()
         ender.join(ENDING_S)
-
-
-@contextlib.contextmanager
-def _followed_by(dataset: Any, recordings: Sequence[Path], after_s: float) -> Iterator[threading.Event]:
-    """Adds recordings while the block lasts; gives what is set when all are there."""
-    over, all_there = threading.Event(), threading.Event()
-
-    def add() -> None:
-        if recordings:
-            over.wait(after_s)
-        for first in range(0, len(recordings), AT_ONCE):
-            if over.is_set():
-                return
-            some = [path.resolve().as_uri() for path in recordings[first : first + AT_ONCE]]
-            dataset.register(some).wait()
-        all_there.set()
-
-    adder = threading.Thread(target=add, name="recordings", daemon=True)
-    adder.start()
-    try:
-        yield all_there
-    finally:
-        over.set()
-        adder.join()
 
 
 def _figure(name: str) -> str:
@@ -235,7 +196,7 @@ def open_table(
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
         if web:
             with (
-                catalog(name, recordings, OPENING_S) as served,
+                catalog(name, recordings) as served,
                 contextlib.suppress(KeyboardInterrupt),
                 web_viewer(Path(scratch)) as (viewer, address, _),
             ):
@@ -259,7 +220,7 @@ def window(
 
     Args:
         name: of the campaign.
-        recordings: files of its runs, those that matter most first.
+        recordings: files of its runs.
         scratch: an empty folder for the viewer's settings.
         arguments: of the viewer besides.
 
@@ -269,7 +230,7 @@ def window(
     """
     port = free_port()
     command = ["--bind", LOCALHOST, "--port", str(port), "--hide-welcome-screen", *arguments]
-    with viewer_process(command, scratch) as viewer, catalog(name, recordings, OPENING_S) as served:
+    with viewer_process(command, scratch) as viewer, catalog(name, recordings) as served:
         from rerun.experimental import ViewerClient
 
         if not answers(port, viewer):
@@ -280,49 +241,7 @@ def window(
         except ConnectionError as error:
             raise ViewerError(NO_DRIVER) from error
         try:
-            with _kept_fresh(client, served) if len(recordings) > AT_ONCE else contextlib.nullcontext():
-                yield viewer, client
+            yield viewer, client
         finally:
             viewer.kill()  # the server waits for who is still connected
             viewer.wait()
-
-
-@contextlib.contextmanager
-def _kept_fresh(client: Any, served: Catalog) -> Iterator[None]:
-    """Has the viewer read the table again when all recordings are there: at once, or when it comes back from a run."""
-    over = threading.Event()
-
-    def refresh() -> None:
-        while not over.wait(LOOKING_S):
-            if served.all_there.is_set():
-                with contextlib.suppress(RuntimeError, ConnectionError):  # a run is shown
-                    client.run_command("table.refresh")
-                    return
-
-    refresher = threading.Thread(target=refresh, name="refresh", daemon=True)
-    refresher.start()
-    try:
-        yield
-    finally:
-        over.set()
-        refresher.join()
-
-
-def table_screenshot(
-    name: str, recordings: Sequence[Path], png: Path, size: tuple[int, int] = (1600, 900)
-) -> None:
-    """Draws the table of a campaign as the viewer shows it, without a screen.
-
-    Raises:
-        ViewerError: no driver, or no server.
-    """
-    arguments = ["--headless", "--window-size", f"{size[0]}x{size[1]}"]
-    with (
-        tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch,
-        window(name, recordings, Path(scratch), arguments) as (_, client),
-    ):
-        try:
-            draw_settled(client, png.resolve())
-        except ConnectionError as error:
-            # Without a driver it listens for a moment before it gives up.
-            raise ViewerError(NO_DRIVER) from error

@@ -10,7 +10,6 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from harness.recording.blueprint import (
-    ATTITUDE,
     BACKGROUND,
     BELIEVED,
     COLOURS,
@@ -67,20 +66,17 @@ def blueprint(
     Args:
         frame: what to frame the views on.
         runs: entity of each run below PLAN and WORLD, ending in a slash; of a single recording the empty
-            string.
+            string, of a thin one nothing.
         without: names of time series that have nothing to show.
         follows: whether the cursor stays at the latest time, for a flight that goes on.
         lanes: how many lanes of states there are; default: those of `runs`.
     """
     plan = plan_view(frame, runs)
-    events = _events_view()
-    about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
-    colours = rrb.TextDocumentView(origin=COLOURS, name="Colours")
     states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())
     below: list[rrb.Container | rrb.View] = [
-        events,
-        about,
-        *([rrb.Tabs(colours, attitude_view(), active_tab=0)] if len(runs) == 1 else []),
+        _events_view(),
+        rrb.TextDocumentView(origin=SUMMARY, name="Summary"),
+        *([rrb.TextDocumentView(origin=COLOURS, name="Colours")] if len(runs) == 1 else []),
     ]
     if lanes is None:
         lanes = 3 if len(runs) == 1 else 2 * len(runs)
@@ -119,8 +115,7 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
         runs: as in `blueprint`.
     """
     lanes = sum(each.startswith(f"/{STATES}/") for each in entities)
-    if not lanes and len(runs) == 1:
-        return thin_blueprint(frame)
+    runs = runs if lanes or len(runs) > 1 else ()
     drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{SERIES}/")}
     without = [name for _, names in PLOTS for name in names if name not in drawn]
     return blueprint(frame, runs, without, lanes=lanes)
@@ -134,6 +129,7 @@ PLOTS: Final = (
 """Rows of the time series: share of the height, and names."""
 THIN_SERIES: Final = ("cross_track", "clearance", "bank")
 """Time series of a thin recording."""
+NOT_THIN: Final = tuple(name for _, names in PLOTS for name in names if name not in THIN_SERIES)
 
 
 def _events_view() -> rrb.TextLogView:
@@ -148,32 +144,6 @@ def _events_view() -> rrb.TextLogView:
     )
 
 
-def thin_blueprint(frame: Frame) -> Layout:
-    """The layout of a thin recording: plan view and 3-D flight, events and summary, three time series.
-
-    Args:
-        frame: what to frame the views on.
-    """
-    shares = [share for share, _ in PLOTS]
-    about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
-    return Layout(
-        rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Horizontal(plan_view(frame), flight_view(frame)),
-                rrb.Horizontal(_events_view(), about),
-                row_shares=[12, 5],
-            ),
-            rrb.Vertical(*series_views(frame, ("",), THIN_SERIES, background=False), row_shares=shares),
-            column_shares=[13, 6],
-        ),
-        rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed", playback_speed=60.0),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        auto_layout=False,
-        auto_views=False,
-    )
-
-
 def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:
     """The plan view, north up, framed on the area.
 
@@ -181,8 +151,7 @@ def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:
 
     Args:
         frame: what to frame the view on.
-        trails: entity of each run, as `runs` of `blueprint`, whose trail is shown up to the cursor; of thin recordings
-            none.
+        trails: entity of each run, as `runs` of `blueprint`, whose trail is shown up to the cursor.
     """
     xmin, ymin, xmax, ymax = frame.bounds_m
     margin = 0.03 * frame.span_m
@@ -190,7 +159,7 @@ def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:
         origin="/",
         contents=[f"/{PLAN}/**"],
         name="Plan view (north up)",
-        background=list(BACKGROUND) if trails else None,
+        background=list(BACKGROUND),
         visual_bounds=rrb.VisualBounds2D(
             x_range=[xmin - margin, xmax + margin], y_range=[-ymax - margin, -ymin + margin]
         ),
@@ -223,7 +192,7 @@ def flight_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial3DView:
         origin=WORLD,
         contents=contents,
         name="3-D flight",
-        background=list(BACKGROUND) if trails else None,
+        background=list(BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=(0.0, 0.0, 1.0)
@@ -232,28 +201,11 @@ def flight_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial3DView:
     )
 
 
-def attitude_view() -> rrb.Spatial3DView:
-    """Bank and pitch of the aircraft, seen from behind."""
-    return rrb.Spatial3DView(
-        origin=ATTITUDE,
-        name="Attitude, from behind",
-        background=list(BACKGROUND),
-        line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=(0.0, -2.9, 1.1),
-            look_target=(0.0, 0.0, 0.1),
-            eye_up=(0.0, 0.0, 1.0),
-        ),
-    )
-
-
 def series_views(
     frame: Frame,
     runs: Sequence[str],
     only: Sequence[str] | None = None,
     without: Sequence[str] = (),
-    background: bool = True,
 ) -> list[rrb.TimeSeriesView]:
     """The time series, one a question, each over the whole flight.
 
@@ -264,11 +216,9 @@ def series_views(
         runs: as in `blueprint`.
         only: names of the series shown; default: all.
         without: names of series that are not shown.
-        background: whether they have ours, as whole recordings do; else rerun's.
     """
     wanted = max(frame.clearance_m, 1.0)
-    one = len(runs) == 1
-    whole = one and background
+    one, whole = len(runs) < 2, len(runs) == 1
     rows: list[tuple[str, str, tuple[float, float] | None]] = [
         (
             "cross_track",
@@ -295,9 +245,7 @@ def series_views(
         rrb.TimeSeriesView(
             origin=f"{SERIES}/{entity}",
             name=title,
-            background=rrb.archetypes.PlotBackground(color=list(BACKGROUND), show_grid=True)
-            if background
-            else None,
+            background=rrb.archetypes.PlotBackground(color=list(BACKGROUND), show_grid=True),
             axis_x=_whole_flight(),
             axis_y=rrb.ScalarAxis(range=limits) if limits else None,
             plot_legend=rrb.PlotLegend(visible=False)

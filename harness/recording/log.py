@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,10 +20,10 @@ import rerun as rr
 from aircraft.interface import AircraftState
 from harness.analysis.causes import NAVIGATION_ERROR
 from harness.flight.observer import Caution
-from harness.flight.record import AcceptedPlan, FloatArray, Track
+from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, RunningViewer, Sink, recording_stream
-from harness.recording.layout import blueprint
+from harness.recording.layout import NOT_THIN, blueprint
 from harness.recording.moving import Changing, Tracked, log_tracked_style
 from harness.recording.plans import log_plan_style, send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
@@ -37,7 +38,7 @@ from harness.recording.scene import (
     send_believed,
 )
 from harness.recording.sensed import NewEdges, Sensed, returns_m
-from harness.recording.series import Returns, curves, send_curves, send_levels
+from harness.recording.series import Returns, curves, send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_2d, strips_3d
 from harness.recording.states import (
     AT_LIMIT,
@@ -65,7 +66,10 @@ CELL_SHARE = 0.0015
 """Side of the cells in which sensed places are kept, as a share of the area."""
 PIECE_SHARE = 0.001
 """Length of a piece of the trail, which has one colour, as a share of the area."""
-MARKER_STEP_ROWS = 5
+MARKER_STEP_ROWS, THIN_STEP_ROWS = 5, 20
+"""Rows of the track from one that is drawn to the next: of the marker in the plan view, of a thin recording."""
+THIN_CHORD_ERROR = 1e-2
+"""How far a plan of a thin recording may be off the true one, as a share of the turn radius: less than a pixel."""
 
 
 class RerunLog:
@@ -77,6 +81,8 @@ class RerunLog:
         scene: what is known before the flight.
         recording_id: identity of the recording; the same run gives the same one.
         moving: tells what the map takes to move.
+        thin: no more than track, plans, obstacles and few rows of three time series, for campaigns that keep
+            thousands.
 
     Raises:
         OSError: the file cannot be written.
@@ -88,15 +94,16 @@ class RerunLog:
         scene: look.Scene,
         recording_id: str,
         moving: Callable[[], Sequence[MovingEdges]] = tuple,
+        thin: bool = False,
     ) -> None:
         if isinstance(into, Path) and not into.parent.is_dir():
             raise FileNotFoundError(f"no folder {into.parent} for the recording")
-        self._scene = scene
+        self._scene, self._thin = scene, thin
         self._rec = recording_stream(recording_id)
         self._sink = self._opened(into)
-        self._rec.send_recording_name(scene.name)
+        self._rec.send_recording_name(recording_id if thin else scene.name)
         span_m = scene.frame.span_m
-        self._chord_error_m = 1e-5 * span_m
+        self._chord_error_m = THIN_CHORD_ERROR * scene.mission.turn_radius_m if thin else 1e-5 * span_m
         self._scan_period_s = max(SCAN_SHARE * span_m / scene.mission.speed_mps, LEAST_PERIOD_S)
         self._piece_rows = min(max(round(10 * PIECE_SHARE * span_m / scene.mission.speed_mps), 10), 100)
         self._scan: RangeScan | None = None
@@ -114,20 +121,25 @@ class RerunLog:
         self._known_to_move, self._tracked = moving, Tracked()
         self._changing, self._returns = Changing(scene), Returns()
         self._nearness = Nearness(scene.limits.clearance_m)
-        log_scene(self._rec, scene)
-        log_plan_style(self._rec)
-        log_tracked_style(self._rec)
-        self._log_style()
+        log_scene(self._rec, scene, thin)
+        log_plan_style(self._rec, thin)
+        if not thin:
+            log_tracked_style(self._rec)
+            self._log_style()
         self.flush()
 
     def _opened(self, into: Path | str) -> Sink:
-        layout = blueprint(self._scene.frame, ("",), self._scene.empty_series, follows=isinstance(into, str))
+        runs, without = ((), NOT_THIN) if self._thin else (("",), self._scene.empty_series)
+        lanes = 0 if self._thin else None
+        layout = blueprint(self._scene.frame, runs, without, follows=isinstance(into, str), lanes=lanes)
         if isinstance(into, str):
             return RunningViewer(self._rec, into, layout)
         return RecordingFile(self._rec, into, layout)
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Takes a scan; keeps it when one is due to be drawn."""
+        if self._thin:
+            return
         self._scan = scan
         self._returns.take(scan)
         self._tracked.take(scan.time_s, self._known_to_move())
@@ -139,6 +151,8 @@ class RerunLog:
         if self._scan is not None and self._scan.time_s > self._scan_drawn_s:
             self._draw(self._scan)
         self._plans.append(accepted)
+        if self._thin:
+            return
         self._states.on_plan(accepted)
         self._events.append((accepted.time_s, plan_text(accepted), look.TOLD_PLAN))
 
@@ -149,19 +163,14 @@ class RerunLog:
     def on_block(self, block: Track) -> None:
         """Draws consecutive rows of the track, and what happened meanwhile."""
         self._events += [(*event, look.TOLD) for event in self._nearness.events(block)]
-        self._send_happened()
         self._last = block
-        times = look.time_column(block.time_s)
         position = np.column_stack((block.east_m, block.north_m, block.up_m))
-        self._rec.send_columns(
-            f"{look.WORLD}/aircraft",
-            [times],
-            rr.Transform3D.columns(
-                translation=position,
-                quaternion=quaternions(block.heading_deg, block.pitch_deg, block.roll_deg),
-            ),
-        )
-        self._send_marker(block)
+        send_levels(self._rec, self._scene, block.time_s)
+        if self._thin:
+            self._send_thin(block, position)
+            return
+        self._send_happened()
+        self._send_aircraft(block, position, np.arange(len(block)), MARKER_STEP_ROWS)
         self._send_trail(block, position)
         self._changing.send(self._rec, block.time_s)
         for lane, changes in self._states.changes(block).items():
@@ -171,9 +180,19 @@ class RerunLog:
         for empty in self._scene.empty_series:
             drawn.pop(f"{empty}/flown", None)
         send_curves(self._rec, drawn, block.time_s)
-        send_levels(self._rec, self._scene, block.time_s)
         if block.has_beliefs:
             self._believed_point = send_believed(self._rec, block, self._piece_rows, self._believed_point)
+
+    def _send_thin(self, block: Track, position_m: FloatArray) -> None:
+        """Draws few rows of the track, and the plans meanwhile; events are told at the end."""
+        send_plans(self._rec, self._plans, self._scene.held_m, self._chord_error_m, thin=True)
+        self._plans = []
+        rows = np.unique(np.append(np.arange(0, len(block), THIN_STEP_ROWS), len(block) - 1))
+        self._whole.append(position_m[rows])
+        self._send_aircraft(block, position_m, rows, 1)
+        for name, curve in thin_curves(block).items():
+            kept = thin_rows(name, curve, THIN_STEP_ROWS)
+            send_curves(self._rec, {name: curve[kept]}, block.time_s[kept])
 
     def flush(self) -> None:
         """Writes out all that has been logged; a process killed afterwards leaves about that.
@@ -193,7 +212,7 @@ class RerunLog:
         run: Mapping[str, Value] | None = None,
         varied: Mapping[str, Value] | None = None,
     ) -> None:
-        """Draws the whole track, writes verdicts and summary where there are metrics, and ends the file.
+        """Draws the whole track, writes summary and verdicts where there are metrics, and ends the file.
 
         Args:
             metrics: content of `metrics.json`; None where the flight broke off.
@@ -206,30 +225,32 @@ class RerunLog:
         ]
         self._send_happened()
         if self._whole:
-            whole = np.concatenate(self._whole)
-            track = lines_2d([whole], look.WHOLE_TRACK, 1.5, 15)
+            whole, colour = np.concatenate(self._whole), look.TRACK if self._thin else look.WHOLE_TRACK
+            track = lines_2d([whole], colour, 1.5, 15)
             self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
-            style: dict[str, Any] = {"colors": [look.WHOLE_TRACK], "radii": rr.Radius.ui_points(0.75)}
-            self._rec.log(
-                f"{look.WORLD}/{look.WHOLE}", rr.LineStrips3D(strips_3d([whole]), **style), static=True
-            )
+            flown = rr.LineStrips3D(strips_3d([whole]), colors=[colour], radii=rr.Radius.ui_points(0.75))
+            self._rec.log(f"{look.WORLD}/{look.WHOLE}", flown, static=True)
         if metrics is not None:
-            changes = tracking_changes(metrics["trackability"])
-            send_changes(self._rec, look.TRACKING_LANE, changes)
-            causes = dict.fromkeys((state for _, state in changes), look.HIT) | {
-                NAVIGATION_ERROR: look.WARNED
-            }
-            ended = {over(metrics): look.CALM}
-            log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM} | ended)
-            log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours() | ended)
-            log_summary(self._rec, self._scene, metrics)
+            shown = replace(self._scene, scenario_yaml="") if self._thin else self._scene
+            log_summary(self._rec, shown, metrics)
             if self._last is not None and metrics["outcome"] not in ("reached", "unreachable"):
                 log_end(self._rec, self._last, metrics["outcome"])
-            self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
+            if not self._thin:
+                self._log_verdicts(metrics)
         send_properties(self._rec, RUN, run or {})
         send_properties(self._rec, VARIED, varied or {})
         self._sink.flush()
         self._sink.end()
+
+    def _log_verdicts(self, metrics: Mapping[str, Any]) -> None:
+        """Fills the lane of the legs, and says in the lanes that the flight is over."""
+        changes = tracking_changes(metrics["trackability"])
+        send_changes(self._rec, look.TRACKING_LANE, changes)
+        causes = dict.fromkeys((state for _, state in changes), look.HIT) | {NAVIGATION_ERROR: look.WARNED}
+        ended = {over(metrics): look.CALM}
+        log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM} | ended)
+        log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours() | ended)
+        self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
 
     def _draw(self, scan: RangeScan) -> None:
         self._scan_drawn_s = scan.time_s
@@ -260,7 +281,7 @@ class RerunLog:
         self._scans, self._plans = [], []
         self._tracked.send(self._rec)
         self._returns.send(self._rec)
-        send_plans(self._rec, plans, self._scene.held_m, self._chord_error_m)
+        send_plans(self._rec, plans, self._scene.held_m, self._chord_error_m, self._thin)
         if scans:
             points = [returns_m(scan) for scan in scans]
             self._rec.send_columns(
@@ -300,22 +321,18 @@ class RerunLog:
             rr.LineStrips3D.columns(strips=strips_3d(list(posts))).partition(counts),
         )
 
-    def _send_marker(self, block: Track) -> None:
-        rows = slice(None, None, MARKER_STEP_ROWS)
-        level = np.zeros(len(block.time_s[rows]))
-        times = [look.time_column(block.time_s[rows])]
-        self._rec.send_columns(
-            f"{look.PLAN}/aircraft",
-            times,
-            rr.Transform3D.columns(
-                translation=np.column_stack((block.east_m[rows], block.north_m[rows], level)),
-                quaternion=quaternions(block.heading_deg[rows], level, level),
-            ),
+    def _send_aircraft(self, block: Track, position_m: FloatArray, rows: IntArray, step: int) -> None:
+        """Moves the aircraft in the 3-D view at some rows, and at every so many of these in the plan view."""
+        turn = quaternions(block.heading_deg[rows], block.pitch_deg[rows], block.roll_deg[rows])
+        pose = rr.Transform3D.columns(translation=position_m[rows], quaternion=turn)
+        self._rec.send_columns(f"{look.WORLD}/aircraft", [look.time_column(block.time_s[rows])], pose)
+        rows = rows[::step]
+        level = np.zeros(len(rows))
+        pose = rr.Transform3D.columns(
+            translation=position_m[rows] * (1.0, 1.0, 0.0),
+            quaternion=quaternions(block.heading_deg[rows], level, level),
         )
-        attitude = quaternions(level, block.pitch_deg[rows], block.roll_deg[rows])
-        self._rec.send_columns(
-            f"{look.ATTITUDE}/aircraft", times, rr.Transform3D.columns(quaternion=attitude)
-        )
+        self._rec.send_columns(f"{look.PLAN}/aircraft", [look.time_column(block.time_s[rows])], pose)
 
     def _send_trail(self, block: Track, position_m: FloatArray) -> None:
         """Sends the trail in pieces, each at the time of its last point and joined to the one before."""

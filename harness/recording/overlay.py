@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import re
 import warnings
-from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import rerun as rr
 
-from harness.analysis.metric import number
+from harness.analysis.registry import METRICS
 from harness.analysis.rows import escaped
 from harness.files.errors import RunFolderError
 from harness.recording import blueprint as look
@@ -21,7 +20,7 @@ from harness.recording.layout import layout_of
 from harness.recording.properties import RUN
 from harness.recording.states import over, send_changes
 
-SHARED = ("bounds", "goal", "ends", "area", "outlines", look.DISCS, "moving", look.TRUE)
+SHARED = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
 """Below PLAN and WORLD: what all runs of a scenario have in common."""
 OWN = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 """Below PLAN and WORLD: what is drawn of every run."""
@@ -73,37 +72,19 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             "log" if log else "none" if each else "unfinished"
             for log, each in zip(logs, figures, strict=True)
         ]
-        told = _of_other_worlds(names, chunks)
+        told = _of_other_worlds(
+            names, [_properties(own).get(look.FRAME, {}).get("world", "") for own in chunks]
+        )
         summary = (f"**{escaped(told)}**\n\n" if told else "") + _summary(names, figures, without)
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
         return told
 
 
-WORLD_ENTITIES: Final = tuple(f"/{look.PLAN}/{each}" for each in ("bounds", "outlines", look.DISCS))
-"""What tells one world from another in the plan view."""
-
-
-def _of_other_worlds(names: Sequence[str], chunks: Sequence[Sequence[rr.chunk.Chunk]]) -> str:
-    """Says which runs are not of the world that is shown; of a log, and of thin ones beside whole, it is unknown."""
-    worlds = [
-        {
-            (chunk.entity_path, name): values
-            for chunk in own
-            if chunk.entity_path in WORLD_ENTITIES
-            for name, values in chunk.to_record_batch().to_pydict().items()
-            if name.endswith((":strips", ":positions"))
-        }
-        for own in chunks
-    ]
-    entities = [{entity for entity, _ in world} for world in worlds]
-    thin = [f"/{look.PLAN}/{look.DISCS}" in each for each in entities]
-    others = [
-        name
-        for name, world, known, is_thin in zip(names, worlds, entities, thin, strict=True)
-        if known and is_thin == thin[0] and world != worlds[0]
-    ]
-    if not others:
+def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:
+    """Says which runs are not of the world that is shown; of a recording that does not name its world it is unknown."""
+    others = [name for name, world in zip(names, worlds, strict=True) if world not in ("", worlds[0])]
+    if not others or not worlds[0]:
         return ""
     were = "was" if len(others) == 1 else "were"
     return f"The obstacles are those of {names[0]}; {', '.join(others)} {were} flown in another world."
@@ -146,16 +127,25 @@ def _chunks(recording: Path) -> list[rr.chunk.Chunk]:
         raise RunFolderError(f"cannot read the recording {recording}: {error}") from error
 
 
+def _properties(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]:
+    """The properties of a recording, by their names and those of their values."""
+    return {
+        chunk.entity_path.rpartition("/")[2]: {
+            name.rpartition(":")[2]: cells[0]
+            for name, cells in chunk.to_record_batch().to_pydict().items()
+            if isinstance(cells[0], list)
+        }
+        for chunk in chunks
+        if chunk.entity_path.startswith("/__properties/")
+    }
+
+
 def _frame(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
-    for chunk in chunks:
-        if chunk.entity_path == f"/__properties/{look.FRAME}":
-            values = chunk.to_record_batch().to_pydict()
-            bounds, altitude, clearance = (
-                next(column[0] for name, column in values.items() if name.endswith(key))
-                for key in ("bounds_m", "altitude_m", "clearance_m")
-            )
-            return look.Frame(tuple(bounds), altitude[0], clearance[0])
-    raise RunFolderError(f"{recording} is not a recording of a flight")
+    kept = _properties(chunks).get(look.FRAME)
+    if kept is None:
+        raise RunFolderError(f"{recording} is not a recording of a flight")
+    xmin, ymin, xmax, ymax = kept["bounds_m"]
+    return look.Frame((xmin, ymin, xmax, ymax), kept["altitude_m"][0], kept["clearance_m"][0])
 
 
 def _is_shared(entity: str) -> bool:
@@ -172,7 +162,7 @@ def _renamed(chunks: Sequence[rr.chunk.Chunk], run: str, place: int, name: str) 
     for chunk in chunks:
         top, _, below = chunk.entity_path.strip("/").partition("/")
         if top in (look.PLAN, look.WORLD) and below.split("/")[0] in OWN:
-            if below not in ("aircraft/sensing", "aircraft/axes"):
+            if below != "aircraft/sensing":
                 yield chunk.with_entity_path(f"/{top}/{run}{below}")
         elif top == look.SERIES and below.endswith(FLOWN_LINE) and not chunk.is_static:
             yield chunk.with_entity_path(f"/{look.SERIES}/{below}/{place}")
@@ -245,28 +235,18 @@ def _end_lanes(
 
 
 def _metrics(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, Any]:
-    """The figures that a recording carries; empty where its run did not end, few of a log."""
-    found = {
-        chunk.entity_path.rpartition("/")[2]: {
-            name.rpartition(":")[2]: cells[0][0]
-            for name, cells in chunk.to_record_batch().to_pydict().items()
-            if isinstance(cells[0], list)
-        }
-        for chunk in chunks
-        if chunk.entity_path.startswith("/__properties/")
-    }
+    """The figures that a recording carries, by `Metric.name`; empty where its run did not end, few of a log."""
+    found = _properties(chunks)
     if "metrics" in found:
-        whole: dict[str, Any] = json.loads(found["metrics"]["json"])
-        return whole
-    if RUN not in found:
-        return {}
-    thin = defaultdict(lambda: None, found[RUN])
+        whole = json.loads(found["metrics"]["json"][0])
+        return {metric.name: metric.value(whole) for metric in METRICS}
+    run = {name: values[0] for name, values in found.get(RUN, {}).items()}
     return {
-        **{name: thin[name] for name in ("outcome", "flown_length_m", "flight_time_s", "min_clearance_m")},
-        **{name: thin[name] for name in ("trackable", "replans")},
-        "cross_track_m": {"max": thin["cross_track_max_m"]},
-        "smoothness": {"flown": {"heading_change_deg": None}},
-        "compute_ms": {"p99": thin["planner_p99_ms"]},
+        metric.name: run[metric.recorded_as] / (metric.factor if metric.unit == "%" else 1.0)
+        if metric.kind == "number"
+        else run[metric.recorded_as]
+        for metric in METRICS
+        if metric.recorded_as in run
     }
 
 
@@ -278,25 +258,18 @@ def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]], without
         figures: of each, as `_metrics` gives them.
         without: what is said of each where it has no such figure.
     """
-    labels: dict[str, Callable[[Mapping[str, Any]], str]] = {
-        "outcome": lambda m: m["outcome"],
-        "flown, km": lambda m: number(m["flown_length_m"], 1e-3),
-        "time, s": lambda m: number(m["flight_time_s"]),
-        "least clearance, m": lambda m: number(m["min_clearance_m"]),
-        "cross-track max, m": lambda m: number(m["cross_track_m"]["max"]),
-        "heading change flown, deg": lambda m: number(m["smoothness"]["flown"]["heading_change_deg"]),
-        "trackable": lambda m: {None: "", True: "yes", False: "no"}[m["trackable"]],
-        "replans": lambda m: "" if m["replans"] is None else str(m["replans"]),
-        "search p99, ms": lambda m: number(m["compute_ms"]["p99"]),
-    }
     rows = [
         " | ".join(
             [
-                label,
-                *((each and of(each)) or what for each, what in zip(figures, without, strict=True)),
+                metric.label or metric.name,
+                *(
+                    escaped(metric.text(each.get(metric.name))) or what
+                    for each, what in zip(figures, without, strict=True)
+                ),
             ]
         )
-        for label, of in labels.items()
+        for metric in METRICS
+        if metric.heading
     ]
     colours = [COLOUR_NAMES[place % len(COLOUR_NAMES)] for place in range(len(names))]
     return "\n".join(

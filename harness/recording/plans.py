@@ -64,6 +64,7 @@ def send_plans(
     plans: Sequence[AcceptedPlan],
     held_m: Callable[[FloatArray], FloatArray],
     chord_error_m: float,
+    thin: bool = False,
 ) -> None:
     """Draws plans, each from the time on at which it takes effect.
 
@@ -72,16 +73,24 @@ def send_plans(
         plans: in order of time; none draws nothing.
         held_m: altitudes of the path in the 3-D view, from arc lengths.
         chord_error_m: how far a drawn path may be off the true one.
+        thin: no more than paths and waypoints.
     """
     if not plans:
         return
     times = [look.time_column(np.array([each.time_s for each in plans]))]
-    pictures = [each.plan.picture() if each.plan.picture else None for each in plans]
     paths = polylines([each.segments for each in plans], chord_error_m)
     waypoints = [each.plan.waypoints_m for each in plans]
+    rec.send_columns(
+        f"{look.PLAN}/waypoints",
+        times,
+        rr.Points2D.columns(positions=np.concatenate(waypoints)).partition([len(each) for each in waypoints]),
+    )
+    rec.send_columns(f"{look.PLAN}/chosen", times, rr.LineStrips2D.columns(strips=strips_2d(paths)))
+    if thin:
+        return
+    pictures = [each.plan.picture() if each.plan.picture else None for each in plans]
     guides = np.array([p.guide_m for p in pictures if p]).reshape(-1, 2, 2)
     strips: dict[str, list[list[FloatArray]]] = {
-        "chosen": [[path] for path in paths],
         "window": [[circle(p.guide_m[0], p.window_m)] if p and p.window_m else [] for p in pictures],
         "sectors": [
             [fan(p.guide_m[0], edges, p.window_m) for edges in p.sectors] if p else [] for p in pictures
@@ -92,11 +101,6 @@ def send_plans(
         flat = [strip for row in rows for strip in row]
         columns = rr.LineStrips2D.columns(strips=strips_2d(flat)).partition([len(row) for row in rows])
         rec.send_columns(f"{look.PLAN}/{entity}", times, columns)
-    rec.send_columns(
-        f"{look.PLAN}/waypoints",
-        times,
-        rr.Points2D.columns(positions=np.concatenate(waypoints)).partition([len(each) for each in waypoints]),
-    )
     rec.send_columns(
         f"{look.PLAN}/guide",
         times,

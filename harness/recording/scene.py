@@ -27,9 +27,8 @@ from harness.recording.solids import (
     strips_3d,
 )
 from harness.recording.summary import colours, summary
-from harness.world.obstacle import Circle, Obstacle
 
-LEAST_CIRCLE_POINTS, POINTS_OF_ALL = 12, 400_000
+LEAST_CIRCLE_POINTS, THIN_CIRCLE_POINTS, POINTS_OF_ALL = 12, 24, 400_000
 """Thousands of circles are drawn with fewer points each, so that their recording fits into memory."""
 AIRCRAFT_SHARE = 0.022
 """Wing span of the drawn aircraft as a share of the area: its true size could not be seen."""
@@ -47,36 +46,26 @@ SHAPE = np.array(
 
 
 def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None:
-    """Logs all that never changes.
-
-    Args:
-        rec: where to.
-        scene: what it is.
-        thin: for a thin recording: circles as discs, no attitude, and the summary when it is known.
-    """
-    frame = scene.frame
-    rec.send_property(
-        look.FRAME,
-        rr.AnyValues(**frame.kept),
-    )
+    """Logs all that never changes; of a thin recording few points of circles, and the summary when it is known."""
+    rec.send_property(look.FRAME, rr.AnyValues(**scene.frame.kept))
     rec.log(look.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     rec.log(look.PLAN, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
-    _log_area(rec, scene, thin)
+    _log_area(rec, scene)
     if scene.ground is not None:
         log_ground(rec, scene.ground)
     standing = [obstacle for obstacle in scene.obstacles if obstacle.stands_for_ever]
     if standing:
         points = max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
-        lined = _log_discs(rec, standing) if thin else standing
-        rings = [ring for each in lined for ring in outlines(each.shape, points)]
+        if thin:
+            points = min(points, THIN_CIRCLE_POINTS)
         # Of many obstacles each of these is large: none is kept while the next is made.
-        if rings:
-            rec.log(f"{look.PLAN}/outlines", lines_2d(rings, look.OUTLINE, 1.5, 10), static=True)
+        rings = [ring for each in standing for ring in outlines(each.shape, points)]
+        rec.log(f"{look.PLAN}/outlines", lines_2d(rings, look.OUTLINE, 1.5, 10), static=True)
         del rings
         if not thin:
             rec.log(f"{look.WORLD}/outlines", rims(scene, standing, look.OUTLINE, points), static=True)
         log_solids(rec, f"{look.WORLD}/{look.TRUE}", scene, standing, look.OBSTACLE)
-    _log_aircraft(rec, scene, thin)
+    _log_aircraft(rec, scene.frame)
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
         plot = entity.partition("/")[0]
         if thin and (plot not in THIN_SERIES or entity in look.WHOLE_ONLY):
@@ -86,22 +75,12 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         style = look.series_lines(name, colour, width)
         rec.log(f"{look.SERIES}/{entity}", style, static=True)
     if not thin:
-        log_colours_page(rec, scene)
+        range_m = scene.mission.sensor_range_m
+        sensing = lines_2d([circle((0.0, 0.0), range_m)], look.SENSING, 1.0, 20)
+        rec.log(f"{look.PLAN}/aircraft/sensing", sensing, static=True)
+        page = rr.TextDocument(colours(scene), media_type=rr.MediaType.MARKDOWN)
+        rec.log(look.COLOURS, page, static=True)
         log_summary(rec, scene, None)
-
-
-def _log_discs(rec: rr.RecordingStream, obstacles: Sequence[Obstacle]) -> list[Obstacle]:
-    """Draws circles in the plan view as discs, a tenth of what outlines take; returns the other obstacles."""
-    circles = [each.shape for each in obstacles if isinstance(each.shape, Circle)]
-    if circles:
-        discs = rr.Points2D(
-            [shape.center_m for shape in circles],
-            radii=[shape.radius_m for shape in circles],
-            colors=[look.OUTLINE],
-            draw_order=10,
-        )
-        rec.log(f"{look.PLAN}/{look.DISCS}", discs, static=True)
-    return [each for each in obstacles if not isinstance(each.shape, Circle)]
 
 
 def send_believed(rec: rr.RecordingStream, block: Track, piece_rows: int, last_m: FloatArray) -> FloatArray:
@@ -166,25 +145,16 @@ def log_trail_style(rec: rr.RecordingStream) -> None:
     rec.log(f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D.from_fields(radii=width), static=True)
 
 
-def log_end(rec: rr.RecordingStream, track: Track, outcome: str, thin: bool = False) -> None:
-    """Marks where a flight ended that did not reach its goal, with how it ended.
-
-    Args:
-        rec: where to.
-        track: its last row is the end.
-        outcome: how it ended.
-        thin: for a thin recording, which has the viewer's own background.
-    """
+def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
+    """Marks the last row of a flight that did not reach its goal, with how it ended."""
     last = np.array([[track.east_m[-1], track.north_m[-1], track.up_m[-1]]])
+    mark: dict[str, Any] = {"colors": [look.HIT], "radii": rr.Radius.ui_points(7.0)}
     told: dict[str, Any] = {"labels": [outcome.replace("_", " ")], "show_labels": True}
-    mark: dict[str, Any] = {"colors": [look.HIT], "radii": rr.Radius.ui_points(7.0), **(told if thin else {})}
-    plan, world = f"{look.PLAN}/{look.END}", f"{look.WORLD}/{look.END}"
-    rec.log(plan, rr.Points2D(last[:, :2], draw_order=70, **mark), static=True)
-    rec.log(world, rr.Points3D(last, **mark), static=True)
-    if not thin:
-        told |= {"colors": [look.END_LIGHT], "radii": rr.Radius.ui_points(0.0)}
-        rec.log(f"{plan}/label", rr.Points2D(last[:, :2], draw_order=71, **told), static=True)
-        rec.log(f"{world}/label", rr.Points3D(last, **told), static=True)
+    told |= {"colors": [look.END_LIGHT], "radii": rr.Radius.ui_points(0.0)}
+    for below, style, order in (("", mark, 70), ("/label", told, 71)):
+        plan, world = f"{look.PLAN}/{look.END}{below}", f"{look.WORLD}/{look.END}{below}"
+        rec.log(plan, rr.Points2D(last[:, :2], draw_order=order, **style), static=True)
+        rec.log(world, rr.Points3D(last, **style), static=True)
 
 
 def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any] | None) -> None:
@@ -194,12 +164,6 @@ def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any
         rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN),
         static=True,
     )
-
-
-def log_colours_page(rec: rr.RecordingStream, scene: Scene) -> None:
-    """Logs what the colours mean."""
-    page = rr.TextDocument(colours(scene), media_type=rr.MediaType.MARKDOWN)
-    rec.log(look.COLOURS, page, static=True)
 
 
 def lines_2d(
@@ -249,8 +213,8 @@ def quaternions(heading_deg: FloatArray, pitch_deg: FloatArray, roll_deg: FloatA
     )
 
 
-def _log_area(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
-    ends = [look.START, look.GOAL] if thin else [look.START_LIGHT, look.GOAL_LIGHT]
+def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
+    ends = [look.START_LIGHT, look.GOAL_LIGHT]
     xmin, ymin, xmax, ymax = scene.mission.bounds_m
     bounds = np.array([(xmin, ymin), (xmax, ymin), (xmax, ymax), (xmin, ymax), (xmin, ymin)])
     goal = circle(scene.mission.goal_m, scene.mission.goal_radius_m)
@@ -330,48 +294,16 @@ def _log_labelled(rec: rr.RecordingStream, name: str, line: FloatArray, label: s
     rec.log(f"{look.PLAN}/{name}", strips, static=True)
 
 
-def log_shapes(rec: rr.RecordingStream, frame: look.Frame) -> None:
+def _log_aircraft(rec: rr.RecordingStream, frame: look.Frame) -> None:
     """The aircraft as a mesh (x forward, y left, z up) in the 3-D view, and as an arrowhead in the plan view."""
     half = 0.5 * AIRCRAFT_SHARE * frame.span_m
-    _log_mesh(rec, look.WORLD, half)
+    corners = half * SHAPE.reshape(-1, 3)
+    mesh = rr.Mesh3D(
+        vertex_positions=corners,
+        triangle_indices=np.arange(len(corners)).reshape(-1, 3),
+        albedo_factor=look.AIRCRAFT,
+        face_rendering="DoubleSided",
+    )
+    rec.log(f"{look.WORLD}/aircraft/shape", mesh, static=True)
     arrowhead = half * np.array([(1.0, 0.0), (-0.8, 0.65), (-0.4, 0.0), (-0.8, -0.65), (1.0, 0.0)])
     rec.log(f"{look.PLAN}/aircraft/shape", lines_2d([arrowhead], look.AIRCRAFT, 2.5, 60), static=True)
-
-
-def _log_mesh(rec: rr.RecordingStream, top: str, size: float) -> None:
-    corners = size * SHAPE.reshape(-1, 3)
-    rec.log(
-        f"{top}/aircraft/shape",
-        rr.Mesh3D(
-            vertex_positions=corners,
-            triangle_indices=np.arange(len(corners)).reshape(-1, 3),
-            albedo_factor=look.AIRCRAFT,
-            face_rendering="DoubleSided",
-        ),
-        static=True,
-    )
-
-
-def _log_aircraft(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
-    """The aircraft, within the sensing range; beside it its axes and the horizon, but in thin recordings."""
-    log_shapes(rec, scene.frame)
-    if thin:
-        return
-    _log_mesh(rec, look.ATTITUDE, 1.0)
-    half = 0.5 * AIRCRAFT_SHARE * scene.frame.span_m
-    for top, size in ((look.WORLD, half), (look.ATTITUDE, 1.0)):
-        rec.log(
-            f"{top}/aircraft/axes",
-            rr.Arrows3D(vectors=1.5 * size * np.eye(3), colors=look.AXES, radii=rr.Radius.ui_points(1.0)),
-            static=True,
-        )
-    level = np.column_stack((circle((0.0, 0.0), 1.6), np.zeros(CIRCLE_POINTS + 1)))
-    horizon = rr.LineStrips3D(
-        [level, [(-1.6, 0.0, 0.0), (1.6, 0.0, 0.0)]], colors=[look.BOUNDS], radii=rr.Radius.ui_points(0.75)
-    )
-    rec.log(f"{look.ATTITUDE}/level", horizon, static=True)
-    rec.log(
-        f"{look.PLAN}/aircraft/sensing",
-        lines_2d([circle((0.0, 0.0), scene.mission.sensor_range_m)], look.SENSING, 1.0, 20),
-        static=True,
-    )

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from harness.analysis.metric import number
+from harness.analysis.registry import METRICS
 from harness.analysis.rows import escaped
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ LEGEND = """\
 * **orange**: what the map takes to move, with where it will be in 30 s
 * **violet dots**: where the plan expects to meet it
 
-Axes of the aircraft: red ahead, green left, blue up. It is drawn larger than it is; obstacles have no top.
+The aircraft is drawn larger than it is; obstacles have no top.
 """
 """A list, for its lines are wrapped; a viewer cuts the cells of a table at the edge of a narrow view."""
 
@@ -67,50 +68,22 @@ def colours(scene: Scene) -> str:
 
 
 def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
-    """What came out, name and value, what is looked for first before the rest."""
-    cross, altitude, compute = metrics["cross_track_m"], metrics["altitude_error_m"], metrics["compute_ms"]
-    planned, flown = metrics["smoothness"]["planned"], metrics["smoothness"]["flown"]
-    causes = [leg["cause"] for leg in metrics["trackability"] if not leg["trackable"]]
-    return {
+    """What came out, name and value: clearance and verdict, then what the viewer's table of runs shows."""
+    causes = dict.fromkeys(leg["cause"] for leg in metrics["trackability"] if not leg["trackable"])
+    found = {
         "least clearance": _clearance(scene, metrics),
-        "trackable": "yes"
-        if metrics["trackable"]
-        else f"no: {', '.join(dict.fromkeys(causes)) or 'no plan'}",
-        "cross-track p95, max": f"{_text(cross['p95'], 2)} m, {_text(cross['max'], 2)} m",
-        **_navigation(metrics),
-        **_late_and_lost(metrics),
-        "altitude p95, max": f"{_text(altitude['p95'], 2)} m, {_text(altitude['max'], 2)} m",
-        "bank at its limit": f"{100 * metrics['bank_saturation_fraction']:.1f} % of the time",
-        "flown": f"{_text(metrics['flown_length_m'], 0)} m in {_text(metrics['flight_time_s'], 0)} s",
-        "heading change": f"planned {_text(planned['heading_change_deg'], 0)}°, "
-        f"flown {_text(flown['heading_change_deg'], 0)}°",
-        "replans": str(metrics["replans"]),
-        "search p50, p99, max": ", ".join(_text(compute[name], 1) for name in ("p50", "p99", "max")) + " ms",
-        "digest": metrics["digest"][:16],
+        "trackable": "yes" if metrics["trackable"] else f"no: {', '.join(causes) or 'no plan'}",
     }
-
-
-def _navigation(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """How far off the believed position was, where navigation was not perfect."""
-    error = metrics.get("navigation_error_m")
-    if error is None:
-        return {}
-    margin = f"{metrics['navigation_margin_m']:.1f} m beyond the clearance"
-    return {
-        "navigation error p95, max": f"{_text(error['p95'], 2)} m, {_text(error['max'], 2)} m",
-        "planned for it": margin,
-    }
-
-
-def _late_and_lost(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """How late plans took effect and what the sensor lost, where there was either."""
-    delay_s, lost = metrics["plan_delay_s"]["max"], metrics["lost_returns"]
-    found = {}
-    if delay_s:
-        found["plan delay max"] = f"{delay_s:.1f} s"
-    if lost["share"]:
-        found["returns lost, worst scan"] = f"{100 * lost['share']:.1f} %, {100 * lost['max']:.1f} %"
-    return found
+    for metric in METRICS:
+        value = metric.value(metrics)
+        if (
+            metric.heading
+            and metric.kind in ("number", "int")
+            and value is not None
+            and (value or not metric.rare)
+        ):
+            found.setdefault(metric.title, f"{metric.text(value)} {metric.unit}".rstrip())
+    return {**found, "digest": metrics["digest"][:16]}
 
 
 def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:
@@ -118,9 +91,5 @@ def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:
     if not least:
         return "no obstacle"
     below_s = metrics["clearance_violation_s"]
-    below = f"; {_text(below_s, 1)} s below" if below_s else ""  # a narrow view cuts what is longer
+    below = f"; {below_s:.1f} s below" if below_s else ""  # a narrow view cuts what is longer
     return f"{least} m of {scene.limits.clearance_m:g} m{below}"
-
-
-def _text(value: float | None, digits: int) -> str:
-    return "none" if value is None else f"{value:.{digits}f}"

@@ -331,6 +331,31 @@ def _terminated_as_interrupted() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
+def in_notebook() -> bool:
+    """Whether this process answers a notebook: IPython runs in it with a kernel."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return getattr(shell, "kernel", None) is not None
+
+
+def viewer_widget(recording: Path, width_px: int, height_px: int) -> Any:
+    """A widget of a notebook that shows a recording with its layout.
+
+    Raises:
+        ViewerError: rerun's notebook viewer is not installed.
+    """
+    import rerun as rr
+    from rerun import notebook
+
+    if not notebook.HAS_NOTEBOOK:
+        raise ViewerError(
+            "to show recordings in a notebook needs rerun's viewer; pip install 'wayproof[notebook]'"
+        )
+    stream = rr.RecordingStream("wayproof-notebook")
+    viewer = notebook.Viewer(width=width_px, height=height_px, recording=stream)
+    stream.log_file_from_path(recording)
+    return viewer
+
+
 def free_port() -> int:
     """A port of this machine that nobody listens on."""
     with socket.socket() as probe:

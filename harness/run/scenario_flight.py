@@ -234,13 +234,10 @@ def _sources(scenario: Scenario) -> list[dict[str, str]]:
 
 def _recording(scene: Scene, loop: Loop, folder: RunFolder, identity: str | None, thin: bool) -> Any:
     from harness.recording.log import RerunLog
-    from harness.recording.thin import ThinLog
 
     settings = hashlib.sha256(f"{scene.scenario_yaml}{versions()}".encode()).hexdigest()
     identity = identity or f"{scene.name} ({settings[:8]})"
-    if thin:
-        return ThinLog(folder.recording_path, scene, identity)
-    return RerunLog(folder.recording_path, scene, identity, moving=lambda: loop.seen.moving)
+    return RerunLog(folder.recording_path, scene, identity, lambda: loop.seen.moving, thin)
 
 
 def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None) -> Scene:

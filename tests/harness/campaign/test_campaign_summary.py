@@ -25,7 +25,6 @@ from harness.campaign.paired import mean_estimate
 from harness.campaign.questions import QUESTIONS, percent
 from harness.campaign.report import PAGE, PLAIN, write_summary
 from harness.campaign.summary import CURVE_POINTS, Cell, Summary, summarise, wilson
-from harness.campaign.table import worst_first
 from harness.cli.app import main
 from harness.cli.campaign_terminal import print_summary
 from harness.files.strict_yaml import InputError
@@ -707,9 +706,6 @@ def test_navigation_errors_that_were_planned_for_come_last_and_say_so(tmp_path: 
     page = write_summary(summary, folder).read_text()
     usual = page.index("navigation error, of position no more than <abbr")
     assert page.index(": navigation error.") < page.index("planner too late.") < usual
-    recordings = [folder / "runs" / str(run) / "flight.rrd" for run in (0, 4, 13, 19)]
-    first = [int(path.parent.name) for path in worst_first(folder, recordings)][:2]
-    assert sorted(first) == [4, 13], "they come first in the table of recordings too"
 
 
 def test_a_key_drawn_at_random_is_always_grouped() -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,20 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun as rr
-from PIL import Image, ImageChops
 
 from harness.analysis.metrics import metrics
-from harness.campaign.table import recordings_of, worst_first
+from harness.campaign.table import recordings_of
 from harness.cli.app import main
-from harness.files.errors import RunFolderError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.recording import catalog as catalogs
 from harness.recording.blueprint import Frame
-from harness.recording.catalog import catalog, table_screenshot
-from harness.recording.layout import layout_of, thin_blueprint
+from harness.recording.catalog import catalog
+from harness.recording.log import RerunLog
 from harness.recording.properties import properties_of, run_properties, severity
-from harness.recording.thin import ThinLog
-from harness.recording.viewer import NO_DRIVER, SETTLE_S, ViewerError
+from harness.recording.viewer import NO_DRIVER, ViewerError, draw_settled
 from harness.scenario.scenario import parse_scenario
 from tests.harness.recording.test_rerun_log import LIMITS, SCENE
 
@@ -38,11 +34,6 @@ mission: {start_m: [0, 0], goal_m: [0, 2500]}
 planner: {clearance_m: 100}
 environment: {wind: {speed_mps: 4, from_deg: 270}}
 """
-
-ROWS = (240, 225, 1600, 870)
-"""Where the rows of a table are in a picture of 1600 x 900: left, top, right, bottom."""
-ROW = 32
-"""Height of one."""
 
 MakeTrack = Callable[..., Track]
 MakePlan = Callable[..., AcceptedPlan]
@@ -66,7 +57,7 @@ def record(folder: Path, number: int, flown: Flight) -> dict[str, Any]:
     path = folder / "runs" / str(number) / "flight.rrd"
     path.parent.mkdir(parents=True)
     figures = metrics(flown, LIMITS)
-    log = ThinLog(path, SCENE, f"run {number}")
+    log = RerunLog(path, SCENE, f"run {number}", thin=True)
     for plan in flown.plans:
         log.on_plan(plan, None)  # type: ignore[arg-type]
     log.on_block(flown.track)
@@ -91,7 +82,7 @@ def test_a_thin_recording_is_small_and_has_typed_properties(
 ) -> None:
     given = record(tmp_path, 7, flight(make_track, make_plan, Outcome.TIMEOUT, 90.0))
     (path,) = recordings_of(tmp_path)
-    assert path.stat().st_size < 260_000
+    assert path.stat().st_size < 300_000
     assert properties_of(path) == pytest.approx(given)
     kinds = {name: type(value) for name, value in properties_of(path).items()}
     assert kinds["outcome"] is str
@@ -117,7 +108,6 @@ def test_a_thin_recording_shows_the_whole_track(campaign: Path) -> None:
         "/plan/waypoints",
         "/plan/whole_track",
         "/plan/outlines",
-        "/plan/discs",
         "/world/true_obstacles/circles",
         "/summary",
         "/events",
@@ -244,26 +234,6 @@ def test_a_campaign_is_one_table_worst_first(campaign: Path) -> None:
     assert table[varied] == [[5.0], [6.0], [4.0]]
 
 
-def test_a_run_of_the_table_opens_in_our_layout(campaign: Path) -> None:
-    """A viewer does not take the layout inside a recording that is one of a dataset."""
-    pytest.importorskip("datafusion")
-    with catalog("small", recordings_of(campaign)) as served:
-        assert served.dataset.default_blueprint() is not None
-        assert served.dataset.default_segment_table_blueprint() is not None
-
-
-def test_a_thin_file_has_the_layout_of_the_table() -> None:
-    """Its events are one column, its bank has the height for numbers."""
-    frame = Frame((0.0, 0.0, 100.0, 100.0), 300.0, 40.0)
-    layouts: tuple[Any, ...] = (thin_blueprint(frame), layout_of(frame, {"/series/bank/flown"}))
-    for layout in layouts:
-        left, plots = layout.root_container.contents
-        events = left.contents[1].contents[0]
-        assert "TextLogColumns" in events.properties
-        assert plots.row_shares == [4, 4, 5]
-        layout.let_go()
-
-
 def test_the_layout_of_all_runs_is_framed_on_all_of_them() -> None:
     import pyarrow as pa
 
@@ -277,58 +247,6 @@ def test_the_layout_of_all_runs_is_framed_on_all_of_them() -> None:
     assert catalogs.common_frame(runs) == Frame((-10.0, -50.0, 100.0, 300.0), 350.0, 40.0)
 
 
-def test_a_server_that_waits_for_ever_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A browser's page stays connected for as long as its tab is open."""
-    closed = threading.Event()
-
-    class Server:
-        def shutdown(self) -> None:
-            closed.wait(60.0)
-
-    monkeypatch.setattr(catalogs, "ENDING_S", 0.05)
-    begun_s = time.monotonic()
-    with catalogs.ended_in_time(Server()):
-        pass
-    assert time.monotonic() - begun_s < 30.0
-    closed.set()
-
-
-def test_a_campaign_without_recordings_says_what_keeps_them(tmp_path: Path) -> None:
-    with pytest.raises(RunFolderError, match="recordings: thin"), catalog("empty", recordings_of(tmp_path)):
-        pass
-
-
-@pytest.mark.flights
-def test_the_table_is_drawn(campaign: Path, tmp_path: Path) -> None:
-    pytest.importorskip("datafusion")
-    png = tmp_path / "table.png"
-    with driven():
-        table_screenshot("small", recordings_of(campaign), png)
-    assert png.stat().st_size > 20_000
-
-
-@pytest.fixture
-def many(tmp_path: Path, make_track: MakeTrack, make_plan: MakePlan, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """More runs than the table has at once; the last of them went worst."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    monkeypatch.setattr(catalogs, "AT_ONCE", 16)
-    least_m = [300.0 - number for number in range(20)]
-    for number, clearance_m in enumerate(least_m):
-        record(tmp_path, number, flight(make_track, make_plan, Outcome.REACHED, clearance_m))
-    runs = len(least_m)
-    rows = {
-        "run": [*range(runs)],
-        "outcome": ["reached"] * runs,
-        "trackable": [True] * runs,
-        "min_clearance_m": least_m,
-        "wanted_clearance_m": [100.0] * runs,
-    }
-    pq.write_table(pa.table(rows), tmp_path / "results.parquet")
-    return tmp_path
-
-
 @contextlib.contextmanager
 def driven() -> Iterator[None]:
     """Skips the test where nothing can be drawn."""
@@ -340,24 +258,20 @@ def driven() -> Iterator[None]:
         pytest.skip(NO_DRIVER)
 
 
-@contextlib.contextmanager
-def window(recordings: Sequence[Path], scratch: Path) -> Iterator[Any]:
-    """rerun's handle of a viewer without a screen that shows the table of `many`."""
-    arguments = ["--headless", "--window-size", "1600x900"]
-    with driven(), catalogs.window("many", recordings, scratch, arguments) as (_, client):
-        yield client
-
-
-def rows_of(png: Path) -> Image.Image:
-    """The rows of a table in its picture."""
-    with Image.open(png) as picture:
-        return picture.convert("RGB").crop(ROWS)
-
-
-def alike(one: Image.Image, other: Image.Image) -> bool:
-    """Whether two pictures show the same. A software renderer is off by some; two rows that changed places by 190."""
-    off = np.asarray(ImageChops.difference(one, other)).max(axis=2)
-    return int((off > 64).sum()) < 50
+@pytest.mark.flights
+def test_the_table_is_drawn_and_a_run_opens_in_our_layout(campaign: Path, tmp_path: Path) -> None:
+    pytest.importorskip("datafusion")
+    png, arguments = tmp_path / "table.png", ["--headless", "--window-size", "1600x900"]
+    with driven(), catalogs.window("small", recordings_of(campaign), tmp_path, arguments) as (_, client):
+        draw_settled(client, png)
+        table = seen(client, lambda state: "/dataset/" in state.location).location
+        client.open(f"{table}?segment_id=run%201")
+        opened = seen(client, lambda state: state.views and not state.loading)
+    assert png.stat().st_size > 20_000
+    assert opened.active_recording.endswith(":run 1")
+    shown = {view.name: view.reports for view in opened.views}
+    assert {"Plan view (north up)", "3-D flight", "Events", "Summary"} <= shown.keys()
+    assert not any(shown.values())
 
 
 def seen(client: Any, there: Callable[[Any], object]) -> Any:
@@ -367,74 +281,3 @@ def seen(client: Any, there: Callable[[Any], object]) -> Any:
         assert time.monotonic() < until_s, state
         time.sleep(0.1)
     return state
-
-
-@pytest.mark.flights
-def test_the_table_of_many_is_drawn_worst_first_and_the_worst_opens(many: Path, tmp_path: Path) -> None:
-    pytest.importorskip("datafusion")
-    worst = worst_first(many, recordings_of(many))[: catalogs.AT_ONCE]
-    assert worst[0].parent.name == "19"
-    for _ in range(3):  # on a busy machine rows are still on their way in a picture that looks settled
-        rows = []
-        for order, name in ((worst, "sorted"), (worst[::-1], "turned")):
-            with driven():
-                table_screenshot("many", order, tmp_path / f"{name}.png")
-            rows.append(rows_of(tmp_path / f"{name}.png"))
-        if alike(*rows):
-            break
-    assert alike(*rows), "the order of the rows is that of the files"
-    assert len(rows[0].getcolors(1 << 24) or ()) > 20, "there are rows"
-    with window(worst, tmp_path) as client:
-        table = seen(client, lambda state: "/dataset/" in state.location).location
-        client.open(f"{table}?segment_id=run%2019")
-        opened = seen(client, lambda state: state.views and not state.loading)
-    assert opened.active_recording.endswith(":run 19")
-    shown = {view.name: view.reports for view in opened.views}
-    assert {"Plan view (north up)", "3-D flight", "Events", "Summary"} <= shown.keys()
-    assert not any(shown.values())
-
-
-@pytest.mark.flights
-def test_the_recordings_that_follow_come_into_the_table_by_themselves(
-    many: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Also where a run was looked at meanwhile; else its reader would take the first for all."""
-    pytest.importorskip("datafusion")
-    monkeypatch.setattr(catalogs, "OPENING_S", 2.0)
-    recordings = worst_first(many, recordings_of(many))
-    with window(recordings, tmp_path) as client:
-        table = seen(client, lambda state: "/dataset/" in state.location).location
-        client.open(f"{table}?segment_id=run%2019")
-        seen(client, lambda state: state.views and not state.loading)
-        time.sleep(4.0)
-        client.set_location(table)
-        time.sleep(2.0 * SETTLE_S)
-        client.save_screenshot(str(tmp_path / "table.png"))
-    rows = rows_of(tmp_path / "table.png")
-    last = rows.crop((0, catalogs.AT_ONCE * ROW + ROW // 2, *rows.size))
-    assert len(last.getcolors(1 << 24) or ()) > 20, "only the first are there"
-
-
-def test_many_recordings_follow_the_first(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(catalogs, "AT_ONCE", 1)
-    with catalog("windy", recordings_of(campaign)) as served:
-        assert len(served.table()) == 3
-    with catalog("windy", recordings_of(campaign)[:1]) as served:
-        assert served.all_there.wait(10.0)
-
-
-def test_recordings_are_asked_worst_first(campaign: Path) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    recordings = recordings_of(campaign)
-    assert worst_first(campaign, recordings) == recordings
-    rows = {
-        "run": [0, 1, 2],
-        "outcome": ["reached", "collision", "reached"],
-        "trackable": [True, False, True],
-        "min_clearance_m": [250.0, -3.0, 120.0],
-        "wanted_clearance_m": [100.0, 100.0, 100.0],
-    }
-    pq.write_table(pa.table(rows), campaign / "results.parquet")
-    assert [path.parent.name for path in worst_first(campaign, recordings)] == ["1", "2", "0"]
