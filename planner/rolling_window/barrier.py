@@ -111,11 +111,11 @@ class Proof:
         self._taken = 0
         self._begun_at = self._gone = self._memory.cleared
 
-    def closed(self, position: Point) -> bool:
-        """Takes in some more of the points and says whether they close all ways from the first position given."""
+    def closed(self, position: Point, most: int = PROVED_AT_ONCE) -> bool:
+        """Takes in so many more of the points and says whether they close all ways from the first position given."""
         # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
         self._ends = self._ends or (position, self._mission.goal_m)
-        closed = self._taken_in(self._ends, PROVED_AT_ONCE)
+        closed = self._taken_in(self._ends, most)
         if closed and self._begun_at != self._memory.cleared:
             # Some of what closes it may have been let go of since: what is left has to close it as well.
             self._begin()

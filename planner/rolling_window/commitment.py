@@ -89,7 +89,11 @@ class Commitment:
         terrain = self._local.room.terrain(self._mission.clearance_m + self._mission.tracking_error_m)
         certified = certifier.certify(course.path, seen, terrain, cut_m)
         if certified is None or not self._leads_on(certified.loiter_entry_m, course):
-            certified = self._to_goal(certifier, course, seen, cut_m) or certified
+            certified = (
+                self._to_goal(certifier, course, seen, cut_m)
+                or certifier.certify_ahead(course.path, seen, terrain, cut_m)
+                or certified
+            )
         return certified
 
     def leads_on(self, found: CommittedPlan, start: Start, effective: CommittedPlan | None) -> bool:

@@ -19,7 +19,7 @@ that these are finitely many as well; they are tried again only where no other w
 looked for first. A search in vain is repeated with twice the effort; where nothing is left open at all, the
 distances to go (`cost_to_go`) tell it at once. Where no way is left at the clearance, a closed chain of edges
 proves it; where none is left but those given up, one with room to turn everywhere must remain, or such a chain
-proves that there is none for this aircraft (`barrier`). Assumed: a world that stands still, a sensor that sees
+shows that there is none (`barrier`), and the flight ends: a longer lane is not entered. Assumed: a world that stands still, a sensor that sees
 every gap narrower than twice the clearance as one wall, and a way to the goal along which a disc of the turn
 radius can be moved at the clearance, within the area.
 """
@@ -47,7 +47,7 @@ from planner.rolling_window.rolling_search import (
     RollingStep,
     Work,
 )
-from planner.rolling_window.situation import PlanningState, Situation
+from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
 from planner.shield.committed_plan import CommittedPlan, MonitorLimits, PlanMonitor
 from planner.shield.encounters import encounters
 from planner.shield.escape import BROKEN_SHARE, Escapes, left_of, room_m
@@ -57,6 +57,7 @@ from planner.shield.intervention_log import InterventionLog, ShieldReport
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
 NO_BETTER = "the plan in effect serves as well as any other"
 THINKING_ON = "thinking on; the plan in effect goes on"
+CHAIN = "a closed chain of obstacles lies between the aircraft and the goal"
 NO_WAY_BARE = "no way is found"
 NO_WAY_ON = "no way on can be seen to be safe; the plan in effect goes on"
 
@@ -357,7 +358,7 @@ class RollingWindow:
             return Plan(PlanStatus.NO_PATH, NO_WAY_ON)
         narrow = giving_up.narrow(no_room, giving_up.settled(now.request.time_s))
         if narrow and giving_up.retries_used():
-            return self._prove_no_room_to_turn()
+            return self._end_without_room_to_turn(now)
         # No way is left but those given up, or one that takes more looking for. Or none that can be flown from here:
         # elsewhere on the turn there may be one.
         at_end = (only_given_up or giving_up.out_of_effort) and (turned or not search.candidates)
@@ -366,14 +367,17 @@ class RollingWindow:
 
     def _prove_no_way(self) -> Plan:
         """Any state -> PROVING: a closed chain of edges with no gap that any vehicle could pass."""
-        return self._prove(f"no gap in it is wider than {self._proofs.no_way_gap_m:.0f} m")
-
-    def _prove_no_room_to_turn(self) -> Plan:
-        """GIVING_UP -> PROVING: a closed chain of edges with no gap that this aircraft could turn in."""
-        gap_m = self._proofs.turning_gap_m
-        return self._prove(f"no gap in it has room to turn ({gap_m:.0f} m) or is seen to lead on")
-
-    def _prove(self, gaps: str) -> Plan:
         self.state = PlanningState.PROVING
-        chain = "a closed chain of obstacles lies between the aircraft and the goal"
-        return Plan(PlanStatus.UNREACHABLE, f"{chain}: {gaps}")
+        gap_m = self._proofs.no_way_gap_m
+        return Plan(PlanStatus.UNREACHABLE, f"{CHAIN}: no gap in it is wider than {gap_m:.0f} m")
+
+    def _end_without_room_to_turn(self, now: Situation) -> Plan:
+        """GIVING_UP -> PROVING: a closed chain of edges with no gap that is seen to have room for a turn.
+
+        Raises:
+            NoRoomToTurn: gaps are left that are wide enough for a vehicle. That is no proof.
+        """
+        if self._proofs.no_way.closed(now.request.position_m, self._memory.known):
+            return self._prove_no_way()
+        self.state = PlanningState.PROVING
+        raise NoRoomToTurn(self._proofs.turning_gap_m)

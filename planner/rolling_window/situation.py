@@ -22,7 +22,21 @@ class PlanningState(Enum):
     GIVING_UP = "giving up"
     """A search found no way: a place is given up, or what was given up is tried again, with more effort."""
     PROVING = "proving"
-    """The edge points seen leave no way: the goal is unreachable."""
+    """The edge points seen leave no way: the goal is unreachable. Or none with room to turn, which ends the flight."""
+
+
+class NoRoomToTurn(RuntimeError):
+    """Every way that is left leads through a gap in which no full turn has been seen to be free.
+
+    Args:
+        gap_m: the width of a gap with room for a turn.
+    """
+
+    def __init__(self, gap_m: float) -> None:
+        super().__init__(
+            "no way with room to turn is left: of the gaps between obstacles that part the aircraft from the goal, none "
+            f"is {gap_m:.0f} m wide or was seen to lead to room for a turn. That does not prove the goal unreachable"
+        )
 
 
 @dataclass(frozen=True, eq=False)

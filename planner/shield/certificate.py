@@ -124,6 +124,39 @@ class Certifier:
                             return Certified(Path(np.array([*way, *turn]), loiter=True), arc_length_m)
         return None
 
+    def certify_ahead(self, path: Path, seen: MapView, terrain: Terrain, to_m: float) -> Certified | None:
+        """The longest part of a path that ends in a turn about a place ahead on it, seen to be free.
+
+        Through a gap narrower than a turn beside the path, this is the first turn that is seen. An arc to one side leads
+        into a full turn to the other, whose centre lies ahead of where the arc begins. Arguments are those of `certify`.
+        """
+        radius, roll = self._limits
+        # With the arc of angle a: 2 R cos(a) - roll sin(a) = R, so that the centre is not beside the path.
+        angle = math.acos(radius / math.hypot(2.0 * radius, roll)) - math.atan2(roll, 2.0 * radius)
+        ahead_m = 2.0 * radius * math.sin(angle) + roll * math.cos(angle)
+        free_to = min(self.seen_free_to_m(path, seen), to_m)
+        step = 0.125 * radius
+        arc_lengths_m: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
+        poses = poses_at(path, arc_lengths_m)
+        centres = poses[:, :2] + ahead_m * poses[:, 2:]
+        places = (centres[:, None] + self._disc).reshape(-1, 2)
+        free = seen.seen_free(places).reshape(len(centres), -1).all(axis=1)
+        for arc_length_m in arc_lengths_m[free].tolist():
+            pose, curvature = place_on(path, arc_length_m)
+            for side in SIDES:
+                if side * curvature > 0.0:
+                    continue  # that would take a straight to roll
+                arc: Segment = (*pose, -side / radius, angle * radius)
+                line: Segment = (*along(arc, arc[5]), 0.0, roll)
+                turn = [arc, line, full_turn(along(line, roll), radius, side)]
+                lead = Path(np.array([row for row in turn[:2] if row[5] > 0.0]))
+                if self.seen_free_to_m(lead, seen) >= lead.length_m and terrain.admits(Path(np.array(turn))):
+                    way = between(path, 0.0, arc_length_m)
+                    return Certified(
+                        Path(np.array([*way, *lead.segments.tolist(), turn[2]]), loiter=True), arc_length_m
+                    )
+        return None
+
     def certify_up_to(
         self, over_m: float, path: Path, seen: MapView, bounds_m: tuple[float, float, float, float]
     ) -> Certified | None:

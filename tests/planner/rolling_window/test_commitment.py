@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from planner.geometry.course import Course
-from planner.geometry.curves import Pose
+from planner.geometry.curves import Pose, along
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.commitment import Commitment
 from planner.rolling_window.local_planning import LocalPlanning, Start
+from planner.shield.certificate import hold_centre
 from planner.shield.committed_plan import CommittedPlan
 
 Known = Callable[[FloatArray], MapView]
@@ -34,7 +36,7 @@ MISSION = Mission(
 LEAST_M = 400.0
 OVER_M = 1000.0 - (50.0 - 3.0)
 """Station of the course at which an aircraft that is off it by the tracking error is at the goal all the same."""
-NARROW = replace(MISSION, bounds_m=(-500.0, -150.0, 1500.0, 150.0))
+NARROW = replace(MISSION, bounds_m=(-500.0, -90.0, 1500.0, 90.0))
 """No room to turn in it."""
 
 AT_ORIGIN = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
@@ -92,13 +94,20 @@ def committed(
 def test_a_turn_keeps_the_clearance_and_the_tracking_error(
     room_m: float, fits: bool, known: Known, wall: MakePoints
 ) -> None:
-    beside = 2.0 * MISSION.turn_radius_m + room_m
+    """A turn beside the course has no room, one whose centre is on it just so."""
+    beside = MISSION.turn_radius_m + room_m
     walls = [wall((-300.0, side * beside), (1300.0, side * beside), 5.0) for side in (1.0, -1.0)]
     course = replace(to_goal(), to_goal=False)
     _, found = committed(known(np.concatenate(walls)), MISSION, course)
     assert (found is not None) is fits
     if found is not None:
         assert found.path.loiter
+        centre = hold_centre(found.path.segments[-1])
+        assert centre[1] == pytest.approx(0.0, abs=1e-6)
+        assert found.loiter_entry_m < centre[0]
+        joints = found.path.segments
+        for before, after in pairwise(joints.tolist()):
+            np.testing.assert_allclose(along(before, before[5]), after[:4], atol=1e-6)
 
 
 def test_where_no_turn_leads_on_the_goal_is_flown_to(known: Known) -> None:

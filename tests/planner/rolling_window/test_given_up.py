@@ -13,7 +13,7 @@ from planner.geometry.curves import Pose, end_of
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanStatus
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, RETRY_S
 from planner.rolling_window.planner import RollingWindow
-from planner.rolling_window.situation import Situation
+from planner.rolling_window.situation import NoRoomToTurn, Situation
 from planner.world_stability import SETTLED_S
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
@@ -109,11 +109,10 @@ def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, search
     pilot._proofs.no_room_to_turn.closed = lambda position: True  # type: ignore[method-assign]
     pilot._search.last = SimpleNamespace(done=True, stuck=None, candidates=[])  # type: ignore[assignment]
     effort = pilot._giving_up.effort
-    told = [
-        pilot._no_way_found(now).status
-        for _ in range(searches + 1 + MOST_RETRIES * (MOST_EFFORT + 1) - effort)
-    ]
-    assert told == [PlanStatus.NO_PATH] * (len(told) - 1) + [PlanStatus.UNREACHABLE]
+    for _ in range(searches + MOST_RETRIES * (MOST_EFFORT + 1) - effort):
+        assert pilot._no_way_found(now).status is PlanStatus.NO_PATH
+    with pytest.raises(NoRoomToTurn):
+        pilot._no_way_found(now)
 
 
 def far_on(pilot: RollingWindow, seen: HalfOpen, plan: Plan, flown_m: float, time_s: float) -> None:
@@ -148,17 +147,24 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
     far_on(pilot, seen, plan, flown_m, changed_s)
     flown = pilot._monitor.plan
     assert flown is not None
-    pilot._proofs.no_way.closed = lambda position: not for_turns_alone  # type: ignore[method-assign]
+    pilot._proofs.no_way.closed = lambda *_: not for_turns_alone  # type: ignore[method-assign]
     pilot._proofs.no_room_to_turn.closed = lambda position: True  # type: ignore[method-assign]
     pilot._search.last = SimpleNamespace(done=True, stuck=None, candidates=[])  # type: ignore[assignment]
 
-    def told(time_s: float) -> list[PlanStatus]:
+    def told(time_s: float) -> list[PlanStatus | None]:
         request = request_on(plan, flown_m, seen)._replace(time_s=time_s)
         now = Situation(request, flown, flown_m)
-        return [pilot._no_way_found(now).status for _ in range((MOST_RETRIES + 1) * (MOST_EFFORT + 2))]
+        statuses = []
+        for _ in range((MOST_RETRIES + 1) * (MOST_EFFORT + 2)):
+            try:
+                statuses.append(pilot._no_way_found(now).status)
+            except NoRoomToTurn:
+                return [None]
+        return statuses
 
     assert set(told(changed_s + SETTLED_S - 1.0)) == {PlanStatus.NO_PATH}
     pilot._giving_up.dead_ends.give_up(Pose(3000.0, 0.0, 1.0, 0.0))
-    assert told(changed_s + SETTLED_S + 1.0)[-1] is PlanStatus.UNREACHABLE
+    ends_as = None if for_turns_alone else PlanStatus.UNREACHABLE
+    assert told(changed_s + SETTLED_S + 1.0)[-1] is ends_as
     # Where it is for want of room to turn, what was given up was tried again before.
     assert (len(given_up(pilot)) == 0) is for_turns_alone

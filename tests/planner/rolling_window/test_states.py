@@ -15,7 +15,7 @@ from planner.interface import BoolArray, FloatArray, Mission, NoWayToBegin, Plan
 from planner.memory import ObstacleMemory
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
 from planner.rolling_window.planner import NO_BETTER, NO_WAY_ON, THINKING_ON, RollingWindow
-from planner.rolling_window.situation import PlanningState, Situation
+from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
 from planner.shield.certificate import CertificateBroken
 from planner.shield.escape import Escape
 from tests.planner.rolling_window.test_rolling_window import (
@@ -65,7 +65,7 @@ def searched_in_vain(pilot: RollingWindow, *, done: bool = True, stuck: object =
 
 def proved(pilot: RollingWindow, *, no_way: bool = False, no_room: bool = False) -> None:
     """So much is proved of the edges seen."""
-    pilot._proofs.no_way.closed = lambda position: no_way  # type: ignore[method-assign]
+    pilot._proofs.no_way.closed = lambda *_: no_way  # type: ignore[method-assign]
     pilot._proofs.no_room_to_turn.closed = lambda position: no_room  # type: ignore[method-assign]
 
 
@@ -230,10 +230,11 @@ def test_want_of_room_to_turn_is_proved_after_all_was_tried_again() -> None:
     pilot, now = in_the_loiter()
     proved(pilot, no_room=True)
     searched_in_vain(pilot)
-    answers = [pilot._no_way_found(now) for _ in range((MOST_RETRIES + 1) * (MOST_EFFORT + 2))]
-    first = next(i for i, each in enumerate(answers) if each.status is PlanStatus.UNREACHABLE)
-    assert first > MOST_RETRIES
-    assert "has room to turn (700 m)" in answers[first].reason
+    for _ in range(MOST_RETRIES + 1):
+        assert pilot._no_way_found(now).status is PlanStatus.NO_PATH
+    with pytest.raises(NoRoomToTurn, match=r"none is 700 m wide .* does not prove the goal unreachable"):
+        for _ in range((MOST_RETRIES + 1) * (MOST_EFFORT + 2)):
+            assert pilot._no_way_found(now).status is PlanStatus.NO_PATH
     assert pilot.state is PlanningState.PROVING
     assert pilot._giving_up.tried_again
 
