@@ -19,9 +19,9 @@ that these are finitely many as well; they are tried again only where no other w
 looked for first. A search in vain is repeated with twice the effort; where nothing is left open at all, the
 distances to go (`cost_to_go`) tell it at once. Where no way is left at the clearance, a closed chain of edges
 proves it; where none is left but those given up, one with room to turn everywhere must remain, or such a chain
-shows that there is none (`barrier`), and the flight ends: a longer lane is not entered. Assumed: a world that stands still, a sensor that sees
-every gap narrower than twice the clearance as one wall, and a way to the goal along which a disc of the turn
-radius can be moved at the clearance, within the area.
+shows that there is none (`barrier`), and the flight ends. Assumed: a world that stands still, a sensor that sees every
+gap narrower than twice the clearance as one wall, and a way to the goal along which a disc of the turn radius can be
+moved at the clearance, within the area.
 """
 
 from __future__ import annotations

@@ -34,8 +34,9 @@ class NoRoomToTurn(RuntimeError):
 
     def __init__(self, gap_m: float) -> None:
         super().__init__(
-            "no way with room to turn is left: of the gaps between obstacles that part the aircraft from the goal, none "
-            f"is {gap_m:.0f} m wide or was seen to lead to room for a turn. That does not prove the goal unreachable"
+            "no way with room to turn is left: of the gaps between obstacles that part the aircraft from the "
+            f"goal, none is {gap_m:.0f} m wide or was seen to lead to room for a turn. "
+            "That does not prove the goal unreachable"
         )
 
 

@@ -127,8 +127,8 @@ class Certifier:
     def certify_ahead(self, path: Path, seen: MapView, terrain: Terrain, to_m: float) -> Certified | None:
         """The longest part of a path that ends in a turn about a place ahead on it, seen to be free.
 
-        Through a gap narrower than a turn beside the path, this is the first turn that is seen. An arc to one side leads
-        into a full turn to the other, whose centre lies ahead of where the arc begins. Arguments are those of `certify`.
+        Through a gap narrower than a turn beside the path, this is the first turn that is seen. An arc to one side
+        leads into a full turn to the other, about a place ahead. Arguments are those of `certify`.
         """
         radius, roll = self._limits
         # With the arc of angle a: 2 R cos(a) - roll sin(a) = R, so that the centre is not beside the path.

@@ -106,7 +106,7 @@ def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, search
     pilot._memory.cleared += gone
     now = Situation(request_on(plan, flown_m, seen), pilot._monitor.plan, flown_m)
     assert now.plan is not None
-    pilot._proofs.no_room_to_turn.closed = lambda position: True  # type: ignore[method-assign]
+    pilot._proofs.no_room_to_turn.closed = lambda position, most=0: True  # type: ignore[method-assign]
     pilot._search.last = SimpleNamespace(done=True, stuck=None, candidates=[])  # type: ignore[assignment]
     effort = pilot._giving_up.effort
     for _ in range(searches + MOST_RETRIES * (MOST_EFFORT + 1) - effort):
@@ -147,14 +147,14 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
     far_on(pilot, seen, plan, flown_m, changed_s)
     flown = pilot._monitor.plan
     assert flown is not None
-    pilot._proofs.no_way.closed = lambda *_: not for_turns_alone  # type: ignore[method-assign]
-    pilot._proofs.no_room_to_turn.closed = lambda position: True  # type: ignore[method-assign]
+    pilot._proofs.no_way.closed = lambda position, most=0: not for_turns_alone  # type: ignore[method-assign]
+    pilot._proofs.no_room_to_turn.closed = lambda position, most=0: True  # type: ignore[method-assign]
     pilot._search.last = SimpleNamespace(done=True, stuck=None, candidates=[])  # type: ignore[assignment]
 
     def told(time_s: float) -> list[PlanStatus | None]:
         request = request_on(plan, flown_m, seen)._replace(time_s=time_s)
         now = Situation(request, flown, flown_m)
-        statuses = []
+        statuses: list[PlanStatus | None] = []
         for _ in range((MOST_RETRIES + 1) * (MOST_EFFORT + 2)):
             try:
                 statuses.append(pilot._no_way_found(now).status)
