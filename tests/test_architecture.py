@@ -66,7 +66,6 @@ ONLY_IN = {
         "harness/campaign/sampling.py",
         "harness/campaign/paired.py",
         "harness/campaign/summary.py",
-        "harness/falsify/search.py",
         "harness/certification/bounds.py",
         "harness/certification/rare.py",
         "harness/world_files/free_room.py",

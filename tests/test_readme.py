@@ -215,7 +215,7 @@ def test_the_breaking_point_is_found_as_shown(tmp_path: Path) -> None:
     assert flown.returncode == 1
     folder = (tmp_path / again.removeprefix("again: wayproof fly ")).parent
     found = json.loads((folder / "falsify.json").read_text())["found"]
-    assert json.loads(flown.stdout)["digest"] == found["digest"]
+    assert json.loads(flown.stdout)["digest"] == found["figures"]["digest"]
 
 
 @pytest.mark.flights

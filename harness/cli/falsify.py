@@ -68,8 +68,8 @@ def falsify(
 ) -> int:
     """Searches for the mildest condition that makes a flight fail, and writes it as a scenario.
 
-    The answer is the mildest failure found. With one key, milder failures can lie only in a gap between tried values;
-    the widest gap is printed, and more --runs make it smaller.
+    The answer is the mildest failure found. A scan in equal steps finds it; a failing range narrower than a step may be
+    missed, and more --runs make the steps finer.
 
     LO is the mild end; LO > HI if smaller is harder. With several keys, the key furthest from its mild end counts.
 
@@ -104,8 +104,8 @@ def _search(
 ) -> int:
     from harness.cli.falsify_terminal import breaking_rows, last_line
     from harness.cli.terminal import print_table, step_bar
+    from harness.falsify.breaking_point import FALSIFIED, INDEX
     from harness.falsify.breaking_point import falsify as search
-    from harness.falsify.folder import FALSIFIED, TRIALS
     from harness.falsify.keys import vary_of
     from harness.files.errors import RunFolderError
 
@@ -138,7 +138,7 @@ def _search(
     except RunFolderError as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:
-        told = f"the flights so far are in {folder / TRIALS}" if flights else "no flight had ended yet"
+        told = f"the flights so far are in {folder / INDEX}" if flights else "no flight had ended yet"
         say(f"wayproof: interrupted; {told}", err=True)
         raise
     if as_json:

@@ -1,26 +1,34 @@
-"""The breaking point: flies a scenario under ever other conditions until the mildest is known that makes it fail.
+"""The breaking point: flies a scenario under ever harder conditions until the mildest is known that makes it fail.
 
-The folder holds `falsify.csv`, a line for every flight; `falsify.json`, the result, which says whether it is
-complete; and, where something failed, `falsified.yaml`, the whole scenario that does.
+The folder holds `falsify.json`, the result and every flight; and, where something failed, `falsified.yaml`, the whole
+scenario that does. They are written when the search ends.
 """
 
 from __future__ import annotations
 
 import itertools
+import json
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
-from harness.falsify.folder import FALSIFIED, SCHEMA, SearchFolder, Trial, write_index
 from harness.falsify.keys import Load, Vary, scenario_at
-from harness.falsify.search import Judge, Point, Searched, search
+from harness.falsify.search import Point, search
 from harness.files.crash import sentence
+from harness.files.errors import RunFolderError
+from harness.files.folder_lock import FolderLock
+from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
-from harness.files.whole_file import replace_text
+from harness.files.whole_file import PARTIAL, replace_text
 from harness.scenario.scenario import Scenario, dump_scenario
+
+SCHEMA: Final = "wayproof/falsify/2"
+INDEX: Final = "falsify.json"
+FALSIFIED: Final = "falsified.yaml"
 
 Until: TypeAlias = Literal["failed", "untrackable"]
 """What is looked for: an outcome other than `reached`, or a leg that was not tracked (or such an outcome)."""
@@ -29,21 +37,35 @@ Flown: TypeAlias = Callable[[Scenario], Mapping[str, Any]]
 """Flies a scenario and gives the content of its `metrics.json`."""
 
 
+FIGURES: Final = (
+    "outcome",
+    "reason",
+    "trackable",
+    "min_clearance_m",
+    "flown_length_m",
+    "flight_time_s",
+    "digest",
+)
+"""Figures of `metrics.json` that are kept of every flight."""
+
+
 @dataclass(frozen=True)
-class TriedBand:
-    """Conditions of one key that were tried one beside the other and had the same outcome.
+class Trial:
+    """One flight.
 
     Attributes:
-        failed: whether they failed.
-        mildest: the value of the mildest.
-        hardest: the value of the hardest.
-        conditions: how many.
+        displacement: of each key, from 0 (mild) to 1 (hard).
+        values: of each key.
+        seed: root seed of the flight; flights of one condition differ in it.
+        failed: whether it did what was looked for.
+        figures: those of `FIGURES`; the outcome is `error` where the software failed.
     """
 
+    displacement: Point
+    values: tuple[float, ...]
+    seed: int
     failed: bool
-    mildest: float
-    hardest: float
-    conditions: int
+    figures: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -51,25 +73,13 @@ class Breaking:
     """What was found.
 
     Attributes:
-        scenario: its name.
-        planner: what planned.
-        aircraft: what flew.
         until: what was looked for.
-        vary: the keys.
         tolerance: a displacement was narrowed down to this.
-        allowed: at most so many conditions were to be tried.
-        conditions: how many were tried. Fewer than allowed where nothing was left to try.
-        settled: whether the search did all its steps within its conditions, and narrowed down what failed.
-        verdict: `found`, `not_found` or `fails_at_the_mild_end`.
+        conditions: how many were tried.
+        steps: number of equal steps of the scan; a failing range narrower than one may have been missed.
+        settled: whether the answer was narrowed down to the tolerance within the conditions that were allowed.
         found: the flight that failed under the mildest condition of those tried.
         passes: values of the hardest condition that passed and is no harder in any key.
-        passes_above: values of the hardest condition that passed and is no milder in any key.
-        milder: how many milder conditions were tried. All passed.
-        widest_gap: with one key, the two neighbouring values with most room between them that no flight has
-            tried, of all up to the mildest failure.
-        not_monotone: how many pairs there are of a condition that failed and one, harder or equal in every
-            key, that passed.
-        example: values of such a pair.
         trials: every flight, in order.
     """
 
@@ -79,44 +89,18 @@ class Breaking:
     until: Until
     vary: tuple[Vary, ...]
     tolerance: float
-    allowed: int
     conditions: int
+    steps: int
     settled: bool
     verdict: Literal["found", "not_found", "fails_at_the_mild_end"]
     found: Trial | None
     passes: tuple[float, ...] | None
-    passes_above: tuple[float, ...] | None
-    milder: int
-    widest_gap: tuple[float, float] | None
-    not_monotone: int
-    example: tuple[tuple[float, ...], tuple[float, ...]] | None
     trials: tuple[Trial, ...]
 
-    @property
-    def bands(self) -> tuple[TriedBand, ...]:
-        """With one key, every condition tried: neighbours with the same outcome make a band, mild ones first."""
-        verdicts: dict[tuple[Point, float], bool] = {}
-        for each in self.trials:
-            condition = each.displacement, each.values[0]
-            verdicts[condition] = verdicts.get(condition, False) or each.failed
-        bands = []
-        for failed, group in itertools.groupby(sorted(verdicts.items()), key=lambda item: item[1]):
-            values = [value for (_, value), _ in group]
-            bands.append(TriedBand(failed, values[0], values[-1], len(values)))
-        return tuple(bands)
-
     def plain(self) -> dict[str, Any]:
-        """The content of `falsify.json`: all but the flights, which are in `falsify.csv`."""
-        content = {name: value for name, value in asdict(self).items() if name != "trials"}
+        """The content of `falsify.json`."""
         command = shlex.join(["wayproof", *sys.argv[1:]])
-        return {
-            "schema": SCHEMA,
-            "complete": True,
-            "command": command,
-            **content,
-            "bands": [asdict(each) for each in self.bands] if len(self.vary) == 1 else None,
-            "flights": len(self.trials),
-        }
+        return {"schema": SCHEMA, "complete": True, "command": command, **asdict(self)}
 
 
 def falsify(
@@ -150,42 +134,62 @@ def falsify(
     """
     base = scenario_at(load, vary, (0.0,) * len(vary))
     trials: list[Trial] = []
-    numbers = itertools.count()
+    begun = itertools.count(1)
+
+    def values(point: Point) -> tuple[float, ...]:
+        return tuple(each.value(place) for each, place in zip(vary, point, strict=True))
 
     def judge(point: Point) -> bool:
         scenario = scenario_at(load, vary, point)
-        condition = next(numbers)
-        values = tuple(each.value(place) for each, place in zip(vary, point, strict=True))
+        condition = next(begun)
         for seed in range(base.seed, base.seed + seeds):
             figures = _flown(flown, scenario.model_copy(update={"seed": seed}))
             failed = figures["outcome"] != "reached" or (until == "untrackable" and not figures["trackable"])
-            trial = Trial(len(trials), condition, point, values, seed, failed, **_columns(figures))
-            trials.append(trial)
-            folder.write(trial)
+            kept = {name: figures.get(name) for name in FIGURES}
+            trials.append(Trial(point, values(point), seed, failed, kept))
             if progress is not None:
-                told = ", ".join(f"{value:.4g}" for value in values)
-                progress(condition + 1, conditions, f"{told}: {trial.outcome}")
+                told = ", ".join(f"{value:.4g}" for value in values(point))
+                progress(condition, conditions, f"{told}: {figures['outcome']}")
             if failed:
                 return True
         return False
 
-    with SearchFolder(out, vary) as folder:
-        searched = _searched(judge, vary, conditions, tolerance, base.seed)
-        folder.take_over()
-        result = _breaking(base, vary, until, conditions, tolerance, searched, trials)
-        if result.found is not None:
-            failing = scenario_at(load, vary, result.found.displacement)
-            text = dump_scenario(failing.model_copy(update={"seed": result.found.seed}))
-            replace_text(out / FALSIFIED, text)
-        write_index(out, result.plain())
-    return result
-
-
-def _searched(judge: Judge, vary: Sequence[Vary], conditions: int, tolerance: float, seed: int) -> Searched:
     def snap(point: Point) -> Point:
         return tuple(each.snapped(place) for each, place in zip(vary, point, strict=True))
 
-    return search(len(vary), judge, conditions, tolerance, seed, snap)
+    with _claimed(out):
+        try:
+            searched = search(len(vary), judge, conditions, tolerance, snap)
+        except KeyboardInterrupt:
+            if trials:
+                told = {"schema": SCHEMA, "complete": False, "trials": [asdict(each) for each in trials]}
+                _write(out, told, None)
+            raise
+        mildest, passed = searched.mildest, searched.passed_below
+        verdict: Literal["found", "fails_at_the_mild_end"] = (
+            "found" if mildest and max(mildest) > 0.0 else "fails_at_the_mild_end"
+        )
+        found = next((each for each in trials if each.failed and each.displacement == mildest), None)
+        result = Breaking(
+            scenario=base.name,
+            planner=base.planner.label,
+            aircraft=Path(base.aircraft.model).name,
+            until=until,
+            vary=tuple(vary),
+            tolerance=tolerance,
+            conditions=len(searched.verdicts),
+            steps=searched.steps,
+            settled=searched.settled,
+            verdict="not_found" if found is None else verdict,
+            found=found,
+            passes=values(passed) if passed else None,
+            trials=tuple(trials),
+        )
+        failing = None
+        if found is not None:
+            failing = scenario_at(load, vary, found.displacement).model_copy(update={"seed": found.seed})
+        _write(out, result.plain(), failing)
+    return result
 
 
 def _flown(flown: Flown, scenario: Scenario) -> Mapping[str, Any]:
@@ -200,49 +204,35 @@ def _flown(flown: Flown, scenario: Scenario) -> Mapping[str, Any]:
         return {"outcome": "error", "reason": sentence(error), "trackable": None}
 
 
-def _columns(figures: Mapping[str, Any]) -> dict[str, Any]:
-    names = {field.name for field in fields(Trial)}
-    own = {name: value for name, value in figures.items() if name in names}
-    return own | {"cross_track_max_m": figures.get("cross_track_m", {}).get("max")}
+@contextmanager
+def _claimed(out: Path) -> Iterator[None]:
+    """Holds the folder of a search, made where missing; what was made goes again where nothing was written."""
+    if out.exists() and not out.is_dir():
+        raise RunFolderError(f"{out} is a file, not a folder for a search")
+    made = [each for each in (out, *out.parents) if not each.exists()]
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        lock = FolderLock(out)
+        try:
+            others = {each.name for each in out.iterdir() if not each.name.endswith(PARTIAL)}
+            if others and read_index(out / INDEX, SCHEMA) is None:
+                raise RunFolderError(
+                    f"{out} is not empty and not a search: choose another folder or empty it first"
+                )
+            yield
+        finally:
+            lock.release()
+    except OSError as error:
+        raise RunFolderError(f"cannot write the search in {out}: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):  # a folder that holds anything stays
+            for each in made:
+                each.rmdir()
 
 
-def _breaking(
-    base: Scenario,
-    vary: Sequence[Vary],
-    until: Until,
-    allowed: int,
-    tolerance: float,
-    searched: Searched,
-    trials: Sequence[Trial],
-) -> Breaking:
-    def values(point: Point) -> tuple[float, ...]:
-        return tuple(each.value(place) for each, place in zip(vary, point, strict=True))
-
-    mildest, passed, pairs = searched.mildest, searched.passed_below, searched.not_monotone
-    above, gap = searched.passed_above, searched.widest_gap
-    found = next((each for each in trials if each.failed and each.displacement == mildest), None)
-    example = (values(pairs[0][0]), values(pairs[0][1])) if pairs else None
-    return Breaking(
-        scenario=base.name,
-        planner=base.planner.label,
-        aircraft=Path(base.aircraft.model).name,
-        until=until,
-        vary=tuple(vary),
-        tolerance=tolerance,
-        allowed=allowed,
-        conditions=len(searched.verdicts),
-        settled=searched.settled,
-        verdict="not_found"
-        if mildest is None
-        else "found"
-        if max(mildest) > 0.0
-        else "fails_at_the_mild_end",
-        found=found,
-        passes=values(passed) if passed else None,
-        passes_above=values(above) if above else None,
-        milder=searched.milder,
-        widest_gap=(vary[0].value(gap[0]), vary[0].value(gap[1])) if gap else None,
-        not_monotone=len(pairs),
-        example=example,
-        trials=tuple(trials),
-    )
+def _write(out: Path, result: Mapping[str, Any], failing: Scenario | None) -> None:
+    """Replaces an earlier search, all of which goes; what fails comes before the index that names it."""
+    (out / FALSIFIED).unlink(missing_ok=True)
+    if failing is not None:
+        replace_text(out / FALSIFIED, dump_scenario(failing))
+    replace_text(out / INDEX, json.dumps(result, indent=2, allow_nan=False) + "\n")

@@ -9,11 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
-from harness.falsify.search import STEPS, Point
+from harness.falsify.search import Point
 from harness.files.strict_yaml import InputError, as_spelt, loc_of
 from harness.scenario.scenario import Scenario
 
-MOST_KEYS: Final = 6
+MAX_KEYS: Final = 6
+"""At most this many keys are varied at once: every combination of their ends is made before the search."""
 
 Load: TypeAlias = Callable[[Sequence[tuple[str, str]]], Scenario]
 """Makes the scenario with keys replaced, as `harness.scenario.scenario.load_scenario` takes them."""
@@ -35,20 +36,18 @@ class Vary:
     mild: float
     hard: float
     whole: bool = False
-    decimals: int | None = None
+    decimals: int = 15
 
     def value(self, displacement: float) -> float:
         """Its value at a displacement from 0 (mild) to 1 (hard)."""
         if displacement in (0.0, 1.0):
             return self.hard if displacement else self.mild
         value = self.mild + displacement * (self.hard - self.mild)
-        if self.whole:
-            return round(value)
-        return value if self.decimals is None else round(value, self.decimals)
+        return round(value) if self.whole else round(value, self.decimals)
 
     def snapped(self, displacement: float) -> float:
-        """The displacement of the value that is flown in place of one that is not whole, or not rounded."""
-        if displacement in (0.0, 1.0) or not (self.whole or self.decimals is not None):
+        """The displacement of the value that is flown."""
+        if displacement in (0.0, 1.0):
             return displacement
         return (self.value(displacement) - self.mild) / (self.hard - self.mild)
 
@@ -58,7 +57,6 @@ def vary_of(
 ) -> tuple[Vary, ...]:
     """The keys to vary, once every combination of their ends has been found to be a scenario.
 
-    Args:
         load: makes the scenario.
         given: key path, mild end and hard end of each.
         fixed: paths of keys that have been given a value.
@@ -68,9 +66,9 @@ def vary_of(
     Raises:
         InputError: too many keys, one twice, with a value or without a range, or an end that makes no scenario.
     """
-    if len(given) > MOST_KEYS:
+    if len(given) > MAX_KEYS:
         raise InputError(
-            f"command line: --vary is given {len(given)} times; at most {MOST_KEYS} keys are varied"
+            f"command line: --vary is given {len(given)} times; at most {MAX_KEYS} keys are varied"
         )
     given = [(_spelt("--vary", key), mild, hard) for key, mild, hard in given]
     valued = {_spelt("--set", key) for key in fixed}
@@ -92,7 +90,7 @@ def vary_of(
         Vary(key, mild, hard, _is_whole(first, key), _decimals(abs(hard - mild) * tolerance / 100.0))
         for key, mild, hard in given
     )
-    diagonal = [(step / STEPS,) * len(vary) for step in range(STEPS + 1)]
+    diagonal = [(step / 8,) * len(vary) for step in range(9)]
     for point in dict.fromkeys([*itertools.product((0.0, 1.0), repeat=len(vary)), *diagonal]):
         scenario_at(load, vary, point)
     return vary

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import csv
+import itertools
 import json
 import re
 from collections.abc import Sequence
@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from aircraft.airframes import AircraftError
 from harness.cli.app import main
 from harness.cli.falsify_terminal import breaking_rows, last_line
-from harness.falsify.folder import FALSIFIED, INDEX, TRIALS
+from harness.falsify.breaking_point import FALSIFIED, INDEX
 from harness.falsify.keys import number_text, scenario_at, vary_of
+from harness.files.errors import RunFolderError
 from harness.files.strict_yaml import InputError
 from harness.scenario.scenario import Scenario, load_scenario
 from tests.examples import examples
@@ -27,26 +28,27 @@ from tests.harness.breaking import WAY_M, broken, flown, stand_in
 @pytest.mark.flights
 def test_the_time_that_is_too_short_is_found(to_break: Path) -> None:
     result = broken(to_break, ("mission.time_limit_s", 300.0, 20.0), tolerance=0.005)
-    assert (result.verdict, result.settled, result.not_monotone) == ("found", True, 0)
+    assert (result.verdict, result.settled) == ("found", True)
     assert result.found is not None
     assert result.passes is not None
     needed_s = WAY_M / 25.0
     assert needed_s - 280 * 0.005 - 0.5 <= result.found.values[0] <= needed_s <= result.passes[0] + 0.5
-    assert result.found.outcome == "timeout"
+    assert result.found.figures["outcome"] == "timeout"
     value = number_text(result.found.values[0])
     told = f", the mildest found in {result.conditions} conditions"
     assert last_line(result) == f"falsified: mission.time_limit_s={value}{told}"
 
-    rows = list(csv.DictReader((to_break.parent / "out" / TRIALS).read_text().splitlines()))
-    assert len(rows) == result.conditions == len(result.trials)
-    assert [float(row["mission.time_limit_s"]) for row in rows[:2]] == [300.0, 20.0]
-    assert {row["failed"] for row in rows} == {"True", "False"}
     index = json.loads((to_break.parent / "out" / INDEX).read_text())
-    assert (index["complete"], index["found"]["digest"]) == (True, result.found.digest)
+    limits_s = [trial["values"][0] for trial in index["trials"]]
+    assert len(limits_s) == result.conditions == len(result.trials)
+    assert limits_s[0] == 300.0
+    far_s = [trial for trial in index["trials"] if abs(trial["values"][0] - needed_s) > 0.5]
+    assert all(trial["failed"] == (trial["values"][0] < needed_s) for trial in far_s)
+    assert (index["complete"], index["found"]["figures"]["digest"]) == (True, result.found.figures["digest"])
 
     again = load_scenario(to_break.parent / "out" / FALSIFIED)
     assert again.mission.time_limit_s == result.found.values[0]
-    assert flown(again)["digest"] == result.found.digest
+    assert flown(again)["digest"] == result.found.figures["digest"]
 
 
 @pytest.mark.flights
@@ -67,10 +69,11 @@ def test_two_keys_are_brought_to_the_edge_between_passing_and_failing(to_break: 
 
 def test_nothing_fails_and_it_is_said(to_break: Path) -> None:
     result = broken(to_break, ("mission.time_limit_s", 300.0, 200.0), conditions=3)
-    assert (result.verdict, result.found, result.conditions) == ("not_found", None, 3)
-    assert last_line(result) == "not falsified: nothing failed in 3 flights"
+    assert (result.verdict, result.found, result.conditions) == ("not_found", None, 2)
+    assert "1 equal step of 100.00%" in breaking_rows(result)["scan"]
+    assert last_line(result) == "not falsified: nothing failed in 2 flights"
     assert breaking_rows(result)["mildest found"] == "none: every condition tried was reached"
-    assert sorted(path.name for path in (to_break.parent / "out").iterdir()) == [TRIALS, INDEX]
+    assert sorted(path.name for path in (to_break.parent / "out").iterdir()) == [INDEX]
 
 
 def test_it_fails_already_at_the_mild_end(to_break: Path) -> None:
@@ -89,11 +92,13 @@ def test_a_condition_fails_when_one_of_its_seeds_does(to_break: Path) -> None:
     result = broken(to_break, ("sensor.range_noise_m", 0.0, 8.0), flown=unlucky, seeds=4, tolerance=0.1)
     assert result.found is not None
     assert (result.found.values, result.found.seed) == ((4.0,), 6)
-    assert [trial.seed for trial in result.trials if trial.condition == 0] == [4, 5, 6, 7]
+    assert [trial.seed for trial in result.trials][:5] == [4, 5, 6, 7, 4], "in order, none left out"
+    assert [trial.seed for trial in result.trials if trial.failed] == [6] * sum(
+        t.failed for t in result.trials
+    )
     assert breaking_rows(result)["tried"].startswith(
         f"{result.conditions} conditions, {len(result.trials)} flights"
     )
-    assert [trial.seed for trial in result.trials if trial.condition == 1] == [4, 5, 6]
     assert load_scenario(to_break.parent / "out" / FALSIFIED).seed == 6
 
 
@@ -126,40 +131,13 @@ def test_a_crash_is_a_failure_and_a_model_that_cannot_begin_is_not(to_break: Pat
     noise = ("sensor.range_noise_m", 0.0, 8.0)
     result = broken(to_break, noise, flown=crashes)
     assert result.found is not None
-    assert (result.found.outcome, result.found.reason) == ("error", "ZeroDivisionError: in the planner")
+    assert (result.found.figures["outcome"], result.found.figures["reason"]) == (
+        "error",
+        "ZeroDivisionError: in the planner",
+    )
     with pytest.raises(InputError, match="cannot fly this condition: cannot be trimmed"):
         broken(to_break, noise, flown=refuses)
     assert json.loads((to_break.parent / "out" / INDEX).read_text())["complete"] is True, "the earlier search"
-
-
-def test_what_is_not_monotone_is_reported(to_break: Path) -> None:
-    def island(scenario: Scenario) -> dict[str, Any]:
-        return stand_in("collision" if 2.0 <= scenario.sensor.range_noise_m <= 3.0 else "reached")
-
-    result = broken(to_break, ("sensor.range_noise_m", 0.0, 8.0), flown=island)
-    assert result.found is not None
-    assert result.found.values == (2.0,)
-    assert result.passes_above == (8.0,)
-    assert result.example is not None
-    assert result.example[0][0] < result.example[1][0]
-    rows = breaking_rows(result)
-    assert rows["passes above"] == "at 8, which is harder"
-    below = result.found.displacement
-    assert result.milder == sum(trial.displacement < below for trial in result.trials) > 10
-    assert rows["passes below"].endswith(f"so do all {result.milder} milder conditions that were tried")
-    assert rows["in order"].startswith(f"passes 0 to 1.9375 ({result.milder}), fails 2 to 3 (")
-    assert rows["in order"].endswith(f"passes 4 to 8 ({result.bands[-1].conditions})")
-    assert sum(band.conditions for band in result.bands) == result.conditions == 39
-    assert rows["tried"].startswith("39 conditions of 40 allowed: none is left")
-    low, high = result.widest_gap or (0.0, 0.0)
-    assert (rows["widest untried gap"], high - low) == ("1.9375 to 2 below the failure", 0.0625)
-    index = json.loads((to_break.parent / "out" / INDEX).read_text())
-    assert index["bands"][0] == {
-        "failed": False,
-        "mildest": 0.0,
-        "hardest": 1.9375,
-        "conditions": result.milder,
-    }
 
 
 @pytest.mark.flights
@@ -175,20 +153,8 @@ def test_a_value_that_is_printed_fails_when_it_is_typed_in(to_break: Path, edge:
         assert float(printed) >= edge, "not the edge rounded down"
         assert float(printed) - edge <= 8.0 * tolerance
         assert len(printed) <= 7, "and not sixteen digits"
-        passes = breaking_rows(result)["passes below"].removeprefix("at ").split(";")[0]
+        passes = breaking_rows(result)["passes below"].removeprefix("at ")
         assert float(passes) < edge
-
-
-def test_count_and_sentence_agree_with_few_conditions_for_two_keys(to_break: Path) -> None:
-    keys = ("sensor.range_noise_m", 0.0, 8.0), ("sensor.dropout", 0.0, 0.5)
-    result = broken(to_break, *keys, flown=lambda scenario: stand_in(), conditions=8)
-    rows = breaking_rows(result)
-    assert (rows["tried"], result.settled) == ("8 conditions", False)
-    assert rows["not settled"] == "the conditions ran out first; give more with --runs"
-    few = broken(to_break, ("sensor.rays", 90.0, 91.0), flown=lambda scenario: stand_in(), conditions=16)
-    rows = breaking_rows(few)
-    assert "not settled" not in rows
-    assert rows["tried"].startswith("2 conditions of 16 allowed: none is left to try that differs")
 
 
 def test_of_two_keys_each_value_is_told_with_its_key(to_break: Path) -> None:
@@ -204,7 +170,6 @@ def test_of_two_keys_each_value_is_told_with_its_key(to_break: Path) -> None:
         f"sensor.range_noise_m {number_text(noise)}, sensor.rays {number_text(rays)}" in rows["mildest found"]
     )
     assert rows["passes below"].startswith("at sensor.range_noise_m ")
-    assert rows["passes below"].endswith("conditions tried of which the hardest key is milder")
 
 
 def test_whole_numbers_stay_whole(to_break: Path) -> None:
@@ -229,15 +194,6 @@ def test_a_key_inside_a_list_can_be_varied(to_break: Path) -> None:
     assert circle.radius_m == 300.0
 
 
-def test_the_command_that_fails_again_can_be_copied(
-    to_break: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = to_break.parent / "my folder"
-    given = [str(to_break), "--vary", "mission.time_limit_s=90:30", "--runs", "2", "--out", str(folder)]
-    assert main(["falsify", *given]) == 0
-    assert f"again: wayproof fly '{folder}/falsified.yaml'" in capsys.readouterr().out.replace("\n", "")
-
-
 def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     to_break: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -254,9 +210,8 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     assert max(len(line) for line in said.out.splitlines() if not line.startswith("again: ")) <= 80
     found = json.loads((folder / "falsify.json").read_text())
     (value,) = found["found"]["values"]
-    assert said.out.splitlines()[-1] == (
-        f"falsified: mission.time_limit_s={value}, the mildest found in 9 conditions"
-    )
+    told = f"the mildest found in {found['conditions']} conditions"
+    assert said.out.splitlines()[-1] == f"falsified: mission.time_limit_s={value}, {told}"
     assert WAY_M / 25.0 - 10.0 < value < WAY_M / 25.0 + 3.0
     again = [
         "fly",
@@ -268,12 +223,12 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     ]
     assert main(again) == 1
     metrics_again = json.loads(capsys.readouterr().out)
-    assert metrics_again["outcome"] == found["found"]["outcome"] == "timeout"
-    assert metrics_again["digest"] == found["found"]["digest"]
+    assert metrics_again["outcome"] == found["found"]["figures"]["outcome"] == "timeout"
+    assert metrics_again["digest"] == found["found"]["figures"]["digest"]
 
     assert main(["falsify", *given, "--runs", "2", "--json", "--set", "mission.goal_radius_m=60"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert (printed["verdict"], printed["flights"], printed["settled"]) == ("found", 2, False)
+    assert (printed["verdict"], printed["conditions"], printed["settled"]) == ("found", 2, False)
 
 
 @pytest.mark.parametrize(
@@ -326,3 +281,76 @@ def test_bad_usage_is_one_line_and_writes_nothing(
     assert sentence in said.err
     assert len(said.err.splitlines()) <= 2
     assert [path.name for path in to_break.parent.iterdir()] == ["straight.yaml"]
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {each.name: each.read_bytes() for each in folder.iterdir()}
+
+
+def test_a_folder_with_other_things_is_refused(to_break: Path) -> None:
+    (to_break.parent / "out").mkdir()
+    (to_break.parent / "out" / "mine.txt").touch()
+    with pytest.raises(RunFolderError, match="not empty and not a search"):
+        broken(to_break, ("mission.time_limit_s", 300.0, 200.0))
+    assert [path.name for path in (to_break.parent / "out").iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize("flights", [0, 1, 6])
+def test_a_condition_that_cannot_be_flown_leaves_everything_as_it_was(to_break: Path, flights: int) -> None:
+    def refuses(scenario: Scenario) -> dict[str, Any]:
+        if next(begun) >= flights:
+            raise AircraftError("cannot be trimmed")
+        return stand_in()
+
+    begun = itertools.count()
+    with pytest.raises(InputError, match="cannot fly this condition: cannot be trimmed"):
+        broken(to_break, ("sensor.dropout", 0.0, 1.0), flown=refuses, out=to_break.parent / "new" / "out")
+    assert [each.name for each in to_break.parent.iterdir()] == ["straight.yaml"]
+
+    broken(to_break, ("mission.time_limit_s", 300.0, 20.0), conditions=3)
+    earlier = content(to_break.parent / "out")
+    assert {FALSIFIED, INDEX} == earlier.keys()
+    begun = itertools.count()
+    with pytest.raises(InputError, match="cannot fly this condition: cannot be trimmed"):
+        broken(to_break, ("sensor.dropout", 0.0, 1.0), flown=refuses)
+    assert content(to_break.parent / "out") == earlier
+
+
+def test_two_searches_into_one_folder(to_break: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def second(scenario: Scenario) -> dict[str, Any]:
+        vary = "mission.time_limit_s=300:20"
+        assert main(["falsify", str(to_break), "--vary", vary, "--out", str(out)]) == 2
+        said.append(capsys.readouterr().err)
+        return stand_in()
+
+    said: list[str] = []
+    out = to_break.parent / "out"
+    broken(to_break, ("sensor.dropout", 0.0, 1.0), flown=second, conditions=2)
+    sentence = f"another wayproof is writing to {out}: wait until it has ended or choose another folder"
+    assert said == [f"wayproof: {sentence}\n"] * 2
+    assert json.loads((out / INDEX).read_text())["vary"][0]["key"] == "sensor.dropout"
+
+
+def test_an_interrupt_leaves_the_flights_so_far(
+    to_break: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from harness.cli import falsify as command
+
+    flights = iter([stand_in(), stand_in()])
+
+    def interrupted(_: Scenario) -> dict[str, Any]:
+        try:
+            return next(flights)
+        except StopIteration:
+            raise KeyboardInterrupt from None
+
+    monkeypatch.setattr(command, "_flown", interrupted)
+    out = to_break.parent / "out"
+    for flown_so_far, told in (
+        (2, f"interrupted; the flights so far are in {out / INDEX}"),
+        (0, "interrupted; no flight had ended yet"),
+    ):
+        assert main(["falsify", str(to_break), "--vary", "sensor.dropout=0:1", "--out", str(out)]) == 130
+        assert told in capsys.readouterr().err, flown_so_far
+        index = json.loads((out / INDEX).read_text())
+        assert (index["complete"], len(index["trials"])) == (False, 2), "those of the search before stay"
