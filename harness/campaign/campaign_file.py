@@ -14,10 +14,9 @@ from harness.campaign.sampling import Distribution, Sampler
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node, fault_line, node_of
 from harness.scenario.files_resolved import file_beside
-from harness.scenario.generators.generators import WorldSpec
-from harness.scenario.planner_section import PlannerSpec
+from harness.scenario.generators import WorldSpec
 from harness.scenario.resolving import model_or_folder
-from harness.scenario.sections import AircraftSpec, Section, key
+from harness.scenario.sections import AircraftSpec, PlannerSpec, Section, key
 from harness.scenario.shipped import shipped_scenarios
 from harness.scenario.validation import NAME_PATTERN, KeyFault, input_error, shown
 
@@ -55,7 +54,7 @@ class Campaign(Section):
 
     schema_: Literal["wayproof/campaign/1"] = key("Format and version.", alias="schema")
     name: str = key("Names the folder.", pattern=NAME_PATTERN, max_length=100)
-    seed: int = key("Root seed; every case's seed and draws derive from it.", unit="1", ge=0, le=2**53)
+    seed: int = key("Root seed; every case's seed and draws derive from it.", ge=0, le=2**53)
     scenarios: Annotated[tuple[str, ...], Strict(False)] = key(
         "What is flown: scenario files or folders of them, from the campaign file on, or names that `wayproof "
         "list scenarios` prints. Default: none, the worlds are flown with every default.",
@@ -85,7 +84,7 @@ class Campaign(Section):
         "How the draws of one combination are spread: each for itself, or evenly over all ranges together.",
         default="independent",
     )
-    draws: int = key("Draws of every combination.", unit="1", default=1, ge=1, le=MAX_RUNS)
+    draws: int = key("Draws of every combination.", default=1, ge=1, le=MAX_RUNS)
     recordings: Literal["all", "thin", "failures", "none"] = key(
         "Of which runs a run folder is kept; thin: of all, their recordings with no more than track, plans and "
         "obstacles; failures are those that do not reach the goal.",

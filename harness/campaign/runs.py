@@ -35,7 +35,7 @@ from harness.files.strict_yaml import (
     node_of,
     replaced,
 )
-from harness.scenario.generators.generators import generated
+from harness.scenario.generators import generated
 from harness.scenario.overrides import overridden, with_key
 from harness.scenario.scenario import Scenario, packed, scenario_from, unpacked
 from harness.scenario.validation import KeyFaults, in_lines

@@ -218,7 +218,7 @@ def turbulence_of(text: str | None) -> dict[str, str] | None:
 def planner_kind(text: str) -> str:
     """The kind that --planner means: FILE.py:NAME and MODULE:NAME are imported, and known by their name then."""
     from harness.scenario.given import PLANNER
-    from harness.scenario.planner_section import SHIELDED
+    from harness.scenario.sections import SHIELDED
 
     shielded = SHIELDED if text.endswith(SHIELDED) else ""
     return _kind(text.removesuffix(SHIELDED), PLANNER, "--planner") + shielded

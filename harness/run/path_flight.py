@@ -29,7 +29,7 @@ from harness.run_files.mission.flying import Flying, Ground
 from harness.run_files.mission.route import CLIMB_SHARE, mission_route
 from harness.run_files.mission.waypoint_run import without_steps
 from harness.run_files.path_files import PathAsGiven
-from harness.scenario.guidance_keys import airframe_of
+from harness.scenario.craft import airframe_of
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario
 from harness.scenario.sections import ALTITUDES_M

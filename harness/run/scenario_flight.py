@@ -32,9 +32,9 @@ from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
-from harness.scenario.guidance_keys import airframe_of, flown_airframe, law_of
+from harness.scenario.craft import airframe_of, flown_airframe
+from harness.scenario.parts import law_of, planner_of
 from harness.scenario.performance import mission_of, performance_of, wind_mps_of
-from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.scenario.start import air_of, start_conditions
 from harness.world.ground import Ground
@@ -151,7 +151,7 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
         roll_rate_radps=guidance.roll_rate_radps,
         stall_angle_deg=frame.stall_angle_deg,
         sensor_range_m=_given(sensor.range_m),
-        no_wind=scenario.environment.wind is None and scenario.environment.gust is None,
+        no_wind=scenario.environment.wind is None,
         scan_period_s=1.0 / sensor.rate_hz,
         compute_latency_s=scenario.planner.compute_latency_s,
         horizon_m=performance.turn_radius_m + planned_m + (speed + wind) * (blind_s + performance.roll_in_s),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
@@ -17,10 +17,11 @@ from aircraft.start import profile_share
 from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.sections import (
+    MOST_SHARE,
+    MOST_SHIFT_M,
     ActuatorsSpec,
     AircraftSpec,
     DeviationSpec,
-    Section,
     UncertaintySpec,
 )
 
@@ -72,6 +73,29 @@ class Day:
     uncertainty: dict[str, float]
 
 
+def _receiver(
+    position_m: float, velocity_mps: float, heading_deg: float, airspeed_mps: float, altitude_m: float
+) -> dict[str, Any]:
+    """Navigation keys of a satellite receiver with a barometer, by the sigma of each error."""
+    return {
+        "kind": "gnss",
+        "position_sigma_m": position_m,
+        "velocity_sigma_mps": velocity_mps,
+        "heading_sigma_deg": heading_deg,
+        "airspeed_sigma_mps": airspeed_mps,
+        "altitude_sigma_m": altitude_m,
+    }
+
+
+def _sigmas(
+    mass: float, thrust: float, drag: float, lift_slope: float, controls: float, centre_of_gravity_m: float
+) -> dict[str, float]:
+    """Uncertainty keys; that of `controls` holds for elevator, aileron and rudder each."""
+    shares = {"mass": mass, "thrust": thrust, "drag": drag, "lift_slope": lift_slope}
+    surfaces = dict.fromkeys(("elevator", "aileron", "rudder"), controls)
+    return {**shares, **surfaces, "centre_of_gravity_m": centre_of_gravity_m}
+
+
 DAYS: Final = {
     "typical": Day(
         wind_mps=3.28,
@@ -81,26 +105,12 @@ DAYS: Final = {
         turbulence="light",
         vertical_gust_mps=2.3,
         vertical_gust_every_s=120.0,
-        navigation={
-            "kind": "gnss",
-            "position_sigma_m": 1.3,
-            "velocity_sigma_mps": 0.05,
-            "heading_sigma_deg": 1.0,
-            "airspeed_sigma_mps": 0.65,
-            "altitude_sigma_m": 2.1,
-        },
+        navigation=_receiver(1.3, 0.05, heading_deg=1.0, airspeed_mps=0.65, altitude_m=2.1),
         latency_s=0.12,
         servos={"lag_s": 0.03, "rate_limit_degps": 300.0, "deadband_deg": 0.0},
-        uncertainty={
-            "mass": 0.02,
-            "thrust": 0.05,
-            "drag": 0.1,
-            "lift_slope": 0.05,
-            "elevator": 0.1,
-            "aileron": 0.1,
-            "rudder": 0.1,
-            "centre_of_gravity_m": 0.002,
-        },
+        uncertainty=_sigmas(
+            mass=0.02, thrust=0.05, drag=0.1, lift_slope=0.05, controls=0.1, centre_of_gravity_m=0.002
+        ),
     ),
     "rough": Day(
         wind_mps=(8.0, 10.7),
@@ -110,31 +120,14 @@ DAYS: Final = {
         turbulence="moderate",
         vertical_gust_mps=4.6,
         vertical_gust_every_s=60.0,
-        navigation={
-            "kind": "gnss",
-            "position_sigma_m": 3.3,
-            "velocity_sigma_mps": 0.1,
-            "heading_sigma_deg": 2.0,
-            "airspeed_sigma_mps": 1.3,
-            "altitude_sigma_m": 4.2,
-        },
+        navigation=_receiver(3.3, 0.1, heading_deg=2.0, airspeed_mps=1.3, altitude_m=4.2),
         latency_s=0.22,
         servos={"lag_s": 0.06, "rate_limit_degps": 150.0, "deadband_deg": 1.0},
-        uncertainty={
-            "mass": 0.05,
-            "thrust": 0.1,
-            "drag": 0.2,
-            "lift_slope": 0.1,
-            "elevator": 0.2,
-            "aileron": 0.2,
-            "rudder": 0.2,
-            "centre_of_gravity_m": 0.004,
-        },
+        uncertainty=_sigmas(
+            mass=0.05, thrust=0.1, drag=0.2, lift_slope=0.1, controls=0.2, centre_of_gravity_m=0.004
+        ),
     ),
 }
-
-
-Part = TypeVar("Part", bound=Section)
 
 
 def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
@@ -205,7 +198,7 @@ def _air(keys: ScenarioKeys, day: Day, rng: np.random.Generator) -> Environment:
         every_s=every_s,
         start_s=round(first_s, 2),
     )
-    return _filled(air, wind=wind, turbulence=Turbulence(intensity=day.turbulence), vertical_gusts=gusts)
+    return air.filled(wind=wind, turbulence=Turbulence(intensity=day.turbulence), vertical_gusts=gusts)
 
 
 def _navigation(keys: ScenarioKeys, day: Day) -> Any:
@@ -222,10 +215,10 @@ def _navigation(keys: ScenarioKeys, day: Day) -> Any:
 
 def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float) -> UncertaintySpec | None:
     if day is None:
-        return given and _filled(given, **dict.fromkeys(UncertaintySpec.model_fields, 0.0))
+        return given and given.filled(**dict.fromkeys(UncertaintySpec.model_fields, 0.0))
     figures = dict(day.uncertainty)
     figures["centre_of_gravity_m"] = round(figures["centre_of_gravity_m"] * mass_kg ** (1.0 / 3.0), 5)
-    return _filled(given or UncertaintySpec(), **figures)
+    return (given or UncertaintySpec()).filled(**figures)
 
 
 def _deviation(
@@ -234,19 +227,13 @@ def _deviation(
     """What is drawn for one flight, on top of nothing that the scenario names itself."""
     names = list(DeviationSpec.model_fields)
     if uncertainty is None:
-        return aircraft.deviation and _filled(aircraft.deviation, **dict.fromkeys(names, 0.0))
+        return aircraft.deviation and aircraft.deviation.filled(**dict.fromkeys(names, 0.0))
     drawn = rng.standard_normal(len(names)).clip(-MOST_SIGMAS, MOST_SIGMAS).tolist()
-    values = {
-        name: round((getattr(uncertainty, name) or 0.0) * each, 6)
-        for name, each in zip(names, drawn, strict=True)
-    }
-    return _filled(aircraft.deviation or DeviationSpec(), **values)
-
-
-def _filled(section: Part, **values: Any) -> Part:
-    """A section with those of its keys filled in that the file leaves out."""
-    missing = {name: value for name, value in values.items() if getattr(section, name) is None}
-    return section.model_copy(update=missing)
+    values = {}
+    for name, each in zip(names, drawn, strict=True):
+        most = MOST_SHIFT_M if name == "centre_of_gravity_m" else MOST_SHARE
+        values[name] = min(max(round((getattr(uncertainty, name) or 0.0) * each, 6), -most), most)
+    return (aircraft.deviation or DeviationSpec()).filled(**values)
 
 
 def _stream(seed: int, number: int) -> np.random.Generator:
@@ -259,7 +246,7 @@ def told(scenario: ScenarioKeys) -> str:
     said = [_wind_told(air.wind) if air.wind and air.wind.fastest_mps else "calm"]
     if air.turbulence and air.turbulence.intensity != "none":
         said.append(f"{air.turbulence.intensity} turbulence")
-    if air.gust or air.vertical_gusts:
+    if air.vertical_gusts:
         said.append("gusts")
     latency_s = navigation.latency_s
     said.append(

@@ -23,14 +23,12 @@ STEP_M = 0.1
 class GroundSpec(Section):
     """The true height of the ground on a grid, bilinear in between; wayproof writes it from terrain files."""
 
-    corner_m: Point = key("South-western node: east, north.", unit="m")
-    spacing_m: Annotated[tuple[Spacing, Spacing], Strict(False)] = key(
-        "From node to node: east, north.", unit="m"
-    )
-    rows: int = key("Nodes from south to north.", unit="1", ge=1, le=100_000)
-    columns: int = key("Nodes from west to east.", unit="1", ge=1, le=100_000)
-    lowest_m: float = key("Height of the number 0, above mean sea level.", unit="m", ge=-12_000, le=9000)
-    step_m: float = key("Height from a number to the next.", unit="m", default=STEP_M, gt=0, le=10)
+    corner_m: Point = key("South-western node: east, north.")
+    spacing_m: Annotated[tuple[Spacing, Spacing], Strict(False)] = key("From node to node: east, north.")
+    rows: int = key("Nodes from south to north.", ge=1, le=100_000)
+    columns: int = key("Nodes from west to east.", ge=1, le=100_000)
+    lowest_m: float = key("Height of the number 0, above mean sea level.", ge=-12_000, le=9000)
+    step_m: float = key("Height from a number to the next.", STEP_M, gt=0, le=10)
     heights: str = key(
         "Heights: base64 of zlib of 16-bit little-endian numbers, row by row from the south, each the difference to "
         "its neighbour in the west; the number 65535 is a height that is not known.",
@@ -80,7 +78,7 @@ class SourceSpec(Section):
     path: str = key("The file, as the scenario named it.", min_length=1, max_length=1000)
     kind: str = key("Its kind.", min_length=1, max_length=40)
     sha256: str = key("SHA-256 of its bytes.", pattern="^[0-9a-f]{64}$")
-    polygons: int = key("How many obstacles were made of it.", unit="1", ge=0)
+    polygons: int = key("How many obstacles were made of it.", ge=0)
     notes: Annotated[tuple[Note, ...], Strict(False)] = key(
         "What was assumed or passed over. Default: nothing.", default=()
     )
@@ -94,22 +92,19 @@ Change = Annotated[tuple[Time, WindSpeed, Direction], Strict(False)]
 class Wind(Section):
     """Wind, the same everywhere at one height and time; steady unless changes are given."""
 
-    speed_mps: float = key(
-        "Wind speed; must be below 0.9 of the airspeed.", unit="m/s", default=0.0, ge=0, le=200
-    )
-    from_deg: float = key("Direction it blows from.", unit="deg", default=270.0, ge=0, le=360)
+    speed_mps: float = key("Wind speed; must be below 0.9 of the airspeed.", 0.0, ge=0, le=200)
+    from_deg: float = key("Direction it blows from.", 270.0, ge=0, le=360)
     measured_at_m: float | None = key(
         "Height over ground of these speeds; above and below, the wind has the logarithmic profile of MIL-F-8785C. "
         "Default: the wind is the same at all heights.",
-        unit="m",
-        default=None,
+        None,
         ge=1,
         le=300,
     )
     changes: Annotated[tuple[Change, ...], Strict(False)] = key(
         "Later winds: time in s, speed in m/s, direction in degrees, each; the wind goes over linearly from one to the "
         "next, and stays after the last.",
-        default=(),
+        (),
         max_length=10_000,
     )
 
@@ -129,38 +124,13 @@ class Wind(Section):
         return max(self.speed_mps, *(speed for _, speed, _ in self.changes), 0.0)
 
 
-class Gust(Section):
-    """One gust front, on top of the wind; it reaches the whole area at one time."""
-
-    shape: Literal["step", "one_minus_cosine"] = key(
-        "step: all of it at once, until its end; one_minus_cosine: speed / 2 (1 - cos(2 pi t / duration)).",
-        default="one_minus_cosine",
-    )
-    speed_mps: float = key("Speed of the gust at its strongest.", unit="m/s", gt=0, le=200)
-    from_deg: float = key("Direction it blows from.", unit="deg", default=270.0, ge=0, le=360)
-    start_s: float = key("When it begins.", unit="s", default=60.0, ge=0, le=1e7)
-    duration_s: float | None = key(
-        "How long it lasts (its length over the airspeed). Default: a step stays; the other shape needs it.",
-        unit="s",
-        default=None,
-        gt=0,
-        le=1e7,
-    )
-
-    @model_validator(mode="after")
-    def _ends_unless_a_step(self) -> Gust:
-        if self.duration_s is None and self.shape != "step":
-            raise ValueError(f"has no duration_s; a {self.shape} gust must have one")
-        return self
-
-
 class VerticalGustsSpec(Section):
     """Discrete vertical gusts on top of the wind: upwards and downwards in turn, 1 - cosine each."""
 
-    speed_mps: float = key("Speed of a gust at its strongest.", unit="m/s", gt=0, le=50)
-    duration_s: float = key("How long one lasts (its length over the airspeed).", unit="s", gt=0, le=1e4)
-    every_s: float = key("Time from the beginning of one to that of the next.", unit="s", gt=0, le=1e7)
-    start_s: float = key("When the first begins.", unit="s", default=60.0, ge=0, le=1e7)
+    speed_mps: float = key("Speed of a gust at its strongest.", gt=0, le=50)
+    duration_s: float = key("How long one lasts (its length over the airspeed).", gt=0, le=1e4)
+    every_s: float = key("Time from the beginning of one to that of the next.", gt=0, le=1e7)
+    start_s: float = key("When the first begins.", 60.0, ge=0, le=1e7)
 
     @model_validator(mode="after")
     def _one_after_the_other(self) -> VerticalGustsSpec:
@@ -176,16 +146,15 @@ class Turbulence(Section):
 
     model: Literal["tustin", "milspec"] = key(
         "Dryden gusts: Tustin's discretisation, or MIL-F-8785C as JSBSim has it; over true ground they are one.",
-        default="tustin",
+        "tustin",
     )
-    intensity: Literal["none", "light", "moderate", "severe"] = key("How strong.", default="moderate")
+    intensity: Literal["none", "light", "moderate", "severe"] = key("How strong.", "moderate")
 
 
 class Environment(Section):
     """The air."""
 
-    wind: Wind | None = key("Wind. Default: that of the conditions; calm for ideal.", default=None)
-    gust: Gust | None = key("A gust front. Default: none.", default=None)
+    wind: Wind | None = key("Wind. Default: that of the conditions; calm for ideal.", None)
     vertical_gusts: VerticalGustsSpec | None = key(
         "Vertical gusts. Default: those of the conditions; none for ideal.", default=None
     )
@@ -196,8 +165,5 @@ class Environment(Section):
     @property
     def gusts(self) -> str | None:
         """Intensity of the turbulence; None in smooth air."""
-        return (
-            None
-            if self.turbulence is None or self.turbulence.intensity == "none"
-            else self.turbulence.intensity
-        )
+        intensity = self.turbulence.intensity if self.turbulence else "none"
+        return None if intensity == "none" else intensity

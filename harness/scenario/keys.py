@@ -11,13 +11,13 @@ from aircraft.interface import STEP_RATE_HZ
 from harness.scenario.environment import Environment, GroundSpec, SourceSpec
 from harness.scenario.navigation import Navigation
 from harness.scenario.obstacles import Obstacle
-from harness.scenario.planner_section import PlannerSpec
 from harness.scenario.sections import (
-    MAX_COORDINATE_M,
     AircraftSpec,
     Area,
     GuidanceSpec,
+    Length,
     MissionSpec,
+    PlannerSpec,
     Section,
     Sensor,
     UncertaintySpec,
@@ -29,30 +29,19 @@ from harness.scenario.validation import NAME_PATTERN, KeyFault
 class TrackabilitySpec(Section):
     """What a leg of the flight may be off before it counts as not trackable."""
 
-    cross_track_m: float = key(
+    cross_track_m: Length = key(
         "Distance of the true position from the plan; what the planner keeps for navigation errors comes on top.",
-        unit="m",
         derived="a tenth of planner.clearance_m where the file gives that, else 10 m",
-        gt=0,
-        le=MAX_COORDINATE_M,
     )
-    altitude_m: float = key(
-        "Distance from mission.altitude_m.",
-        unit="m",
-        derived="10 m",
-        gt=0,
-        le=MAX_COORDINATE_M,
-    )
+    altitude_m: Length = key("Distance from mission.altitude_m.", derived="10 m")
     airspeed_mps: float = key(
         "Error of the true airspeed, averaged over 20 s.",
-        unit="m/s",
         derived="a tenth of aircraft.airspeed_mps",
         gt=0,
         le=1000,
     )
     load_factor: float = key(
         "Load factor, averaged over 1 s.",
-        unit="1",
         derived="the limit manoeuvring load factor of 14 CFR 23.337 (amendment 23-48) for the aircraft's mass, "
         "2.1 + 24000 / (weight in lb + 10000) and at most 3.8",
         gt=1,
@@ -67,8 +56,6 @@ SLOWEST_HZ: Final = 30
 """A step is then as long as the time constant of the Aerosonde's roll rate, 1/32 s; its track on 14 turns is 0.07 m
 from that with 480 steps a second."""
 
-FASTEST_HZ: Final = 1200
-
 
 class Simulation(Section):
     """How finely the flight is integrated."""
@@ -76,10 +63,9 @@ class Simulation(Section):
     rate_hz: int = key(
         f"Integration steps per simulated second, a multiple of {UPDATE_RATE_HZ}, the guidance rate; every other rate "
         "must divide it.",
-        unit="Hz",
         derived=f"{RATES_HZ[0]}, or {RATES_HZ[1]} where sensor.rate_hz does not divide {RATES_HZ[0]}",
         ge=SLOWEST_HZ,
-        le=FASTEST_HZ,
+        le=1200,
     )
 
     @field_validator("rate_hz")
@@ -103,7 +89,7 @@ class ScenarioKeys(Section):
 
     schema_: Literal["wayproof/scenario/1"] = key("Format and version.", alias="schema")
     name: str = key("Names the run folder.", pattern=NAME_PATTERN, max_length=100)
-    seed: int = key("Root seed; every random stream derives from it.", unit="1", default=1, ge=0, le=2**53)
+    seed: int = key("Root seed; every random stream derives from it.", 1, ge=0, le=2**53)
     area: Area = key("The area of operations.")
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = key(
         "Unknown to the planner until sensed.", default=()
@@ -123,11 +109,11 @@ class ScenarioKeys(Section):
     conditions: Literal["ideal", "typical", "rough"] = key(
         "What kind of day it is: fills what is left out of navigation, aircraft.actuators, environment, uncertainty. "
         "typical: an ordinary day of a small aircraft; rough: the worst on which one would fly.",
-        default="ideal",
+        "ideal",
     )
     uncertainty: UncertaintySpec | None = key(
         "By how much the flown aircraft differs from its model, 1 sigma. Default: that of the conditions.",
-        default=None,
+        None,
     )
     simulation: Simulation = key("How finely it is integrated.", default_factory=Simulation)
     environment: Environment = key("The air.", default_factory=Environment)
@@ -138,9 +124,7 @@ class ScenarioKeys(Section):
     @property
     def given(self) -> dict[str, Any]:
         """What the file has, by attribute."""
-        return {
-            name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set
-        }
+        return {name: value for name, value in self if name in self.model_fields_set}
 
     def updated(self, **sections: Any) -> ScenarioKeys:
         """The same with some sections replaced."""

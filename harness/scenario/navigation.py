@@ -8,10 +8,11 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, Strict, model_validator
 
-from harness.scenario.sections import Interval, Section, key
+from harness.scenario.sections import Interval, Section, Share, key
 from harness.scenario.validation import KeyFault
 
 MAX_ERROR_M: Final = 10_000.0
+Error = Annotated[float, Field(ge=0, le=MAX_ERROR_M)]
 Offset = Annotated[float, Field(ge=-MAX_ERROR_M, le=MAX_ERROR_M)]
 PRESET: Final = "that of the kind"
 
@@ -74,53 +75,42 @@ VISUAL_VELOCITY_SIGMA_MPS: Final = 0.1
 SIGMAS: Final = 3.0
 """The planner's margin covers so many sigma of the position error: 98.9 % of all errors in the plane are smaller."""
 
-_SENSORS: Final = {"heading_sigma_deg": COMPASS_SIGMA_DEG, "airspeed_sigma_mps": PITOT_SIGMA_MPS}
-
+_PERFECT: Final[dict[str, Any]] = {
+    "position_sigma_m": 0.0,
+    "position_correlation_s": GPS_CORRELATION_S,
+    "position_bias_m": (0.0, 0.0),
+    "velocity_sigma_mps": 0.0,
+    "heading_sigma_deg": 0.0,
+    "airspeed_sigma_mps": 0.0,
+    "altitude_sigma_m": 0.0,
+    "drift_share": 0.0,
+    "outages_s": (),
+    "latency_s": 0.0,
+}
+_GNSS: Final[dict[str, Any]] = _PERFECT | {
+    "position_sigma_m": GPS_SIGMA_M,
+    "velocity_sigma_mps": GPS_VELOCITY_SIGMA_MPS,
+    "heading_sigma_deg": COMPASS_SIGMA_DEG,
+    "airspeed_sigma_mps": PITOT_SIGMA_MPS,
+    "altitude_sigma_m": GPS_ALTITUDE_SIGMA_M,
+    "drift_share": AIR_DATA_DRIFT,
+}
 PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
-    "perfect": {
-        "position_sigma_m": 0.0,
-        "position_correlation_s": GPS_CORRELATION_S,
-        "position_bias_m": (0.0, 0.0),
-        "velocity_sigma_mps": 0.0,
-        "heading_sigma_deg": 0.0,
-        "airspeed_sigma_mps": 0.0,
-        "altitude_sigma_m": 0.0,
-        "drift_share": 0.0,
-        "outages_s": (),
-        "latency_s": 0.0,
-    },
-    "gnss": {
-        "position_sigma_m": GPS_SIGMA_M,
-        "position_correlation_s": GPS_CORRELATION_S,
-        "position_bias_m": (0.0, 0.0),
-        "velocity_sigma_mps": GPS_VELOCITY_SIGMA_MPS,
-        **_SENSORS,
-        "altitude_sigma_m": GPS_ALTITUDE_SIGMA_M,
-        "drift_share": AIR_DATA_DRIFT,
-        "outages_s": (),
-        "latency_s": 0.0,
-    },
-    "rtk": {
+    "perfect": _PERFECT,
+    "gnss": _GNSS,
+    "rtk": _GNSS
+    | {
         "position_sigma_m": RTK_SIGMA_M,
         "position_correlation_s": RTK_CORRELATION_S,
-        "position_bias_m": (0.0, 0.0),
-        "velocity_sigma_mps": GPS_VELOCITY_SIGMA_MPS,
-        **_SENSORS,
         "altitude_sigma_m": RTK_ALTITUDE_SIGMA_M,
-        "drift_share": AIR_DATA_DRIFT,
-        "outages_s": (),
-        "latency_s": 0.0,
     },
-    "dead_reckoning": {
+    "dead_reckoning": _GNSS
+    | {
         "position_sigma_m": 0.0,
-        "position_correlation_s": GPS_CORRELATION_S,
-        "position_bias_m": (0.0, 0.0),
         "velocity_sigma_mps": VISUAL_VELOCITY_SIGMA_MPS,
-        **_SENSORS,
         "altitude_sigma_m": BAROMETER_SIGMA_M,
         "drift_share": VISUAL_DRIFT,
         "outages_s": ((0.0, 1e7),),
-        "latency_s": 0.0,
     },
 }
 """What each kind fills in. `dead_reckoning` knows its start and never has a fix after it."""
@@ -130,65 +120,44 @@ class Navigation(Section):
     """What the aircraft believes of its state, beside what it is."""
 
     kind: Literal["perfect", "gnss", "rtk", "dead_reckoning"] = key(
-        "Where the other keys have their defaults from; perfect has no error at all.", default="perfect"
+        "Where the other keys have their defaults from; perfect has no error at all.", "perfect"
     )
-    position_sigma_m: float = key(
-        "1 sigma of the position error, east and north each (Gauss-Markov, of first order).",
-        unit="m",
-        derived=PRESET,
-        ge=0,
-        le=MAX_ERROR_M,
+    position_sigma_m: Error = key(
+        "1 sigma of the position error, east and north each (Gauss-Markov, of first order).", derived=PRESET
     )
     position_correlation_s: float = key(
-        "Correlation time of the position error and of the altitude error.",
-        unit="s",
-        derived=PRESET,
-        ge=1e-3,
-        le=1e7,
+        "Correlation time of the position error and of the altitude error.", derived=PRESET, ge=1e-3, le=1e7
     )
     position_bias_m: Annotated[tuple[Offset, Offset], Strict(False)] = key(
-        "Constant position error on top: east, north.", unit="m", derived=PRESET
+        "Constant position error on top: east, north.", derived=PRESET
     )
     velocity_sigma_mps: float = key(
-        "1 sigma of the error of each component of the velocity.", unit="m/s", derived=PRESET, ge=0, le=100
+        "1 sigma of the error of each component of the velocity.", derived=PRESET, ge=0, le=100
     )
-    heading_sigma_deg: float = key("1 sigma of the heading error.", unit="deg", derived=PRESET, ge=0, le=90)
+    heading_sigma_deg: float = key("1 sigma of the heading error.", derived=PRESET, ge=0, le=90)
     airspeed_sigma_mps: float = key(
-        "1 sigma of the error of the true airspeed.", unit="m/s", derived=PRESET, ge=0, le=100
+        "1 sigma of the error of the true airspeed.", derived=PRESET, ge=0, le=100
     )
-    altitude_sigma_m: float = key(
-        "1 sigma of the altitude error.", unit="m", derived=PRESET, ge=0, le=MAX_ERROR_M
-    )
-    drift_share: float = key(
-        "Without a fix the position drifts by this share of the distance flown.",
-        unit="1",
-        derived=PRESET,
-        ge=0,
-        le=1,
+    altitude_sigma_m: Error = key("1 sigma of the altitude error.", derived=PRESET)
+    drift_share: Share = key(
+        "Without a fix the position drifts by this share of the distance flown.", derived=PRESET
     )
     outages_s: Annotated[tuple[Interval, ...], Strict(False)] = key(
         "Times without a fix, from and to, one after the other; at the end the position comes back with a jump.",
-        unit="s",
         derived=PRESET,
         max_length=1000,
     )
-
     latency_s: float = key(
         "Age of the state that guidance and autopilot work with: position, velocity, attitude and airspeed.",
-        unit="s",
         derived="that of the conditions, 0 for ideal",
         ge=0,
         le=5,
     )
-
-    margin_m: float = key(
+    margin_m: Error = key(
         "What the planner keeps from obstacles beyond planner.clearance_m.",
-        unit="m",
         derived="3 sigma, the bias, what is flown in latency_s, the drift of the longest outage, or of half a turn "
         "where that is less, and what 3 sigma of the heading misplace an edge by that is one clearance away, or as far "
         "as it takes to turn aside",
-        ge=0,
-        le=MAX_ERROR_M,
     )
 
     @model_validator(mode="after")

@@ -16,8 +16,8 @@ Shift = Annotated[float, Field(ge=-1e9, le=1e9)]
 class Circle(Section):
     """A disc."""
 
-    center_m: Point = key("Centre: east, north.", unit="m")
-    radius_m: float = key("Radius.", unit="m", gt=0, le=MAX_COORDINATE_M)
+    center_m: Point = key("Centre: east, north.")
+    radius_m: float = key("Radius.", gt=0, le=MAX_COORDINATE_M)
 
 
 Ring = Annotated[tuple[Point, ...], Strict(False)]
@@ -30,13 +30,10 @@ class Polygon(Section):
     vertices_m: Annotated[tuple[Point, ...], Strict(False), FailFast()] = key(
         "Vertices in order round the shape: east, north. One that repeats the vertex before it, or the first at the "
         "end, is dropped.",
-        unit="m",
         min_length=3,
     )
     holes_m: Rings | None = key(
-        "Rings inside the shape, in either direction, within which it is free. Default: none.",
-        unit="m",
-        default=None,
+        "Rings inside the shape, in either direction, within which it is free. Default: none.", None
     )
 
     @field_validator("vertices_m")
@@ -105,54 +102,48 @@ class WorldFile(Section):
         min_length=1,
         max_length=1000,
     )
-    kind: KindName | None = key("Its kind. Default: told from the file.", default=None)
+    kind: KindName | None = key("Its kind. Default: told from the file.", None)
     vertical_clearance_m: float = key(
         "A part is an obstacle where it reaches into the band of so much below and above mission.altitude_m.",
-        unit="m",
-        default=10.0,
+        10.0,
         ge=0,
         le=10_000,
     )
     metres_per_cell: float | None = key(
         "Side of a cell of an occupancy map, or of a grid that names no place on earth. Default: as the file says, "
         "else 1 m.",
-        unit="m",
-        default=None,
+        None,
         gt=0,
         le=MAX_COORDINATE_M,
     )
     shift_m: Annotated[tuple[Shift, Shift], Strict(False)] = key(
-        "East and north, added to the metres of a file that names no place on earth.",
-        unit="m",
-        default=(0.0, 0.0),
+        "East and north, added to the metres of a file that names no place on earth.", (0.0, 0.0)
     )
     crs: str | None = key(
         "Coordinate reference system of a file that names none, as EPSG:28992. Default: as the file says.",
-        default=None,
+        None,
         min_length=1,
         max_length=200,
     )
     tolerance_m: float | None = key(
         "Notches of outlines up to so deep are filled. Default: a cell of a raster, else 0.1 m.",
-        unit="m",
-        default=None,
+        None,
         ge=0,
         le=10_000,
     )
     holes: Literal["keep", "fill", "flyable"] = key(
         "Holes of solid parts: kept, filled, or kept where a circle of the turn radius and planner.clearance_m fits.",
-        default="keep",
+        "keep",
     )
-    nodata: Literal["solid", "free"] = key("What cells of terrain without a height are.", default="solid")
-    unknown: Literal["occupied", "free"] = key("What unknown cells of an occupancy map are.", default="free")
+    nodata: Literal["solid", "free"] = key("What cells of terrain without a height are.", "solid")
+    unknown: Literal["occupied", "free"] = key("What unknown cells of an occupancy map are.", "free")
     default_height_m: float = key(
-        "Height of a building that gives neither height nor levels.", unit="m", default=6.0, ge=0, le=1000
+        "Height of a building that gives neither height nor levels.", 6.0, ge=0, le=1000
     )
     ground_m: float | None = key(
         "Height above mean sea level of flat ground, for heights above ground where no terrain is known. Default: "
         "0 below buildings; zones with limits above ground are refused.",
-        unit="m",
-        default=None,
+        None,
         ge=-1000,
         le=9000,
     )
@@ -165,25 +156,21 @@ class Obstacle(Section):
         json_schema_extra={"oneOf": [{"required": [shape]} for shape in ("circle", "polygon", "file")]}
     )
 
-    circle: Circle | None = key("Its shape, if it is round.", default=None)
-    polygon: Polygon | None = key("Its shape, if it has corners.", default=None)
-    file: WorldFile | None = key("A file: what of it is solid at the mission's altitude.", default=None)
+    circle: Circle | None = key("Its shape, if it is round.", None)
+    polygon: Polygon | None = key("Its shape, if it has corners.", None)
+    file: WorldFile | None = key("A file: what of it is solid at the mission's altitude.", None)
     velocity_mps: Velocity | None = key(
         "Moves in a straight line: east, north; as its shape says at active_s[0]. Default: it stands still.",
-        unit="m/s",
-        default=None,
+        None,
     )
     active_s: Interval | None = key(
-        "Pops up at the first time and is gone after the second. Default: there for the whole flight.",
-        unit="s",
-        default=None,
+        "Pops up at the first time and is gone after the second. Default: there for the whole flight.", None
     )
 
     heights_m: Annotated[tuple[Height, Height], Strict(False)] | None = key(
         "Bottom and top above mean sea level, for drawings; the aircraft flies at one altitude, at which it is there. "
         "Twice the same: terrain, cut at that height. Default: a column without end.",
-        unit="m",
-        default=None,
+        None,
     )
 
     @model_validator(mode="after")

@@ -10,8 +10,7 @@ import numpy as np
 
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, IN_PYTHON, InputError, Loc, Node, loc_of, node_of
-from harness.scenario.planner_section import PlannerSpec
-from harness.scenario.sections import GuidanceSpec, Section
+from harness.scenario.sections import GuidanceSpec, PlannerSpec, Section
 
 OWN_KEYS: Final[Mapping[Loc, type[Section]]] = {
     ("planner", "kind"): PlannerSpec,
@@ -27,18 +26,14 @@ def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
         InputError: one is not a key path, has no value or leads nowhere.
     """
     for name, text in overrides:
-        root = _overridden(root, name, text)
+        try:
+            loc = loc_of(name)
+        except ValueError as error:
+            raise InputError(f"command line: {error}") from error
+        if not text.strip():
+            raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
+        root = with_key(root, loc, strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE))
     return root
-
-
-def _overridden(root: Node, name: str, text: str) -> Node:
-    try:
-        loc = strict_yaml.loc_of(name)
-    except ValueError as error:
-        raise InputError(f"command line: {error}") from error
-    if not text.strip():
-        raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
-    return with_key(root, loc, strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE))
 
 
 def with_key(root: Node, loc: Loc, new: Node) -> Node:
@@ -47,18 +42,11 @@ def with_key(root: Node, loc: Loc, new: Node) -> Node:
     Raises:
         InputError: there is no such key, as far as it can be told without the scenario's types.
     """
-    if loc in OWN_KEYS:
-        root = _without_own_keys(root, str(loc[0]), OWN_KEYS[loc], new)
+    shared, section = OWN_KEYS.get(loc), root.at(loc[:1])
+    if shared and section and isinstance(section.value, dict) and section.plain().get("kind") != new.value:
+        common = {name: node for name, node in section.value.items() if name in shared.model_fields}
+        root = strict_yaml.replaced(root, loc[:1], Node(common, section.line))
     return strict_yaml.replaced(root, loc, new)
-
-
-def _without_own_keys(root: Node, name: str, shared: type[Section], kind: Node) -> Node:
-    """`root` without the keys that only the kind which a section names knows, unless that is `kind`."""
-    section = root.value.get(name) if isinstance(root.value, dict) else None
-    if section is None or not isinstance(section.value, dict) or section.plain().get("kind") == kind.value:
-        return root
-    common = {each: node for each, node in section.value.items() if each in shared.model_fields}
-    return strict_yaml.replaced(root, (name,), Node(common, section.line))
 
 
 class Given(NamedTuple):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from aircraft.start import profile_share
-from harness.scenario import guidance_keys
+from harness.scenario.craft import airframe_of
 from harness.scenario.keys import ScenarioKeys
+from harness.scenario.parts import card_of
 from harness.scenario.sections import Bounds
 from harness.scenario.validation import KeyFault
 
@@ -21,7 +22,7 @@ MAX_WIND_FRACTION: Final = 0.9
 
 
 def performance_of(scenario: ScenarioKeys) -> Performance:
-    """What the scenario's aircraft can do at its airspeed under its guidance, in its wind, gust and turbulence.
+    """What the scenario's aircraft can do at its airspeed under its guidance, in its wind and turbulence.
 
     Args:
         scenario: its airspeed and the keys of its guidance law filled in.
@@ -41,11 +42,10 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
             f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s",
         )
     try:
-        front_mps = air.gust.speed_mps if air.gust else 0.0
-        frame = guidance_keys.airframe_of(spec)
+        frame = airframe_of(spec)
         frame.check_airspeed(spec.airspeed_mps)
-        law = guidance_keys.card_of(scenario.guidance, spec)
-        return performance(frame, spec.airspeed_mps, wind_mps, air.gusts, front_mps, law)
+        law = card_of(scenario.guidance, spec)
+        return performance(frame, spec.airspeed_mps, wind_mps, air.gusts, law=law)
     except AircraftError as error:
         raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
 
@@ -81,22 +81,14 @@ def mission_with(scenario: ScenarioKeys, performance: Performance) -> Mission:
     """The same as `mission_of`, where it is known what the aircraft can do."""
     from planner.interface import Mission
 
-    margin_m = scenario.navigation.margin_m or 0.0
+    margin_m, radius_m = scenario.navigation.margin_m or 0.0, performance.turn_radius_m
+    clearance_m = max(scenario.planner.clearance_m + margin_m, LEAST_CLEARANCE * radius_m)
     return Mission(
         goal_m=scenario.mission.goal_m,
         goal_radius_m=scenario.mission.goal_radius_m,
-        bounds_m=_inset(
-            _inside(scenario.area.bounds_m, margin_m, scenario.mission.start_m, scenario.mission.goal_m),
-            performance.tracking_error_m,
-            performance.turn_radius_m,
-            scenario.mission.start_m,
-            scenario.mission.goal_m,
-        ),
-        clearance_m=max(
-            scenario.planner.clearance_m + margin_m,
-            LEAST_CLEARANCE * performance.turn_radius_m,
-        ),
-        turn_radius_m=performance.turn_radius_m,
+        bounds_m=_inset(scenario, margin_m, performance.tracking_error_m, near_m=radius_m),
+        clearance_m=clearance_m,
+        turn_radius_m=radius_m,
         speed_mps=performance.airspeed_mps,
         roll_in_s=performance.roll_in_s,
         tracking_error_m=performance.tracking_error_m,
@@ -108,24 +100,18 @@ def mission_with(scenario: ScenarioKeys, performance: Performance) -> Mission:
     )
 
 
-def _inside(bounds_m: Bounds, margin_m: float, *places_m: tuple[float, float]) -> Bounds:
-    """Bounds that are smaller by a margin on each side, but hold some places."""
-    xmin, ymin, xmax, ymax = bounds_m
-    return (
-        min(xmin + margin_m, *(east for east, _ in places_m)),
-        min(ymin + margin_m, *(north for _, north in places_m)),
-        max(xmax - margin_m, *(east for east, _ in places_m)),
-        max(ymax - margin_m, *(north for _, north in places_m)),
-    )
+def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: float) -> Bounds:
+    """The area's bounds moved in by a margin, but not past start and goal, and by the tracking error.
 
-
-def _inset(bounds_m: Bounds, by_m: float, near_m: float, *places_m: tuple[float, float]) -> Bounds:
-    """Bounds with each side moved in, but for sides that a place is nearer to than `near_m`."""
-    xmin, ymin, xmax, ymax = bounds_m
-    east, north = zip(*places_m, strict=True)
+    The latter is not kept from sides that start or goal is nearer to than `near_m`.
+    """
+    xmin, ymin, xmax, ymax = scenario.area.bounds_m
+    east, north = zip(scenario.mission.start_m, scenario.mission.goal_m, strict=True)
+    xmin, xmax = min(xmin + margin_m, *east), max(xmax - margin_m, *east)
+    ymin, ymax = min(ymin + margin_m, *north), max(ymax - margin_m, *north)
     return (
-        xmin + by_m * (min(east) - xmin >= near_m),
-        ymin + by_m * (min(north) - ymin >= near_m),
-        xmax - by_m * (xmax - max(east) >= near_m),
-        ymax - by_m * (ymax - max(north) >= near_m),
+        xmin + tracking_m * (min(east) - xmin >= near_m),
+        ymin + tracking_m * (min(north) - ymin >= near_m),
+        xmax - tracking_m * (xmax - max(east) >= near_m),
+        ymax - tracking_m * (ymax - max(north) >= near_m),
     )

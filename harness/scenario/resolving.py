@@ -9,18 +9,19 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Final
 
 from aircraft.interface import GRAVITY_MPS2
-from harness.scenario import guidance_keys, planner_keys
 from harness.scenario.checks import check_local_plane, check_start_and_goal, check_start_leads_in
 from harness.scenario.conditions import with_day, with_servos
+from harness.scenario.craft import airframe_of, limits_of
 from harness.scenario.files_resolved import plane_point
 from harness.scenario.files_resolved import resolved as files_expanded
 from harness.scenario.keys import ScenarioKeys, step_rate_hz
 from harness.scenario.navigation import planning_margin_m
+from harness.scenario.parts import is_here, resolved_guidance, resolved_planner
 from harness.scenario.performance import LEAST_CLEARANCE, mission_with, performance_of, wind_mps_of
-from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec, Section
+from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec
 from harness.scenario.start import check_level_flight
 from harness.scenario.validation import KeyFault
 from planner.geometry.margin import TOLERATED_SHARE
@@ -33,8 +34,6 @@ POUND_KG: Final = 0.45359237
 TOLERANCE_M: Final = 10.0
 """What a flight may be off in altitude, and off its path where no clearance is written (m)."""
 
-Part = TypeVar("Part", bound=Section)
-
 
 def resolve(
     keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
@@ -45,39 +44,37 @@ def resolve(
         keys: as they were read.
         folder: where the folder of an aircraft, and files of obstacles, are sought first.
         ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
-        as_flown: the keys are of a run folder, as `planner_keys.resolved` and `guidance_keys.resolved` take it.
+        as_flown: the keys are of a run folder, as `parts` takes it.
 
     Raises:
         KeyFault: keys contradict each other, or the aircraft cannot do what they ask for.
     """
     sensor = keys.sensor
-    simulation = _filled(keys.simulation, rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
+    simulation = keys.simulation.filled(rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
     mission = _ends_in_plane(keys.mission, keys.area)
     aircraft = keys.aircraft.model_copy(update={"model": model_or_folder(keys.aircraft.model, folder)})
     nominal = _nominal_airframe(aircraft)
     keys = with_servos(keys.updated(simulation=simulation, mission=mission, aircraft=aircraft), nominal)
-    aircraft = _filled(keys.aircraft, airspeed_mps=_cruise_mps(keys.aircraft))
+    aircraft = keys.aircraft.filled(airspeed_mps=_cruise_mps(keys.aircraft))
     keys = with_day(keys.updated(aircraft=aircraft), nominal)
     aircraft = _with_latency(keys.aircraft, keys.navigation.latency_s)
     keys = keys.updated(aircraft=aircraft)
-    guidance = guidance_keys.resolved(keys.guidance, aircraft, as_flown)
+    guidance = resolved_guidance(keys.guidance, aircraft, as_flown)
     scenario = keys.updated(guidance=guidance)
-    if as_flown and not guidance_keys.is_here(guidance):
+    if as_flown and not is_here(guidance):
         return scenario  # what follows from how the law tracks stands there
 
     performance = performance_of(scenario)
     radius_m, wind_mps = performance.turn_radius_m, wind_mps_of(scenario)
     (x0, y0), (x1, y1) = mission.start_m, mission.goal_m
     slowest_s = math.hypot(x1 - x0, y1 - y0) / (aircraft.airspeed_mps - wind_mps)
-    mission = _filled(
-        mission,
+    mission = mission.filled(
         course_deg=math.degrees(math.atan2(x1 - x0, y1 - y0)) % 360,
         goal_radius_m=_rounded_up(radius_m, 10),
         time_limit_s=_rounded_up(10 * slowest_s + 60, 60),
     )
-    planner = _filled(keys.planner, clearance_m=_rounded_up(radius_m, 10))
-    sensor = _filled(
-        sensor,
+    planner = keys.planner.filled(clearance_m=_rounded_up(radius_m, 10))
+    sensor = sensor.filled(
         range_m=_rounded_up(10 * radius_m, 100),
         beam_deg=sensor.field_of_view_deg / sensor.rays,
         least_width_m=max(planner.clearance_m, LEAST_CLEARANCE * radius_m),
@@ -91,9 +88,8 @@ def resolve(
         clearance_m=planner.clearance_m,
         turn_radius_m=radius_m,
     )
-    navigation = _filled(keys.navigation, margin_m=margin_m)
-    limits = _filled(
-        keys.trackability,
+    navigation = keys.navigation.filled(margin_m=margin_m)
+    limits = keys.trackability.filled(
         cross_track_m=TOLERATED_SHARE * keys.planner.clearance_m if keys.planner.clearance_m else TOLERANCE_M,
         altitude_m=TOLERANCE_M,
         airspeed_mps=0.1 * aircraft.airspeed_mps,
@@ -111,21 +107,15 @@ def resolve(
         check_start_and_goal(scenario.area, scenario.obstacles, mission, planner.clearance_m, names)
         check_start_leads_in(scenario.area, mission, _tightest_m(aircraft, wind_mps))
     told = mission_with(scenario, performance)
-    return scenario.updated(planner=planner_keys.resolved(planner, told, as_flown))
+    return scenario.updated(planner=resolved_planner(planner, told, as_flown))
 
 
 def _with_latency(aircraft: AircraftSpec, latency_s: float) -> AircraftSpec:
     """An aircraft whose autopilot is tuned for the age of the state, where there is one."""
     if not latency_s and aircraft.autopilot is None:
         return aircraft
-    autopilot = _filled(aircraft.autopilot or AutopilotSpec(), state_latency_s=latency_s)
+    autopilot = (aircraft.autopilot or AutopilotSpec()).filled(state_latency_s=latency_s)
     return aircraft.model_copy(update={"autopilot": autopilot})
-
-
-def _filled(section: Part, **defaults: float) -> Part:
-    """A section with those of its keys filled in that the file leaves out."""
-    missing = {key: value for key, value in defaults.items() if getattr(section, key) is None}
-    return section.model_copy(update=missing)
 
 
 def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
@@ -150,7 +140,9 @@ def _with_files_expanded(
 
 def model_or_folder(model: str, folder: Path | None) -> str:
     """The aircraft's name, or the absolute path of its folder: beside the scenario file, or from here."""
-    if "/" not in model and model in _aircraft_names():
+    from aircraft.airframes import aircraft_names
+
+    if "/" not in model and model in aircraft_names():
         return model
     for place in (Path() if folder is None else folder, Path()):
         try:
@@ -161,18 +153,12 @@ def model_or_folder(model: str, folder: Path | None) -> str:
     return model
 
 
-def _aircraft_names() -> tuple[str, ...]:
-    from aircraft.airframes import aircraft_names
-
-    return aircraft_names()
-
-
 def _nominal_airframe(spec: AircraftSpec) -> Airframe:
     """The airframe as its card has it, without servos of the scenario's."""
     from aircraft.airframes import AircraftError
 
     try:
-        return guidance_keys.airframe_of(spec.model_copy(update={"actuators": None, "autopilot": None}))
+        return airframe_of(spec.model_copy(update={"actuators": None, "autopilot": None}))
     except AircraftError as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
 
@@ -181,19 +167,19 @@ def _cruise_mps(spec: AircraftSpec) -> float:
     from aircraft.airframes import AircraftError
 
     try:
-        return guidance_keys.airframe_of(spec).cruise_mps
+        return airframe_of(spec).cruise_mps
     except AircraftError as error:
         raise KeyFault(("aircraft", "actuators"), str(error)) from error
 
 
 def _limit_load_factor(spec: AircraftSpec) -> float:
-    weight_lb = guidance_keys.airframe_of(spec).mass_kg / POUND_KG
+    weight_lb = airframe_of(spec).mass_kg / POUND_KG
     return min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0))
 
 
 def _tightest_m(spec: AircraftSpec, wind_mps: float) -> float:
     """Radius of the tightest turn over the ground, downwind."""
-    bank_rad = guidance_keys.limits_of(spec).bank_limit_rad
+    bank_rad = limits_of(spec).bank_limit_rad
     return (spec.airspeed_mps + wind_mps) ** 2 / (GRAVITY_MPS2 * math.tan(bank_rad))
 
 

@@ -16,10 +16,9 @@ from pydantic import ValidationError
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, Node
 from harness.files.wording import counted
-from harness.files.yaml_pieces import dump_in_pieces
-from harness.scenario import guidance_keys, planner_keys
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.overrides import Given, changed, overridden
+from harness.scenario.parts import with_own_keys
 from harness.scenario.resolving import resolve
 from harness.scenario.shipped import scenario_path
 from harness.scenario.validation import KeyFault, KeyFaults, fault_error, faults
@@ -34,11 +33,7 @@ class Scenario(ScenarioKeys):
 
     @classmethod
     def of(
-        cls,
-        keys: ScenarioKeys,
-        folder: Path | None = None,
-        ends_checked: bool = True,
-        as_flown: bool = False,
+        cls, keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
     ) -> Scenario:
         """The complete scenario of some keys, as `resolve` has it.
 
@@ -89,14 +84,13 @@ def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -
         InputError: the file cannot be read or is not a scenario; a line of its text names file, line and key.
     """
     path = scenario_path(str(path))
-    root = strict_yaml.read(path)
-    return validated(overridden(root, overrides), str(path), path.absolute().parent)
+    return validated(overridden(strict_yaml.read(path), overrides), str(path), path.absolute().parent)
 
 
 def parse_scenario(
     text: str, source: str = "scenario", as_flown: bool = False, folder: Path | None = None
 ) -> Scenario:
-    """Reads a scenario from text.
+    """Reads a scenario from YAML text.
 
     Args:
         text: YAML.
@@ -108,9 +102,7 @@ def parse_scenario(
     Raises:
         InputError: it is not a scenario.
     """
-    return validated(
-        strict_yaml.parse(text, source), source, folder, ends_checked=not as_flown, as_flown=as_flown
-    )
+    return validated(strict_yaml.parse(text, source), source, folder, not as_flown, as_flown)
 
 
 def node_of_keys(keys: Mapping[str, Any]) -> Node:
@@ -123,21 +115,13 @@ def node_of_keys(keys: Mapping[str, Any]) -> Node:
 
 
 def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-    """A scenario from keys that a command has put together, every default filled in.
-
-    Args:
-        keys: as in a file; plain values.
-        overrides: as `load_scenario` takes them.
-
-    Raises:
-        InputError: it is not a scenario; its faults name the command line.
-    """
+    """A scenario from plain keys that a command has put together; the rest is as `load_scenario` has it."""
     return validated(overridden(node_of_keys(keys), overrides), "command line")
 
 
 def dump_scenario(scenario: Scenario) -> str:
     """The YAML text of a scenario, all defaults written out; it loads back to an equal one, bit for bit."""
-    return dump_in_pieces(scenario.model_dump(by_alias=True, exclude_none=True))
+    return strict_yaml.dump(scenario.model_dump(by_alias=True, exclude_none=True))
 
 
 def packed(scenario: Scenario) -> bytes:
@@ -151,19 +135,13 @@ def unpacked(kept: bytes) -> Scenario:
 
 
 def scenario_schema() -> dict[str, Any]:
-    """JSON Schema of the format, the own keys of every known planner included."""
-    schema = ScenarioKeys.model_json_schema()
-    schema["properties"]["planner"] = planner_keys.json_schema(schema["$defs"].pop("PlannerSpec"))
-    schema["properties"]["guidance"] = guidance_keys.json_schema(schema["$defs"].pop("GuidanceSpec"))
+    """JSON Schema of the format, the own keys of every known planner and guidance law included."""
+    schema = with_own_keys(ScenarioKeys.model_json_schema())
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
 def validated(
-    root: Node,
-    source: str,
-    folder: Path | None = None,
-    ends_checked: bool = True,
-    as_flown: bool = False,
+    root: Node, source: str, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
 ) -> Scenario:
     """A scenario from what was read, every default filled in.
 
@@ -186,16 +164,10 @@ def validated(
 def scenario_from(
     plain: Any, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
 ) -> Scenario:
-    """A scenario from plain values, every default filled in.
-
-    Args:
-        plain: its keys, as YAML has them.
-        folder: as `validated` takes it.
-        ends_checked: as `validated` takes it.
-        as_flown: likewise.
+    """The same from plain values, as YAML has them.
 
     Raises:
-        KeyFaults: it is not a scenario.
+        KeyFaults: they are not a scenario.
     """
     try:
         return Scenario.of(ScenarioKeys.model_validate(plain), folder, ends_checked, as_flown)

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from aircraft.frames import LocalPlane
-from aircraft.start import Atmosphere, Gust, StartConditions, VerticalGusts
-from harness.scenario import guidance_keys
+from aircraft.start import Atmosphere, StartConditions, VerticalGusts
+from harness.scenario.craft import flown_airframe
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.validation import KeyFault
 
@@ -63,20 +63,14 @@ def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
         seed: of the turbulence.
     """
     air = scenario.environment
-    wind, front, vertical = air.wind, air.gust, air.vertical_gusts
-    gust = None
-    if front:
-        duration_s = math.inf if front.duration_s is None else front.duration_s
-        gust = Gust(front.shape, *towards(front.speed_mps, front.from_deg), front.start_s, duration_s)
+    wind, vertical = air.wind, air.vertical_gusts
+    changes = wind.changes if wind else ()
     return Atmosphere(
         *steady_wind_mps(scenario),
         turbulence=air.turbulence.model if air.turbulence and air.gusts else None,
         intensity=air.gusts,
         seed=seed,
-        gust=gust,
-        changes=tuple(
-            (time_s, *towards(speed, degrees)) for time_s, speed, degrees in (wind.changes if wind else ())
-        ),
+        changes=tuple((time_s, *towards(speed, degrees)) for time_s, speed, degrees in changes),
         measured_at_m=wind.measured_at_m if wind else None,
         vertical_gusts=VerticalGusts(**dict(vertical)) if vertical else None,
     )
@@ -104,12 +98,10 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     try:
         wind = air_of(scenario).wind_at(0.0, scenario.mission.altitude_m)
         heading_rad = start.heading_rad(Atmosphere(*wind))
-        frame = guidance_keys.flown_airframe(scenario.aircraft)
+        frame = flown_airframe(scenario.aircraft)
         slowest, fastest = frame.airspeed_range_mps
-        if (
-            NEAR_M[0] <= start.altitude_m <= NEAR_M[1]
-            and MIDDLE * slowest <= start.airspeed_mps <= fastest / MIDDLE
-        ):
+        near = NEAR_M[0] <= start.altitude_m <= NEAR_M[1]
+        if near and MIDDLE * slowest <= start.airspeed_mps <= fastest / MIDDLE:
             return
         files = frame.files
         fault = _fault(files, place, start, heading_rad)
@@ -127,16 +119,11 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     while abs(good - bad) > STEP_M:
         middle = 0.5 * (good + bad)
         good, bad = (middle, bad) if flies(middle) else (good, middle)
-    bound = "at most" if bad > good else "at least"
-    raise KeyFault(
-        ("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {bound} {_told(good, bad):g}: {fault}"
+    bound, steps = (
+        ("at most", math.floor(good / STEP_M)) if bad > good else ("at least", math.ceil(good / STEP_M))
     )
-
-
-def _told(good_m: float, bad_m: float) -> float:
-    """An altitude of level flight without its last digits, on the side away from one without."""
-    steps = good_m / STEP_M
-    return STEP_M * (math.floor(steps) if bad_m > good_m else math.ceil(steps))
+    told_m = STEP_M * steps
+    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {bound} {told_m:g}: {fault}")
 
 
 @lru_cache(maxsize=512)

@@ -26,7 +26,7 @@ from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.run.path_check import asked
 from harness.run_files.path_files import read_path
-from harness.scenario.generators.generators import GENERATORS, WorldSpec
+from harness.scenario.generators import GENERATORS, WorldSpec
 from harness.scenario.scenario import Scenario, dump_scenario, load_scenario, parse_scenario
 from tests.faults.hostile import (
     CAMPAIGN_SNIPPETS,

@@ -395,7 +395,7 @@ def line_of(begin: str) -> int:
         ("{kind: bug2,", "{kind: bug2, stepps: 3,", "planners[1].stepps: unknown key"),
         ("model: c172p,", "model: nosuch,", "aircraft[1].model: unknown aircraft 'nosuch'"),
         ("airspeed_mps: 50}", "airspeed_mps: 500}", "aircraft[1].airspeed_mps: "),
-        ("draws: 3", "worlds: [{maze: {cells: [2, 2]}, town: {}}]", "worlds[0]: has town and maze of"),
+        ("draws: 3", "worlds: [{maze: {cells: [2, 2]}, forest: {}}]", "worlds[0]: has forest and maze of"),
         ("draws: 3", "worlds: [{}]", "worlds[0]: has none of circles"),
         ("draws: 3", "worlds: [{maze: {}}, {maze: {}}]", "worlds[1]: is called maze as another"),
         (
@@ -523,7 +523,7 @@ def test_editors_find_the_campaign_schema_and_one_shipped_campaign_has_every_key
     whole = load_campaign(shipped_campaigns()["everything"]).campaign
     assert whole.model_fields_set == set(type(whole).model_fields)
     generators = {world.generator for world in whole.worlds}
-    assert len(generators) == 7
+    assert len(generators) == 4
     assert {name for each in whole.random.values() for name in each.model_fields_set} == {
         "uniform",
         "normal",

@@ -420,7 +420,7 @@ def cut_short(place: Path, unbroken: Path) -> None:
             "  environment.wind.speed_mps: [0, 5]\n  sensor.rays: [360, 720]\n",
             "campaign.grid.sensor.rays was not there, is [360, 720]",
         ),
-        ("seed: 5\n", "seed: 5\nset: {environment.gust: null}\n", "campaign.set was not there"),
+        ("seed: 5\n", "seed: 5\nset: {environment.vertical_gusts: null}\n", "campaign.set was not there"),
     ],
 )
 def test_resume_refuses_what_was_added(
@@ -452,10 +452,10 @@ def test_resume_refuses_an_added_null_and_another_order_of_keys(
         capsys.readouterr().err
     )
     (place / "campaign.yaml").write_text(
-        two.replace("{sensor.dropout: 0}", "{sensor.dropout: 0, environment.gust: null}")
+        two.replace("{sensor.dropout: 0}", "{sensor.dropout: 0, environment.vertical_gusts: null}")
     )
     assert sweep(place, "--resume") == 2
-    assert "campaign.set.environment.gust was not there, is null" in capsys.readouterr().err
+    assert "campaign.set.environment.vertical_gusts was not there, is null" in capsys.readouterr().err
 
 
 def test_resume_refuses_another_aircraft_or_planner_of_the_same_name(

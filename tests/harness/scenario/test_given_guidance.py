@@ -77,7 +77,7 @@ def test_a_flight_is_flown_under_a_given_law() -> None:
 
 
 def test_what_a_law_raises_ends_the_flight_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harness.scenario.guidance_keys.card_of", lambda *_: None)
+    monkeypatch.setattr("harness.scenario.performance.card_of", lambda *_: None)
     scenario = load_scenario("aerosonde_forest").with_({"mission.altitude_m": 120.0})
     run = fly(scenario, guidance=Failing())
     assert run.outcome == Outcome.LOST_CONTROL.value

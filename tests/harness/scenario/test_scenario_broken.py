@@ -36,7 +36,7 @@ planner:
 environment:
   wind: {speed_mps: 5, from_deg: 270}
   turbulence: {model: tustin, intensity: light}
-  gust: {shape: one_minus_cosine, speed_mps: 4, start_s: 60, duration_s: 5}
+  vertical_gusts: {speed_mps: 4, duration_s: 5, every_s: 60}
 trackability: {cross_track_m: 10, altitude_m: 15, airspeed_mps: 2, load_factor: 2.5}
 """
 
@@ -216,20 +216,11 @@ BROKEN = {
         "27: trackability.crosstrack_m",
         "did you mean cross_track_m?",
     ),
-    "gust's shape": (
-        "one_minus_cosine",
-        "ramp",
-        "26: environment.gust.shape",
-        "'step' or 'one_minus_cosine'",
-    ),
-    "gust without end": (", duration_s: 5", "", "26: environment.gust", "has no duration_s"),
-    "gust of no speed": ("speed_mps: 4", "speed_mps: 0", "26: environment.gust.speed_mps", "greater than 0"),
-    "gust before the start": ("start_s: 60", "start_s: -1", "26: environment.gust.start_s", "at least 0"),
-    "gust's misspelt key": (
+    "gusts without end": (
         "duration_s: 5",
-        "duration: 5",
-        "26: environment.gust.duration",
-        "did you mean duration_s?",
+        "duration_s: 61",
+        "26: environment.vertical_gusts.duration_s",
+        "at most",
     ),
     "key given twice": ("seed: 1", "seed: 1\nseed: 2", "4: seed", "is given twice, first in line 3"),
     "nested key given twice": ("rays: 360", "rays: 3, rays: 4", "18: sensor.rays", "is given twice"),

@@ -1,1 +1,0 @@
-"""Worlds drawn from a seed: what a campaign file names under `worlds`."""

@@ -1,0 +1,235 @@
+"""Planner and guidance law of a scenario: the own keys of their kinds, checked, and the parts for one flight."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
+
+from pydantic import ValidationError, create_model
+
+import aircraft.guidance.registry
+import planner.registry
+from aircraft.guidance.registry import GuidanceKind, guidance_kinds
+from harness.files.crash import PlannerError, sentence
+from harness.files.printing import PrintingAside
+from harness.scenario.craft import airframe_of, limits_of
+from harness.scenario.given import Kind, is_source
+from harness.scenario.sections import AircraftSpec, GuidanceSpec, PartSpec, PlannerSpec, Section, key
+from harness.scenario.validation import KeyFault, first_fault, unknown_key
+from planner.compiled import compile_all
+from planner.kernel_cache import seal
+from planner.registry import PlannerKind, planner_kinds
+from planner.shield.shield import Shield
+
+if TYPE_CHECKING:
+    from aircraft.envelope import LawCard
+    from aircraft.guidance.interface import GuidanceLaw
+    from planner.interface import Mission, Planner
+
+AnyKind = TypeVar("AnyKind", PlannerKind, GuidanceKind)
+
+
+def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False) -> PlannerSpec:
+    """The planner's section with its own keys checked and every default filled in.
+
+    Args:
+        spec: the section.
+        mission: what the planner is told.
+        as_flown: the section is of a run folder, where every default stands already; a planner that was given by a
+            source file, or in Python, need not be here.
+
+    Raises:
+        KeyFault: there is no such planner or key, or the keys contradict each other or the mission.
+    """
+    if as_flown and spec.kind not in planner_kinds():
+        return spec
+    with PrintingAside():
+        kind = _named("planner", spec, planner_kinds())
+        own = _resolved_keys("planner", spec, kind, mission)
+    chosen = getattr(spec, "shield", None) or ("none" if kind.bare is None else "loiter")
+    return spec.model_copy(update={"shield": chosen, **own})
+
+
+def resolved_guidance(spec: GuidanceSpec, aircraft: AircraftSpec, as_flown: bool = False) -> GuidanceSpec:
+    """The same of the guidance section, for an aircraft whose airspeed is filled in."""
+    if as_flown and not is_here(spec):
+        return spec
+    with PrintingAside():
+        kind = _named("guidance", spec, guidance_kinds())
+        return spec.model_copy(update=_resolved_keys("guidance", spec, kind, limits_of(aircraft)))
+
+
+def is_here(spec: GuidanceSpec) -> bool:
+    """Whether the law is; of one that was given by a source file, or in Python, another process knows nothing."""
+    return spec.kind in guidance_kinds()
+
+
+def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
+    """The planner for one flight, from a section that `resolved_planner` returned; nothing is left to compile in it.
+
+    Raises:
+        PlannerError: whatever its constructor raised; or the run of its scenario was read back, and it is not here.
+    """
+    compile_all()
+    kind = planner_kinds().get(spec.kind)
+    if kind is None:
+        raise PlannerError(f"the planner {spec.kind} is not here; give it anew (planner=, or --planner)")
+    try:
+        with PrintingAside():
+            if spec.shield == "none":
+                return (kind.bare or kind.make)(kind.config(**spec.own), mission)
+            made = kind.make(kind.config(**spec.own), mission)
+            return made if kind.bare is not None else Shield(made, mission)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise PlannerError(f"the planner {spec.kind} cannot be made: {sentence(error)}") from error
+
+
+def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
+    """The law for one flight, from a section that `resolved_guidance` returned."""
+    seal()  # before the laws' machine code is loaded
+    kind, config = _kind_and_config(spec)
+    limits = limits_of(aircraft)
+    with PrintingAside():
+        law = kind.make(config, limits)
+    if spec.follow == "path":
+        return law
+    from aircraft.guidance.waypoints import waypoint_law
+
+    return waypoint_law(law, spec.kind, config, limits, spec.acceptance_radius_m)
+
+
+def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
+    """How the law tracks with the aircraft, flown unless that is known; None: as the aircraft's survey says.
+
+    Args:
+        spec: a section that `resolved_guidance` returned.
+        aircraft: what flies, its airspeed filled in.
+
+    Raises:
+        KeyFault: the law does not track with this aircraft, or raised an exception.
+    """
+    from aircraft.airframes import AircraftError
+    from aircraft.law_cards.cards import law_card
+
+    kind, config = _kind_and_config(spec)
+    waypoints = spec.follow == "waypoints"
+    if waypoints and not getattr(config, "switch_by_passing", True):
+        return None  # it flies to points: where it is beside the legs says nothing of how it tracks
+    try:
+        with PrintingAside():
+            return law_card(
+                airframe_of(aircraft),
+                kind,
+                config,
+                aircraft.airspeed_mps,
+                waypoints=waypoints,
+                acceptance_radius_m=spec.acceptance_radius_m,
+            )
+    except AircraftError as error:
+        raise KeyFault(("guidance", "kind"), str(error)) from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise KeyFault(("guidance", "kind"), f"{spec.kind}: it cannot be flown: {sentence(error)}") from error
+
+
+def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
+    if not is_here(spec):
+        raise KeyFault(
+            ("guidance", "kind"), f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
+        )
+    kind = guidance_kinds()[spec.kind]
+    return kind, kind.config(**spec.own)
+
+
+def _named(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKind:
+    """The kind that a section names."""
+    if spec.kind in kinds:
+        return kinds[spec.kind]
+    if is_source(spec.kind):
+        name = spec.kind[:80]
+        told = f"is {name!r}, which no file may name: code is only run for --{section} {name}, or in Python"
+        raise KeyFault((section, "kind"), told)
+    raise KeyFault((section, "kind"), f"is {spec.kind[:40]!r}; must be one of {', '.join(kinds)}")
+
+
+def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[str, Any]:
+    """The own keys of a kind, checked and every default filled in from what the part may be told."""
+    known = [field.name for field in fields(kind.config)]
+    for name in spec.own:
+        if name not in known:
+            raise KeyFault((section, name), unknown_key(name, (*type(spec).model_fields, *known)))
+    try:
+        own = dict(_keys_section(kind).model_validate(spec.own))
+    except ValidationError as error:
+        fault = first_fault(error)
+        raise KeyFault((section, *fault.loc), str(fault)) from error
+    try:
+        config = kind.config(**own).resolved(told)
+    except ValueError as error:
+        other = re.match(r"(\w+)\.(\w+) (is .*)", str(error), re.DOTALL)  # as `sensor.range_m is ...`
+        if other is not None:
+            raise KeyFault((other[1], other[2]), other[3]) from error
+        raise KeyFault((section, *[name for name in known if name in str(error)][:1]), str(error)) from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise KeyFault((section, "kind"), f"cannot be configured: {sentence(error)}") from error
+    return {name: getattr(config, name) for name in known}
+
+
+_sections: dict[type[Any], type[Section]] = {}
+
+
+def _keys_section(kind: Kind) -> type[Section]:
+    """The own keys of a kind as a section."""
+    if kind.config not in _sections:
+        hints = get_type_hints(kind.config)
+        bounds = {"ge": "minimum", "le": "maximum", "gt": "above"}
+        keys: dict[str, Any] = {
+            field.name: (
+                hints[field.name],
+                key(
+                    f"{field.metadata['doc']}.",
+                    field.default,
+                    **{bound: field.metadata.get(name) for bound, name in bounds.items()},
+                ),
+            )
+            for field in fields(kind.config)
+        }
+        _sections[kind.config] = create_model(f"{kind.kind} keys", __base__=Section, **keys)
+    return _sections[kind.config]
+
+
+def with_own_keys(schema: dict[str, Any]) -> dict[str, Any]:
+    """The JSON Schema of a scenario with a choice for each kind of planner and of guidance law, its own keys in it."""
+    for name, spec, kinds in (
+        ("planner", "PlannerSpec", planner.registry.installed_kinds()),
+        ("guidance", "GuidanceSpec", aircraft.guidance.registry.installed_kinds()),
+    ):
+        shared = schema["$defs"].pop(spec)
+        choices = [_choice(shared, kind) for kind in kinds.values()]
+        schema["properties"][name] = {"description": shared["description"], "anyOf": choices}
+    return schema
+
+
+def _choice(shared: dict[str, Any], kind: Kind) -> dict[str, Any]:
+    own = _keys_section(kind).model_json_schema()["properties"]
+    for field in fields(kind.config):
+        own[field.name] |= {"unit": field.metadata["unit"]} if "unit" in field.metadata else {}
+    named = {**shared["properties"]["kind"], "const": kind.kind}
+    usual = kind.kind == named["default"]
+    if not usual:
+        del named["default"]
+    return {
+        "title": kind.kind,
+        "description": kind.summary,
+        "type": "object",
+        "additionalProperties": False,
+        "properties": {**shared["properties"], "kind": named, **own},
+        "required": [] if usual else ["kind"],
+    }
