@@ -4,38 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from harness.flight.record import FloatArray
+from harness.run_files.given_path import CutCorner
 
 
-class Corner(Protocol):
-    """A corner of a path that was to be flown by."""
+@dataclass(frozen=True)
+class Corner(CutCorner):
+    """A corner of a path that was given, or another end of a leg (`cut_m` and `half_m` 0).
 
-    @property
-    def arc_length_m(self) -> float:
-        """Where on the plan the path turns at it."""
-        ...
+    Attributes:
+        allowed_cut_m: how far off it may be passed.
+    """
 
-    @property
-    def waypoint(self) -> int:
-        """Its number in the path as given."""
-        ...
-
-    @property
-    def turn_deg(self) -> float:
-        """The turn asked for, positive to the left."""
-        ...
-
-    @property
-    def cut_m(self) -> float:
-        """How far from it the plan passes."""
-        ...
-
-    @property
-    def half_m(self) -> float:
-        """So far before and after that the plan is off the legs that meet at it."""
-        ...
+    allowed_cut_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.analysis.as_given import Corner
 from harness.flight.record import FloatArray, Track
 
 BLOCK = 256
@@ -60,25 +60,6 @@ class Deviation:
         return {"p95": float(np.percentile(every, 95)), "max": float(every.max())}
 
 
-class AllowedCut(Protocol):
-    """A corner, and how far off it may be passed."""
-
-    @property
-    def arc_length_m(self) -> float:
-        """Where on the flown path it is."""
-        ...
-
-    @property
-    def half_m(self) -> float:
-        """So far before and after that the flown path is off the corner's legs."""
-        ...
-
-    @property
-    def allowed_cut_m(self) -> float:
-        """How far off it may be passed."""
-        ...
-
-
 def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: float) -> Deviation:
     """Measures a track against a path that was given.
 
@@ -101,7 +82,7 @@ def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: flo
     return Deviation(rows, distances_m(points, line, window_m), flown[_row(line[:, 2], points[:, 2])])
 
 
-def allowed_m(track: Track, tolerance_m: float, corners: Iterable[AllowedCut]) -> FloatArray:
+def allowed_m(track: Track, tolerance_m: float, corners: Iterable[Corner]) -> FloatArray:
     """(n,) what each row may be off the path as given: the tolerance, or about a corner what that may be passed at.
 
     Args:
@@ -116,7 +97,7 @@ def allowed_m(track: Track, tolerance_m: float, corners: Iterable[AllowedCut]) -
     return np.where(np.isfinite(of_corners), of_corners, tolerance_m)
 
 
-def at_corner(track: Track, corner: AllowedCut) -> NDArray[np.bool_]:
+def at_corner(track: Track, corner: Corner) -> NDArray[np.bool_]:
     """(n,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
 
     They reach as far as the planned path is off the corner's legs and one limit more, and at least `ABOUT` limits to

@@ -16,7 +16,6 @@ from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
 
 if TYPE_CHECKING:
     from harness.flight.observer import Progress
-    from harness.run_files.run_folder import Run
 
 
 def fly(
@@ -79,29 +78,21 @@ def load_run(folder: str | Path) -> FlightResult:
     with as_input_errors():
         run = run_folder.load_run(Path(folder))
     track, plans = run_folder.tables(run.folder)
+    try:
+        metrics = Metrics.of(run.metrics)
+    except KeyError as error:
+        file = run.folder / run_folder.METRICS
+        raise InputError(
+            f"{file}: {error.args[0]}: is missing; another version of wayproof flew this run, or the file was changed"
+        ) from error
     return FlightResult(
         parse_scenario(run.scenario_yaml, str(run.folder / run_folder.SCENARIO), as_flown=True),
-        _metrics(run),
+        metrics,
         track,
         plans,
         run.folder,
         run.manifest,
     )
-
-
-def _metrics(run: Run) -> Metrics:
-    from pydantic import ValidationError
-
-    from harness.run_files import run_folder
-
-    try:
-        return Metrics.of(run.metrics)
-    except ValidationError as error:
-        first = error.errors()[0]
-        file, key = run.folder / run_folder.METRICS, ".".join(map(str, first["loc"]))
-        raise InputError(
-            f"{file}: {key}: {first['msg']}; another version of wayproof flew this run, or the file was changed"
-        ) from error
 
 
 def in_python(what: str) -> str:

@@ -55,17 +55,17 @@ class FlightResult:
     @property
     def outcome(self) -> str:
         """How it ended: a value of `harness.flight.record.Outcome`, such as `reached` or `collision`."""
-        return self.metrics.outcome
+        return str(self.metrics.outcome)
 
     @property
     def reason(self) -> str:
         """The same as a sentence."""
-        return self.metrics.reason
+        return str(self.metrics.reason)
 
     @property
     def digest(self) -> str:
         """SHA-256 of the track: the same for the same scenario, seed and versions."""
-        return self.metrics.digest
+        return str(self.metrics.digest)
 
     @property
     def recording(self) -> Path | None:

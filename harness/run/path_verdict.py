@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from aircraft.guidance.altitude import slewed
-from harness.analysis.as_given import AsGiven
+from harness.analysis.as_given import AsGiven, Corner
 from harness.analysis.breaches import CONTACT, Breach, Kept, crossings, inside_m, kept
 from harness.analysis.deviation import allowed_m, at_corner, deviation, distances_m
 from harness.analysis.flight_limits import FlightLimits
@@ -19,7 +19,7 @@ from harness.analysis.metrics import error_figures, metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.wording import tallied
 from harness.flight.record import Flight, Outcome, Track
-from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray
+from harness.run_files.given_path import SAME_PLACE_M, FloatArray
 from harness.world.world import World
 
 if TYPE_CHECKING:
@@ -47,39 +47,6 @@ MOST_TRIES: Final = 50
 """A corner limit that would be kept is looked for in so many steps; each makes it, and what it holds for, larger."""
 
 
-@dataclass(frozen=True)
-class JudgedCorner:
-    """A corner, and how far off it may be passed."""
-
-    corner: CutCorner
-    allowed_cut_m: float
-
-    @property
-    def waypoint(self) -> int:
-        """Its number."""
-        return self.corner.waypoint
-
-    @property
-    def arc_length_m(self) -> float:
-        """Where on the plan it is."""
-        return self.corner.arc_length_m
-
-    @property
-    def turn_deg(self) -> float:
-        """The turn asked for, positive to the left."""
-        return self.corner.turn_deg
-
-    @property
-    def cut_m(self) -> float:
-        """How far from it the plan passes."""
-        return self.corner.cut_m
-
-    @property
-    def half_m(self) -> float:
-        """So far before and after it the plan is off its legs."""
-        return self.corner.half_m
-
-
 def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str, Any]:
     """The content of `metrics.json` of a path that was flown.
 
@@ -92,7 +59,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         limits: what it is measured against.
     """
     track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
-    corners = [JudgedCorner(corner, check.allowed_cut_m(corner.waypoint)) for corner in way.corners]
+    corners = [Corner(**vars(each), allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
     window_m = WINDOW_RADII * limits.turn_radius_m
     found = deviation(track, way.given_m, SPACING_SHARE * tolerance, window_m)
     off_m, allowed = np.nan_to_num(found.by_row_m), allowed_m(track, tolerance, corners)
@@ -195,9 +162,7 @@ def _first(found: Sequence[Breach], verb: str) -> str:
     return f"{verb} {first.name} at {first.start_s:.0f} s, by {first.depth_m:.3g} m{more}"
 
 
-def _worst(
-    track: Track, off_m: FloatArray, allowed: FloatArray, corners: Sequence[JudgedCorner]
-) -> dict[str, Any]:
+def _worst(track: Track, off_m: FloatArray, allowed: FloatArray, corners: Sequence[Corner]) -> dict[str, Any]:
     """The place where the track is furthest off the path in relation to what is allowed there."""
     row = int((off_m / np.maximum(allowed, 1e-9)).argmax())
     near = [corner.waypoint for corner in corners if at_corner(track, corner)[row]]
@@ -212,11 +177,11 @@ def _worst(
 
 
 def _sufficient_m(
-    track: Track, off_m: FloatArray, tolerance_m: float, corners: Sequence[JudgedCorner]
+    track: Track, off_m: FloatArray, tolerance_m: float, corners: Sequence[Corner]
 ) -> float | None:
     """The limit at all corners that would have been kept, rounded up to 1 m; None where none would, or no other."""
 
-    def off_at_corners(these: Sequence[JudgedCorner]) -> float:
+    def off_at_corners(these: Sequence[Corner]) -> float:
         return max(float(_passed(corner, track, off_m, tolerance_m)["most_off_m"]) for corner in these)
 
     reached = [_passed(corner, track, off_m, tolerance_m) for corner in corners]
@@ -257,7 +222,7 @@ def _line(plan: PathPlan) -> FloatArray:
 
 
 def _as_given(
-    plan: PathPlan, track: Track, corners: list[JudgedCorner], off_m: FloatArray, allowed: FloatArray
+    plan: PathPlan, track: Track, corners: list[Corner], off_m: FloatArray, allowed: FloatArray
 ) -> AsGiven:
     """What the path asks for, row by row."""
     along = np.nan_to_num(track.arc_length_m)
@@ -280,12 +245,12 @@ def _as_given(
     )
 
 
-def _ends(plan: PathPlan, corners: list[JudgedCorner]) -> list[JudgedCorner]:
+def _ends(plan: PathPlan, corners: list[Corner]) -> list[Corner]:
     """Where legs end: at every item of a mission; at the corners of a drawn line, and where its slope changes."""
     known = {(corner.waypoint, round(corner.arc_length_m, 3)): corner for corner in corners}
     ends = [] if plan.marks else corners.copy()
     for number, along in plan.marks or plan.bends:
-        plain = JudgedCorner(CutCorner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along, 0.0), 0.0)
+        plain = Corner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along, 0.0)
         corner = known.get((number, round(along, 3)), plain)
         ends += [corner] if plan.marks or corner is plain else []
     return sorted(ends, key=lambda each: each.arc_length_m)
@@ -301,24 +266,23 @@ def _kept_figures(seen: Kept) -> dict[str, Any]:
     }
 
 
-def _passed(corner: JudgedCorner, track: Track, off_m: FloatArray, tolerance_m: float) -> dict[str, Any]:
+def _passed(corner: Corner, track: Track, off_m: FloatArray, tolerance_m: float) -> dict[str, Any]:
     """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there.
 
     What it is off counts up to where it is within the tolerance of the path again.
     """
-    place, about = corner.corner, at_corner(track, corner)
+    about = at_corner(track, corner)
     flown, most = None, 0.0
     if about.any() and bool((track.arc_length_m >= corner.arc_length_m).any()):
         last = int(np.flatnonzero(about)[-1])
         back = np.flatnonzero(off_m[last:] <= tolerance_m)
         about[last : last + int(back[0]) if len(back) else len(track)] = True
-        flown = float(np.hypot(track.east_m - place.east_m, track.north_m - place.north_m)[about].min())
+        flown = float(np.hypot(track.east_m - corner.east_m, track.north_m - corner.north_m)[about].min())
         most = max(flown, float(off_m[about].max()))
     return {
-        **dataclasses.asdict(place),
+        **vars(corner),
         "flown_cut_m": flown,
         "most_off_m": most,
-        "allowed_cut_m": corner.allowed_cut_m,
         "kept": flown is not None and most <= corner.allowed_cut_m,
     }
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 import shapely
 
+from harness.analysis.as_given import Corner
 from harness.analysis.deviation import allowed_m, deviation, distances_m
 from harness.flight.record import FloatArray, Track
 
@@ -59,16 +59,12 @@ def test_what_was_not_flown_yet_is_not_compared(make_track: MakeTrack) -> None:
     assert deviation(before, line((0.0, 0.0), (0.0, 1.0)), 1.0, 1.0).figures() == {"p95": None, "max": None}
 
 
-@dataclass(frozen=True)
-class Corner:
-    arc_length_m: float
-    half_m: float
-    allowed_cut_m: float
-
-
 def test_a_corner_may_be_cut_by_its_own_figure(make_track: MakeTrack) -> None:
     track = make_track(401)
-    corners = [Corner(250.0, 80.0, 60.0), Corner(600.0, 60.0, 20.0), Corner(750.0, 0.5, 0.5)]
+    corners = [
+        Corner(1, 0.0, along_m, 90.0, 80.0, 33.0, along_m, half_m, allowed_cut)
+        for along_m, half_m, allowed_cut in ((250.0, 80.0, 60.0), (600.0, 60.0, 20.0), (750.0, 0.5, 0.5))
+    ]
     allowed = allowed_m(track, 10.0, corners)
     assert sorted(set(allowed.tolist())) == [0.5, 10.0, 20.0, 60.0]
     # Three times the limit to each side, or as far as the arc is off the legs.

@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from harness.analysis.as_given import AsGiven
+from harness.analysis.as_given import AsGiven, Corner
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.trackability import legs
 from harness.flight.record import AcceptedPlan, FloatArray, Track
@@ -127,16 +127,11 @@ def test_thresholds_can_be_given() -> None:
     assert replace(LIMITS, max_cross_track_m=1.5).cross_track_threshold_m == 1.5
 
 
-@dataclass(frozen=True)
-class Passed:
-    arc_length_m: float
-    cut_m: float
-    waypoint: int
-    half_m: float = 30.0
-    turn_deg: float = 90.0
+def passed(arc_length_m: float, cut_m: float, waypoint: int) -> Corner:
+    return Corner(waypoint, 0.0, arc_length_m, 90.0, 100.0, cut_m, arc_length_m, 30.0, 50.0)
 
 
-def as_given(track: Track, corners: list[Passed], off_m: FloatArray, allowed_m: float) -> AsGiven:
+def as_given(track: Track, corners: list[Corner], off_m: FloatArray, allowed_m: float) -> AsGiven:
     """A level path for an aircraft that climbs at 5 m/s and sinks at 8."""
     rows = len(track)
     return AsGiven(
@@ -153,7 +148,7 @@ def as_given(track: Track, corners: list[Passed], off_m: FloatArray, allowed_m: 
 def test_corners_end_legs_and_belong_to_the_leg_that_they_end(
     make_track: Callable[..., Track], straight_plan: AcceptedPlan
 ) -> None:
-    corners = [Passed(500.0, 49.0, 1), Passed(1000.0, 51.0, 2)]
+    corners = [passed(500.0, 49.0, 1), passed(1000.0, 51.0, 2)]
     track = make_track(601)
     off = np.where(np.abs(track.arc_length_m - 1000.0) < 30.0, 51.0, 3.0)
     given = as_given(track, corners, off, 50.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
+import pickle
 import re
 import shutil
 import subprocess
@@ -19,7 +20,6 @@ import planner.registry
 import wayproof
 from aircraft.airframes import airframe
 from aircraft.guidance.registry import guidance_kinds
-from harness.api.metrics import Figures, Metrics
 from harness.cli.app import main
 from harness.flight.record import TRACK_FIELDS
 from harness.scenario.performance import mission_of
@@ -63,19 +63,16 @@ def test_in_memory_and_into_a_folder_the_same_is_flown(
     assert again.plans.equals(kept.plans)
 
 
-def test_every_figure_has_a_field_with_a_type(
-    run: wayproof.FlightResult, kept: wayproof.FlightResult
-) -> None:
-    def untyped(figures: Figures) -> list[str]:
-        found = list(figures.model_extra or {})
-        for name in type(figures).model_fields:
-            value = getattr(figures, name)
-            found += untyped(value) if isinstance(value, Figures) else []
-        return found
-
-    assert untyped(run.metrics) == untyped(run.metrics.trackability[0]) == []
-    assert run.metrics.trackability[0].cause is None
-    assert Metrics.of({**kept.metrics.to_dict(), "a_later_figure": 3}).to_dict()["a_later_figure"] == 3
+def test_figures_are_attributes_and_keys_and_cannot_be_changed(run: wayproof.FlightResult) -> None:
+    metrics = run.metrics
+    assert metrics.trackability[0].cause is None
+    assert metrics["cross_track_m"].keys() == [*metrics.to_dict()["cross_track_m"]]
+    assert metrics.navigation_error_m is None
+    assert pickle.loads(pickle.dumps(metrics)) == metrics
+    with pytest.raises(AttributeError, match="no figure 'cros_track_m'; there are outcome, "):
+        _ = metrics.cros_track_m
+    with pytest.raises(AttributeError, match="cannot be changed"):
+        metrics.outcome = "collision"
 
 
 def test_what_to_dict_gives_is_a_copy(run: wayproof.FlightResult) -> None:
@@ -105,14 +102,12 @@ def test_a_figure_that_a_run_lacks_is_told(kept: wayproof.FlightResult, tmp_path
     folder = tmp_path / "run"
     shutil.copytree(kept.folder, folder)
     metrics = json.loads((folder / "metrics.json").read_text())
-    del metrics["bank_saturation_fraction"]
+    del metrics["trackable"]
     (folder / "metrics.json").write_text(json.dumps(metrics))
     manifest = json.loads((folder / "manifest.json").read_text())
     del manifest["sha256"]["metrics.json"]
     (folder / "manifest.json").write_text(json.dumps(manifest))
-    said = re.escape(
-        f"{folder / 'metrics.json'}: bank_saturation_fraction: Field required; another version of"
-    )
+    said = re.escape(f"{folder / 'metrics.json'}: trackable: is missing; another version of")
     with pytest.raises(wayproof.InputError, match=said):
         wayproof.load_run(folder)
 
