@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.analysis.flight_limits import FlightLimits
-from harness.analysis.planned import along_plan
+from harness.analysis.smoothness import tangent_of
 from harness.flight.record import AcceptedPlan, Flight, FloatArray, Track
 
 SLACK_S: Final = 1.0
@@ -94,8 +94,8 @@ def contradictions_s(track: Track, plans: Sequence[AcceptedPlan]) -> list[float]
 
 def _direction(plan: AcceptedPlan, arc_length_m: float) -> float:
     """Direction of a plan at a station, counter-clockwise from east."""
-    _, _, direction = along_plan(plan, np.array([arc_length_m]), 1.0)
-    return float(direction[0])
+    east, north = tangent_of(plan, arc_length_m)
+    return math.atan2(north, east)
 
 
 def _ended(flight: Flight, limits: FlightLimits) -> Finding | None:

@@ -95,7 +95,6 @@ def row_of(
     *,
     optimum_m: float | None,
     turn_radius_m: float,
-    tightest_1pm: float,
     kinematic: bool,
     guidance: str = "",
 ) -> Row:
@@ -107,7 +106,6 @@ def row_of(
         metrics: content of `metrics.json`.
         optimum_m: the clairvoyant optimum; None where there is none.
         turn_radius_m: smallest radius of the aircraft.
-        tightest_1pm: largest planned curvature.
         kinematic: a point flew, which tracks anything.
         guidance: the law, where several are compared.
     """
@@ -117,7 +115,7 @@ def row_of(
         "optimum_m": optimum_m,
         "ratio": length / optimum_m if reached and optimum_m else None,
         "turn_radius_m": turn_radius_m,
-        "tightest_turn": tightest_1pm * turn_radius_m,
+        "tightest_turn": metrics["smoothness"]["planned"]["max_curvature_1pm"] * turn_radius_m,
         "tightest_flown_turn": metrics["smoothness"]["flown"]["max_curvature_1pm"] * turn_radius_m,
     }
     if kinematic:

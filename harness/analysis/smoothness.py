@@ -11,12 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from planner.geometry.curves import along
+
+if TYPE_CHECKING:
+    from harness.run_files.run_tables import PlanRow
 
 COURSE_WINDOW_S = 1.0
 """Time over which the curvature rate is taken. The flown curvature is averaged over an odd number of rows' intervals,
@@ -134,7 +137,7 @@ def flown_lengths(track: Track) -> FloatArray:
     return np.hypot(np.diff(track.east_m), np.diff(track.north_m))
 
 
-def planned_profile(track: Track, plans: Sequence[AcceptedPlan], window_m: float) -> Profile:
+def planned_profile(track: Track, plans: Sequence[AcceptedPlan | PlanRow], window_m: float) -> Profile:
     """Curvature profile of what was planned and in effect, plan after plan.
 
     Of every plan, the part between the stations at which it was taken up and replaced counts. A corner, where
@@ -149,16 +152,16 @@ def planned_profile(track: Track, plans: Sequence[AcceptedPlan], window_m: float
     pieces: list[tuple[float, float]] = []
     left: tuple[float, float] | None = None
     for index, start, end in stations_in_effect(track):
-        taken_up = _tangent(plans[index], start)
+        taken_up = tangent_of(plans[index], start)
         if left is not None:
             pieces += _corner(left, taken_up, window_m)
         pieces += _stretch(plans[index], start, end, window_m)
-        left = _tangent(plans[index], end)
+        left = tangent_of(plans[index], end)
     length, curvature = np.array([each for each in pieces if each[0] > 0.0]).reshape(-1, 2).T
     return Profile(length, curvature)
 
 
-def turn_onto_first_plan_1pm(track: Track, plans: Sequence[AcceptedPlan], window_m: float) -> float:
+def turn_onto_first_plan_1pm(track: Track, plans: Sequence[AcceptedPlan | PlanRow], window_m: float) -> float:
     """Curvature of the corner from the course of the aircraft onto the first plan, where it takes that up.
 
     Args:
@@ -170,7 +173,7 @@ def turn_onto_first_plan_1pm(track: Track, plans: Sequence[AcceptedPlan], window
     if not len(flown) or track.plan_index[flown[0]] != 0 or track.arc_length_m[flown[0]] > window_m:
         return 0.0
     course = math.radians(float(track.course_deg[flown[0]]))
-    onto = _tangent(plans[0], float(track.arc_length_m[flown[0]]))
+    onto = tangent_of(plans[0], float(track.arc_length_m[flown[0]]))
     return sum(abs(each[1]) for each in _corner((math.sin(course), math.cos(course)), onto, window_m))
 
 
@@ -220,7 +223,7 @@ def stations_in_effect(track: Track) -> list[tuple[int, float, float]]:
 
 
 def _stretch(
-    accepted: AcceptedPlan, start_m: float, end_m: float, window_m: float
+    accepted: AcceptedPlan | PlanRow, start_m: float, end_m: float, window_m: float
 ) -> list[tuple[float, float]]:
     """Length and curvature of pieces of a plan between two stations; beyond its end a line, or the circle again."""
     pieces: list[tuple[float, float]] = []
@@ -235,7 +238,7 @@ def _stretch(
     return pieces
 
 
-def _tangent(accepted: AcceptedPlan, arc_length_m: float) -> tuple[float, float]:
+def tangent_of(accepted: AcceptedPlan | PlanRow, arc_length_m: float) -> tuple[float, float]:
     """Unit tangent of a plan at a station; beyond its end that of the line, or the loiter circle, there."""
     *before, last = accepted.segments.tolist()
     away = max(arc_length_m, 0.0)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.analysis.metric import number
-from harness.analysis.planned import PlannedRows, planned_rows
 from harness.analysis.rows import Row, row_of
 from harness.files.errors import RunFolderError
 from harness.files.whole_file import replace_bytes
@@ -37,12 +36,10 @@ class ReportedFlight:
     Attributes:
         row: its figures.
         run: what was flown; None if the software failed.
-        planned: the plans row by row of the track; None if the software failed.
     """
 
     row: Row
     run: Run | None = None
-    planned: PlannedRows | None = None
 
 
 def entry(
@@ -57,18 +54,16 @@ def entry(
         kinematic: a point flew instead of the aircraft.
         guidance: the law, where several are compared.
     """
-    planned = planned_rows(run.track, run.plans)
     row = row_of(
         scenario.name,
         GIVEN if "check" in run.metrics else scenario.planner.label,
         run.metrics,
         optimum_m=optimum.length_m,
         turn_radius_m=_turn_radius_m(scenario, run),
-        tightest_1pm=planned.tightest_1pm,
         kinematic=kinematic,
         guidance=guidance,
     )
-    return ReportedFlight(row, run, planned)
+    return ReportedFlight(row, run)
 
 
 def optimum_of(scenario: Scenario) -> Optimum:
@@ -163,10 +158,9 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
 
 def _enlarged(scene: FigureScene, drawn: DrawnRun) -> str:
     """What the figure of a planner enlarges, as the end of a sentence."""
-    miss = "where it came nearest to an obstacle" if drawn.nearest(scene.clearance_m) is not None else ""
-    turn = "its tightest planned turn" if drawn.planned.tightest is not None else ""
-    enlarged = " and ".join(filter(None, (miss, turn)))
-    return f"; enlarged: {enlarged}" if enlarged else ""
+    return (
+        "" if drawn.nearest(scene.clearance_m) is None else "; enlarged: where it came nearest to an obstacle"
+    )
 
 
 PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
@@ -224,9 +218,9 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
 def _drawn(flight: ReportedFlight) -> DrawnRun | None:
     from harness.report.figures import DrawnRun
 
-    if flight.run is None or flight.planned is None:
+    if flight.run is None:
         return None
-    return DrawnRun(flight.row.label, flight.row.outcome, flight.run.track, flight.planned)
+    return DrawnRun(flight.row.label, flight.row.outcome, flight.run.track, flight.run.plans)
 
 
 def _picture(stem: Path, figure: Any, caption: str) -> Picture:

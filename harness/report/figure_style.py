@@ -36,6 +36,9 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
     "path.simplify": True,
 }
+BEHIND_TEXT: dict[str, Any] = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0}
+"""Box behind text that lies on a map."""
+
 WIDTH_IN = 4.8
 """Narrow, so that the letters stay legible on a phone and in a column of a paper."""
 

@@ -17,27 +17,23 @@ from matplotlib.lines import Line2D
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 
-from harness.analysis.planned import PlannedRows
-from harness.analysis.smoothness import flown_lengths, flown_profile
-from harness.report.figure_style import DASHES, WIDTH_IN, colour, round_length_m, styled
+from harness.analysis.smoothness import Profile, flown_lengths, flown_profile, planned_profile, window_m
+from harness.report.figure_style import BEHIND_TEXT, DASHES, WIDTH_IN, colour, round_length_m, styled
 from harness.world.obstacle import Circle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from harness.flight.record import FloatArray, Track
+    from harness.flight.record import AcceptedPlan, FloatArray, Track
+    from harness.run_files.run_tables import PlanRow
     from harness.world.obstacle import Obstacle
 
 SOLID: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}
 CHANGING = SOLID | {"ls": "--"}
 """Obstacles that stand for the whole flight, and others where they are at first."""
 
-TURN: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 9, "zorder": 8}
 NEAREST: dict[str, Any] = {"marker": "s", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 7, "zorder": 8}
-"""Marks in the colour of a flight: its tightest planned turn; where it was nearest to an obstacle, and too near."""
-
-BEHIND_TEXT: dict[str, Any] = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0}
-"""Box behind text that lies on a map."""
+"""Mark, in the colour of a flight, of where it was nearest to an obstacle, and too near."""
 
 LEGEND_ROW_IN = 0.19
 TALLEST_MAP_IN = 6.0
@@ -55,13 +51,13 @@ class DrawnRun:
         planner: its kind.
         outcome: how it ended.
         track: what was flown.
-        planned: the plans row by row.
+        plans: the plan of rows with `plan_index` i is `plans[i]`.
     """
 
     planner: str
     outcome: str
     track: Track
-    planned: PlannedRows
+    plans: Sequence[AcceptedPlan | PlanRow]
 
     def nearest(self, clearance_m: float) -> int | None:
         """The row at which it was nearest to an obstacle, or hit it; None if never below the wanted clearance.
@@ -133,12 +129,12 @@ def profiles(scene: FigureScene, runs: Numbered) -> Figure:
         for place, (index, run) in enumerate(runs):
             bend, cross = strips[2 * place], strips[2 * place + 1]
             distance = distance_m(run.track) / 1e3
-            planned = run.planned.curvature_1pm * scene.turn_radius_m
-            flown = flown_curvature(run.track) * scene.turn_radius_m
-            most = float(np.nanmax(np.abs(planned), initial=0.0))
-            bend.plot(*_extremes(distance, planned), color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
-            bend.plot(*_extremes(distance, flown), color=colour(index), lw=0.9, label="flown")
-            turn_limits(bend, flown)
+            planned = _steps(planned_profile(run.track, run.plans, window_m(run.track)), scene.turn_radius_m)
+            flown = _steps(flown_profile(run.track), scene.turn_radius_m)
+            most = float(np.abs(planned[1]).max(initial=0.0))
+            bend.plot(*_extremes(*planned), color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
+            bend.plot(*_extremes(*flown), color=colour(index), lw=0.9, label="flown")
+            _limit_turns(bend, flown[1])
             bend.set_ylabel("curvature · R")
             bend.set_title(run.planner, loc="left", color=colour(index))
             bend.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, borderpad=0)
@@ -249,10 +245,6 @@ def draw_flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes
     (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
     if run.outcome != "reached":
         axes.plot(*points[-1] / 1e3, "X", color=colour(index), ms=7, mec="white", mew=0.6, zorder=7)
-    row = run.planned.tightest
-    if row is not None:
-        place = run.planned.east_m[row] / 1e3, run.planned.north_m[row] / 1e3
-        axes.plot(*place, ls="", **TURN | {"mec": colour(index)})
     nearest = run.nearest(scene.clearance_m)
     if nearest is not None:
         place = run.track.east_m[nearest] / 1e3, run.track.north_m[nearest] / 1e3
@@ -269,8 +261,6 @@ def legend_marks(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
         marks.append(
             Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")
         )
-    if any(run.planned.tightest is not None for run in runs):
-        marks.append(Line2D([], [], ls="", label="tightest planned turn", **TURN))
     if any(run.nearest(scene.clearance_m) is not None for run in runs):
         marks.append(Line2D([], [], ls="", label="nearest to an obstacle", **NEAREST))
     return marks
@@ -287,7 +277,7 @@ def thinned(points: FloatArray, scene: FigureScene) -> FloatArray:
     return drawn
 
 
-def turn_limits(axes: Axes, flown: FloatArray) -> None:
+def _limit_turns(axes: Axes, flown: FloatArray) -> None:
     """The aircraft's turn limit, and a scale on which the flown curve can be read; corners may leave it."""
     for limit in (-1.0, 1.0):
         axes.axhline(limit, color="0.35", lw=0.7, ls="--")
@@ -301,10 +291,11 @@ def distance_m(track: Track) -> FloatArray:
     return np.append(0.0, np.cumsum(flown_lengths(track)))
 
 
-def flown_curvature(track: Track) -> FloatArray:
-    """(n,) curvature flown from each row to the next."""
-    pieces = flown_profile(track).curvature_1pm
-    return np.append(pieces, pieces[-1:]) if len(pieces) else np.zeros(len(track))
+def _steps(profile: Profile, radius_m: float) -> tuple[FloatArray, FloatArray]:
+    """A curvature profile as a curve: distance along it, km, and curvature times a radius."""
+    ends = np.cumsum(profile.length_m)
+    along = np.column_stack((ends - profile.length_m, ends)).ravel() / 1e3
+    return along, radius_m * np.repeat(profile.curvature_1pm, 2)
 
 
 def _extremes(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -101,7 +101,6 @@ def run_html(
     legs: Sequence[Mapping[str, Any]],
     checked: Mapping[str, Any] | None,
     *,
-    moments: Mapping[str, float],
     judged: Sequence[JudgedBy],
     remarks: Sequence[Remark],
     aircraft: str,
@@ -117,7 +116,6 @@ def run_html(
         chapter: with one row, and the figures of the path and of its profiles.
         legs: `trackability` of `metrics.json`.
         checked: `metrics.json` of a path that was given; None where a planner made the path.
-        moments: when figures came about, by `Metric.short` (`harness.analysis.moments`).
         judged: what else than the distance from the path legs were judged by.
         remarks: what is said before the figures.
         aircraft: its name.
@@ -138,7 +136,6 @@ def run_html(
         findings={cause: FINDINGS[cause] for cause in FINDINGS if cause in {leg["cause"] for leg in lost}},
         exceeded=[each for each in judged if any(map(each.exceeded, lost))],
         checked=checked,
-        moments=moments,
         remarks=remarks,
         aircraft=aircraft,
         scenario_yaml=scenario_yaml,

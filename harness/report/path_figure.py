@@ -11,40 +11,26 @@ from matplotlib import patches
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from harness.report.figure_style import colour, round_length_m, styled
+from harness.report.figure_style import colour, styled
 from harness.report.figures import LEGEND_ROW_IN, DrawnRun, FigureScene, draw_map, map_height_in, thinned
-from harness.report.planner_figure import CLOSE_UP_IN
+from harness.report.planner_figure import CLOSE_UP_IN, close_up
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from harness.flight.record import FloatArray
 
+RED, GREEN = "#A8201A", "#009E73"
 GIVEN: dict[str, Any] = {"color": "0.7", "lw": 5.0, "solid_joinstyle": "miter", "zorder": 3.5}
-KEPT: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": "#009E73", "mew": 1.4, "ms": 6.5, "zorder": 8}
-CUT: dict[str, Any] = {"marker": "X", "color": "#A8201A", "mec": "white", "mew": 0.6, "ms": 9, "zorder": 8}
-TOUCHED: dict[str, Any] = {
-    "marker": "*",
-    "color": "#A8201A",
-    "mec": "white",
-    "mew": 0.6,
-    "ms": 13,
-    "zorder": 9,
-}
-CROSSED: dict[str, Any] = {
-    "marker": "^",
-    "color": "#A8201A",
-    "mec": "white",
-    "mew": 0.6,
-    "ms": 9,
-    "zorder": 9,
-}
+KEPT: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": GREEN, "mew": 1.4, "ms": 6.5, "zorder": 8}
+CUT: dict[str, Any] = {"marker": "X", "color": RED, "mec": "white", "mew": 0.6, "ms": 9, "zorder": 8}
+TOUCHED, CROSSED = CUT | {"marker": "*", "ms": 13, "zorder": 9}, CUT | {"marker": "^", "zorder": 9}
 FENCES: Mapping[str, dict[str, Any]] = {
-    "exclusion": {"ec": "#A8201A", "fc": "#A8201A22", "lw": 1.0, "ls": "--"},
-    "inclusion": {"ec": "#009E73", "fc": "none", "lw": 1.2, "ls": "--"},
+    "exclusion": {"ec": RED, "fc": f"{RED}22", "lw": 1.0, "ls": "--"},
+    "inclusion": {"ec": GREEN, "fc": "none", "lw": 1.2, "ls": "--"},
 }
 POINT: dict[str, Any] = {"marker": "o", "color": "0.25", "ms": 2.5, "zorder": 6}
-WORST: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "#A8201A", "ms": 9, "zorder": 8}
+WORST: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": RED, "ms": 9, "zorder": 8}
 WORST_SHOWN = 3.0
 """The enlargement of the worst place reaches so many times what it is off, or what is allowed, to each side."""
 
@@ -105,18 +91,9 @@ def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[s
     middle = np.array((worst["east_m"], worst["north_m"]))
     half_m = WORST_SHOWN * max(worst["off_m"], worst["allowed_m"])
     axes.plot(*given_m.T / 1e3, **GIVEN)
-    axes.plot(run.track.east_m / 1e3, run.track.north_m / 1e3, color=colour(0), lw=1.5, zorder=5)
+    flown = np.column_stack((run.track.east_m, run.track.north_m))
+    close_up(axes, [(flown, colour(0), 1.5, "-")], middle, (2 * half_m, half_m))
     axes.plot(*middle / 1e3, **WORST)
-    (east, north), half_km = middle / 1e3, half_m / 1e3
-    axes.set(
-        xlim=(east - 2 * half_km, east + 2 * half_km), ylim=(north - half_km, north + half_km), aspect="equal"
-    )
-    axes.set_xticks([])
-    axes.set_yticks([])
-    bar_km = round_length_m(half_m) / 1e3
-    left, low = east - 1.9 * half_km, north - 0.88 * half_km
-    axes.plot([left, left + bar_km], [low, low], color="black", lw=2, solid_capstyle="butt")
-    axes.annotate(f"{1e3 * bar_km:g} m", (left, low), (0, 4), textcoords="offset points", fontsize=8)
     axes.set_title(
         f"worst place: {worst['off_m']:.3g} m off at {worst['time_s']:.0f} s, {worst['allowed_m']:.3g} m allowed"
     )

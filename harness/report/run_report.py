@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from harness.analysis.moments import moments
 from harness.analysis.rows import escaped, to_csv, to_markdown
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
@@ -47,16 +46,10 @@ def _written(run: Run, folder: Path) -> Path:
     _, *arguments = shlex.split(line)
     command = shlex.join(["wayproof", *_found_again(arguments, folder)])
     versions = {name: version for name, version in manifest["versions"].items() if version}
-    when = dict(
-        moments(run.track, scenario.planner.clearance_m or 0.0, run.metrics["bank_saturation_fraction"] > 0.0)
-    )
-    if "check" in run.metrics:
-        when.pop("tse max", None)  # there it is the distance from the path as given
     text = run_html(
         run_chapter(scenario, flight, optimum),
         run.metrics["trackability"],
         run.metrics if "check" in run.metrics else None,
-        moments=when,
         judged=_judged_by(scenario),
         remarks=[Remark(each["kind"], each["text"]) for each in run.metrics.get("findings", ())]
         + remarks(

@@ -21,7 +21,6 @@ import numpy as np
 import pytest
 
 from harness.analysis.metric import number
-from harness.analysis.planned import PlannedRows, planned_rows
 from harness.analysis.rows import Row, row_of, to_csv, to_markdown
 from harness.cli.app import main
 from harness.cli.compare import print_comparison
@@ -31,8 +30,6 @@ from harness.report.page import Chapter, report_html
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.world.obstacle import Circle, Obstacle
-from planner.interface import Path as PlanPath
-from planner.interface import Plan, PlanStatus
 from tests.page import shown
 
 ROOT = Path(__file__).parents[3]
@@ -189,12 +186,12 @@ def test_there_is_no_ratio_of_a_flight_that_did_not_arrive(flown: Path) -> None:
         {**said, "outcome": "timeout"},
         optimum_m=OPTIMUM_M,
         turn_radius_m=100.0,
-        tightest_1pm=0.02,
         kinematic=False,
     )
     assert row.ratio is None
     assert row.flown_length_m == said["flown_length_m"]
-    assert row.tightest_turn == pytest.approx(2.0)
+    tightest_1pm = said["smoothness"]["planned"]["max_curvature_1pm"]
+    assert row.tightest_turn == pytest.approx(100.0 * tightest_1pm)
 
 
 @pytest.mark.flights
@@ -508,57 +505,6 @@ MakeTrack = Callable[..., Track]
 MakePlan = Callable[..., AcceptedPlan]
 
 
-def test_planned_rows_follow_line_corner_arc_and_end(make_track: MakeTrack, make_plan: MakePlan) -> None:
-    east_then_left = [(0.0, 0.0, 0.0, 1.0, 0.0, 100.0), (0.0, 100.0, 1.0, 0.0, 0.01, 50.0 * math.pi)]
-    track = make_track(160)
-    planned = planned_rows(track, [make_plan(east_then_left)])
-    before, after = track.arc_length_m < 100.0, track.arc_length_m > 100.0 + 50.0 * math.pi
-    corner = (track.arc_length_m >= 100.0) & (track.arc_length_m < 125.0)
-    assert planned.curvature_1pm[before] == pytest.approx(0.0)
-    # A right turn of 90 degrees within one second of flight, on top of the arc that begins there.
-    assert planned.curvature_1pm[corner] == pytest.approx(-math.pi / 2 / 25.0 + 0.01)
-    assert planned.curvature_1pm[~before & ~corner & ~after] == pytest.approx(0.01)
-    assert planned.curvature_1pm[after] == pytest.approx(0.0)
-    # The quarter of a circle ends northward at (100, 200); beyond it goes straight on.
-    beyond = track.arc_length_m[after] - 100.0 - 50.0 * math.pi
-    assert planned.east_m[after] == pytest.approx(100.0)
-    assert planned.north_m[after] == pytest.approx(200.0 + beyond)
-    assert planned.tightest is not None
-    assert corner[planned.tightest]
-    assert planned.tightest_1pm == pytest.approx(math.pi / 2 / 25.0 - 0.01)
-
-
-def test_planned_rows_go_round_a_loiter(make_track: MakeTrack) -> None:
-    circle = np.array([[100.0, 0.0, 0.0, 1.0, 0.01, math.tau * 100.0]])
-    plan = Plan(PlanStatus.FOUND, "holds", circle[:, :2], PlanPath(circle, loiter=True))
-    planned = planned_rows(make_track(600), [AcceptedPlan(0, 0.0, 1.0, plan)])
-    assert np.hypot(planned.east_m, planned.north_m) == pytest.approx(100.0)
-    assert planned.curvature_1pm == pytest.approx(0.01)
-
-
-def test_the_turn_onto_a_plan_that_takes_effect_counts(make_track: MakeTrack, make_plan: MakePlan) -> None:
-    north, east = [(0.0, 0.0, 0.0, 1.0, 0.0, 900.0)], [(0.0, 100.0, 1.0, 0.0, 0.0, 900.0)]
-    index = np.repeat((0, 1), 40)
-    station = np.concatenate((2.5 * np.arange(40), 2.5 * np.arange(40)))
-    planned = planned_rows(
-        make_track(80, plan_index=index, arc_length_m=station), [make_plan(north), make_plan(east, index=1)]
-    )
-    assert planned.curvature_1pm[:40] == pytest.approx(0.0)
-    assert planned.curvature_1pm[40:50] == pytest.approx(-math.pi / 2 / 25.0)
-    assert planned.curvature_1pm[50:] == pytest.approx(0.0)
-
-
-def test_before_the_first_plan_nothing_is_planned(make_track: MakeTrack) -> None:
-    planned = planned_rows(make_track(5, plan_index=-1, arc_length_m=math.nan), [])
-    assert np.isnan(planned.curvature_1pm).all()
-    assert (planned.tightest, planned.tightest_1pm) == (None, 0.0)
-
-
-def test_of_equal_turns_the_longest_is_the_tightest() -> None:
-    bend = np.array([0.1, 0.0, -0.1, -0.1, -0.1, 0.0, 0.1, 0.1])
-    assert PlannedRows(0 * bend, 0 * bend, bend).tightest == 3
-
-
 @pytest.fixture
 def drawn(
     make_circle: Callable[..., Track], circle_plan: AcceptedPlan
@@ -569,12 +515,10 @@ def drawn(
         name="a_world", bounds_m=(-1000.0, -1000.0, 5000.0, 5000.0), obstacles=(obstacle,), start_m=(500.0, 0.0),
         goal_m=(4000.0, 4500.0), goal_radius_m=60.0, clearance_m=50.0, turn_radius_m=100.0, optimum_m=np.zeros((0, 2)),
     )  # fmt: skip
-    return scene, figures.DrawnRun("round", "timeout", track, planned_rows(track, [circle_plan]))
+    return scene, figures.DrawnRun("round", "timeout", track, [circle_plan])
 
 
-def test_the_map_shows_the_track_and_the_tightest_turn(
-    drawn: tuple[figures.FigureScene, figures.DrawnRun],
-) -> None:
+def test_the_map_shows_the_track(drawn: tuple[figures.FigureScene, figures.DrawnRun]) -> None:
     scene, run = drawn
     (axes,) = figures.overview(scene, [(2, run)]).axes
     lines = {str(line.get_label()): line for line in axes.get_lines()}
@@ -584,11 +528,19 @@ def test_the_map_shows_the_track_and_the_tightest_turn(
     assert np.hypot(*flown.T) == pytest.approx(0.5, abs=2e-3)
     assert lines["round"].get_color() == figure_style.COLOURS[2]
     assert "clairvoyant optimum" not in lines
-    row = run.planned.tightest
-    assert row is not None
-    tightest = (run.planned.east_m[row] / 1e3, run.planned.north_m[row] / 1e3)
-    places = [np.asarray(line.get_xydata()) for line in axes.get_lines()]
-    assert any(np.allclose(place, tightest) for place in places if place.shape == (1, 2))
+
+
+def test_the_profile_shows_the_curvature_of_plan_and_track(
+    drawn: tuple[figures.FigureScene, figures.DrawnRun],
+) -> None:
+    """A circle of 500 m and a turn radius of 100 m: 0.2 all along."""
+    scene, run = drawn
+    planned, flown = (
+        np.asarray(line.get_xydata()) for line in figures.profiles(scene, [(0, run)]).axes[0].get_lines()[:2]
+    )
+    assert planned[:, 1] == pytest.approx(0.2, abs=1e-6)
+    assert flown[:, 1] == pytest.approx(0.2, abs=2e-3)
+    assert (planned[0, 0], flown[-1, 0]) == pytest.approx((0.0, 1.5), abs=0.01)
 
 
 @pytest.mark.parametrize("changes", [False, True])
@@ -604,7 +556,6 @@ def test_the_legend_explains_every_mark_that_is_there_and_no_other(
         told = {text.get_text() for text in legend.get_texts()}
         assert ("moves, or stands for a time" in told) is changes
         assert ("ended, not at G" in told) is (outcome == "timeout")
-        assert "tightest planned turn" in told
 
 
 def test_a_planner_that_came_too_near_is_marked_on_the_page() -> None:
@@ -619,7 +570,7 @@ def test_a_planner_that_came_too_near_is_marked_on_the_page() -> None:
         assert f'<td data-planner="fair">{text}</td>' in html
 
 
-def test_a_near_miss_is_enlarged_before_the_tightest_turn(
+def test_a_near_miss_is_enlarged(
     drawn: tuple[figures.FigureScene, figures.DrawnRun], circle_plan: AcceptedPlan
 ) -> None:
     """With the obstacle where it was then, and the clearance that was wanted."""
@@ -634,12 +585,11 @@ def test_a_near_miss_is_enlarged_before_the_tightest_turn(
     row = int(track.clearance_m.argmin())
     assert 0.0 < track.clearance_m[row] < scene.clearance_m
     figure = planner_figure(scene, run, 0)
-    whole, close_up, clearance, turn, _ = figure.axes
+    whole, close_up, clearance = figure.axes
     assert (
         close_up.get_title()
         == f"nearest: {number(float(track.clearance_m[row]))} m, at {track.time_s[row]:.1f} s"
     )
-    assert turn.get_title() == "its tightest planned turn"
     place = points_m[row] / 1e3
     for axes in (whole, close_up):
         marked = [np.asarray(line.get_xydata()) for line in axes.get_lines() if line.get_marker() == "s"]
@@ -651,16 +601,13 @@ def test_a_near_miss_is_enlarged_before_the_tightest_turn(
     assert corners_km.mean(axis=0) == pytest.approx(moved_km, abs=1e-3)
     assert any(np.allclose(line.get_ydata(), scene.clearance_m) for line in clearance.get_lines())
     cut = track.part(0, row + 1)
-    crash = figures.DrawnRun("round", "collision", cut, planned_rows(cut, [circle_plan]))
+    crash = figures.DrawnRun("round", "collision", cut, [circle_plan])
     collided = planner_figure(scene, crash, 0)
     assert collided.axes[1].get_title() == f"its collision, at {track.time_s[row]:.1f} s"
     (legend,) = figure.legends
     assert "nearest to an obstacle" in {text.get_text() for text in legend.get_texts()}
     fair = planner_figure(replace(scene, clearance_m=float(track.clearance_m[row])), run, 0)
-    assert [axes.get_title() for axes in fair.axes[1:]] == [
-        "its tightest planned turn",
-        "curvature · turn radius",
-    ]
+    assert len(fair.axes) == 1
     assert "nearest to an obstacle" not in {text.get_text() for text in fair.legends[0].get_texts()}
 
 
@@ -686,7 +633,7 @@ def test_a_curve_of_many_rows_keeps_its_peaks(
     error = np.zeros(50_000)
     error[31_234], error[44_321] = 7.0, -3.0
     track = make_track(50_000, cross_track_m=error)
-    run = figures.DrawnRun("straight", "reached", track, planned_rows(track, [straight_plan]))
+    run = figures.DrawnRun("straight", "reached", track, [straight_plan])
     cross = figures.profiles(drawn[0], [(0, run)]).axes[1]
     curve = max((np.asarray(line.get_xydata()) for line in cross.get_lines()), key=len)
     assert len(curve) < 2000
