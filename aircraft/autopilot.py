@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from aircraft.interface import FloatArray
 
 GRAVITY_FPS2 = 32.174
-ROLL_RATE_LIMIT_RADPS = 1.05
 FREQUENCIES_RADPS = np.logspace(-1.0, 2.5, 4000)
 NEEDED_DEG = 45.0
 """The least phase margin that loops keep behind servos; a margin of 45 degrees is what is usually asked of aircraft
@@ -29,6 +28,8 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 ROLL_ERROR_SHARE = 0.8
 """Share of the steady roll rate at full aileron that roll errors may ask for."""
+LEAST_AILERON_S = 0.1
+"""Aileron that holds a roll rate of 1 rad/s is taken for no less: 10 rad/s at full aileron."""
 
 
 @dataclass(frozen=True)
@@ -224,7 +225,7 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
             f"unstable in pitch at trim (omega^2 = {short_period2:.3g} 1/s2): no gains can be derived"
         )
     speed = at.airspeed_fps
-    roll = pace * min(4.0, at.roll_mode_radps / 4.0)
+    roll = pace * at.roll_mode_radps / 4.0
     aileron_p = pace * (at.roll_mode_radps - abs(at.lp)) / at.lda
 
     determinant = at.lda * at.ndr - at.ldr * at.nda
@@ -253,7 +254,7 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
     return Gains(
         qbar_psf=at.qbar_psf,
         roll=roll,
-        roll_rate_limit=min(ROLL_RATE_LIMIT_RADPS, ROLL_ERROR_SHARE / max(aileron_p_forward, 1e-6)),
+        roll_rate_limit=ROLL_ERROR_SHARE / max(aileron_p_forward, LEAST_AILERON_S),
         aileron_p=aileron_p,
         aileron_p_integral=2.0 * aileron_p,
         aileron_p_forward=aileron_p_forward,

@@ -14,7 +14,15 @@ from typing import Any
 import numpy as np
 
 from aircraft.airframe import FIGURES, Airframe, AirframeEntry
-from aircraft.autopilot import NEEDED_DEG, Derivatives, Gains, gains, pitch_margin_deg, roll_margin_deg
+from aircraft.autopilot import (
+    LEAST_AILERON_S,
+    NEEDED_DEG,
+    Derivatives,
+    Gains,
+    gains,
+    pitch_margin_deg,
+    roll_margin_deg,
+)
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ
@@ -43,7 +51,6 @@ GAIN_DIGITS = 5
 """Significant digits of derived gains: fewer than what processors and compilers agree on."""
 
 BANK_LIMIT_DEG = 45.0
-ROLL_RATE_DPS = 60.0
 ROLL_COMMAND_SHARE = 0.5
 """Share of the steady roll rate at full aileron that the roll command may ask for."""
 
@@ -183,13 +190,14 @@ def _provisional(
     entry: AirframeEntry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains
 ) -> Airframe:
     """The airframe before its limits are known."""
-    roll_rate_dps = ROLL_COMMAND_SHARE * math.degrees(1.0 / max(abs(placed.aileron_p_forward), 1e-6))
-    roll_rate_dps = float(math.floor(min(roll_rate_dps, ROLL_RATE_DPS)))
+    roll_rate_dps = ROLL_COMMAND_SHARE * math.degrees(
+        1.0 / max(abs(placed.aileron_p_forward), LEAST_AILERON_S)
+    )
+    roll_rate_dps = float(math.floor(roll_rate_dps))
     slow = (GRAVITY_MPS2 * math.radians(roll_rate_dps) / (ROLL_LIMITED_S * cruise)) ** (1.0 / 3.0)
     roll_delay_s = round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _lag_s(files, "aileron"), 2)
-    if files.latency_s:
-        roll_delay_s = round(roll_delay_s + files.latency_s, 3)
-        slow = min(slow, bandwidth_of_delay_margin(DELAY_MARGIN_S, roll_delay_s))
+    roll_delay_s = round(roll_delay_s + files.latency_s, 3)
+    slow = min(slow, bandwidth_of_delay_margin(DELAY_MARGIN_S, roll_delay_s))
     figures = {
         "bank_limit_deg": BANK_LIMIT_DEG,
         "roll_rate_dps": roll_rate_dps,

@@ -28,7 +28,11 @@ GRAVITY_MPS2 = 9.80665
 TRIED = {
     "as above": (),
     "state not old": (("navigation.latency_s", "0"),),
-    "state 0.24 s old": (("navigation.latency_s", "0.24"),),
+    "state 0.12 s old": (("navigation.latency_s", "0.12"),),
+    "roll of 60 deg/s at most, in 0.25 s": (
+        ("aircraft.autopilot.roll_rate_limit_degps", "60"),
+        ("aircraft.autopilot.roll_time_constant_s", "0.25"),
+    ),
     "airspeed 18.1 m/s": (("aircraft.airspeed_mps", "18.1"),),
     "gain 1": (("guidance.gain", "1"),),
     "gain 3": (("guidance.gain", "3"),),
@@ -79,7 +83,7 @@ def _proto(flown: Path) -> list[str]:
     columns: dict[str, FloatArray] = {
         name: table[name].cast("float64").to_numpy() for name in table.column_names
     }
-    rows = []
+    rows, side_1pm = [], None
     for name, loiter in facts["loiters"].items():
         chosen = np.flatnonzero(
             (columns["time_s"] >= loiter["from_s"]) & (columns["time_s"] <= loiter["to_s"])
@@ -88,18 +92,17 @@ def _proto(flown: Path) -> list[str]:
         place = {each: turn[each] for each in ("time_s", "east_m", "north_m", "ve_mps", "vn_mps")}
         wind = fit_wind(FlownFlight(Path(name), place))
         east, north = turn["ve_mps"] - wind.east_mps, turn["vn_mps"] - wind.north_mps
-        speed = float(np.hypot(east, north).mean())
-        turned = float(np.ptp(np.unwrap(np.arctan2(east, north))))
-        rate = turned / float(turn["time_s"][-1] - turn["time_s"][0])
-        tangents = (
-            float(np.tan(np.radians(turn["roll_deg"])).mean()),
-            float(turn["q_degps"].mean() / turn["r_degps"].mean()),
-        )
-        radii = [speed**2 / (GRAVITY_MPS2 * tangent) for tangent in tangents]
-        share = speed * rate / (GRAVITY_MPS2 * tangents[0])
-        cells = (loiter["circle_fitted"]["radius_m"], speed / rate, *radii)
+        speed, course = float(np.hypot(east, north).mean()), np.unwrap(np.arctan2(east, north))
+        rate = float(np.ptp(course)) / float(turn["time_s"][-1] - turn["time_s"][0])
+        skid = np.sin(np.radians(turn["heading_deg"]) - course)
+        banked = GRAVITY_MPS2 * float(np.tan(np.radians(turn["roll_deg"])).mean())
+        skidding = speed**2 * float(skid.mean())
+        if side_1pm is None:  # fitted on the first loiter alone
+            side_1pm = (speed * rate - banked) / skidding
+        radii = (speed / rate, speed**2 / banked, speed**2 / (banked + side_1pm * skidding))
+        cells = (loiter["circle_fitted"]["radius_m"], *radii, math.degrees(math.asin(skid.mean())))
         assert math.isfinite(sum(cells))
-        rows.append(f"| {name} | {' | '.join(f'{cell:.1f}' for cell in cells)} | {share:.2f} |")
+        rows.append(f"| {name} | {' | '.join(f'{cell:.1f}' for cell in cells)} |")
     return rows
 
 

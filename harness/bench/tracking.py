@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -186,10 +186,9 @@ def fly_course(
             cross.append(abs(progress.nearest(true.east_m, true.north_m).cross_track_m))
         altitude.append(abs((believed if as_believed else true).up_m - ALTITUDE_M))
         saturated += output.bank_saturated
+        too_high_m, too_fast_mps = navigator.held_errors
         model.command(
-            output.roll_command_rad,
-            ALTITUDE_M + (true.up_m - believed.up_m),  # the model holds true values
-            output.airspeed_or(airspeed_mps) + (true.airspeed_mps - believed.airspeed_mps),
+            output.roll_command_rad, ALTITUDE_M - too_high_m, output.airspeed_or(airspeed_mps) - too_fast_mps
         )
         model.advance(steps)
     return Tracking(
@@ -246,27 +245,26 @@ def bench_tracking(
 
     Returns:
         `aircraft`, `guidance`, `airspeed_mps`, `seeds`, and `cases`: for each its name, the figures of `Tracking`,
-        worst over the seeds, its `limits` likewise (None where nothing is promised) and whether they are `kept`.
+        worst over the seeds, its `limits` likewise (None where nothing is promised), whether they are `kept`, and how
+        control was `lost` (None where it was not): then the figures are None.
 
     Raises:
         AircraftError: the aircraft cannot be flown in one of the cases.
-        ArithmeticError: control is lost on the way.
     """
     factor = LIMIT_FACTORS.get(name) if guidance == DEFAULT_KIND else None
     rows = []
     for done, case in enumerate(CASES):
         if progress is not None:
             progress(done, len(CASES), case.name)
-        flown = tracked(name, case, range(1, seeds + 1), guidance=guidance)
         limits = case.limits.times(factor) if factor and case.limits else None
-        rows.append(
-            {
-                "case": case.name,
-                **vars(flown),
-                "limits": vars(limits) if limits else None,
-                "kept": flown.within(limits) if limits else None,
-            }
-        )
+        row: dict[str, Any] = {"case": case.name, "limits": vars(limits) if limits else None, "lost": None}
+        try:
+            flown = tracked(name, case, range(1, seeds + 1), guidance=guidance)
+        except ArithmeticError as error:
+            row |= {**{each.name: None for each in fields(Tracking)}, "kept": False, "lost": str(error)}
+        else:
+            row |= {**vars(flown), "kept": flown.within(limits) if limits else None}
+        rows.append(row)
     return {
         "aircraft": name,
         "guidance": guidance,

@@ -259,6 +259,9 @@ def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequen
     rows: list[Sequence[str]] = []
     for case in result["cases"]:
         limits = case["limits"]
+        if case["lost"]:
+            rows.append((case["case"], *("-" for _ in figures), "-", "[bold red]control is lost[/]"))
+            continue
         cells = [f"{case[name]:.3f}" + (f" <= {limits[name]:.2g}" if limits else "") for name in figures]
         verdict = {True: "kept", False: "[bold red]not kept[/]", None: "-"}[case["kept"]]
         rows.append((case["case"], *cells, f"{case['bank_saturation']:.1%}", verdict))

@@ -184,16 +184,17 @@ class ClosedLoop:
         """Steers along the plan in effect where guidance is due, and logs a row of the track."""
         if not instant.guidance:
             return None
-        loop, true, believed = self._loop, self.true, self.believed
+        loop, believed = self._loop, self.believed
         ending = self.plans.take_effect(believed, loop.guidance) or self._steer()
         if ending is not None:
             return ending
         altitude_m, airspeed_mps = loop.vertical.command(believed, self.steering.arc_length_m)
+        too_high_m, too_fast_mps = loop.navigator.held_errors
         loop.model.command(
             self.steering.roll_command_rad,
-            # The model's loops hold true values: the navigation error is added to the command.
-            altitude_m + (true.up_m - believed.up_m),
-            self.steering.airspeed_or(airspeed_mps) + (true.airspeed_mps - believed.airspeed_mps),
+            # The model's loops measure without error: it is taken off the command.
+            altitude_m - too_high_m,
+            self.steering.airspeed_or(airspeed_mps) - too_fast_mps,
         )
         self._log_row()
         return None

@@ -93,6 +93,8 @@ class Navigator:
         self._past: deque[AircraftState] = deque()
         self.jumps = 0
         """How often a fix has come back after an outage, and the believed position has jumped."""
+        self.held_errors = 0.0, 0.0
+        """Error of altitude (m) and airspeed (m/s), without the age of the state."""
         self._unit = np.zeros(8)  # the processes, over their sigmas
         self._time_s, self._place = math.nan, np.zeros(2)
         self._outage = -1
@@ -134,15 +136,17 @@ class Navigator:
             drift_mps = self._navigation.drift_share * state.groundspeed_mps
             velocity[:2] += drift_mps * self._directions[self._outage]
         v_east, v_north, v_up = velocity.tolist()
+        airspeed_mps = max(0.0, state.airspeed_mps + float(errors[_AIRSPEED]))
+        self.held_errors = float(errors[_ALTITUDE]), airspeed_mps - state.airspeed_mps
         return state._replace(
             east_m=east_m,
             north_m=north_m,
-            up_m=state.up_m + float(errors[_ALTITUDE]),
+            up_m=state.up_m + self.held_errors[0],
             velocity_east_mps=state.velocity_east_mps + v_east,
             velocity_north_mps=state.velocity_north_mps + v_north,
             velocity_up_mps=state.velocity_up_mps + v_up,
             heading_rad=(state.heading_rad + float(errors[_HEADING])) % math.tau,
-            airspeed_mps=max(0.0, state.airspeed_mps + float(errors[_AIRSPEED])),
+            airspeed_mps=airspeed_mps,
         )
 
     def _go_on(self, time_s: float, place: FloatArray) -> None:

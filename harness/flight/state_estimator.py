@@ -24,6 +24,14 @@ class StateEstimator(Protocol):
         """How often the believed position has jumped, which the aircraft notices: a fix came back after an outage."""
         ...
 
+    @property
+    def held_errors(self) -> tuple[float, float]:
+        """Error of altitude (m) and airspeed (m/s) that the autopilot holds, as of the last call of `believed`.
+
+        The age of the state is not in it: the flight model makes the autopilot work with an older one.
+        """
+        ...
+
     def believed(self, state: AircraftState) -> AircraftState:
         """What the aircraft believes its state to be.
 
@@ -39,7 +47,7 @@ class StateEstimator(Protocol):
 class PerfectEstimator:
     """The aircraft knows its state exactly. Implements `StateEstimator`."""
 
-    has_fix, jumps = True, 0
+    has_fix, jumps, held_errors = True, 0, (0.0, 0.0)
 
     def believed(self, state: AircraftState) -> AircraftState:
         """The state itself."""

@@ -32,7 +32,7 @@ def test_the_fleet_has_those_that_are_asked_for_most() -> None:
 def test_guidance_limits_are_in_radians() -> None:
     limits = airframe("aerosonde").guidance_limits()
     assert limits.bank_limit_rad == pytest.approx(math.pi / 4)
-    assert limits.roll_rate_radps == pytest.approx(math.pi / 3)
+    assert limits.roll_rate_radps == pytest.approx(math.radians(74.0))
 
 
 GOOD = """
@@ -148,5 +148,5 @@ def test_what_rolls_slowly_is_planned_to_turn_wide() -> None:
 def test_an_aircraft_that_was_seen_to_track_badly_is_given_more_room() -> None:
     frame = airframe("aerosonde")
     usual = performance(frame, 25.0).tracking_error_m
-    assert usual > 1.5 * frame.weave_error_m > 0.0
+    assert usual >= 1.5 * frame.weave_error_m > 0.0
     assert performance(replace(frame, weave_error_m=2.0), 25.0).tracking_error_m == pytest.approx(3.0)

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aircraft.airframes import airframe
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw, GuidanceLimits, GuidanceOutput
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import route_rows
@@ -24,7 +23,8 @@ from tests.point_mass import PointMass
 AIRSPEED = 25.0
 ALTITUDE = 300.0
 STEPS = 120 // UPDATE_RATE_HZ
-LIMITS = airframe("aerosonde").guidance_limits()
+LIMITS = GuidanceLimits(25.0, 32.3, math.pi / 4, math.pi / 3, 0.25, 0.03, 1.44)
+"""Of an aircraft that rolls as the point mass does."""
 Piece = tuple[float, float]
 
 

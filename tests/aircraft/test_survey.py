@@ -31,8 +31,9 @@ def test_the_aerosonde_is_what_its_book_says() -> None:
     assert frame.mass_kg == 11.0
     assert 17.3 <= low <= 18.0
     assert 31.5 <= high <= 32.4
-    assert frame.roll_in_s == pytest.approx(0.63, abs=0.02)
-    assert (frame.roll_lag_s, frame.roll_delay_s) == (0.25, 0.03)
+    # A quarter of 1.4 |Lp|, the book's Lp being -22.6 1/s; 27 of 30 degrees take 2.3 time constants.
+    assert frame.roll_lag_s == pytest.approx(4.0 / (1.4 * 22.6), rel=0.1)
+    assert frame.roll_in_s == pytest.approx(2.3 * frame.roll_lag_s + frame.roll_delay_s, abs=0.05)
     assert frame.level_bank_deg(25.0) == frame.bank_limit_deg == 45.0
 
 

@@ -24,7 +24,7 @@ TREE = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}
 class Shifted:
     """Believes to be elsewhere, always by as much."""
 
-    has_fix, jumps = True, 0
+    has_fix, jumps, held_errors = True, 0, (UP_M, AIRSPEED_MPS)
 
     def believed(self, state: AircraftState) -> AircraftState:
         return state._replace(

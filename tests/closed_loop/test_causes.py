@@ -123,15 +123,22 @@ def test_a_straight_path_is_as_long_as_it_is(check: Check) -> None:
     assert check(np.array([(0.0, 0.0), (0.0, 3000.0)]))["planned_length_m"] == pytest.approx(3000.0, abs=0.01)
 
 
+SLOW_ROLL = {
+    "aircraft__autopilot__roll_rate_limit_degps": 60.0,
+    "aircraft__autopilot__roll_time_constant_s": 0.25,
+}
+
+
 def test_bank_limit(check: Check) -> None:
     """66 m takes 44 of the 45 degrees: none are left to get back onto the path with."""
-    assert causes(check(turn(66.0), trackability__cross_track_m=1)) == {"bank limit"}
-    assert causes(check(turn(112.0), trackability__cross_track_m=1)) == set()
+    assert causes(check(turn(66.0), trackability__cross_track_m=1, **SLOW_ROLL)) == {"bank limit"}
+    assert causes(check(turn(112.0), trackability__cross_track_m=1, **SLOW_ROLL)) == set()
 
 
 def test_roll_rate(check: Check) -> None:
-    assert causes(check(weave(112.0, 0.7, 8), trackability__cross_track_m=0.5)) == {"roll rate"}
-    assert causes(check(weave(700.0, 0.7, 4), trackability__cross_track_m=0.5)) == set()
+    limits = {"trackability__cross_track_m": 0.5, **SLOW_ROLL}
+    assert causes(check(weave(112.0, 0.7, 8), **limits)) == {"roll rate"}
+    assert causes(check(weave(700.0, 0.7, 4), **limits)) == set()
 
 
 def test_load_factor(check: Check) -> None:

@@ -18,9 +18,9 @@ from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
 
 HELD = {
-    "aerosonde_forest": "6c59aba0901510e17063edcddcc997ec95b04f4402ad93099b50428c8196a1d4",
-    "polygon_town": "d6dbad733b31a96f5d6c1aac1163b5bd7cdb01ac28280523883acb91fade1304",
-    "one_of_everything": "39e00b6a78725a31877ea10aaf8d17ad3b858b030dedbbd94f971c332daa746b",
+    "aerosonde_forest": "ddfa6a222d840d1ed9d6f96fb1885b2bd691240167ddbf0b71abdc8822129d72",
+    "polygon_town": "6c0fd27e7de66e8b479bf0492505b8fbf5ee06f874b5613246b8211f89d79648",
+    "one_of_everything": "de123b6bccd09e3c4491473f698550dcd2fc99e08974fa8c222148a66f25e35a",
 }
 """SHA-256 of the first minute of each."""
 

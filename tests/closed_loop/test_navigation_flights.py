@@ -131,7 +131,7 @@ def test_the_plan_keeps_the_margin_from_the_border_of_the_area(scenario: Scenari
 class Jumping:
     """Believes to be 80 m to the east, until a fix comes at 30 s."""
 
-    has_fix, jumps = True, 0
+    has_fix, jumps, held_errors = True, 0, (0.0, 0.0)
 
     def believed(self, state: AircraftState) -> AircraftState:
         if state.time_s >= 30.0:

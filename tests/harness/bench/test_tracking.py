@@ -174,3 +174,18 @@ def test_other_laws_are_flown_and_promise_nothing(monkeypatch: pytest.MonkeyPatc
     assert ours["limits"] is not None
     assert theirs["limits"] is theirs["kept"] is None
     assert theirs["cross_track_p95_m"] > 5.0 * ours["cross_track_p95_m"]
+
+
+def test_an_aircraft_that_is_lost_is_a_row_of_the_table(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In gusts of 45 knots and half its airspeed of wind an Ultra Stick of 2 kg stalls."""
+    storm = replace(CASES[5], name="storm", wind_share=0.5)
+    monkeypatch.setattr("harness.bench.tracking.CASES", (storm,))
+    result = bench_tracking("ultrastick25e", 3)
+    (case,) = result["cases"]
+    assert case["kept"] is False
+    assert case["cross_track_max_m"] is None
+    assert "control is lost after" in case["lost"]
+    print_grid("title", *tracking_rows(result))
+    assert "control is lost" in capsys.readouterr().out
