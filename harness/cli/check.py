@@ -83,13 +83,6 @@ def check(
             "file, else 90 m.",
         ),
     ] = None,
-    polygons: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND",
-            help="Fences that polygons beside a drawn path are: exclusion (default), inclusion, none.",
-        ),
-    ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of the turbulence.")] = None,
     settings: Annotated[
         list[str] | None,
@@ -127,10 +120,8 @@ def check(
     from harness.run.path_check import asked, origin_of
     from harness.run_files.path_files import read_path
 
-    if polygons not in (None, "exclusion", "inclusion", "none"):
-        raise typer.BadParameter(f"{polygons!r} is not exclusion, inclusion or none", param_hint="--polygons")
     world = None if scenario is None else _world(scenario)
-    given = read_path(path, altitude_m is not None, origin_of(world), polygons)
+    given = read_path(path, altitude_m is not None, origin_of(world))
     sections: dict[str, dict[str, Any]] = {
         "aircraft": _given(model=aircraft, airspeed_mps=airspeed_mps),
         "planner": _given(clearance_m=clearance_m),
@@ -169,7 +160,6 @@ def check(
         "conditions": conditions,
         "wind": wind,
         "turbulence": turbulence,
-        "polygons": polygons,
     }
     differs = [(name, str(value)) for name, value in {**numbers, **words}.items() if value is not None]
     apart = told_apart([*differs, *replaced], named=())

@@ -69,7 +69,7 @@ def read_mission(path: Path) -> FlownMission:
     points = given.points_m
     if len(points) > 2 and np.hypot(*(points[-1] - points[0])) < 1.0:
         points = points[:-1]
-    accepted = [step.acceptance_m for step in given.mission.program.steps] if given.mission else []
+    accepted = [step.acceptance_m for step in given.mission.steps] if given.mission else []
     radius = next((each for each in accepted if each > 0.0), None)
     origin = None if given.origin_deg is None else Origin(*given.origin_deg)
     height_m = float(given.altitudes_m[0]) if len(given.altitudes_m) else None

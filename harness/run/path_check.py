@@ -218,7 +218,7 @@ class PathCheck:
         """How far from it an item lets the aircraft pass."""
         if self.given.mission is None:
             return {}
-        return {step.item: step.acceptance_m for step in self.given.mission.program.steps}
+        return {step.item: step.acceptance_m for step in self.given.mission.steps}
 
     def allowed_cut_m(self, waypoint: int) -> float:
         """How far off a corner may be passed; nothing of the aircraft or its guidance enters.

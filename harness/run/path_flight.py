@@ -147,14 +147,14 @@ def planned(
     else:
         profile, low = _no_lower(profile)
         notes = (*notes, *low)
-    if altitude_m is None and ground is None and given.mission.program.above_ground:
-        items = ", ".join(map(str, given.mission.program.above_ground[:6]))
-        more = " and others" if len(given.mission.program.above_ground) > 6 else ""
+    if altitude_m is None and ground is None and given.mission.above_ground:
+        items = ", ".join(map(str, given.mission.above_ground[:6]))
+        more = " and others" if len(given.mission.above_ground) > 6 else ""
         notes = (
             *notes,
             f"items {items}{more}: above ground, which is taken to be as high as home everywhere",
         )
-    loiters = [step.item for step in given.mission.program.steps if step.loiter is not None]
+    loiters = [step.item for step in given.mission.steps if step.loiter is not None]
     if loiters and scenario.guidance.follow == "waypoints":
         how = (
             "heads for its centre and then joins it"

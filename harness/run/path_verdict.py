@@ -95,7 +95,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         "given": dataclasses.asdict(smoothness(polyline_profile(_line(check.plan), speed), speed)),
         "corners": passed,
         "fences": [fence.plain() for fence in check.given.fences.every],
-        "items": [dataclasses.asdict(told) for told in check.given.mission.program.items]
+        "items": [dataclasses.asdict(told) for told in check.given.mission.items]
         if check.given.mission
         else [],
         "notes": [*check.given.notes, *check.plan.notes],

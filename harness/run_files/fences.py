@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, Final
 
 from harness.files.input_file import InputError
 
 if TYPE_CHECKING:
     from shapely import Geometry
 
-FloatArray = NDArray[np.float64]
 Place = tuple[float, float]
 
-CIRCLE_SIDES = 720
+CIRCLE_SIDES: Final = 720
 """A circle is compared as a polygon of so many sides: one of 10 km is off by 0.1 m."""
 
 
@@ -27,13 +23,12 @@ class Fence:
     """An area to stay out of, or inside of.
 
     Attributes:
-        name: what it is called: where in its file it stands.
+        name: where in its file it stands.
         inclusion: to stay inside of; else to stay out of.
         rings: the outer ring and its holes, (east, north) in metres, or latitude and longitude in degrees while it
             is being read; empty for a circle.
         center: of a circle, likewise.
         radius_m: of a circle.
-        stated: the file says which of both it is.
     """
 
     name: str
@@ -41,12 +36,17 @@ class Fence:
     rings: tuple[tuple[Place, ...], ...] = ()
     center: Place | None = None
     radius_m: float = 0.0
-    stated: bool = True
 
     @property
     def kind(self) -> str:
-        """One word for people."""
+        """`inclusion` or `exclusion`."""
         return "inclusion" if self.inclusion else "exclusion"
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """All its positions."""
+        corners = tuple(place for ring in self.rings for place in ring)
+        return corners if self.center is None else (self.center,)
 
     @cached_property
     def area(self) -> Geometry:
@@ -56,10 +56,6 @@ class Fence:
         if self.center is not None:
             return shapely.Point(self.center).buffer(self.radius_m, quad_segs=CIRCLE_SIDES // 4)
         return shapely.Polygon(self.rings[0], self.rings[1:])
-
-    def stated_as(self, inclusion: bool) -> Fence:
-        """The same fence as one of both, unless its file says which."""
-        return self if self.stated else replace(self, inclusion=inclusion)
 
     def moved(self, place: Callable[[Place], Place]) -> Fence:
         """The same fence with every position put elsewhere."""
@@ -106,20 +102,30 @@ class Fences:
             return None
         return shapely.intersection_all(areas) if self.inside_all else shapely.union_all(areas)
 
-    def moved(self, place: Callable[[Place], Place]) -> Fences:
-        """The same fences with every position put elsewhere."""
-        return replace(self, every=tuple(fence.moved(place) for fence in self.every))
 
-
-def checked(fence: Fence, source: str) -> Fence:
-    """A fence in the plane, its rings cleaned of repeated and closing points.
+def in_plane(fences: Fences, plane: Callable[[Place], Place], source: str) -> Fences:
+    """Fences in the local plane, their rings without repeated and closing points.
 
     Raises:
-        InputError: it encloses no area, or crosses itself.
+        InputError: one encloses no area, or crosses itself, or several have no place in common.
     """
+    clean = replace(fences, every=tuple(_checked(fence.moved(plane), source) for fence in fences.every))
+    if clean.allowed is not None and clean.allowed.is_empty:
+        names = ", ".join(fence.name for fence in clean.inclusions)
+        raise InputError(
+            f"{source}: {names}: have no place in common; an aircraft has to stay inside of all of them"
+        )
+    return clean
+
+
+def _checked(fence: Fence, source: str) -> Fence:
     import shapely
 
-    rings = tuple(_cleaned(ring) for ring in fence.rings)
+    # A ring is closed; a corner that comes twice in a row is one.
+    rings = tuple(
+        tuple(place for place, after in zip(ring, (*ring[1:], *ring[:1]), strict=True) if place != after)
+        for ring in fence.rings
+    )
     clean = replace(fence, rings=rings)
     if fence.center is None and min(map(len, rings), default=0) < 3:
         raise InputError(f"{source}: {fence.name}: has fewer than 3 distinct corners; must enclose an area")
@@ -133,10 +139,3 @@ def checked(fence: Fence, source: str) -> Fence:
             "corners in order round the area"
         )
     return clean
-
-
-def _cleaned(ring: Sequence[Place]) -> tuple[Place, ...]:
-    kept = [point for number, point in enumerate(ring) if not number or point != ring[number - 1]]
-    if len(kept) > 1 and kept[0] == kept[-1]:
-        kept.pop()
-    return tuple(kept)

@@ -12,8 +12,7 @@ from harness.run_files.path_as_read import PathAsRead
 
 FLYING_MPS: Final = 12.0
 """Before the first fix and after the last at this ground speed the aircraft rolls, or stands."""
-FASTEST_MPS: Final = 150.0
-STEEPEST_MPS: Final = 80.0
+FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
 """No glider flies faster than these over the ground, and up or down: a fix that is so far from both its neighbours is
 an error of the receiver."""
 MOST_BROKEN: Final = 0.05
@@ -31,41 +30,40 @@ def read_igc(text: str, source: str) -> PathAsRead:
 
     Where the logger has no GNSS altitude (0 or no 3-D fix), all of it is at the pressure altitude.
 
-    Args:
-        text: of the file.
-        source: its name, for faults.
-
     Raises:
         InputError: it is no IGC file, has no flight in it, or aerofiles is not installed.
     """
     fixes, broken = igc_fixes(text, source)
-    valid = [fix for fix in fixes if abs(fix["lat"]) > 1e-9 or abs(fix["lon"]) > 1e-9]
-    right = _without_leaps(valid)
+    placed = [fix for fix in fixes if abs(fix["lat"]) > 1e-9 or abs(fix["lon"]) > 1e-9]
+    right = _without_leaps(placed)
     moving = [k for k in range(1, len(right)) if _speed_mps(right[k - 1], right[k]) >= FLYING_MPS]
     flown = right[moving[0] - 1 : moving[-1] + 1] if moving else []
     if len(flown) < 2:
         raise InputError(f"{source}: has {len(fixes)} fixes, none of them in flight; must be a flight")
-    known = [fix for fix in flown if fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V"]
-    kind, notes = "gps_alt", ["GNSS altitudes of the logger taken as above the sea"]
-    if len(known) < len(flown) and any(fix["pressure_alt"] for fix in flown):
-        known, kind = flown, "pressure_alt"
-        notes = ["pressure altitudes of the logger taken as above the sea"]
-    elif len(known) < 2:
-        known, kind, notes = flown, "", ["its logger has no altitudes"]
+    known, kind, note = _with_altitude(flown)
     counts = {
         "fixes without an altitude passed over: the logger has no barometer": len(flown) - len(known),
         "B records that cannot be read passed over": broken,
-        "fixes too far from both neighbours passed over": len(valid) - len(right),
+        "fixes too far from both neighbours passed over": len(placed) - len(right),
         "fixes on the ground not flown": len(right) - len(flown),
-        "fixes without a position passed over": len(fixes) - len(valid),
+        "fixes without a position passed over": len(fixes) - len(placed),
     }
-    notes += [f"{count} {what}" for what, count in counts.items() if count]
     return PathAsRead(
         False,
         tuple((float(fix["lat"]), float(fix["lon"])) for fix in known),
-        tuple(float(fix[kind] or 0.0) for fix in known if kind),
-        notes=tuple(notes),
+        tuple(float(fix[kind] or 0.0) for fix in known) if kind else (),
+        notes=(note, *(f"{count} {what}" for what, count in counts.items() if count)),
     )
+
+
+def _with_altitude(flown: list[Fix]) -> tuple[list[Fix], str, str]:
+    """The fixes that have the altitude they are flown at, its key, and what is said of it."""
+    known = [fix for fix in flown if fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V"]
+    if len(known) < len(flown) and any(fix["pressure_alt"] for fix in flown):
+        return flown, "pressure_alt", "pressure altitudes of the logger taken as above the sea"
+    if len(known) < 2:
+        return flown, "", "its logger has no altitudes"
+    return known, "gps_alt", "GNSS altitudes of the logger taken as above the sea"
 
 
 def igc_fixes(text: str, source: str) -> tuple[list[Fix], int]:
@@ -82,9 +80,8 @@ def igc_fixes(text: str, source: str) -> tuple[list[Fix], int]:
         raise InputError(f"{source}:1: must begin with an A record, the logger's number; is no IGC file")
     if not DATE.search(text):
         raise InputError(f"{source}: has no date (an HFDTE record); must have one before the first fix")
-    # A reader that goes on after a broken line; of each it keeps the error.
     try:
-        read = Reader(skip_duplicates=True).read(io.StringIO(text))
+        read = Reader(skip_duplicates=True).read(io.StringIO(text))  # of a broken line it keeps the error
     except Exception as error:  # whatever its parser meets
         raise InputError(f"{source}: is not IGC ({type(error).__name__}: {error})") from error
     broken, fixes = read["fix_records"]

@@ -15,11 +15,19 @@ from xml.etree import ElementTree
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.run_files.fences import Fence, Fences
-from harness.run_files.path_as_read import PathAsRead
+from harness.run_files.path_as_read import PathAsRead, Point, of_points
 from harness.run_files.read_values import finite, shown
 
 LINES: Final = ("LineString", "Track")
-PASSED: Final = ("Point", "Model", "NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay")
+PASSED: Final = (
+    "Point",
+    "Model",
+    "NetworkLink",
+    "GroundOverlay",
+    "ScreenOverlay",
+    "PhotoOverlay",
+    "LinearRing",
+)
 GIVEN_UP: Final = ("altitudeOffset", "MultiTrack")
 """Elements of Google's extension that are refused by name."""
 BOUNDARIES: Final = ("outerBoundaryIs", "innerBoundaryIs")
@@ -27,17 +35,11 @@ COMMA: Final = re.compile(r"\s*,\s*")
 ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
 """Values of KML's altitudeMode; with any other the altitude means nothing. The last is the default."""
 
-Point = tuple[float, float, float | None]
-"""Latitude, longitude, altitude."""
 Element = ElementTree.Element
 
 
 def read_kml(text: str, source: str) -> PathAsRead:
-    """The path of a KML file: its one LineString or gx:Track; polygons are fences, all else is passed over.
-
-    Args:
-        text: of the file.
-        source: its name, for faults.
+    """The path of a KML file: its one LineString or gx:Track; polygons are fences to stay out of.
 
     Raises:
         InputError: it is none, or holds no line or several.
@@ -56,36 +58,22 @@ def read_kml(text: str, source: str) -> PathAsRead:
         told = f" ({', '.join(name for name, _ in lines[:4])})" if lines else ""
         raise InputError(f"{source}: has {len(lines)} lines{told}; must have exactly one, the path")
     ((name, line),) = lines
-    points, mode = _line_points(line, f"{source}: {name}"), _text(line, "altitudeMode")
-    notes = _others(root)
-    flat = mode not in (ABSOLUTE, RELATIVE)
-    if flat and any(altitude for *_, altitude in points):
-        notes.append(f"altitudes passed over: their altitudeMode is {shown(mode or CLAMPED)}")
-    points = [(north, east, None) for north, east, _ in points] if flat else points
-    return _path(points, f"{source}: {name}", Fences(tuple(fences)), notes, mode == RELATIVE)
-
-
-def _line_points(line: Element, where: str) -> list[Point]:
-    """Points of a LineString, or of a gx:Track, which has them one an element."""
-    track = _name(line) == "Track"
-    rows = [(each.text or "").split() for each in _all(line, "coord")] if track else _coordinates(line)
-    return [_point(row, f"{where}: point {number}") for number, row in enumerate(rows)]
-
-
-def _others(root: Element) -> list[str]:
-    """What is beside the path in a KML file and no polygon."""
     others = Counter(kind for each in root.iter() if (kind := _name(each)) in PASSED)
-    rings = sum(1 for kind in BOUNDARIES for each in _all(root, kind) for _ in _all(each, "LinearRing"))
-    others["LinearRing"] = sum(1 for _ in _all(root, "LinearRing")) - rings
-    return [f"{counted(count, kind)} beside the path passed over" for kind, count in (+others).items()]
+    others["LinearRing"] -= sum(
+        1 for kind in BOUNDARIES for each in _all(root, kind) for _ in _all(each, "LinearRing")
+    )
+    notes = _notes(others)
+    points = [_point(row, f"{source}: {name}: point {number}") for number, row in enumerate(_rows(line))]
+    mode = _text(line, "altitudeMode")
+    if mode not in (ABSOLUTE, RELATIVE):
+        if any(altitude for *_, altitude in points):
+            notes.append(f"altitudes passed over: their altitudeMode is {shown(mode or CLAMPED)}")
+        points = [(latitude, longitude, None) for latitude, longitude, _ in points]
+    return of_points(points, f"{source}: {name}", Fences(tuple(fences)), notes, mode == RELATIVE)
 
 
 def read_gpx(text: str, source: str) -> PathAsRead:
     """The path of a GPX file: its one track, else its one route; waypoints are passed over.
-
-    Args:
-        text: of the file.
-        source: its name, for faults.
 
     Raises:
         InputError: it is none, or holds no track and no route, or several.
@@ -103,24 +91,14 @@ def read_gpx(text: str, source: str) -> PathAsRead:
         points.append((latitude, longitude, finite(height, f"{where}: ele") if height else None))
     segments = sum(1 for _ in _all(lines[0], "trkseg"))
     notes = [f"{segments} segments of the track joined by straight lines"] if segments > 1 else []
-    others = {"route": len(routes) if tracks else 0, "waypoint": sum(1 for _ in _all(root, "wpt"))}
-    notes += [
-        f"{counted(count, what)} beside the path passed over" for what, count in others.items() if count
+    notes += _notes({"route": len(routes) if tracks else 0, "waypoint": sum(1 for _ in _all(root, "wpt"))})
+    return of_points(points, f"{source}: {shown(_text(lines[0], 'name') or tag)}", Fences(), notes)
+
+
+def _notes(others: dict[str, int]) -> list[str]:
+    return [
+        f"{counted(count, what)} beside the path passed over" for what, count in others.items() if count > 0
     ]
-    return _path(points, f"{source}: {shown(_text(lines[0], 'name') or tag)}", Fences(), notes, False)
-
-
-def _path(
-    points: list[Point], where: str, fences: Fences, notes: list[str], above_ground: bool
-) -> PathAsRead:
-    """A path of points; altitudes that are there at some only are a fault."""
-    heights = tuple(altitude for *_, altitude in points if altitude is not None)
-    if heights and len(heights) != len(points):
-        raise InputError(
-            f"{where}: has an altitude at {len(heights)} of {len(points)} points; give it at all or none"
-        )
-    positions = tuple((latitude, longitude) for latitude, longitude, _ in points)
-    return PathAsRead(False, positions, heights, above_ground and bool(heights), fences, tuple(notes))
 
 
 def _parsed(text: str, source: str, root: str) -> Element:
@@ -150,8 +128,10 @@ def _text(element: Element, name: str) -> str:
     return next(((each.text or "").strip() for each in _all(element, name)), "")
 
 
-def _coordinates(element: Element) -> list[list[str]]:
-    """Numbers of each position; blanks round a comma do not part positions."""
+def _rows(element: Element) -> list[list[str]]:
+    """Numbers of each position, one element a point in a gx:Track; blanks round a comma do not part positions."""
+    if _name(element) == "Track":
+        return [(each.text or "").split() for each in _all(element, "coord")]
     return [part.split(",") for part in COMMA.sub(",", _text(element, "coordinates")).split()]
 
 
@@ -163,12 +143,11 @@ def _point(row: list[str], where: str) -> Point:
 
 
 def _polygon(element: Element, name: str, source: str) -> Fence:
-    where = f"{source}: {name}: corner"
     rings = tuple(
-        tuple(_point(row, f"{where} {number}")[:2] for number, row in enumerate(_coordinates(each)))
+        tuple(_point(row, f"{source}: {name}: corner {number}")[:2] for number, row in enumerate(_rows(each)))
         for boundary in BOUNDARIES
         for each in _all(element, boundary)
     )
     if not rings:
         raise InputError(f"{source}: {name}: is a Polygon without a boundary; must have outerBoundaryIs")
-    return Fence(name, False, rings, stated=False)
+    return Fence(name, False, rings)

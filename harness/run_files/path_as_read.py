@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from harness.files.input_file import InputError
 from harness.run_files.fences import Fences
+
+Point = tuple[float, float, float | None]
+"""Latitude, longitude, altitude."""
 
 
 @dataclass(frozen=True)
@@ -26,3 +31,24 @@ class PathAsRead:
     above_ground: bool = False
     fences: Fences = field(default_factory=Fences)
     notes: tuple[str, ...] = ()
+
+
+def of_points(
+    points: Sequence[Point],
+    where: str,
+    fences: Fences,
+    notes: Sequence[str],
+    above_ground: bool = False,
+) -> PathAsRead:
+    """A path in degrees.
+
+    Raises:
+        InputError: some of its points have an altitude, and others none.
+    """
+    heights = tuple(altitude for *_, altitude in points if altitude is not None)
+    if heights and len(heights) != len(points):
+        raise InputError(
+            f"{where}: has an altitude at {len(heights)} of {len(points)} points; give it at all or none"
+        )
+    positions = tuple((latitude, longitude) for latitude, longitude, _ in points)
+    return PathAsRead(False, positions, heights, above_ground and bool(heights), fences, tuple(notes))

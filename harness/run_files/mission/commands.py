@@ -8,72 +8,37 @@ from __future__ import annotations
 
 from typing import Final
 
-WAYPOINT: Final = 16
-LOITER_UNLIMITED: Final = 17
-LOITER_TURNS: Final = 18
-LOITER_TIME: Final = 19
-RETURN_TO_LAUNCH: Final = 20
-LAND: Final = 21
-TAKEOFF: Final = 22
-CONTINUE_AND_CHANGE_ALTITUDE: Final = 30
-LOITER_TO_ALTITUDE: Final = 31
-ARC_WAYPOINT: Final = 36
-SPLINE_WAYPOINT: Final = 82
-VTOL_TAKEOFF: Final = 84
-VTOL_LAND: Final = 85
-CONDITION_DELAY: Final = 112
-CONDITION_DISTANCE: Final = 114
-CONDITION_LOCATION: Final = 116
-JUMP: Final = 177
+WAYPOINT, SPLINE_WAYPOINT, ARC_WAYPOINT = 16, 82, 36
+LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE = 17, 18, 19, 31
+RETURN_TO_LAUNCH, CONTINUE_AND_CHANGE_ALTITUDE = 20, 30
+LAND, VTOL_LAND, LAND_START = 21, 85, 189
+TAKEOFF, VTOL_TAKEOFF = 22, 84
+CONDITIONS: Final = (112, 114, 116)
+"""Conditions of delay, distance and location."""
+JUMP, TAG, JUMP_TO_TAG = 177, 600, 601
 CHANGE_SPEED: Final = 178
-LAND_START: Final = 189
-TAG: Final = 600
-JUMP_TO_TAG: Final = 601
 SCRIPT: Final = 42702
 
-CONDITIONS: Final = (CONDITION_DELAY, CONDITION_DISTANCE, CONDITION_LOCATION)
 LOITERS: Final = (LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE)
 TAKEOFFS: Final = {
     TAKEOFF: "the roll is not flown: the flight begins at the altitude of the takeoff",
     VTOL_TAKEOFF: "the vertical takeoff is not flown: the flight begins at its altitude",
 }
 LANDINGS: Final = (LAND, VTOL_LAND)
-FLOWN: Final = (
-    WAYPOINT,
-    SPLINE_WAYPOINT,
-    *LOITERS,
-    RETURN_TO_LAUNCH,
-    *LANDINGS,
-    *TAKEOFFS,
-    CONTINUE_AND_CHANGE_ALTITUDE,
-)
+AT_AN_ALTITUDE: Final = (WAYPOINT, SPLINE_WAYPOINT, *TAKEOFFS)
+"""Items that always have an altitude of their own."""
+FLOWN: Final = (*AT_AN_ALTITUDE, *LOITERS, RETURN_TO_LAUNCH, *LANDINGS, CONTINUE_AND_CHANGE_ALTITUDE)
 """Items that are flown to, or about, or along."""
 
 NAMES: Final = {
-    WAYPOINT: "waypoint",
-    LOITER_UNLIMITED: "loiter without limit",
-    LOITER_TURNS: "loiter turns",
-    LOITER_TIME: "loiter time",
-    RETURN_TO_LAUNCH: "return to launch",
-    LAND: "land",
-    TAKEOFF: "takeoff",
-    CONTINUE_AND_CHANGE_ALTITUDE: "continue and change altitude",
-    LOITER_TO_ALTITUDE: "loiter to altitude",
-    SPLINE_WAYPOINT: "spline waypoint",
-    VTOL_TAKEOFF: "VTOL takeoff",
-    VTOL_LAND: "VTOL land",
-    JUMP: "jump",
-    CHANGE_SPEED: "change speed",
-    LAND_START: "landing start",
-    TAG: "jump tag",
-    JUMP_TO_TAG: "jump to tag",
-    ARC_WAYPOINT: "arc waypoint",
-    CONDITION_DELAY: "condition delay",
-    CONDITION_DISTANCE: "condition distance",
-    CONDITION_LOCATION: "condition location",
-    SCRIPT: "script",
-    25: "follow", 32: "follow", 93: "delay", 94: "place payload", 176: "set mode", 179: "set home",
-    180: "set parameter", 183: "set servo", 192: "reposition", 201: "region of interest",
+    WAYPOINT: "waypoint", LOITER_UNLIMITED: "loiter without limit", LOITER_TURNS: "loiter turns",
+    LOITER_TIME: "loiter time", RETURN_TO_LAUNCH: "return to launch", LAND: "land", TAKEOFF: "takeoff",
+    CONTINUE_AND_CHANGE_ALTITUDE: "continue and change altitude", LOITER_TO_ALTITUDE: "loiter to altitude",
+    SPLINE_WAYPOINT: "spline waypoint", VTOL_TAKEOFF: "VTOL takeoff", VTOL_LAND: "VTOL land", JUMP: "jump",
+    CHANGE_SPEED: "change speed", LAND_START: "landing start", TAG: "jump tag", JUMP_TO_TAG: "jump to tag",
+    ARC_WAYPOINT: "arc waypoint", 112: "condition delay", 114: "condition distance", 116: "condition location",
+    SCRIPT: "script", 25: "follow", 32: "follow", 93: "delay", 94: "place payload", 176: "set mode",
+    179: "set home", 180: "set parameter", 183: "set servo", 192: "reposition", 201: "region of interest",
     205: "control mount", 206: "camera trigger distance", 207: "enable fence", 208: "parachute",
     210: "inverted flight", 211: "gripper", 214: "camera trigger interval", 2000: "take pictures",
     2001: "stop taking pictures", 3000: "VTOL transition",
@@ -103,8 +68,5 @@ def name_of(command: int) -> str:
     except ImportError:
         return f"command {command}"
     entry = enums["MAV_CMD"].get(command)
-    return (
-        f"command {command}"
-        if entry is None
-        else f"command {command} ({entry.name.removeprefix('MAV_CMD_')})"
-    )
+    told = "" if entry is None else f" ({entry.name.removeprefix('MAV_CMD_')})"
+    return f"command {command}{told}"

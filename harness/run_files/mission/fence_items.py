@@ -15,32 +15,28 @@ from harness.run_files.fences import Fence, Fences
 from harness.run_files.mission.items import Item
 
 
-def fences_of(items: Sequence[Item], home: tuple[float, float] | None = None) -> Fences:
+def fences_of(items: Sequence[Item], home: tuple[float, float] | None) -> Fences:
     """The fences among some items, in degrees. An aircraft must be inside of all inclusion fences, as ArduPilot has it.
-
-    Args:
-        items: in order.
-        home: its latitude and longitude.
 
     Raises:
         InputError: one has fewer corners than it says, or a circle has no radius or no place.
     """
     found: list[Fence] = []
-    pending: list[Item] = []
-    for item in items:
-        if item.command not in (*CORNERS, *CIRCLES):
-            continue
-        if pending and item.command != pending[0].command:
-            raise _torn(pending)
+    corners: list[Item] = []
+    for item in (each for each in items if each.command in (*CORNERS, *CIRCLES)):
+        if corners and item.command != corners[0].command:
+            raise _torn(corners)
         if item.command in CIRCLES:
             found.append(_circle(item, home))
             continue
-        pending.append(item)
-        if len(pending) >= pending[0].params[0]:
-            found.append(_polygon(pending))
-            pending = []
-    if pending:
-        raise _torn(pending)
+        corners.append(item)
+        if len(corners) >= corners[0].params[0]:
+            ring = tuple((each.params[4], each.params[5]) for each in corners)
+            name = f"items {corners[0].number} to {item.number}"
+            found.append(Fence(name, CORNERS[item.command], (ring,)))
+            corners = []
+    if corners:
+        raise _torn(corners)
     return Fences(tuple(found), inside_all=True)
 
 
@@ -48,10 +44,8 @@ def rally_note(points: int) -> tuple[str, ...]:
     """What is to be said of rally points."""
     if not points:
         return ()
-    return (
-        f"{counted(points, 'rally point')} passed over: a return to launch is flown to home, not to the nearest of "
-        "them",
-    )
+    told = "a return to launch is flown to home, not to the nearest of them"
+    return (f"{counted(points, 'rally point')} passed over: {told}",)
 
 
 def nothing_but(items: Sequence[Item]) -> str:
@@ -64,26 +58,19 @@ def nothing_but(items: Sequence[Item]) -> str:
     return " and ".join(held) + more
 
 
-def _torn(pending: Sequence[Item]) -> InputError:
-    first = pending[0]
+def _torn(corners: Sequence[Item]) -> InputError:
+    first = corners[0]
     return InputError(
         f"{first.place}: item {first.number} begins a fence of {first.params[0]:g} corners, of which "
-        f"{len(pending)} follow; it may be torn"
+        f"{len(corners)} follow; it may be torn"
     )
 
 
-def _polygon(corners: Sequence[Item]) -> Fence:
-    name = f"items {corners[0].number} to {corners[-1].number}"
-    return Fence(name, CORNERS[corners[0].command], (tuple(item.params[4:6] for item in corners),))  # type: ignore[misc]
-
-
 def _circle(item: Item, home: tuple[float, float] | None) -> Fence:
-    radius = item.params[0]
+    radius, told = item.params[0], f"{item.place}: item {item.number} is a fence"
     if not radius > 0.0:
-        raise InputError(
-            f"{item.place}: item {item.number} is a fence of radius {radius:g} m; must be greater than 0"
-        )
-    center = home if item.command == HOME_CIRCLE else item.params[4:6]
+        raise InputError(f"{told} of radius {radius:g} m; must be greater than 0")
+    center = home if item.command == HOME_CIRCLE else (item.params[4], item.params[5])
     if center is None:
-        raise InputError(f"{item.place}: item {item.number} is a fence about home, which has no position")
-    return Fence(f"item {item.number}", CIRCLES[item.command], center=center, radius_m=radius)  # type: ignore[arg-type]
+        raise InputError(f"{told} about home, which has no position")
+    return Fence(f"item {item.number}", CIRCLES[item.command], center=center, radius_m=radius)

@@ -9,7 +9,6 @@ from typing import Final
 from aircraft.guidance.altitude import VerticalProfile
 from aircraft.guidance.mission_legs import MissionLeg
 from harness.run_files.given_path import FloatArray, FlyBy
-from harness.run_files.mission.steps import Program
 
 Ground = Callable[[FloatArray, FloatArray], FloatArray]
 """East and north -> height of the ground above mean sea level, NaN where it is not known."""
@@ -51,21 +50,6 @@ class Flying:
     heads_for_centres: bool = False
     corner_m: float | None = None
     wind_mps: complex = 0j
-
-
-@dataclass(frozen=True, eq=False)
-class GivenMission:
-    """A mission in the local plane.
-
-    Attributes:
-        program: what it makes an aeroplane fly.
-        places: of its steps, east + i north; None where a step has none.
-        home_altitude_m: above mean sea level.
-    """
-
-    program: Program
-    places: tuple[complex | None, ...]
-    home_altitude_m: float
 
 
 @dataclass(frozen=True, eq=False)

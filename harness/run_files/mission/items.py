@@ -15,15 +15,14 @@ MISSION: Final = 2
 """MAV_FRAME of commands without a place. ArduPilot takes an altitude in it as above the sea; PX4 refuses it."""
 FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11: GROUND, 4: HOME, 1: HOME}
 """MAV_FRAME to what its altitude is above. Autopilots load no item to fly to in any other frame."""
-
 LOCAL_ENU, LOCAL_NED = 4, 1
 LOCAL: Final = (LOCAL_ENU, LOCAL_NED)
-
 MOST: Final = {"command": 65_535, "frame": 255}
 """The largest numbers that MAVLink's message of a mission item has room for."""
-
 NOWHERE: Final = 1e-7
 """Degrees, or metres: a position with less than this in both is none. ArduPilot writes zeros where none is meant."""
+MOST_TOLD: Final = 10
+"""Numbers of items that a note has at most."""
 
 
 @dataclass(frozen=True)
@@ -48,16 +47,11 @@ class Item:
     autocontinue_off: bool = False
 
     def __post_init__(self) -> None:
-        for name, number in (("command", self.command), ("frame", self.frame)):
-            if not 0 <= number <= MOST[name]:
+        for name, most in MOST.items():
+            if not 0 <= getattr(self, name) <= most:
                 raise InputError(
-                    f"{self.place}: has the {name} {number:g}; those of MAVLink are 0 to {MOST[name]}"
+                    f"{self.place}: has the {name} {getattr(self, name):g}; those of MAVLink are 0 to {most}"
                 )
-
-    @property
-    def waits(self) -> bool:
-        """Whether an autopilot that heeds it would wait there."""
-        return self.autocontinue_off and self.command in commands.FLOWN
 
     @property
     def position(self) -> tuple[float, float] | None:
@@ -87,49 +81,6 @@ class Item:
         return FRAMES[self.frame]
 
 
-def filled(
-    params: Sequence[float | None], command: int, frame: int, missing: Callable[[int], str]
-) -> tuple[float, ...]:
-    """Seven parameters with 0 for those that are left to the autopilot.
-
-    Args:
-        params: None where they are.
-        command: MAV_CMD.
-        frame: MAV_FRAME.
-        missing: what a fault says of one of them that is not there, by its index.
-
-    Raises:
-        InputError: half of a place is there, or no altitude where one is needed.
-    """
-    latitude, longitude, altitude = params[4:7]
-    if command in commands.FLOWN and (latitude is None) != (longitude is None):
-        which = 4 if latitude is None else 5
-        raise InputError(f"{missing(which)}; a place must have latitude and longitude")
-    needed = (
-        command in (commands.WAYPOINT, commands.SPLINE_WAYPOINT, *commands.TAKEOFFS)
-        or (command in commands.LOITERS and latitude is not None)
-        or (command in commands.LANDINGS and FRAMES.get(frame) != HOME)
-    )
-    if altitude is None and needed:
-        raise InputError(f"{missing(6)}; a {commands.name_of(command)} must have an altitude")
-    return tuple(0.0 if value is None else value for value in params)
-
-
-def waiting_notes(numbers: Sequence[int]) -> tuple[str, ...]:
-    """What is to be said of items that are flown to and whose `autocontinue` is off."""
-    if not numbers:
-        return ()
-    told = ", ".join(map(str, numbers[:MOST_TOLD])) + (", ..." if len(numbers) > MOST_TOLD else "")
-    return (
-        f"item{'' if len(numbers) == 1 else 's'} {told}: autocontinue is off: PX4 waits there to be told to go on; "
-        "flown on, as ArduPilot does",
-    )
-
-
-MOST_TOLD: Final = 10
-"""Numbers of items that a note has at most."""
-
-
 @dataclass(frozen=True)
 class MissionAsRead:
     """A mission as its file has it.
@@ -149,3 +100,40 @@ class MissionAsRead:
     home_altitude_m: float
     fences: Fences
     notes: tuple[str, ...] = ()
+
+
+def filled(
+    params: Sequence[float | None], command: int, frame: int, missing: Callable[[int], str]
+) -> tuple[float, ...]:
+    """Seven parameters with 0 for those that are left to the autopilot.
+
+    Args:
+        params: None where they are.
+        command: MAV_CMD.
+        frame: MAV_FRAME.
+        missing: what a fault says of one of them that is not there, by its index.
+
+    Raises:
+        InputError: half of a place is there, or no altitude where one is needed.
+    """
+    latitude, longitude, altitude = params[4:7]
+    if command in commands.FLOWN and (latitude is None) != (longitude is None):
+        raise InputError(f"{missing(4 if latitude is None else 5)}; a place must have latitude and longitude")
+    needed = command in commands.AT_AN_ALTITUDE
+    needed |= command in commands.LOITERS and latitude is not None
+    needed |= command in commands.LANDINGS and FRAMES.get(frame) != HOME
+    if altitude is None and needed:
+        raise InputError(f"{missing(6)}; a {commands.name_of(command)} must have an altitude")
+    return tuple(0.0 if value is None else value for value in params)
+
+
+def waiting_notes(items: Sequence[Item]) -> tuple[str, ...]:
+    """What is to be said of items that are flown to and whose `autocontinue` is off."""
+    numbers = [item.number for item in items if item.autocontinue_off and item.command in commands.FLOWN]
+    if not numbers:
+        return ()
+    told = ", ".join(map(str, numbers[:MOST_TOLD])) + (", ..." if len(numbers) > MOST_TOLD else "")
+    return (
+        f"item{'' if len(numbers) == 1 else 's'} {told}: autocontinue is off: PX4 waits there to be told to go on; "
+        "flown on, as ArduPilot does",
+    )

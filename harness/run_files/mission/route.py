@@ -33,10 +33,10 @@ from harness.run_files.mission.circle import (
     turns_to,
     up_to,
 )
-from harness.run_files.mission.flying import Flying, GivenMission, MissionRoute
+from harness.run_files.mission.flying import Flying, MissionRoute
 from harness.run_files.mission.items import GROUND
 from harness.run_files.mission.short_leg import begins_before_m, corner_radius_m, short_leg
-from harness.run_files.mission.steps import MissionStep
+from harness.run_files.mission.steps import MissionStep, Program
 from harness.run_files.mission.waypoint_run import (
     Vertex,
     altitude_m,
@@ -59,7 +59,7 @@ SAMPLE_M: Final = 5.0
 """Points along circles are this close together, where a track is compared with them."""
 
 
-def mission_route(mission: GivenMission, flying: Flying, source: str) -> MissionRoute:
+def mission_route(mission: Program, flying: Flying, source: str) -> MissionRoute:
     """Makes the route of a mission.
 
     Args:
@@ -71,7 +71,7 @@ def mission_route(mission: GivenMission, flying: Flying, source: str) -> Mission
         InputError: all of it is in one place.
     """
     build = _Build(mission, flying)
-    for number in range(len(mission.program.steps)):
+    for number in range(len(mission.steps)):
         build.fly(number)
     build.flush()
     if not build.rows:
@@ -82,16 +82,14 @@ def mission_route(mission: GivenMission, flying: Flying, source: str) -> Mission
 class _Build:
     """A route while it is made."""
 
-    def __init__(self, mission: GivenMission, flying: Flying) -> None:
-        self._steps, self._places, self._flying = mission.program.steps, mission.places, flying
+    def __init__(self, mission: Program, flying: Flying) -> None:
+        self._steps, self._flying = mission.steps, flying
         self._home_m = mission.home_altitude_m
         self.rows: list[Row] = []
         self._length_m = 0.0
         self._pose: Pose | None = None
         self._run: list[Vertex] = []
-        self._speeds_of_run: list[
-            tuple[float, float]
-        ] = []  # asked and flown on the way to each vertex of the run
+        self._speeds_of_run: list[tuple[float, float]] = []  # asked and flown on the way to each vertex
         self._given: list[FloatArray] = []
         self._corners: list[CutCorner] = []
         self._waypoints: list[tuple[complex, float]] = []
@@ -101,7 +99,7 @@ class _Build:
         self._notes: list[str] = []
         self._legs: list[MissionLeg] = []
         self._asked_mps = self._mps = flying.airspeed_mps
-        if mission.program.steps[0].airspeed_mps is not None:  # the aircraft comes with its own
+        if mission.steps[0].airspeed_mps is not None:  # the aircraft comes with its own
             self._speeds.append((0.0, self._asked_mps, self._mps))
         self._altitude_m = math.nan
 
@@ -117,7 +115,7 @@ class _Build:
                     f"{self._asked_mps:g} m/s asked for before item {step.item}: flown at {self._mps:g} m/s; the "
                     f"aircraft holds speed and altitude in turns from {low:g} to {high:g} m/s"
                 )
-        place = self._places[number]
+        place = step.place
         here = self._here()
         at = place if place is not None else here
         if step.straight:
@@ -294,9 +292,10 @@ class _Build:
 
     def _target(self, number: int, center: complex, radius: float, side: int) -> complex | None:
         """What the aircraft turns to as it leaves a circle; None where it goes on round it or straight."""
-        if number + 1 >= len(self._places):
+        if number + 1 >= len(self._steps):
             return None
-        step, place = self._steps[number + 1], self._places[number + 1]
+        step = self._steps[number + 1]
+        place = step.place
         if place is None or step.straight or (step.loiter is not None and abs(place - center) < SAME_PLACE_M):
             return None
         if step.loiter is None or self._flying.heads_for_centres:

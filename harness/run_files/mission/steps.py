@@ -59,6 +59,11 @@ class MissionStep:
     landing: bool = False
     straight: bool = False
 
+    @property
+    def place(self) -> complex | None:
+        """A position in the plane, east + i north."""
+        return None if self.position is None else complex(*self.position)
+
 
 @dataclass(frozen=True)
 class Told:
@@ -85,11 +90,13 @@ class Program:
         local: positions are east and north in metres; else latitude and longitude in degrees.
         steps: in order.
         items: what became of every item, in the order of the file.
+        home_altitude_m: above mean sea level.
     """
 
     local: bool
     steps: tuple[MissionStep, ...]
     items: tuple[Told, ...]
+    home_altitude_m: float = 0.0
 
     @property
     def above_ground(self) -> tuple[int, ...]:

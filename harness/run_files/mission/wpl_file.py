@@ -6,7 +6,6 @@ The format: https://mavlink.io/en/file_formats/#mission_plain_text_file
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import Final
 
 from harness.files.fence_commands import APART, RALLY_POINT
@@ -20,7 +19,6 @@ CELLS: Final = 12
 FIRST_PARAMETER: Final = 5
 """The field, counted from 1, of the first parameter of an item."""
 COMMENT: Final = "#"
-NAN: Final = "nan"
 RALLY: Final = "RALLY"
 """First word of every line of a list of rally points of MAVProxy."""
 
@@ -28,13 +26,8 @@ RALLY: Final = "RALLY"
 def read_waypoints(text: str, source: str) -> MissionAsRead:
     """The mission of a plain-text file; its first item is home if it is a waypoint, lines after # are comments.
 
-    A waypoint above home that has another number than 0 is no home: it is left out of the file.
-
-    Items of fences that stand among those of the mission are fences; rally points are counted.
-
-    Args:
-        text: of the file.
-        source: its name, for faults.
+    A waypoint above home that has another number than 0 is no home. Items of fences that stand among those of the
+    mission are fences; rally points are counted.
 
     Raises:
         InputError: it is none.
@@ -42,49 +35,32 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
     lines = text.splitlines()
     if not lines or not lines[0].startswith(WPL):
         raise InputError(f'{source}:1: {_meant(lines)}must begin with "{WPL} 110"')
-    items = []
-    for number, line in enumerate(lines[1:], start=2):
-        cells = line.split()
-        if not cells or cells[0].startswith(COMMENT):
-            continue
-        place = f"{source}:{number}"
-        if len(cells) != CELLS:
-            raise InputError(f"{place}: has {len(cells)} fields; a mission item has {CELLS}")
-        index, frame, command = (whole(cells[i], place) for i in (0, 2, 3))
-        # What is left to the autopilot is 0, or no number.
-        given = [None if cell.lower() == NAN else finite(cell, place) for cell in cells[4:11]]
-        params = filled(given, command, frame, partial(_missing, place))
-        off = finite(cells[11], place) == 0.0
-        items.append(Item(place, index, command, frame, params, off))
-    if not items:
+    rows = [(f"{source}:{number}", line.split()) for number, line in enumerate(lines[1:], start=2)]
+    read = [_item(cells, place) for place, cells in rows if cells and not cells[0].startswith(COMMENT)]
+    if not read:
         raise InputError(f"{source}: has no items; the first is home, the others are the path")
-    items, notes = _numbered(items)
-    home = items[0] if _is_home(items[0]) else None
-    others = items[1:] if home is not None else items
+    items, notes = _numbered(read)
+    home, items = (items[0], items[1:]) if _is_home(items[0]) else (None, items)
     if home is not None and FRAMES.get(home.frame, SEA) != SEA and home.params[6] != 0.0:
         altitude = f"its altitude, {home.params[6]:g} m, is taken as above the sea"
         notes += (f"its first item is home, as autopilots have it, though of frame {home.frame}: {altitude}",)
-    flown = tuple(item for item in others if item.command not in APART)
-    if not flown and (instead := fence_items.nothing_but(others)):
+    flown = tuple(item for item in items if item.command not in APART)
+    if not flown and (instead := fence_items.nothing_but(items)):
         raise InputError(f"{source}: has no items to fly to, but {instead}")
-    rally = sum(item.command == RALLY_POINT for item in others)
-    return MissionAsRead(
-        source,
-        flown,
-        None if home is None else home.position,
-        0.0 if home is None else home.params[6],
-        fence_items.fences_of(others, None if home is None else home.position),
-        (
-            *notes,
-            *fence_items.rally_note(rally),
-            *waiting_notes([item.number for item in flown if item.waits]),
-        ),
-    )
+    rally = sum(item.command == RALLY_POINT for item in items)
+    place, altitude_m = (None, 0.0) if home is None else (home.position, home.params[6])
+    notes = (*notes, *fence_items.rally_note(rally), *waiting_notes(flown))
+    return MissionAsRead(source, flown, place, altitude_m, fence_items.fences_of(items, place), notes)
 
 
-def _missing(place: str, index: int) -> str:
-    """What a fault says of a parameter that is no number."""
-    return f"{place}: field {FIRST_PARAMETER + index} is nan"
+def _item(cells: list[str], place: str) -> Item:
+    if len(cells) != CELLS:
+        raise InputError(f"{place}: has {len(cells)} fields; a mission item has {CELLS}")
+    number, frame, command = (whole(cells[field], place) for field in (0, 2, 3))
+    # What is left to the autopilot is 0, or no number.
+    given = [None if cell.lower() == "nan" else finite(cell, place) for cell in cells[4:11]]
+    params = filled(given, command, frame, lambda index: f"{place}: field {FIRST_PARAMETER + index} is nan")
+    return Item(place, number, command, frame, params, finite(cells[11], place) == 0.0)
 
 
 def _is_home(first: Item) -> bool:
@@ -103,8 +79,8 @@ def _numbered(items: list[Item]) -> tuple[list[Item], tuple[str, ...]]:
     gaps = numbers != list(range(numbers[0], numbers[0] + len(numbers)))
     if not twice and not (gaps and any(item.command == commands.JUMP for item in items)):
         return items, ()
-    counted = [replace(item, number=number) for number, item in enumerate(items)]
     told = "come twice" if twice else "are left out"
+    counted = [replace(item, number=number) for number, item in enumerate(items)]
     return counted, (f"some numbers of its items {told}: counted by lines from 0, as autopilots do",)
 
 

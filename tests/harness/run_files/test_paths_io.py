@@ -74,8 +74,8 @@ def test_missions_in_the_json_of_mission_planner(ending: str, tmp_path: Path) ->
     path.write_text(json.dumps(content, indent=2))
     given = read_path(path)
     assert given.mission is not None
-    assert [step.item for step in given.mission.program.steps] == [1, 2, 3, 2, 3]
-    assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.program.steps] == [520.0] * 5
+    assert [step.item for step in given.mission.steps] == [1, 2, 3, 2, 3]
+    assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.steps] == [520.0] * 5
     assert given.notes == ("a doJumpId is there twice: items are counted from 1 instead",)
 
 
@@ -127,7 +127,7 @@ def test_every_format_gives_the_same_path(name: str, tmp_path: Path) -> None:
     if given.mission is None:
         assert given.altitudes_m.tolist() == ([] if altitude is None else [altitude] * len(POINTS))
     else:
-        assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.program.steps] == [altitude] * 3
+        assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.steps] == [altitude] * 3
     for (latitude, longitude), (east, north) in zip(POINTS, given.points_m, strict=True):
         azimuth, _, distance = WGS84.inv(8.0, 47.0, longitude, latitude)
         assert east == pytest.approx(distance * math.sin(math.radians(azimuth)), abs=0.1)
@@ -154,7 +154,7 @@ def test_mission_in_local_metres(frame: int, place: tuple[float, float, float], 
     assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 200.0]]
     assert given.origin_deg is None
     assert given.mission is not None
-    assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.program.steps] == [450.0, 450.0]
+    assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.steps] == [450.0, 450.0]
 
 
 @pytest.mark.parametrize("column", ["altitude_m", "z_m", "up_m"])
@@ -202,7 +202,7 @@ BROKEN = {
     "some altitudes": (
         "a.geojson",
         geojson([[8.0, 47.0, 9], [8.1, 47.0]]),
-        "an altitude at some points only",
+        "has an altitude at 1 of 2 points",
     ),
     "no plan": ("a.plan", '{"fileType": "Fence"}', ": is not a plan of QGroundControl"),
     "no items": ("a.plan", '{"fileType": "Plan", "mission": {}}', ": mission.items: is missing"),
@@ -356,8 +356,9 @@ def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_pa
     path.write_text(json.dumps(content))
     found = read_path(path)
     assert found.mission is not None
-    assert [step.position for step in found.mission.program.steps] == POINTS
-    assert [step.height_m for step in found.mission.program.steps] == [120.0] * 3
+    assert [step.position for step in found.mission.steps] == list(map(tuple, found.points_m.tolist()))
+    assert found.origin_deg == POINTS[0]
+    assert [step.height_m for step in found.mission.steps] == [120.0] * 3
     (fence,) = found.fences.every
     assert fence.inclusion
 
@@ -369,7 +370,7 @@ def test_parameters_that_are_no_number_are_left_to_the_autopilot_and_places_must
     path.write_text(wpl(line(1, 0, 3, 16, 0, 0, 0, "nan", *POINTS[0], 120, 1), *wpl_items()[1:]))
     found = read_path(path)
     assert found.mission is not None
-    assert len(found.mission.program.steps) == 3
+    assert len(found.mission.steps) == 3
     path.write_text(wpl(line(1, 0, 3, 16, 0, 0, 0, 0, "nan", 8.0, 120, 1), *wpl_items()[1:]))
     with pytest.raises(InputError, match=":3: field 9 is nan; a place must have latitude and longitude"):
         read_path(path)
@@ -385,7 +386,7 @@ def test_no_number_in_the_place_of_an_item_that_has_none_is_left_to_the_autopilo
     path.write_text(wpl(*wpl_items(), *items))
     found = read_path(path)
     assert found.mission is not None
-    assert [each.what for each in found.mission.program.items] == ["flown"] * 3 + ["passed over"] * 2
+    assert [each.what for each in found.mission.items] == ["flown"] * 3 + ["passed over"] * 2
 
 
 @pytest.mark.parametrize(
@@ -420,7 +421,7 @@ def test_no_altitude_is_not_an_altitude_of_zero(
     path.write_text(plan(first, here, last))
     found = read_path(path)
     assert found.mission is not None
-    assert [step.height_m for step in found.mission.program.steps] == [120.0, None, 120.0]
+    assert [step.height_m for step in found.mission.steps] == [120.0, None, 120.0]
 
 
 def test_items_whose_autocontinue_is_off_are_named(tmp_path: Path) -> None:
@@ -467,7 +468,7 @@ def test_a_first_waypoint_that_is_numbered_1_and_above_home_is_no_home(tmp_path:
     path.write_text("QGC WPL 110\n" + "\n".join("\t".join(map(str, row)) for row in rows) + "\n")
     found = read_path(path)
     assert found.mission is not None
-    assert [step.item for step in found.mission.program.steps] == [1, 2, 3]
+    assert [step.item for step in found.mission.steps] == [1, 2, 3]
     assert found.notes == ("has no home: altitudes above home are counted from the sea",)
 
 

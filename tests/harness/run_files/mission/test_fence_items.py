@@ -93,7 +93,7 @@ def test_a_first_item_that_is_no_waypoint_is_no_home(tmp_path: Path) -> None:
     path.write_text("\n".join((lines[0], *lines[2:])))
     found = read_path(path)
     assert found.mission is not None
-    assert [step.item for step in found.mission.program.steps] == [1, 2, 3]
+    assert [step.item for step in found.mission.steps] == [1, 2, 3]
     assert "has no home: altitudes above home are counted from the sea" in found.notes
     assert read_waypoints(wpl(*INSIDE, *WAYPOINTS).replace("\t16\t0", "\t5001\t5", 1), "m").fences.every
 

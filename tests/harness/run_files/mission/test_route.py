@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from harness.files.input_file import InputError
 from harness.run_files.given_path import FloatArray
 from harness.run_files.mission.circle import end_of
-from harness.run_files.mission.flying import Flying, GivenMission, Ground, MissionRoute
+from harness.run_files.mission.flying import Flying, Ground, MissionRoute
 from harness.run_files.mission.route import LANDING_HEIGHT_M, mission_route
 from harness.run_files.mission.steps import Loiter, MissionStep, Program
 
@@ -30,10 +31,10 @@ def step(number: int, height: float | None = 100.0, above: str = "home", **more:
 
 def route(*steps: tuple[MissionStep, complex | None], ground: Ground | None = None) -> MissionRoute:
     """The route of steps at places, home at 400 m; every joint of it is held against a kink."""
-    program = Program(True, tuple(each for each, _ in steps), ())
-    made = mission_route(
-        GivenMission(program, tuple(place for _, place in steps), 400.0), flying(ground), "m"
+    placed = tuple(
+        replace(each, position=None if place is None else (place.real, place.imag)) for each, place in steps
     )
+    made = mission_route(Program(True, placed, (), 400.0), flying(ground), "m")
     rows = made.way.segments.tolist()
     for before, after in itertools.pairwise(rows):
         place, direction = end_of(tuple(before))
