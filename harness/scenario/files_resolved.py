@@ -31,7 +31,6 @@ def resolved(
     area: Area,
     ground: GroundSpec | None,
     altitude_m: float,
-    turn_room_m: float,
     folder: Path | None,
 ) -> Resolved:
     """Obstacles with every file of them expanded; without a file, nothing is changed.
@@ -41,7 +40,6 @@ def resolved(
         area: gives the bounds and the origin of the plane.
         ground: of the scenario, where it has one already.
         altitude_m: of the mission.
-        turn_room_m: radius of a circle that a hole must hold to be flyable.
         folder: of the scenario file; paths are looked for there first.
 
     Raises:
@@ -59,7 +57,7 @@ def resolved(
     known = None if ground is None else ground.field()
     with uncollected():
         try:
-            found = expanded(specs, place, area.bounds_m, altitude_m, turn_room_m, ground=known)
+            found = expanded(specs, place, area.bounds_m, altitude_m, ground=known)
         except FileFault as fault:
             raise KeyFault(
                 ("obstacles", at[fault.index], "file"), f"{specs[fault.index].path.name} {fault}"

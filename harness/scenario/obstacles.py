@@ -131,10 +131,6 @@ class WorldFile(Section):
         ge=0,
         le=10_000,
     )
-    holes: Literal["keep", "fill", "flyable"] = key(
-        "Holes of solid parts: kept, filled, or kept where a circle of the turn radius and planner.clearance_m fits.",
-        "keep",
-    )
     nodata: Literal["solid", "free"] = key("What cells of terrain without a height are.", "solid")
     unknown: Literal["occupied", "free"] = key("What unknown cells of an occupancy map are.", "free")
     default_height_m: float = key(

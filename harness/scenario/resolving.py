@@ -102,7 +102,7 @@ def resolve(
     check_local_plane(scenario.area)
     if not as_flown:
         check_level_flight(scenario)
-    scenario, names = _with_files_expanded(scenario, radius_m, folder)
+    scenario, names = _with_files_expanded(scenario, folder)
     if ends_checked:
         check_start_and_goal(scenario.area, scenario.obstacles, mission, planner.clearance_m, names)
         check_start_leads_in(scenario.area, mission, _tightest_m(aircraft, wind_mps))
@@ -125,13 +125,10 @@ def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
     return mission.model_copy(update={"start": None, "goal": None, **given}) if given else mission
 
 
-def _with_files_expanded(
-    scenario: ScenarioKeys, turn_radius_m: float, folder: Path | None
-) -> tuple[ScenarioKeys, tuple[str, ...]]:
+def _with_files_expanded(scenario: ScenarioKeys, folder: Path | None) -> tuple[ScenarioKeys, tuple[str, ...]]:
     """A scenario whose files are made into obstacles and ground, and what messages call each obstacle."""
-    room_m = turn_radius_m + scenario.planner.clearance_m
     altitude_m = scenario.mission.altitude_m
-    found = files_expanded(scenario.obstacles, scenario.area, scenario.ground, altitude_m, room_m, folder)
+    found = files_expanded(scenario.obstacles, scenario.area, scenario.ground, altitude_m, folder)
     if found.sources:
         sources = (*(scenario.sources or ()), *found.sources)
         scenario = scenario.updated(obstacles=found.obstacles, ground=found.ground, sources=sources)

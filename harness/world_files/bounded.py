@@ -35,34 +35,23 @@ def uncollected() -> Iterator[None]:
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> bytes:
-    """The bytes of a regular file.
-
-    Args:
-        path: the file.
-        most: a larger file is refused.
-        first: only so many bytes are read, whatever the size of the file.
+    """The bytes of a regular file of at most `most` bytes, or only the first ones.
 
     Raises:
         WorldFileError: it cannot be read or is too large.
     """
     try:
         with open_regular(path) as file:
-            data: bytes = file.read(most + 1 if first is None else first)
+            too_large = path.stat().st_size > most
+            data: bytes = b"" if too_large else file.read(most if first is None else first)
     except InputError as error:
         raise WorldFileError(str(error).removeprefix(f"{path}: ")) from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise WorldFileError(f"cannot be read ({reason}); give the path of a file") from error
-    if len(data) > most:
+    if too_large:
         raise WorldFileError(f"is larger than {most // 10**6} MB; cut the area of interest out of it first")
     return data
-
-
-def check_file(path: Path, most: int = MAX_BYTES) -> None:
-    """Raises WorldFileError unless a path is a regular file of at most `most` bytes, before a library opens it."""
-    read_bytes(path, first=1)
-    if path.stat().st_size > most:
-        raise WorldFileError(f"is larger than {most // 10**6} MB; cut the area of interest out of it first")
 
 
 def text_of(data: bytes) -> str:
@@ -78,33 +67,32 @@ def text_of(data: bytes) -> str:
 
 
 def json_of(path: Path, lines: bool = False) -> Any:
-    """The content of a JSON file; numbers that are not finite are refused.
-
-    Args:
-        path: of the file.
-        lines: the file may be a sequence of JSON texts, one a line; a list of them is returned, even of one.
+    """The content of a JSON file; where `lines`, a list of JSON texts, as they may stand one a line.
 
     Raises:
-        WorldFileError: it is too large or is not JSON.
+        WorldFileError: it is too large, is not JSON, or has numbers that are not finite.
     """
 
     def refuse(word: str) -> float:
         raise WorldFileError(f"has the number {word}; must have finite numbers only")
 
+    text = text_of(read_bytes(path, MAX_TREE_BYTES))
+    first, _, more = text.lstrip().partition("\n")
     try:
-        text = text_of(read_bytes(path, MAX_TREE_BYTES))
-        first, _, more = text.lstrip().partition("\n")
         if lines and first.rstrip().endswith("}") and more.lstrip().startswith("{"):
             return [json.loads(line, parse_constant=refuse) for line in text.splitlines() if line.strip()]
         whole = json.loads(text, parse_constant=refuse)
-        return [whole] if lines else whole
     except (RecursionError, MemoryError) as error:
         raise WorldFileError("is nested too deeply; must be a map") from error
+    except json.JSONDecodeError as error:
+        raise WorldFileError(
+            f"is not whole JSON (line {error.lineno}); it may be torn: get it again"
+        ) from error
     except ValueError as error:
         if isinstance(error, WorldFileError):
             raise
-        line = getattr(error, "lineno", 1)
-        raise WorldFileError(f"is not whole JSON (line {line}); it may be torn: get it again") from error
+        raise WorldFileError("has a number of too many digits; must be a map") from error
+    return [whole] if lines else whole
 
 
 def check_xml(data: bytes) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,12 +16,13 @@ from harness.files.input_file import open_regular
 from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.bounded import uncollected
+from harness.world_files.cells import placed_cells
 from harness.world_files.growing import simplified
 from harness.world_files.height_field import HeightField
-from harness.world_files.parts import Contents, FloatArray, Raster, Reading, WorldFileError
-from harness.world_files.plane import Mapping, Place
-from harness.world_files.slicing import Box, HeightBand, KnownGround, Solid, sliced_cells, sliced_parts
-from harness.world_files.terrain import height_field
+from harness.world_files.parts import Box, Contents, FloatArray, Raster, Reading, WorldFileError
+from harness.world_files.plane import Mapping, Place, geodetic
+from harness.world_files.slicing import HeightBand, KnownGround, Solid, clipped, sliced_parts
+from harness.world_files.terrain import cell_sides, height_field
 
 MARGIN: Final = 0.02
 """What lies outside the area by more than this share of its longer side is left out."""
@@ -31,10 +33,9 @@ MAX_CORNERS: Final = 900_000
 MANY_CORNERS: Final = 20_000
 """Most corners that are compared with the area one by one; of more, only their hull is."""
 MAX_POLYGONS: Final = 150_000
+"""Most polygons of a file."""
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
 """Bottom and top of what has none."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,6 @@ class FileSpec:
     shift_m: tuple[float, float] = (0.0, 0.0)
     crs: str | None = None
     tolerance_m: float | None = None
-    holes: str = "keep"
     nodata: str = "solid"
     unknown: str = "free"
     default_height_m: float = 6.0
@@ -83,13 +83,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Expanded:
-    """What became of all files of a scenario.
-
-    Attributes:
-        sources: one a file, in order.
-        ground: terrain of all files together; None without.
-        notes: what was said of it.
-    """
+    """What became of all files of a scenario: one source a file, and the terrain of all together, None without."""
 
     sources: tuple[Source, ...]
     ground: HeightField | None
@@ -97,11 +91,7 @@ class Expanded:
 
 
 class FileFault(WorldFileError):
-    """A file that cannot be used, and which.
-
-    Attributes:
-        index: of the file among those that were asked for.
-    """
+    """A file that cannot be used, and its index among those that were asked for."""
 
     def __init__(self, index: int, sentence: str) -> None:
         super().__init__(sentence)
@@ -113,8 +103,7 @@ def expanded(
     place: Place,
     bounds_m: Box,
     altitude_m: float,
-    turn_room_m: float = 0.0,
-    progress: Progress | None = None,
+    progress: Callable[[str], None] | None = None,
     ground: HeightField | None = None,
 ) -> Expanded:
     """Obstacles and ground of some files.
@@ -124,40 +113,52 @@ def expanded(
         place: where the plane touches the earth.
         bounds_m: of the area; what lies outside is left out.
         altitude_m: of the flight, above mean sea level.
-        turn_room_m: radius of a circle that a hole must hold to be kept where holes are `flyable`.
         progress: told what is being done.
         ground: where no file has terrain.
 
     Raises:
         FileFault: a file cannot be used.
     """
+    tell = progress or (lambda _: None)
+    margin = MARGIN * max(bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1])
+    box = bounds_m[0] - margin, bounds_m[1] - margin, bounds_m[2] + margin, bounds_m[3] + margin
+    loaded: list[tuple[Contents, Mapping]] = []
+    for index, spec in enumerate(specs):
+        with _blaming(index):
+            contents = loaded_file(spec.path, spec.kind, spec.reading)
+            loaded.append((contents, Mapping(contents.crs, place, spec.shift_m)))
+            _check_place(*loaded[-1], box)
+    field, notes = height_field([(each.terrain, at) for each, at in loaded if each.terrain is not None], box)
+    field = field or ground
+    sources: list[Source] = []
+    for index, (spec, (contents, mapping)) in enumerate(zip(specs, loaded, strict=True)):
+        tell(f"cutting {spec.path.name} at {altitude_m:g} m")
+        with _blaming(index):
+            known = KnownGround(field, spec.ground_m, bounds_m)
+            sources.append(_cut(spec, contents, mapping, known, box, altitude_m))
+            _check_size(sources)
+    return Expanded(tuple(sources), field, tuple(notes))
+
+
+@contextmanager
+def _blaming(index: int) -> Iterator[None]:
+    """Turns an error of a file into one that says which file."""
+    try:
+        yield
+    except WorldFileError as error:
+        raise FileFault(index, str(error)) from error
+
+
+def _check_size(sources: Sequence[Source]) -> None:
     import shapely
 
-    tell = progress or (lambda _: None)
-    box = _with_margin(bounds_m)
-    loaded: list[tuple[FileSpec, Contents, Mapping]] = []
-    for index, spec in enumerate(specs):
-        with _Blaming(index):
-            contents = loaded_file(spec.path, spec.kind, spec.reading)
-            mapping = Mapping(contents.crs, place, spec.shift_m)
-            _check_place(contents, mapping, box)
-            loaded.append((spec, contents, mapping))
-    terrains = [(each.terrain, mapping) for _, each, mapping in loaded if each.terrain is not None]
-    field, notes = height_field(terrains, box)
-    field = field or ground
-    sources, corners = [], 0
-    for index, (spec, contents, mapping) in enumerate(loaded):
-        tell(f"cutting {spec.path.name} at {altitude_m:g} m")
-        with _Blaming(index):
-            source = _cut(spec, contents, mapping, field, bounds_m, altitude_m, turn_room_m)
-            corners += int(shapely.get_num_coordinates(np.array(source.polygons, dtype=object)).sum())
-            if corners > MAX_CORNERS or len(source.polygons) > MAX_POLYGONS:
-                raise WorldFileError(
-                    f"has {counted(len(source.polygons), 'polygon')} with {corners:,} corners in the area; at most "
-                    f"{MAX_CORNERS:,} corners can be kept: make area.bounds_m smaller"
-                )
-            sources.append(source)
-    return Expanded(tuple(sources), field, tuple(notes))
+    every = [each for source in sources for each in source.polygons]
+    corners = int(shapely.get_num_coordinates(np.array(every, dtype=object)).sum())
+    if corners > MAX_CORNERS or len(every) > MAX_POLYGONS:
+        raise WorldFileError(
+            f"has {counted(len(sources[-1].polygons), 'polygon')}, {corners:,} corners in the area with those of the "
+            f"files before; at most {MAX_CORNERS:,} corners can be kept: make area.bounds_m smaller"
+        )
 
 
 def loaded_file(path: Path, kind: str | None, reading: Reading) -> Contents:
@@ -195,26 +196,6 @@ def _digest(path: Path, stamp: tuple[int, int]) -> str:
     return digest.hexdigest()
 
 
-class _Blaming:
-    """Turns an error of a file into one that says which file."""
-
-    def __init__(self, index: int) -> None:
-        self._index = index
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, WorldFileError):
-            raise FileFault(self._index, str(error)) from error
-
-
-def _with_margin(bounds_m: Box) -> Box:
-    xmin, ymin, xmax, ymax = bounds_m
-    margin = MARGIN * max(xmax - xmin, ymax - ymin)
-    return xmin - margin, ymin - margin, xmax + margin, ymax + margin
-
-
 def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
     """X and y, in the file, of the corners of all that it holds, of many those of their hull; empty without any."""
     import shapely
@@ -243,61 +224,47 @@ def _check_place(contents: Contents, mapping: Mapping, box: Box) -> None:
     xmin, xmax, ymin, ymax = east[known].min(), east[known].max(), north[known].min(), north[known].max()
     if xmin <= box[2] and xmax >= box[0] and ymin <= box[3] and ymax >= box[1]:
         return
-    where = f"east {xmin:,.0f} to {xmax:,.0f} m, north {ymin:,.0f} to {ymax:,.0f} m"
+    where = f"lies outside the area, at east {xmin:,.0f} to {xmax:,.0f} m, north {ymin:,.0f} to {ymax:,.0f} m"
     if contents.crs is None:
-        raise WorldFileError(f"lies outside the area, at {where}; must reach into it: give shift_m")
-    from harness.world_files.plane import geodetic
-
-    x, y = corners_of(contents)
-    latitude, longitude = geodetic(contents.crs, x, y)
+        raise WorldFileError(f"{where}; must reach into it: give shift_m")
+    latitude, longitude = geodetic(contents.crs, *corners_of(contents))
     middle = f"{np.nanmean(latitude):.4f}, longitude_deg: {np.nanmean(longitude):.4f}"
-    raise WorldFileError(
-        f"lies outside the area, at {where}; area.origin {{latitude_deg: {middle}}} is in its middle"
-    )
+    raise WorldFileError(f"{where}; area.origin {{latitude_deg: {middle}}} is in its middle")
 
 
 def _cut(
-    spec: FileSpec,
-    contents: Contents,
-    mapping: Mapping,
-    field: HeightField | None,
-    bounds_m: Box,
-    altitude_m: float,
-    turn_room_m: float,
+    spec: FileSpec, contents: Contents, mapping: Mapping, ground: KnownGround, box: Box, altitude_m: float
 ) -> Source:
     """The polygons of one file."""
-    stamp, box = spec.path.stat(), _with_margin(bounds_m)
+    stamp, notes = spec.path.stat(), list(contents.notes)
     band = HeightBand(altitude_m - spec.vertical_clearance_m, altitude_m + spec.vertical_clearance_m)
-    notes = list(contents.notes)
-    flat_m = spec.ground_m
-    if flat_m is None and field is None and any(part.rigid for part in contents.parts):
-        flat_m = 0.0
+    if ground.flat_m is None and ground.field is None and any(part.rigid for part in contents.parts):
+        ground = KnownGround(None, 0.0, ground.known_in)
         notes.append(
             "no terrain: the ground is taken as flat at 0 m, so altitude_m counts from it (ground_m)"
         )
-    parts = contents.parts
-    solids = sliced_parts(parts, mapping, band, KnownGround(field, flat_m, bounds_m), box)
-    polygons = [each.shape for each in solids]
+    solids = sliced_parts(contents.parts, mapping, band, ground, box)
     tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
     for raster, solid in _solid_cells(contents, spec, band, notes):
-        found, factor = sliced_cells(raster, solid, mapping, box)
-        polygons += found
+        found, factor = placed_cells(raster, solid, mapping, box)
+        low, high = HEIGHTS_M if raster is contents.occupied else (band.low_m, band.low_m)
+        solids += [Solid(shape, low, high) for shape in found]
         if factor > 1:
             notes.append(
                 f"its cells were taken together {factor} by {factor}: they are too many, or too ragged"
             )
         if spec.tolerance_m is None:
-            tolerance_m = factor * _cell_m(raster, mapping)
-    final = [
-        _with_holes(each, spec.holes, turn_room_m) for each in _rounded(_outlines(polygons, tolerance_m))
-    ]
-    if final:
+            rows, columns = raster.values.shape
+            tolerance_m = factor * max(cell_sides(raster, mapping, columns / 2, rows / 2) or (tolerance_m,))
+    solids = clipped(solids, box)
+    polygons = _rounded(_outlines([each.shape for each in solids], tolerance_m))
+    if polygons:
         notes.append(f"outlines simplified by at most {tolerance_m:.3g} m, outwards only")
     else:
         notes.append(f"nothing of it is solid in the area between {band.low_m:g} and {band.high_m:g} m")
-    heights = _heights(final, solids, None if contents.terrain is None else band.low_m)
+    heights = tuple(_heights(polygons, solids))
     digest = _digest(_plainly(spec.path), (stamp.st_size, stamp.st_mtime_ns))
-    return Source(spec, contents.kind, digest, tuple(final), tuple(heights), tuple(notes))
+    return Source(spec, contents.kind, digest, tuple(polygons), heights, tuple(notes))
 
 
 def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
@@ -311,64 +278,39 @@ def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     return grown
 
 
-def _heights(
-    polygons: Sequence[Any], solids: Sequence[Solid], cut_m: float | None
-) -> list[tuple[float, float]]:
-    """Bottom and top of each polygon: the lowest and the highest of the solids that it was made of.
-
-    Args:
-        polygons: united solids, or cells.
-        solids: parts with their heights.
-        cut_m: of what is of no solid, terrain, the height it was cut at; None: there is no end to it.
-    """
+def _heights(polygons: Sequence[Any], solids: Sequence[Solid]) -> Iterator[tuple[float, float]]:
+    """Bottom and top of each polygon: the lowest and the highest of the solids that it was made of."""
     import shapely
 
-    lowest, highest = HEIGHTS_M
-    if not solids:
-        return [HEIGHTS_M if cut_m is None else (cut_m, cut_m)] * len(polygons)
     tree = shapely.STRtree(shapely.point_on_surface(np.array([each.shape for each in solids], dtype=object)))
-    low, high = (np.clip([each[k] for each in solids], lowest, highest) for k in (1, 2))
-    of, inside = tree.query(np.array(polygons, dtype=object), predicate="intersects")
-    bottoms, tops = np.full(len(polygons), np.inf), np.full(len(polygons), -np.inf)
-    np.minimum.at(bottoms, of, low[inside])
-    np.maximum.at(tops, of, high[inside])
-    known = np.isfinite(bottoms)
-    bottoms[~known], tops[~known] = HEIGHTS_M
-    return list(zip(bottoms.tolist(), tops.tolist(), strict=True))
+    for polygon in polygons:
+        inside = [solids[index] for index in tree.query(polygon, predicate="intersects").tolist()]
+        low = min((each.low_m for each in inside), default=HEIGHTS_M[0])
+        high = max((each.high_m for each in inside), default=HEIGHTS_M[1])
+        yield max(low, HEIGHTS_M[0]), min(high, HEIGHTS_M[1])
 
 
 def _solid_cells(
     contents: Contents, spec: FileSpec, band: HeightBand, notes: list[str]
-) -> list[tuple[Raster, Any]]:
+) -> Iterator[tuple[Raster, Any]]:
     """Rasters of a file with those of their cells that are solid."""
-    found: list[tuple[Raster, Any]] = []
-    if contents.terrain is not None:
-        values = contents.terrain.values
-        missing = np.isnan(values)
-        solid = values >= band.low_m
+    for raster, least, is_solid, what, word in (
+        (
+            contents.terrain,
+            band.low_m,
+            spec.nodata == "solid",
+            "cell",
+            "without a height taken as {} (nodata)",
+        ),
+        (contents.occupied, 0.5, spec.unknown == "occupied", "unknown cell", "taken as {} (unknown)"),
+    ):
+        if raster is None:
+            continue
+        missing = np.isnan(raster.values)
         if missing.any():
-            solid |= missing if spec.nodata == "solid" else False
-            word = "solid" if spec.nodata == "solid" else "free"
-            notes.append(f"{counted(int(missing.sum()), 'cell')} without a height taken as {word} (nodata)")
-        found.append((contents.terrain, solid))
-    if contents.occupied is not None:
-        values = contents.occupied.values
-        missing = np.isnan(values)
-        solid = values > 0.5
-        if missing.any():
-            solid |= missing if spec.unknown == "occupied" else False
-            word = "occupied" if spec.unknown == "occupied" else "free"
-            notes.append(f"{counted(int(missing.sum()), 'unknown cell')} taken as {word} (unknown)")
-        found.append((contents.occupied, solid))
-    return found
-
-
-def _cell_m(raster: Raster, mapping: Mapping) -> float:
-    """The longer side of a cell, in the plane."""
-    rows, columns = raster.values.shape
-    x, y = raster.places(columns / 2 + np.array([0.0, 1.0, 0.0]), rows / 2 + np.array([0.0, 0.0, 1.0]))
-    east, north = mapping.to_plane(x, y)
-    return float(np.hypot(east[1:] - east[0], north[1:] - north[0]).max())
+            state = spec.nodata if raster is contents.terrain else spec.unknown
+            notes.append(f"{counted(int(missing.sum()), what)} {word.format(state)}")
+        yield raster, (raster.values >= least) | (missing & is_solid)
 
 
 def _rounded(polygons: Sequence[Any]) -> list[Any]:
@@ -381,14 +323,3 @@ def _rounded(polygons: Sequence[Any]) -> list[Any]:
     placed[bad] = shapely.set_precision(shapes[bad], 10.0**-DECIMALS)
     placed = shapely.remove_repeated_points(placed)
     return [each for each in shapely.get_parts(placed) if each.geom_type == "Polygon" and each.area > 0]
-
-
-def _with_holes(polygon: Any, holes: str, turn_room_m: float) -> Any:
-    """A polygon with all of its holes, with none, or with those in which an aircraft can turn."""
-    import shapely
-
-    if not polygon.interiors or holes == "keep":
-        return polygon
-    rings = [] if holes == "fill" else list(polygon.interiors)
-    kept = [ring for ring in rings if not shapely.Polygon(ring).buffer(-turn_room_m).is_empty]
-    return shapely.Polygon(polygon.exterior, kept)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.world_files.parts import BoolArray, FloatArray
 
@@ -31,18 +30,20 @@ def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     import shapely
 
     given = shapely.orient_polygons(np.array(polygons, dtype=object))
-    worth = _improvable(given, tolerance_m)
-    result = list(given[~worth])
-    for polygon in given[worth]:
+    convex = shapely.area(shapely.convex_hull(given)) <= shapely.area(given) * (1.0 + 1e-12)
+    result = list(given[convex])
+    for polygon in given[~convex]:
         budget = MOST_GROWTH * polygon.area / PASSES
-        shell = shapely.get_coordinates(polygon.exterior)
-        rings = [shapely.get_coordinates(ring) for ring in polygon.interiors]
-        for _ in range(PASSES if tolerance_m > 0 else 1):
-            shell, rings = (
-                _filled(shell, tolerance_m, budget),
-                [_filled(r, tolerance_m, budget) for r in rings],
-            )
-        grown = shapely.Polygon(shell, [ring for ring in rings if len(ring) >= 4])
+        rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
+        corners = sum(map(len, rings))
+        for _ in range(PASSES):
+            rings, before = [_filled(ring, tolerance_m, budget) for ring in rings], sum(map(len, rings))
+            if sum(map(len, rings)) == before:
+                break
+        if before == corners:
+            result.append(polygon)
+            continue
+        grown = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) >= 4])
         if not grown.is_valid:
             grown = shapely.make_valid(grown, method="structure", keep_collapsed=False)
         if not shapely.covers(grown, polygon):  # rounding, or a notch with something in it
@@ -51,54 +52,30 @@ def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     return result
 
 
-def _improvable(polygons: NDArray[np.object_], tolerance_m: float) -> BoolArray:
-    """Which of many polygons, their solid on the left, have a corner that could be left out."""
-    import shapely
-
-    found = np.zeros(len(polygons), dtype=np.bool_)
-    if not len(polygons):
-        return found
-    rings, of = shapely.get_rings(polygons, return_index=True)
-    points, ring = shapely.get_coordinates(rings, return_index=True)
-    # Of a closed ring its last point is its first: each corner is looked at once, between its neighbours.
-    inner = np.flatnonzero(ring[1:] == ring[:-1])
-    starts = np.append(True, ring[1:] != ring[:-1])
-    last = np.append(np.flatnonzero(starts)[1:], len(points)) - 1
-    before = np.where(starts[inner], last[ring[inner]] - 1, inner - 1)
-    into, on = points[inner] - points[before], points[inner + 1] - points[inner]
-    base = points[inner + 1] - points[before]
-    turn = into[:, 0] * on[:, 1] - into[:, 1] * on[:, 0]
-    depth = np.abs(turn) / np.maximum(np.hypot(base[:, 0], base[:, 1]), 1e-12)
-    straight = ((into * on).sum(axis=1) > 0) & (np.abs(turn) <= STRAIGHT_M * np.hypot(on[:, 0], on[:, 1]))
-    notch = (turn < 0) & (depth <= tolerance_m) if tolerance_m > 0 else np.zeros(len(inner), dtype=np.bool_)
-    found[of[ring[inner[straight | notch]]]] = True
-    return found
-
-
 def _filled(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatArray:
     """One pass over a closed ring with the solid on its left; corners next to one another are not both left out."""
-    points = _without_straight(ring[:-1])
+    points = ring[:-1]
+    turn, base, on, forward = _bends(points)
+    straight = forward & (np.abs(turn) <= STRAIGHT_M * on)
+    if 3 <= len(points) - straight.sum() < len(points):
+        points = points[~straight]
+        turn, base, on, forward = _bends(points)
     if len(points) <= 4:
         return np.vstack((points, points[:1]))
-    before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
-    into, on = points - before, after - points
-    base = after - before
-    turn = into[:, 0] * on[:, 1] - into[:, 1] * on[:, 0]
-    length = np.hypot(base[:, 0], base[:, 1])
-    depth = np.abs(turn) / np.maximum(length, 1e-12)
-    notch = (turn < 0) & (depth <= tolerance_m)
+    notch = (turn < 0) & (np.abs(turn) / np.maximum(base, 1e-12) <= tolerance_m)
     kept = points[~_apart(np.where(notch, 0.5 * np.abs(turn), np.inf), budget_m2)]
     return np.vstack((kept, kept[:1])) if len(kept) >= 3 else ring
 
 
-def _without_straight(points: FloatArray) -> FloatArray:
-    """Points of a ring without those between two others on one line."""
-    into, on = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    turn = np.abs(into[:, 0] * on[:, 1] - into[:, 1] * on[:, 0])
-    forward = (into * on).sum(axis=1) > 0
-    straight = forward & (turn <= STRAIGHT_M * np.hypot(on[:, 0], on[:, 1]))
-    kept = points[~straight]
-    return kept if len(kept) >= 3 else points
+def _bends(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Of each corner of a closed ring: twice the area that it adds, the base from neighbour to neighbour, the edge on.
+
+    The area is negative in a notch; the last is whether the ring goes on forwards.
+    """
+    before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+    into, on, base = points - before, after - points, after - before
+    turn = into[:, 0] * on[:, 1] - into[:, 1] * on[:, 0]
+    return turn, np.hypot(base[:, 0], base[:, 1]), np.hypot(on[:, 0], on[:, 1]), (into * on).sum(axis=1) > 0
 
 
 def _apart(cost: FloatArray, budget: float) -> BoolArray:

@@ -13,11 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from harness.world_files.parts import FloatArray
+from harness.world_files.parts import Box, FloatArray
 
 NO_HEIGHT: Final = 65_535
 """Number that stands for a height that is not known."""
 MAX_NODES: Final = 4_000_000
+"""A field has at most this many heights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,32 +37,38 @@ class HeightField:
 
     def at(self, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
         """(k,) heights of the ground; NaN outside of the grid and where one of the four nodes round a place is NaN."""
-        rows, columns = self.heights_m.shape
         column = (np.asarray(east_m, dtype=np.float64) - self.corner_m[0]) / self.spacing_m[0]
         row = (np.asarray(north_m, dtype=np.float64) - self.corner_m[1]) / self.spacing_m[1]
-        inside = (column >= 0) & (column <= columns - 1) & (row >= 0) & (row <= rows - 1)
-        left = np.clip(np.where(inside, column, 0.0).astype(np.int64), 0, max(columns - 2, 0))
-        low = np.clip(np.where(inside, row, 0.0).astype(np.int64), 0, max(rows - 2, 0))
-        right, high = np.minimum(left + 1, columns - 1), np.minimum(low + 1, rows - 1)
-        u, v = column - left, row - low
-        lower = _between(self.heights_m[low, left], self.heights_m[low, right], u)
-        upper = _between(self.heights_m[high, left], self.heights_m[high, right], u)
-        heights: FloatArray = np.where(inside, _between(lower, upper, v), np.nan)
-        return heights
+        return bilinear(self.heights_m, column, row)
 
     @property
-    def bounds_m(self) -> tuple[float, float, float, float]:
+    def bounds_m(self) -> Box:
         """xmin, ymin, xmax, ymax of the nodes."""
         rows, columns = self.heights_m.shape
         (east, north), (right, up) = self.corner_m, self.spacing_m
         return east, north, east + (columns - 1) * right, north + (rows - 1) * up
 
 
+def bilinear(values: FloatArray, column: FloatArray, row: FloatArray) -> FloatArray:
+    """(k,) values between the four nodes round places in columns and rows; NaN outside, and next to a NaN.
+
+    On a node, and on the line between two, the others do not count.
+    """
+    rows, columns = values.shape
+    inside = (column >= 0) & (column <= columns - 1) & (row >= 0) & (row <= rows - 1)
+    left = np.clip(np.where(inside, column, 0.0).astype(np.int64), 0, max(columns - 2, 0))
+    low = np.clip(np.where(inside, row, 0.0).astype(np.int64), 0, max(rows - 2, 0))
+    right, high = np.minimum(left + 1, columns - 1), np.minimum(low + 1, rows - 1)
+    u, v = column - left, row - low
+    lower = _between(values[low, left], values[low, right], u)
+    upper = _between(values[high, left], values[high, right], u)
+    return np.where(inside, _between(lower, upper, v), np.nan)
+
+
 def _between(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArray:
     """Linear between two values; exactly the first at 0 even where the second is NaN, and the second at 1."""
     mixed = first + share * (second - first)
-    result: FloatArray = np.where(share <= 0.0, first, np.where(share >= 1.0, second, mixed))
-    return result
+    return np.where(share <= 0.0, first, np.where(share >= 1.0, second, mixed))
 
 
 def packed(heights_m: FloatArray, lowest_m: float, step_m: float) -> str:
@@ -85,8 +92,7 @@ def unpacked(text: str, rows: int, columns: int, lowest_m: float, step_m: float)
     if rows * columns > MAX_NODES:
         raise ValueError(f"has {rows} x {columns} heights; must be at most {MAX_NODES:,}")
     try:
-        opened = zlib.decompressobj()
-        data = opened.decompress(base64.b64decode(text, validate=True), size + 1)
+        data = zlib.decompressobj().decompress(base64.b64decode(text, validate=True), size + 1)
     except (binascii.Error, zlib.error, ValueError) as error:
         raise ValueError("is not base64 of zlib; must be as wayproof wrote it") from error
     if len(data) != size:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from harness.files.input_file import InputError
 from harness.world_files import bounded
 from harness.world_files.parts import Contents, Reading, WorldFileError
 from harness.world_files.readers import (
@@ -46,33 +47,24 @@ KINDS: Final[dict[str, Callable[[Path, Reading], Contents]]] = {
 }
 """Readers by the name of their kind."""
 
-VECTOR_ENDINGS: Final = (".gpkg", ".shp", ".dxf", ".fgb", ".tab")
-PACKED: Final = {
-    ".hgt": "srtm",
-    "elevation.npy": "numpy_dem",
-    ".kml": "kml",
-    ".shp": "vector",
-    ".gpkg": "vector",
-}
+PACKED: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}
 """Kind of a ZIP archive by the ending of a file in it."""
+IMAGE: Final = "an image; give the YAML file of its ROS map"
+CLOUD: Final = "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)"
+GAZEBO: Final = "a Gazebo world; give its footprints as GeoJSON, or its cells as a MovingAI .map"
 GIVEN_UP: Final = {
-    ".pgm": "an image; give the YAML file of its ROS map",
-    ".png": "an image; give the YAML file of its ROS map",
+    **dict.fromkeys((".pgm", ".png", ".bmp", ".jpg"), IMAGE),
+    **dict.fromkeys((".las", ".laz"), CLOUD),
+    **dict.fromkeys((".world", ".sdf"), GAZEBO),
+    **dict.fromkeys((".gz", ".bz2", ".7z"), "packed; unpack it and give the file"),
+    **dict.fromkeys((".shx", ".dbf", ".prj"), "part of a Shapefile; give the .shp file"),
+    **dict.fromkeys((".dxf", ".dwg"), "a drawing without a place on earth; give GeoPackage or GeoJSON"),
     ".scen": "a list of MovingAI problems; give the .map file that it names",
     ".npy": "a plain array; save it as GeoTIFF or ESRI ASCII grid",
-    ".las": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
-    ".laz": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
     ".igc": "a flight, not a world; `wayproof check` takes flown paths",
     ".gpx": "a track, not a world; `wayproof check` takes paths",
-    ".gz": "packed; unpack it and give the file",
-    ".bz2": "packed; unpack it and give the file",
-    ".7z": "packed; unpack it and give the file",
-    ".shx": "part of a Shapefile; give the .shp file",
-    ".dbf": "part of a Shapefile; give the .shp file",
     ".dt2": "DTED; convert it to GeoTIFF with gdal_translate",
     ".obj": "a mesh; give CityJSON or GeoJSON of the footprints",
-    ".world": "a Gazebo world; give its footprints as GeoJSON, or its cells as a MovingAI .map",
-    ".sdf": "a Gazebo model; give its footprints as GeoJSON, or its cells as a MovingAI .map",
 }
 """Files that are not read, by ending, with what would do."""
 FAMILIES: Final = (
@@ -100,18 +92,16 @@ _JSON_KINDS: Final = (
 
 
 def read(path: Path, kind: str | None, reading: Reading) -> Contents:
-    """Reads a world file.
-
-    Args:
-        path: the file.
-        kind: a name of `KINDS`; None: told from the file.
-        reading: what the file leaves open.
+    """Reads a world file of a kind of `KINDS`; without one, it is told from the file.
 
     Raises:
         WorldFileError: it is of none of the kinds, or cannot be used.
     """
     found = kind or kind_of(path)
-    contents = footprints.finished(KINDS[found](path, reading))
+    try:
+        contents = footprints.finished(KINDS[found](path, reading))
+    except InputError as error:
+        raise WorldFileError(str(error)) from error
     return replace(contents, kind=found, notes=_together(contents.notes))
 
 
@@ -121,11 +111,11 @@ def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
     for note in notes:
         name, found, sentence = note.partition(": its ")
         same.setdefault(f"its {sentence}" if found else note, []).append(name if found else "")
-    return tuple(
-        sentence if not names[0] else f"{names[0]}: {sentence}" if len(names) == 1 else
-        f"{len(names)} parts, {names[0]} the first: {sentence}"
-        for sentence, names in same.items()
-    )  # fmt: skip
+    told = []
+    for sentence, names in same.items():
+        first = names[0] if len(names) == 1 else f"{len(names)} parts, {names[0]} the first"
+        told.append(f"{first}: {sentence}" if names[0] else sentence)
+    return tuple(told)
 
 
 def kind_of(path: Path) -> str:
@@ -151,19 +141,19 @@ def _binary(path: Path, first: bytes, ending: str) -> str | None:
     if first[:2] == b"PK":
         try:
             with zipfile.ZipFile(path) as archive:
-                names = [name.lower() for name in archive.namelist()]
+                names = [name.lower() for name in archive.namelist() if not name.endswith("/")]
         except (zipfile.BadZipFile, OSError, ValueError) as error:
             raise WorldFileError("is a damaged ZIP archive; get it again") from error
-        packed = (kind for end, kind in PACKED.items() if any(name.endswith(end) for name in names))
-        if (kind := next(packed, None)) is not None:
-            return kind
-        held = next((name.rpartition("/")[2][:40] for name in names if not name.endswith("/")), "nothing")
+        for end, kind in PACKED.items():
+            if any(name.endswith(end) for name in names):
+                return kind
+        held = names[0].rpartition("/")[2][:40] if names else "nothing"
         raise WorldFileError(f"is a ZIP archive with {held!r}; unpack it and give the file")
     if ending == ".hgt" or path.name.lower().endswith(".hgt.gz"):
         return "srtm"
     if b"OSMHeader" in first[:64]:
         return "osm_pbf"
-    return "vector" if ending in VECTOR_ENDINGS and first[:1] != b"<" else None
+    return "vector" if ending in (".gpkg", ".shp", ".fgb") and first[:1] != b"<" else None
 
 
 def _text(path: Path, first: bytes) -> str | None:

@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-Affine = tuple[float, float, float, float, float, float]
 BoolArray = NDArray[np.bool_]
+Affine = tuple[float, float, float, float, float, float]
+Box = tuple[float, float, float, float]
+"""xmin, ymin, xmax, ymax."""
 
 WGS84: Final = "EPSG:4326"
 FOOT_M: Final = 0.3048
@@ -37,19 +39,14 @@ class Datum(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """The bottom or the top of a part.
-
-    Attributes:
-        height_m: above the datum; infinite where there is no limit.
-        datum: what it is counted from.
-    """
+    """The bottom or the top of a part: a height above its datum, infinite where there is no limit."""
 
     height_m: float
     datum: Datum = Datum.SEA
 
 
 NO_BOTTOM: Final = Limit(-math.inf)
-"""It begins at the ground, or below."""
+"""A part without a bottom begins at the ground, or below."""
 NO_TOP: Final = Limit(math.inf)
 
 
@@ -133,9 +130,8 @@ class Reading:
     """How a file is to be read, where it leaves that open.
 
     Attributes:
-        metres_per_cell: side of a cell of an occupancy map, or of terrain without a place on earth; None: as the
-            file says.
-        crs: coordinate reference system; None: as the file says.
+        metres_per_cell: side of a cell of an occupancy map, or of terrain without a place on earth.
+        crs: coordinate reference system.
         default_height_m: of a building that gives neither height nor levels.
     """
 

@@ -13,19 +13,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from harness.world_files.area import (
-    FAR_M,
-    Covered,
-    Ends,
-    area_about,
-    areas_of,
-    center_of,
-    common,
-    middle_of,
-    moved,
-    whole_metres,
-)
-from harness.world_files.expansion import Expanded, FileFault, FileSpec, expanded, loaded_file
+from harness.world_files.cells import placed_cells
+from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners_of, expanded, loaded_file
 from harness.world_files.free_room import (
     CORRIDORS,
     LEAST_WAY,
@@ -35,24 +24,29 @@ from harness.world_files.free_room import (
     free_room,
     scale_that_fits,
 )
-from harness.world_files.parts import Contents, WorldFileError
-from harness.world_files.plane import Mapping, Place
-from harness.world_files.slicing import Box, sliced_cells
+from harness.world_files.parts import WGS84, Box, Contents, Datum, FloatArray, Part, WorldFileError
+from harness.world_files.plane import TURN_DEG, Mapping, Place, geodetic, short_way
 
 ANY_PLACE: Final = Place(47.0, 8.0)
 """Where the plane lies of a file that has no place on earth."""
 SCALABLE: Final = ("ros_map", "moving_ai", "ascii_grid")
+"""Kinds of files whose scale may be chosen, by metres_per_cell."""
+LARGEST_TURNS, LARGEST_M = 400.0, 400_000.0
+"""Longest side of an area, in turn radii and in metres: a part of a larger file is taken."""
+PAD_TURNS: Final = 12.0
+"""The area reaches this many turn radii beyond buildings and zones, which leaves room around them."""
+TRIES: Final = 6
+"""Parts of a large file that are tried before there is said to be no room."""
+COUNTRY_DEG: Final = 5.0
+"""The origin of files that span more lies where most of them is."""
+
+Ends = tuple[tuple[float, float], tuple[float, float]]
+"""Start and goal."""
 
 
 @dataclass(frozen=True)
 class Craft:
-    """What the area must have room for.
-
-    Attributes:
-        name: of the aircraft.
-        turn_radius_m: that its plans may ask for.
-        clearance_m: wanted distance from obstacles.
-    """
+    """What the area must have room for: the turn radius that plans may ask for, and the wanted clearance."""
 
     name: str
     turn_radius_m: float
@@ -82,6 +76,22 @@ class Site:
     notes: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class _Files:
+    """What is sited: the files, what they hold, the aircraft and its altitude."""
+
+    specs: tuple[FileSpec, ...]
+    contents: tuple[Contents, ...]
+    craft: Craft
+    altitude_m: float
+    tell: Callable[[str], None] | None
+
+    def mappings(self, place: Place | None) -> list[Mapping]:
+        """From each file to the plane of a place."""
+        each = zip(self.specs, self.contents, strict=True)
+        return [Mapping(contents.crs, place or ANY_PLACE, spec.shift_m) for spec, contents in each]
+
+
 def site(
     specs: Sequence[FileSpec],
     altitude_m: float,
@@ -104,30 +114,26 @@ def site(
         FileFault: a file cannot be used.
         WorldFileError: there is no room; the message has the numbers and what would do.
     """
-    contents = _read(specs, tell)
-    place = None if contents[0].crs is None else middle_of(contents, given)
-    ends = _placed_ends(given, place)
-    mappings = _mappings(contents, specs, place)
-    covered = Covered.by(contents, mappings)
-    notes: tuple[str, ...] = ()
-    if ends is not None:
-        areas = [area_about(ends, covered, craft.turn_radius_m)]
-    else:
-        areas, notes = areas_of(covered, contents, mappings, altitude_m, craft.turn_radius_m)
-    first: WorldFileError | None = None
-    for area in areas:
+    files = _Files(tuple(specs), _read(specs, tell), craft, altitude_m, tell)
+    place = None if files.contents[0].crs is None else _origin(files.contents, given)
+    if given is not None and place is not None:
+        (south, west), (north, east) = given
+        x, y = Mapping(WGS84, place).to_plane(np.array([west, east]), np.array([south, north]))
+        given = (float(x[0]), float(y[0])), (float(x[1]), float(y[1]))
+    areas, notes = _areas(files, place, given)
+    faults: list[WorldFileError] = []
+    for own_place, area in areas:
         try:
-            found = _in_area(area, specs, contents, place, ends, altitude_m, craft, tell)
+            found = _in_area(files, own_place, area, given)
             return replace(found, notes=(*notes, *found.notes))
         except FileFault:
             raise
         except WorldFileError as error:
-            first = first or error
-    assert first is not None
-    raise first
+            faults.append(error)
+    raise faults[0]
 
 
-def _read(specs: Sequence[FileSpec], tell: Callable[[str], None] | None) -> list[Contents]:
+def _read(specs: Sequence[FileSpec], tell: Callable[[str], None] | None) -> tuple[Contents, ...]:
     """What the files hold; either all have a place on earth or none."""
     contents: list[Contents] = []
     for index, spec in enumerate(specs):
@@ -142,121 +148,190 @@ def _read(specs: Sequence[FileSpec], tell: Callable[[str], None] | None) -> list
         raise FileFault(
             local.index(True), "names no place on earth, but another file does; give crs, as EPSG:28992"
         )
-    return contents
+    return tuple(contents)
 
 
-def _mappings(contents: Sequence[Contents], specs: Sequence[FileSpec], place: Place | None) -> list[Mapping]:
-    return [
-        Mapping(each.crs, place or ANY_PLACE, spec.shift_m)
-        for each, spec in zip(contents, specs, strict=True)
-    ]
+def _origin(contents: Sequence[Contents], given: Ends | None) -> Place:
+    """The origin: between start and goal, else in the middle of what the files hold."""
+    if given is not None:
+        latitude, longitude = np.array(given).T
+        return _place(float(np.mean(latitude)), float(np.mean(short_way(longitude))))
+    found = np.hstack([np.stack(geodetic(str(each.crs), *corners_of(each))) for each in contents])
+    latitude, longitude = found[:, np.isfinite(found).all(axis=0)]
+    if not len(latitude):
+        raise WorldFileError("nothing of these files has a place on earth; their crs may be another")
+    degrees = latitude, short_way(longitude)
+    large = max(map(np.ptp, degrees)) > COUNTRY_DEG
+    north, east = (float(np.median(x)) if large else 0.5 * float(x.min() + x.max()) for x in degrees)
+    return _place(min(max(north, -84.0), 84.0), east)
 
 
-def _in_area(
-    bounds: Box,
-    specs: Sequence[FileSpec],
-    contents: Sequence[Contents],
-    place: Place | None,
-    chosen: Ends | None,
-    altitude_m: float,
-    craft: Craft,
-    tell: Callable[[str], None] | None,
-) -> Site:
+def _place(latitude_deg: float, longitude_deg: float) -> Place:
+    return Place(round(latitude_deg, 5), round(math.remainder(longitude_deg, TURN_DEG), 5))
+
+
+def _covered(files: _Files, place: Place | None) -> tuple[list[Box], list[Box]]:
+    """Boxes of rasters and of fences to stay inside of, beyond which nothing is known or free; and of all others."""
+    inside: list[Box] = []
+    around: list[Box] = []
+    for each, mapping in zip(files.contents, files.mappings(place), strict=True):
+        raster = each.terrain or each.occupied
+        east, north = mapping.to_plane(*corners_of(each if raster is None else replace(each, parts=())))
+        known = np.isfinite(east) & np.isfinite(north)
+        if known.any():
+            # Of a raster the largest upright rectangle within its four corners, which may lie askew.
+            first, last = (1, 2) if raster is not None else (0, -1)
+            x, y = np.sort(east[known]).tolist(), np.sort(north[known]).tolist()
+            fenced = any(part.keep_in for part in each.parts)
+            box = x[first], y[first], x[last], y[last]
+            (inside if raster is not None or fenced else around).append(box)
+    return inside, around
+
+
+def _common(boxes: Sequence[Box]) -> Box | None:
+    """What lies in all of some boxes; None where nothing does."""
+    if not boxes:
+        return None
+    (xmin, ymin), (xmax, ymax) = np.max(boxes, axis=0)[:2].tolist(), np.min(boxes, axis=0)[2:].tolist()
+    return (xmin, ymin, xmax, ymax) if xmin < xmax and ymin < ymax else None
+
+
+def _areas(
+    files: _Files, place: Place | None, given: Ends | None
+) -> tuple[list[tuple[Place | None, Box]], tuple[str, ...]]:
+    """Areas with their origins, the first the best, and what is to be said of them.
+
+    There is one about a start and a goal that are given, and one where the files are small. Of large ones there are
+    several parts, the most crowded first, the corners last.
+    """
+    inside, around = _covered(files, place)
+    turn_m = files.craft.turn_radius_m
+    if given is not None:
+        reach = max(PAD_TURNS * turn_m, 0.25 * math.dist(*given))
+        box = (*(np.min(given, axis=0) - reach).tolist(), *(np.max(given, axis=0) + reach).tolist())
+        return [(place, _common([*inside, box]) or box)], ()
+    pad = PAD_TURNS * turn_m
+    low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
+    whole = _common([*inside, (*low.tolist(), *high.tolist())])
+    if whole is None:
+        raise WorldFileError("nothing of these files lies in one area; must overlap")
+    sides, largest = (whole[2] - whole[0], whole[3] - whole[1]), min(LARGEST_TURNS * turn_m, LARGEST_M)
+    if max(sides) <= largest:
+        told = f"the area reaches {pad:,.0f} m beyond what the file holds, to leave room to turn"
+        return [(place, whole)], () if inside else (told,)
+    foci = _crowded(files, place, whole, largest)
+    if not inside:  # a zone larger than the area leaves room at the corners of what is about it
+        foci += [(whole[i], whole[j]) for i in (0, 2) for j in (1, 3)]
+    half = [min(side, largest) / 2 for side in sides]
+    areas: list[tuple[Place | None, Box]] = []
+    for focus in foci:
+        x, y = (min(max(v, whole[k] + half[k]), whole[k + 2] - half[k]) for k, v in enumerate(focus))
+        if place is None:
+            areas.append((None, (x - half[0], y - half[1], x + half[0], y + half[1])))
+        else:  # with its origin in its middle, about which the plane is true to scale
+            longitude, latitude = Mapping(WGS84, place).from_plane(np.array([x]), np.array([y]), 0.0)
+            own = _place(float(latitude[0]), float(longitude[0]))
+            box = (-half[0], -half[1], half[0], half[1])
+            areas.append((own, _common([box, *_covered(files, own)[0]]) or box))
+    told = (
+        f"the files reach over {sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km; the area is a part of that"
+    )
+    return areas, (told,)
+
+
+def _crowded(files: _Files, place: Place | None, whole: Box, side_m: float) -> list[tuple[float, float]]:
+    """Where in a large area to look: at parts with most others near them, half a side apart; else in the middle."""
+    import shapely
+
+    middles: list[FloatArray] = [np.zeros((0, 2))]
+    for each, mapping in zip(files.contents, files.mappings(place), strict=True):
+        solid = [part.footprint for part in each.parts if _may_reach(part, files.altitude_m)]
+        if solid:
+            points = shapely.get_coordinates(shapely.centroid(np.array(solid, dtype=object)))
+            middles.append(np.column_stack(mapping.to_plane(points[:, 0], points[:, 1])))
+    places = np.concatenate(middles)
+    places = places[((places >= whole[:2]) & (places <= whole[2:])).all(axis=1)]
+    some = places[:: max(len(places) // 2000, 1)]
+    near = np.array([(np.abs(places - each).max(axis=1) <= side_m / 3).sum() for each in some])
+    found: list[tuple[float, float]] = []
+    for x, y in some[np.argsort(-near, kind="stable")].tolist():
+        if len(found) < TRIES and all(max(abs(x - u), abs(y - v)) > side_m / 2 for u, v in found):
+            found.append((x, y))
+    return found or [((whole[0] + whole[2]) / 2, (whole[1] + whole[3]) / 2)]
+
+
+def _may_reach(part: Part, altitude_m: float) -> bool:
+    """Whether a part may be solid at an altitude, as far as that is told without the ground."""
+    begins = part.bottom.datum is Datum.GROUND or part.bottom.height_m <= altitude_m
+    return begins and (part.top.datum is Datum.GROUND or part.top.height_m >= altitude_m)
+
+
+def _in_area(files: _Files, place: Place | None, bounds: Box, given: Ends | None) -> Site:
     """A mission in an area, or a sentence with the numbers that say why there is none."""
-    middle = center_of(bounds)
-    if place is not None and chosen is None and math.hypot(*middle) > FAR_M:
-        place = moved(
-            place, middle
-        )  # the area of the same size about it, no larger than rasters and fences there
-        half = (bounds[2] - bounds[0]) / 2, (bounds[3] - bounds[1]) / 2
-        own: Box = (-half[0], -half[1], half[0], half[1])
-        covered = Covered.by(contents, _mappings(contents, specs, place))
-        bounds = common([own, *covered.inside]) or own
     if place is None:
         east, north = -bounds[0], -bounds[1]
-        specs = [replace(s, shift_m=(s.shift_m[0] + east, s.shift_m[1] + north)) for s in specs]
+        moved = (replace(s, shift_m=(s.shift_m[0] + east, s.shift_m[1] + north)) for s in files.specs)
+        files = replace(files, specs=tuple(moved))
         bounds = (0.0, 0.0, bounds[2] + east, bounds[3] + north)
-        if chosen is not None:
-            (x0, y0), (x1, y1) = chosen
-            chosen = (x0 + east, y0 + north), (x1 + east, y1 + north)
-    bounds = whole_metres(bounds)
-    room_m = craft.turn_radius_m + craft.clearance_m
-    found = expanded(specs, place or ANY_PLACE, bounds, altitude_m, room_m, tell)
+        given = None if given is None else tuple((x + east, y + north) for x, y in given)  # type: ignore[assignment]
+    # Inwards to whole metres, or to a tenth of a small area.
+    step = 1.0 if min(bounds[2] - bounds[0], bounds[3] - bounds[1]) > 100 else 0.1
+    rounds = (math.ceil, math.ceil, math.floor, math.floor)
+    xmin, ymin, xmax, ymax = (
+        round(way(side / step + nudge) * step, 1)
+        for way, side, nudge in zip(rounds, bounds, (-1e-9, -1e-9, 1e-9, 1e-9), strict=True)
+    )
+    bounds = xmin, ymin, xmax, ymax
+    found = expanded(files.specs, place or ANY_PLACE, bounds, files.altitude_m, files.tell)
     notes: tuple[str, ...] = ()
-    if chosen is None:
-        chosen, notes = _ends(found, contents, specs, place, bounds, craft)
-    start, goal = ((round(x, 1), round(y, 1)) for x, y in chosen)
-    return Site(tuple(specs), place, bounds, start, goal, found, notes)
+    if given is None:
+        given, notes = _ends(files, place, bounds, found)
+    start, goal = ((round(x, 1), round(y, 1)) for x, y in given)
+    return Site(files.specs, place, bounds, start, goal, found, notes)
 
 
-def _placed_ends(given: Ends | None, place: Place | None) -> Ends | None:
-    if given is None or place is None:
-        return given
-    mapping = Mapping("EPSG:4326", place)
-    east, north = mapping.to_plane(np.array([given[0][1], given[1][1]]), np.array([given[0][0], given[1][0]]))
-    return (float(east[0]), float(north[0])), (float(east[1]), float(north[1]))
-
-
-def _ends(
-    found: Expanded,
-    contents: Sequence[Contents],
-    specs: Sequence[FileSpec],
-    place: Place | None,
-    bounds: Box,
-    craft: Craft,
-) -> tuple[Ends, tuple[str, ...]]:
+def _ends(files: _Files, place: Place | None, bounds: Box, found: Expanded) -> tuple[Ends, tuple[str, ...]]:
     """Start and goal in free room, and what is to be said of the way; or the numbers that say why there are none."""
-    solid = [each for source in found.sources for each in source.polygons]
-    forbidden: list[Any] = []
-    for each, spec in zip(contents, specs, strict=True):
-        if each.occupied is not None and np.isnan(each.occupied.values).any():
-            mapping = Mapping(each.crs, place or ANY_PLACE, spec.shift_m)
-            forbidden += sliced_cells(each.occupied, np.isnan(each.occupied.values), mapping, bounds)[0]
-    room = free_room(solid, bounds, forbidden)
-    cell_m = None
-    for turns in CORRIDORS:
-        chosen = ends(room, craft.turn_radius_m, craft.clearance_m, turns)
-        if chosen is None:
-            cell_m = cell_m or _cell_that_fits(room, contents, specs, craft)
-            continue
-        if turns == CORRIDORS[0]:
+    craft, forbidden = files.craft, list[Any]()
+    for each, mapping in zip(files.contents, files.mappings(place), strict=True):
+        if each.occupied is not None:
+            unknown = np.isnan(each.occupied.values)
+            forbidden += placed_cells(each.occupied, unknown, mapping, bounds)[0]
+    room = free_room([each for source in found.sources for each in source.polygons], bounds, forbidden)
+    for corridor in CORRIDORS:
+        chosen = ends(room, craft.turn_radius_m, craft.clearance_m, corridor)
+        if chosen is not None and corridor == CORRIDORS[0]:
             return chosen, ()
-        wide_m = 2.0 * (craft.clearance_m + CORRIDORS[0] * craft.turn_radius_m)
-        more = "" if cell_m is None else f"; with --metres-per-cell {cell_m:g} it can"
-        return chosen, (
-            f"every way from start to goal is somewhere narrower than {wide_m:,.0f} m, where {craft.name} cannot turn "
-            f"round: the goal may be proved unreachable{more}",
-        )
-    width, height = bounds[2] - bounds[0], bounds[3] - bounds[1]
-    needs = craft.clearance_m + TURNS[-1] * craft.turn_radius_m
-    text = (
-        f"{width:,.0f} x {height:,.0f} m, {room.free_share:.0%} free, are too small for {craft.name}: its start and "
-        f"goal need {needs:,.0f} m of free room around and {LEAST_WAY * craft.turn_radius_m:,.0f} m between them, the "
-        f"widest free disc has {room.widest_m:,.0f} m"
+        if chosen is not None:
+            wide_m = 2.0 * (craft.clearance_m + CORRIDORS[0] * craft.turn_radius_m)
+            cell_m = _cell_that_fits(files, room)
+            return chosen, (
+                f"every way from start to goal is somewhere narrower than {wide_m:,.0f} m, where {craft.name} cannot "
+                "turn round: the goal may be proved unreachable"
+                + (f"; with --metres-per-cell {cell_m:g} it can" if cell_m else ""),
+            )
+    cell_m = _cell_that_fits(files, room)
+    would = (
+        f"--metres-per-cell {cell_m:g}"
+        if cell_m
+        else "another altitude, a smaller clearance or aircraft, or a larger file"
     )
-    if cell_m is not None:
-        raise WorldFileError(f"{text}; --metres-per-cell {cell_m:g} would do")
     raise WorldFileError(
-        f"{text}; another altitude, a smaller clearance or aircraft, or a larger file would do"
+        f"{bounds[2] - bounds[0]:,.0f} x {bounds[3] - bounds[1]:,.0f} m, {room.free_share:.0%} free, are too small for "
+        f"{craft.name}: its start and goal need {craft.clearance_m + TURNS[-1] * craft.turn_radius_m:,.0f} m of free "
+        f"room around and {LEAST_WAY * craft.turn_radius_m:,.0f} m between them, the widest free disc has "
+        f"{room.widest_m:,.0f} m; {would} would do"
     )
 
 
-def _cell_that_fits(
-    room: FreeRoom, contents: Sequence[Contents], specs: Sequence[FileSpec], craft: Craft
-) -> float | None:
+def _cell_that_fits(files: _Files, room: FreeRoom) -> float | None:
     """Side of a cell, in metres, with which the aircraft has room; None of files whose scale is given."""
-    if not any(each.crs is None and each.kind in SCALABLE for each in contents):
+    rasters = [
+        each.occupied or each.terrain for each in files.contents if each.crs is None and each.kind in SCALABLE
+    ]
+    scale = scale_that_fits(room, files.craft.turn_radius_m, files.craft.clearance_m) if rasters else None
+    if scale is None or rasters[0] is None:
         return None
-    scale = scale_that_fits(room, craft.turn_radius_m, craft.clearance_m)
-    return None if scale is None else _rounded_up(_cell_m(contents) * scale)
-
-
-def _cell_m(contents: Sequence[Contents]) -> float:
-    rasters = (each.occupied or each.terrain for each in contents)
-    return next((math.hypot(each.affine[0], each.affine[3]) for each in rasters if each is not None), 1.0)
-
-
-def _rounded_up(value: float) -> float:
-    """To two digits."""
-    step = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return math.ceil(value / step - 1e-9) * step
+    cell_m = math.hypot(rasters[0].affine[0], rasters[0].affine[3]) * scale
+    step = 10.0 ** (math.floor(math.log10(cell_m)) - 1)
+    return math.ceil(cell_m / step - 1e-9) * step

@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from harness.world_files.height_field import HeightField
-from harness.world_files.parts import FloatArray, Raster
+from harness.world_files.cells import window_of
+from harness.world_files.height_field import HeightField, bilinear
+from harness.world_files.parts import Box, Raster
 from harness.world_files.plane import Mapping
-from harness.world_files.slicing import Box, window_of
 
 MOST_NODES: Final = 1_000_000
 """More than these make the field coarser than the file, which is told."""
@@ -30,8 +30,7 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
     Returns:
         None where no file reaches into the box.
     """
-    spacings = [_spacing(raster, mapping, box) for raster, mapping in sources]
-    known = [spacing for spacing in spacings if spacing is not None]
+    known = [each for each in (_spacing(raster, mapping, box) for raster, mapping in sources) if each]
     if not known:
         return None, []
     xmin, ymin, xmax, ymax = box
@@ -40,41 +39,22 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
     nodes = ((xmax - xmin) / right + 1) * ((ymax - ymin) / up + 1)
     if nodes > MOST_NODES:
         factor = math.ceil(math.sqrt(nodes / MOST_NODES))
-        notes.append(
-            f"the ground is kept every {factor * right:g} m, coarser than the file: its area is large"
-        )
         right, up = factor * right, factor * up
+        notes.append(f"the ground is kept every {right:g} m, coarser than the file: its area is large")
     columns, rows = int((xmax - xmin) / right) + 2, int((ymax - ymin) / up) + 2
     east, north = np.meshgrid(xmin + right * np.arange(columns), ymin + up * np.arange(rows))
     heights = np.full(rows * columns, np.nan)
     for raster, mapping in sources:
         missing = np.flatnonzero(np.isnan(heights))
-        if len(missing):
-            heights[missing] = sampled(
-                raster, *mapping.from_plane(east.ravel()[missing], north.ravel()[missing], raster.middle_x)
-            )
+        x, y = mapping.from_plane(east.ravel()[missing], north.ravel()[missing], raster.middle_x)
+        places = raster.cells(x, y)
+        sizes = raster.values.shape[::-1]
+        inside = np.logical_and(*((p >= 0) & (p <= size) for p, size in zip(places, sizes, strict=True)))
+        column, row = (np.clip(p - 0.5, 0.0, size - 1.0) for p, size in zip(places, sizes, strict=True))
+        heights[missing[inside]] = bilinear(raster.values, column[inside], row[inside])
     if not np.isfinite(heights).any():
         return None, []
     return HeightField((xmin, ymin), (right, up), heights.reshape(rows, columns)), notes
-
-
-def sampled(raster: Raster, x: FloatArray, y: FloatArray) -> FloatArray:
-    """(k,) heights at places in a file; NaN outside, and next to a cell without a height."""
-    column, row = raster.cells(x, y)
-    rows, columns = raster.values.shape
-    inside = (column >= 0) & (column <= columns) & (row >= 0) & (row <= rows)
-    column = np.clip(np.where(inside, column, 0.0) - 0.5, 0.0, columns - 1.0)
-    row = np.clip(np.where(inside, row, 0.0) - 0.5, 0.0, rows - 1.0)
-    left, low = (
-        np.minimum(column.astype(np.int64), max(columns - 2, 0)),
-        np.minimum(row.astype(np.int64), max(rows - 2, 0)),
-    )
-    right, high = np.minimum(left + 1, columns - 1), np.minimum(low + 1, rows - 1)
-    u, v, values = column - left, row - low, raster.values
-    lower = (1 - u) * values[low, left] + u * values[low, right]
-    upper = (1 - u) * values[high, left] + u * values[high, right]
-    heights: FloatArray = np.where(inside, (1 - v) * lower + v * upper, np.nan)
-    return heights
 
 
 def _spacing(raster: Raster, mapping: Mapping, box: Box) -> tuple[float, float] | None:
@@ -82,14 +62,15 @@ def _spacing(raster: Raster, mapping: Mapping, box: Box) -> tuple[float, float] 
     rows, columns = window_of(raster, mapping, box)
     if rows.start >= rows.stop or columns.start >= columns.stop:
         return None
-    row, column = 0.5 * (rows.start + rows.stop), 0.5 * (columns.start + columns.stop)
-    x, y = raster.places(np.array([column, column + 1.0, column]), np.array([row, row, row + 1.0]))
+    return cell_sides(raster, mapping, 0.5 * (columns.start + columns.stop), 0.5 * (rows.start + rows.stop))
+
+
+def cell_sides(raster: Raster, mapping: Mapping, column: float, row: float) -> tuple[float, float] | None:
+    """Lengths in the plane of the two sides of a cell, metres; None where its place has none."""
+    x, y = raster.places(column + np.array([0.0, 1.0, 0.0]), row + np.array([0.0, 0.0, 1.0]))
     east, north = mapping.to_plane(x, y)
-    if not (np.isfinite(east).all() and np.isfinite(north).all()):
-        return None
-    across = math.hypot(float(east[1] - east[0]), float(north[1] - north[0]))
-    down = math.hypot(float(east[2] - east[0]), float(north[2] - north[0]))
-    return across, down
+    sides = np.hypot(east[1:] - east[0], north[1:] - north[0]).tolist()
+    return (sides[0], sides[1]) if np.isfinite(sides).all() else None
 
 
 def _rounded(spacing_m: float) -> float:

@@ -16,25 +16,13 @@ import numpy as np
 
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import Contents, FloatArray, Limit, Part, Reading, WorldFileError
-from harness.world_files.plane import (
-    flat_crs,
-    has_heights,
-    in_degrees,
-    unit_that_is_no_metre,
-    vertical_unit_m,
-)
+from harness.world_files.plane import axis_units, in_degrees
 from harness.world_files.readers import limits
-from harness.world_files.readers.lengths import metres_of
 
 SOLID: Final = ("Building", "Bridge", "OtherConstruction")
 """Beginnings of the types that are taken."""
-DEEPEST: Final = 5
-"""A ring's indices lie no deeper than this in `boundaries`."""
 INSTANCE: Final = "GeometryInstance"
 """Type of a geometry that is a template of the file, put somewhere."""
-MOST_NAMED: Final = 4
-LATITUDE_FIRST: Final = "its latitudes are taken to come first"
-"""Note on a file in degrees whose axes are in the order of EPSG."""
 ROOFS: Final = ("b3_h_dak_max", "b3_h_nok", "h_dak_max")
 """Attributes of 3DBAG with the height of the roof above the datum, for buildings whose geometry is flat."""
 LOW_M: Final = 0.1
@@ -52,69 +40,53 @@ def read(path: Path, reading: Reading) -> Contents:
         WorldFileError: it is not CityJSON, or has nothing solid.
     """
     contents = json_of(path, lines=True)
-    crs = reading.crs or _crs(contents[0])
+    if not all(isinstance(each, dict) and isinstance(each.get("CityObjects"), dict) for each in contents):
+        raise WorldFileError("has no CityObjects; must be CityJSON")
+    crs = reading.crs or _crs(contents[0].get("metadata"))
     notes: list[str] = []
     unit_m = 1.0 if crs is None else _height_unit_m(crs, notes)
-    degrees = in_degrees(crs)
     parts: list[Part] = []
-    passed, doubts = Counter[str](), limits.Doubts()
+    passed, doubts, turned = Counter[str](), limits.Doubts(), False
     for content in contents:
-        objects = content.get("CityObjects") if isinstance(content, dict) else None
-        if not isinstance(objects, dict):
-            raise WorldFileError("has no CityObjects; must be CityJSON")
         vertices = _vertices(content, contents[0].get("transform"))
         vertices[:, 2] *= unit_m
-        if degrees and _latitude_first(vertices):
-            vertices = vertices[:, [1, 0, 2]]
-            passed[LATITUDE_FIRST] = 1
-        for name, each in objects.items():
-            part, why = _object(name, each, vertices, reading, doubts)
+        # Some programs write latitudes first; only degrees beyond 90 tell.
+        if (
+            in_degrees(crs)
+            and len(vertices)
+            and np.abs(vertices[:, 1]).max() > 90 >= np.abs(vertices[:, 0]).max()
+        ):
+            vertices, turned = vertices[:, [1, 0, 2]], True
+        for name, thing in content["CityObjects"].items():
+            kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
+            if not kind.startswith(SOLID):
+                passed[kind] += 1
+                continue
+            instances = sum(each["type"] == INSTANCE for each in _geometries(thing))
+            passed[INSTANCE] += instances
+            part = _part(name, thing, vertices, reading, doubts)
             parts += [] if part is None else [part]
-            passed.update(why)
+            passed["building without a shape"] += part is None and not (thing.get("children") or instances)
     if not parts:
         raise WorldFileError("has no building with a shape; must have some")
-    notes += [LATITUDE_FIRST] if passed.pop(LATITUDE_FIRST, 0) else []
+    notes += ["its latitudes are taken to come first"] if turned else []
     notes += doubts.notes(reading)
-    if passed:
-        more = " and others" if len(passed) > MOST_NAMED else ""
-        named = ", ".join(f"{number} {kind}" for kind, number in passed.most_common(MOST_NAMED))
-        notes.append(f"passed over: {named}{more}")
+    if told := [f"{number} {kind}" for kind, number in passed.most_common() if number]:
+        notes.append(f"passed over: {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}")
     if crs is None:
         notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
     return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
 
 
-def _latitude_first(vertices: FloatArray) -> bool:
-    """Whether places can only be degrees with the latitude before the longitude, as some programs write them."""
-    return len(vertices) > 0 and bool(np.abs(vertices[:, 1]).max() > 90.0 >= np.abs(vertices[:, 0]).max())
-
-
-def _object(
-    name: str, thing: Any, vertices: FloatArray, reading: Reading, doubts: limits.Doubts
-) -> tuple[Part | None, list[str]]:
-    """The part that an object is, and what of it is passed over."""
-    kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
-    if not kind.startswith(SOLID):
-        return None, [kind]
-    passed = [INSTANCE for shape in _geometries(thing) if shape["type"] == INSTANCE]
-    part = _part(name, thing, vertices, reading, doubts)
-    if part is None and not (thing.get("children") or passed):
-        passed.append("building without a shape")
-    return part, passed
-
-
 def _height_unit_m(crs: str, notes: list[str]) -> float:
     """Length of the unit of heights in metres: that of the vertical system, else that of the plane."""
-    if has_heights(crs):
-        unit_m = vertical_unit_m(crs)
-        if unit_m != 1.0:
-            notes.append(f"its heights are its numbers times {unit_m:.6g}, as it says")
-        return unit_m
-    name = unit_that_is_no_metre(crs)
-    if not name:
-        return 1.0
-    notes.append(f"its heights name no unit: taken in {name}, as its plane")
-    return float(flat_crs(crs).axis_info[0].unit_conversion_factor)
+    units = axis_units(crs)
+    if units.height_m is None and units.plane_m != 1.0:
+        notes.append(f"its heights name no unit: taken in {units.plane}, as its plane")
+        return units.plane_m
+    if units.height_m not in (None, 1.0):
+        notes.append(f"its heights are its numbers times {units.height_m:.6g}, as it says")
+    return units.height_m or 1.0
 
 
 def _vertices(content: dict[str, Any], common: Any) -> FloatArray:
@@ -132,11 +104,8 @@ def _vertices(content: dict[str, Any], common: Any) -> FloatArray:
 
 def _geometries(thing: dict[str, Any]) -> list[dict[str, Any]]:
     """Geometries of an object that say of what type they are."""
-    return [
-        each
-        for each in thing.get("geometry") or ()
-        if isinstance(each, dict) and isinstance(each.get("type"), str)
-    ]
+    shapes = thing.get("geometry") or ()
+    return [each for each in shapes if isinstance(each, dict) and isinstance(each.get("type"), str)]
 
 
 def _part(
@@ -146,37 +115,29 @@ def _part(
     import shapely
 
     shapes, low, high = [], math.inf, -math.inf
-    for surface in _best_surfaces(thing):
-        rings = [_places(ring, vertices, name) for ring in surface if len(ring) >= 3]
-        if not rings or len(surface[0]) < 3:
-            continue
-        heights = np.concatenate(rings)[:, 2]
-        low, high = min(low, float(heights.min())), max(high, float(heights.max()))
-        shape = shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]])
-        if not shape.is_valid:
-            shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
-        if shape.area > WALL * shape.length**2:
-            shapes.append(shape)
+    areal = [each for each in _geometries(thing) if each["type"].endswith(("Surface", "Solid"))]
+    best = max((str(each.get("lod", "0")) for each in areal), default="")
+    for geometry in (each for each in areal if str(each.get("lod", "0")) == best):
+        for surface in _surfaces(geometry.get("boundaries")):
+            rings = [_places(ring, vertices, name) for ring in surface if len(ring) >= 3]
+            if not rings or len(surface[0]) < 3:
+                continue
+            heights = np.concatenate(rings)[:, 2]
+            low, high = min(low, float(heights.min())), max(high, float(heights.max()))
+            shape = shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]])
+            if not shape.is_valid:
+                shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
+            if shape.area > WALL * shape.length**2:
+                shapes.append(shape)
     if not shapes:
         return None
-    footprint = shapely.union_all(shapes)
-    tags = thing.get("attributes")
+    footprint, tags = shapely.union_all(shapes), thing.get("attributes")
     tags = tags if isinstance(tags, dict) else {}
     if high - low < LOW_M:
-        high = max(metres_of(tags.get(key)) or -math.inf for key in ROOFS)
+        high = max(limits.metres_of(tags.get(key)) or -math.inf for key in ROOFS)
         if high <= low:
             high = low + limits.building(tags, footprint, reading, doubts).top.height_m
     return Part(footprint, Limit(low), Limit(high), name=name[:40])
-
-
-def _best_surfaces(thing: dict[str, Any]) -> Iterator[list[list[Any]]]:
-    """Surfaces of an object at its highest level of detail."""
-    areal = [each for each in _geometries(thing) if "boundaries" in each]
-    areal = [each for each in areal if each["type"].endswith(("Surface", "Solid"))]
-    best = max((str(each.get("lod", "0")) for each in areal), default="")
-    for each in areal:
-        if str(each.get("lod", "0")) == best:
-            yield from _surfaces(each["boundaries"])
 
 
 def _places(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:
@@ -186,27 +147,18 @@ def _places(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:
     return found
 
 
-def _surfaces(boundaries: Any, depth: int = 0) -> Iterator[list[list[Any]]]:
+def _surfaces(boundaries: Any) -> Iterator[list[list[Any]]]:
     """Surfaces, each a list of rings of indices, of a MultiSurface, Solid or MultiSolid."""
-    if not isinstance(boundaries, list) or depth > DEEPEST:
+    if not isinstance(boundaries, list) or not all(isinstance(each, list) for each in boundaries):
         raise WorldFileError("has boundaries that are not lists of rings")
-    if (
-        boundaries
-        and isinstance(boundaries[0], list)
-        and boundaries[0]
-        and not isinstance(boundaries[0][0], list)
-    ):
-        if not all(isinstance(ring, list) for ring in boundaries):
-            raise WorldFileError("has boundaries that are not lists of rings")
+    if boundaries and boundaries[0] and not isinstance(boundaries[0][0], list):
         yield boundaries
         return
     for each in boundaries:
-        if isinstance(each, list) and each:
-            yield from _surfaces(each, depth + 1)
+        yield from _surfaces(each)
 
 
-def _crs(content: Any) -> str | None:
-    metadata = content.get("metadata") if isinstance(content, dict) else None
+def _crs(metadata: Any) -> str | None:
     if not isinstance(metadata, dict):
         return None
     old = metadata.get("crs")  # before version 1.0

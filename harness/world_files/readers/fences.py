@@ -16,6 +16,7 @@ from harness.world_files.readers.footprints import Place, circle, on_earth
 
 WAYPOINT: Final = 16
 """MAV_CMD of the first item of a waypoint file where that is home."""
+TORN: Final = "has a fence of {} corners that should have more; it may be torn"
 Fence = tuple[Any, bool]
 """A shape, and whether it is to be stayed inside of."""
 
@@ -30,25 +31,23 @@ def read_plan(path: Path, reading: Reading) -> Contents:
     fence = content.get("geoFence") if isinstance(content, dict) else None
     if not isinstance(fence, dict):
         raise WorldFileError("has no geoFence; must be a QGroundControl plan with one")
+    polygons = list(fence.get("polygons") or ())
+    if fence.get("polygon"):  # before version 2: one, to stay inside of
+        polygons.append({"polygon": fence["polygon"], "inclusion": True})
     found: list[Fence] = []
     try:
-        found += [
-            (_ring([_turned(corner) for corner in each["polygon"]]), bool(each.get("inclusion")))
-            for each in fence.get("polygons") or ()
-        ]
-        if isinstance(old := fence.get("polygon"), list) and old:  # before version 2: one, to stay inside of
-            found.append((_ring([_turned(corner) for corner in old]), True))
+        rings = [_ring([_turned(corner) for corner in each["polygon"]]) for each in polygons]
+        found += [(ring, bool(each.get("inclusion"))) for ring, each in zip(rings, polygons, strict=True)]
         for each in fence.get("circles") or ():
             shape = circle(_turned(each["circle"]["center"]), float(each["circle"]["radius"]))
             found.append((shape, bool(each.get("inclusion"))))
+        points = (content.get("rallyPoints") or {}).get("points") or ()
+        firmware = (content.get("mission") or {"firmwareType": None}).get("firmwareType")
     except WorldFileError:
         raise
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise WorldFileError("has a geoFence whose polygons or circles are not whole") from error
-    mission, rally = content.get("mission"), content.get("rallyPoints")
-    any_of = isinstance(mission, dict) and not inside_all(mission.get("firmwareType"))
-    points = rally.get("points") if isinstance(rally, dict) else None
-    return _contents("plan_fence", found, any_of, len(points) if isinstance(points, list) else 0)
+    return _contents("plan_fence", found, not inside_all(firmware), len(points))
 
 
 def _turned(place: Any) -> Place:
@@ -95,51 +94,50 @@ def _items(rows: list[list[str]]) -> list[Fence]:
     found: list[Fence] = []
     pending: list[Place] = []
     home: Place | None = None
-    torn = "has a fence of {} corners that should have more; it may be torn"
     before = 0
     for number, row in enumerate(rows):
-        command, first = int(row[3]), float(row[4])
-        place = on_earth(float(row[9]), float(row[8]))
+        command, first, place = int(row[3]), float(row[4]), on_earth(float(row[9]), float(row[8]))
         if pending and command != before:
-            raise WorldFileError(torn.format(len(pending)))
+            raise WorldFileError(TORN.format(len(pending)))
         before = command
         if number == 0 and command == WAYPOINT and place != (0.0, 0.0):
             home = place
-        if command == HOME_CIRCLE and home is None:
-            raise WorldFileError(
-                "has a fence about home, whose place it does not say; give a circle with a place"
-            )
+        if command == HOME_CIRCLE:
+            if home is None:
+                raise WorldFileError(
+                    "has a fence about home, whose place it does not say; give a circle with a place"
+                )
+            place = home
         if command in CIRCLES:
-            found.append(
-                (circle(home if command == HOME_CIRCLE and home else place, first), CIRCLES[command])
-            )
+            found.append((circle(place, first), CIRCLES[command]))
         elif command in CORNERS:
             pending.append(place)
             if len(pending) >= first:
                 found.append((_ring(pending), CORNERS[command]))
                 pending = []
     if pending:
-        raise WorldFileError(torn.format(len(pending)))
+        raise WorldFileError(TORN.format(len(pending)))
     return found
 
 
 def _contents(
     kind: str, fences: list[Fence], any_of: bool, rally: int, told: tuple[str, ...] = ()
 ) -> Contents:
+    """The fences as parts; where the aircraft has to be inside any of several, those are one."""
     import shapely
 
+    points = counted(rally, "rally point")
     if not fences:
-        held = f", but {counted(rally, 'rally point')}, which are no obstacles" if rally else ""
+        held = f", but {points}, which are no obstacles" if rally else ""
         raise WorldFileError(
             f"has an empty fence{held}; must have at least one polygon or circle (a mission is flown by `wayproof "
             "check`)"
         )
     inside = [shape for shape, inclusion in fences if inclusion]
-    if any_of and len(inside) > 1:
-        inside = [shapely.union_all(inside)]
+    inside = [shapely.union_all(inside)] if any_of and inside else inside
     parts = [Part(shape, name="inclusion fence", keep_in=True) for shape in inside]
     parts += [Part(shape, name="exclusion fence") for shape, inclusion in fences if not inclusion]
     notes = ["a fence has no heights: taken as solid at every altitude", *told]
     if rally:
-        notes.append(f"{counted(rally, 'rally point')} passed over: places to return to, no obstacles")
+        notes.append(f"{points} passed over: places to return to, no obstacles")
     return Contents(kind, WGS84, tuple(parts), notes=tuple(notes))

@@ -14,7 +14,6 @@ from harness.files.wording import counted
 from harness.world_files.parts import Contents, FloatArray, WorldFileError
 from harness.world_files.plane import TURN_DEG, in_degrees
 
-NAUTICAL_MILE_M: Final = 1852.0
 CIRCLE_POINTS: Final = 96
 """Corners of the polygon round a circle, whose area is 0.04 % larger."""
 LARGEST_M: Final = 2_000_000.0

@@ -5,15 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from harness.files.wording import counted
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import WGS84, Contents, Reading, WorldFileError
 from harness.world_files.readers import limits
-
-DEEPEST: Final = 8
-"""Collections of geometries nest no deeper than this."""
 
 
 def read(path: Path, reading: Reading) -> Contents:
@@ -23,17 +20,17 @@ def read(path: Path, reading: Reading) -> Contents:
         WorldFileError: it is not GeoJSON, or has no polygon.
     """
     content = whole(path)
-    features: list[tuple[dict[str, Any], Any]] = []
-    passed = 0
-    for tags, geometry in features_of(content):
-        shapes = [polygon_of(each) for each in simple(geometry)] or [None]
-        features += [(tags, each) for each in shapes if each is not None]
-        passed += sum(each is None for each in shapes)
+    shapes = [
+        (tags, polygon_of(each)) for tags, geometry in features_of(content) for each in simple(geometry)
+    ]
     notes: list[str] = []
-    parts = limits.parts_of(features, reading, notes)
-    if passed:
+    parts = limits.parts_of([each for each in shapes if each[1] is not None], reading, notes)
+    if passed := sum(shape is None for _, shape in shapes):
         notes.append(f"{counted(passed, 'point or line')} without an area passed over")
-    return Contents("geojson", reading.crs or _crs(content), parts, notes=tuple(notes))
+    # An older file may name a system that is not WGS84.
+    named = re.search(r"EPSG:+(?:[\d.]*:)?(\d+)", str(content.get("crs")))
+    crs = reading.crs or (f"EPSG:{named[1]}" if named else WGS84)
+    return Contents("geojson", crs, parts, notes=tuple(notes))
 
 
 def whole(path: Path) -> Any:
@@ -53,24 +50,23 @@ def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any]]:
     if not isinstance(features, list) or not all(isinstance(each, dict) for each in features):
         raise WorldFileError("has no list of features; must be GeoJSON")
     for feature in features:
-        if feature.get("type") != "Feature":
+        if feature.get("type") == "Feature":
+            tags = feature.get("properties")
+            named = {"identifier": feature.get("id")}
+            yield {**named, **(tags if isinstance(tags, dict) else {})}, feature.get("geometry")
+        else:
             yield {}, feature
-            continue
-        tags = feature.get("properties")
-        yield (
-            {"identifier": feature.get("id"), **(tags if isinstance(tags, dict) else {})},
-            feature.get("geometry"),
-        )
 
 
-def simple(geometry: Any, depth: int = 0) -> Iterator[dict[str, Any]]:
-    """The geometries of a collection, one after the other."""
-    if isinstance(geometry, dict) and depth <= DEEPEST:
-        if geometry.get("type") != "GeometryCollection":
-            yield geometry
-            return
+def simple(geometry: Any) -> Iterator[dict[str, Any]]:
+    """The geometries of a collection one after the other; an empty one where there is none."""
+    if not isinstance(geometry, dict):
+        yield {}
+    elif geometry.get("type") == "GeometryCollection":
         for each in geometry.get("geometries") or ():
-            yield from simple(each, depth + 1)
+            yield from simple(each)
+    else:
+        yield geometry
 
 
 def polygon_of(geometry: dict[str, Any]) -> Any:
@@ -89,10 +85,3 @@ def polygon_of(geometry: dict[str, Any]) -> Any:
     except (TypeError, ValueError, LookupError, AttributeError, shapely.GEOSException) as error:
         said = " ".join(str(error).split())[:60]
         raise WorldFileError(f"has a polygon whose rings are not lists of positions ({said})") from error
-
-
-def _crs(content: Any) -> str:
-    """WGS84, unless an older file names another system."""
-    named = content.get("crs") if isinstance(content, dict) else None
-    match = re.search(r"EPSG:+(?:[\d.]*:)?(\d+)", str(named)) if named else None
-    return f"EPSG:{match[1]}" if match else WGS84

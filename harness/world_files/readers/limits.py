@@ -1,4 +1,4 @@
-"""Heights as texts and attributes: `2500 ft AMSL`, `FL 65`, `100m GND`, `SFC`; heights of buildings.
+"""Heights as files write them: limits of airspace (`2500 ft AMSL`, `FL 65`, `SFC`) and heights of buildings.
 
 A flight level is taken as an altitude above mean sea level, as it is in the standard atmosphere.
 """
@@ -13,89 +13,127 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from harness.files.wording import counted
-from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum, Limit, Part, Reading
-from harness.world_files.readers.lengths import lengths_of, metres_of
+from harness.world_files.parts import (
+    FOOT_M,
+    LEVEL_M,
+    NO_BOTTOM,
+    NO_TOP,
+    Datum,
+    Limit,
+    Part,
+    Reading,
+    WorldFileError,
+)
 
-_NUMBER: Final = re.compile(r"[-+]?\d+(?:\.\d*)?|[-+]?\.\d+")
-_SURFACE: Final = re.compile(r"^(SFC|GND|SURFACE|GROUND|0+(\s*(FT|M))?(\s*(AGL|GND|ASFC|SFC))?)$")
-_NO_END: Final = re.compile(r"^(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b")
+_NUMBER: Final = re.compile(r"\d+(?:\.\d*)?|\.\d+")
+_SURFACE: Final = re.compile(r"(SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?)")
+_NO_END: Final = re.compile(r"(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b")
 _GROUND: Final = re.compile(r"AGL|GND|SFC|GROUND|SURFACE|RELATIVE")
-_REFERENCE: Final = re.compile(r"AGL|GND|SFC|GROUND|SURFACE|RELATIVE|SL|SEA|STD|FL|QNH|WGS|GEOID|TI\b")
+_SEA: Final = re.compile(r"SL|SEA|STD|FL|QNH|ALT|GEOID")
+_UNIT: Final = re.compile(r"FL|\d\s*(FT|FEET|F\b|M(?!SL))")
+_METRES: Final = re.compile(r"\d\s*(M|METRES?|METERS?|MTR)(?=\b|AMSL|MSL|AGL|ASFC|GND|SFC)")
 _WORD: Final = re.compile(
     r"\d+(?:[.,]\d*)?|\.\d+|[-+]|AMSL|MSL|METRES|METERS|METER|METRE|MEAN|MTR|FEET|FL|FT|F|"
     r"M(?!\w)|M(?=AMSL|MSL|AGL|ASFC|GND|SFC)|AGL|ASFC|GND|SFC|GROUND|ALT|STD|QNH|ABOVE|SEA|LEVEL|RELATIVE|[()'./]"
 )
-"""Words that a limit may consist of. Of others, as `ASK 123.5`, nothing is guessed."""
-_METRES: Final = re.compile(r"\d\s*(M|METRES?|METERS?|MTR)(?=\b|AMSL|MSL|AGL|ASFC|GND|SFC)")
-_LOWER: Final = (
-    "lowerlimit", "lower", "lowerval", "floor", "bottom", "loweraltitude", "minaltitude", "altitudemin", "altmin",
-    "minalt", "lowerlimitaltitude",
-)  # fmt: skip
-_UPPER: Final = (
-    "upperlimit", "upper", "upperval", "ceiling", "top", "upperaltitude", "maxaltitude", "altitudemax", "altmax",
-    "maxalt", "upperlimitaltitude",
-)  # fmt: skip
-"""Names of limits without their underscores; unit and reference may follow, as in `floor_ft_agl`."""
-_TAILS: Final = frozenset(("ft", "feet", "m", "metres", "meters", "agl", "amsl", "msl", "gnd"))
+"""Words that a limit may consist of. Nothing is guessed of a limit with other words, as `ASK 123.5`."""
+_NAMES: Final = {
+    side: re.compile(
+        rf"(?:(?:{words})(?:limit)?(?:val|altitude)?|{end}alt(?:itude)?)((?:ft|feet|m|metres|agl|amsl|msl|gnd)*)"
+    )
+    for side, words, end in (("lower", "lower|floor|bottom", "min"), ("upper", "upper|ceiling|top", "max"))
+}
+"""Names of attributes with a limit, without underscores; unit and reference may follow, as in `floor_ft_agl`."""
 _BEGINS: Final = {"lower": ("lower", "min", "floor", "bottom"), "upper": ("upper", "max", "ceiling", "top")}
-"""Beginnings of the names of attributes that belong to one of the limits."""
-_UNITS: Final = ("uom", "unit")
-"""Parts of the name of an attribute with the unit of a limit."""
-_BOTH_UNITS: Final = ("uom", "unit", "units", "uomdimensions", "altitudeunit", "unitofmeasure")
-_REFERENCES: Final = ("ref", "code", "datum", "type")
-"""Parts of the name of an attribute with the reference of a limit, as `lowerReference`, `UPPER_CODE`."""
-_BOTH_REFERENCES: Final = (
-    "reference", "altitudereference", "verticalreference", "datum", "verticaldatum", "altituderef", "altitudedatum",
-    "altitudetype", "heightreference",
-)  # fmt: skip
-_GRID: Final = ("apt1_", "map_eff")
-"""What attributes begin with in the facility maps of the FAA."""
-NO_NUMBER: Final = -9000.0
-"""Limits so low stand for one that is not known, as -9998 of the FAA's files."""
+"""Beginnings of the names of attributes that say something of one of the limits."""
+_UNITS: Final = (("uom", "unit"), ("uom", "unit", "units", "uomdimensions", "altitudeunit"))
+"""Parts of the name of the attribute with the unit of one limit, and names of an attribute with that of both."""
+_REFERENCES: Final = (
+    ("ref", "code", "datum", "type"),
+    ("reference", "altitudereference", "verticalreference", "datum", "verticaldatum", "heightreference"),
+)
+"""The same for what a limit is counted from."""
+_NO_NUMBER: Final = -9000.0
+"""A limit as low as this stands for one that is not known, as -9998 in files of the FAA."""
+
+_LENGTH: Final = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*([a-z]*)\.?")
+_FEET: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(?:'|ft)\s*(?:(\d+(?:\.\d+)?)\s*(?:''|\"|in)?)?")
+_THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")
+"""Numbers such as `1,200`, which are twelve hundred to some and one and a fifth to others."""
+_LENGTHS_M: Final = {
+    **dict.fromkeys(("", "m", "mtr", "metre", "metres", "meter", "meters"), 1.0),
+    **dict.fromkeys(("ft", "foot", "feet"), FOOT_M),
+    **dict.fromkeys(("in", "inch", "inches"), FOOT_M / 12.0),
+    **{"cm": 0.01, "km": 1000.0},
+}
+"""Metres of the units that OpenStreetMap has: https://wiki.openstreetmap.org/wiki/Map_features/Units."""
 _HEIGHT: Final = (
-    "height", "building:height", "building_height", "measuredheight", "render_height", "bldg_height", "est_height",
-    "hoehe",
-)  # fmt: skip
-_LEVELS: Final = (
-    "building:levels", "building_levels", "levels", "num_floors", "floors", "storeys", "stories",
-)  # fmt: skip
-_MIN_HEIGHT: Final = ("min_height", "render_min_height", "base_height")
-_MIN_LEVEL: Final = ("building:min_level", "min_level", "min_floor")
+    "height",
+    "building:height",
+    "building_height",
+    "measuredheight",
+    "render_height",
+    "est_height",
+)
+_LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")
 
 
-def limit_of(text: str, feet: bool = True, datum: Datum = Datum.SEA) -> Limit | None:
-    """A height as airspace files write it.
-
-    Args:
-        text: as `2500 ft AMSL`, `FL 65`, `100m GND`, `UNLIM`.
-        feet: unit of a number without one.
-        datum: what it is counted from where it says nothing.
+def limit_of(text: str) -> Limit | None:
+    """A height as airspace files write it, `2500 ft AMSL`, `FL 65`, `100m GND`; a number alone is feet above the sea.
 
     Returns:
         The limit; NO_BOTTOM for the surface; None where it cannot be told.
     """
     word = " ".join(text.upper().replace("\N{DEGREE SIGN}", " ").split())
-    if _SURFACE.match(word):
+    if _SURFACE.fullmatch(word):
         return NO_BOTTOM
     if _NO_END.match(word):
         return NO_TOP
     if word in ("MSL", "AMSL", "SEA LEVEL"):
         return Limit(0.0)
-    number = _NUMBER.search(word)
-    if number is None or _WORD.sub("", word).strip() or len(_NUMBER.findall(word)) > 1:
+    numbers = _NUMBER.findall(word)
+    if len(numbers) != 1 or _WORD.sub("", word).strip():
         return None
-    value = float(number[0])
-    if value <= NO_NUMBER:
-        return None
+    value = -float(numbers[0]) if re.search(r"-\s*" + re.escape(numbers[0]), word) else float(numbers[0])
     if "FL" in word:
         return Limit(value * 100.0 * FOOT_M)
-    metres = bool(_METRES.search(word)) if re.search(r"\d\s*(FT|FEET|F\b|M(?!SL))", word) else not feet
-    ground = _GROUND.search(word) is not None or (
-        datum is Datum.GROUND and not re.search("MSL|STD|ALT", word)
-    )
-    if ground and value < 0.0:  # as in SFC-2500, which says where a zone begins as well
+    ground = _GROUND.search(word) is not None
+    if value <= _NO_NUMBER or (
+        ground and value < 0.0
+    ):  # as in SFC-2500, which says where a zone begins as well
         return None
-    return Limit(value * (1.0 if metres else FOOT_M), Datum.GROUND if ground else Datum.SEA)
+    return Limit(value * (1.0 if _METRES.search(word) else FOOT_M), Datum.GROUND if ground else Datum.SEA)
+
+
+def limit_told(value: Any, unit: str, reference: str, notes: list[str], name: str) -> Limit | None:
+    """A limit whose unit and reference stand apart; what is missing is metres above mean sea level, which is noted.
+
+    Args:
+        value: a number or a text, which may have a unit and a reference of its own.
+        unit: as m, ft, FL; empty where none is given.
+        reference: as AGL, AMSL; empty where none is given.
+        notes: are added to.
+        name: of the part.
+    """
+    if isinstance(value, bool | Mapping | list) or value is None:
+        return None
+    word, unit, reference = str(value).strip().upper(), unit.strip().upper(), reference.upper()
+    if re.fullmatch(r"[-+]?[\d.]+", word) and float(word.strip(".") or 0) != 0.0 and unit == "FL":
+        word = f"FL {word}"
+    told = []
+    if re.search(r"[1-9]", word) and not _UNIT.search(word):
+        told += [] if unit else ["its limits name no unit; taken as metres"]
+        word = re.sub(r"([\d.]+)", rf"\1 {'FT' if unit.startswith('F') else 'M'} ", word, count=1)
+    if re.search(r"[1-9]", word) and not (_GROUND.search(word) or _SEA.search(word)):
+        word += " AGL" if _GROUND.search(reference) else " AMSL"
+        if re.search("WGS|W84|HAE|ELLIPS", reference):
+            told.append("its limits are above the ellipsoid; taken as above mean sea level")
+        elif not (_GROUND.search(reference) or _SEA.search(reference)):
+            told.append("its limits name no reference; taken as above mean sea level")
+    limit = limit_of(word)
+    new = [f"{name or 'a part'}: {each}" for each in told] if limit is not None else []
+    notes += [each for each in new if each not in notes[-4:]]
+    return limit
 
 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:
@@ -103,21 +141,75 @@ def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: st
 
     Files write an upper limit of 0 where there is none; a zone of no height would forbid nothing.
     """
+    told = f"{name or 'a part'}: its"
     if lower is None or upper is None:
-        which = (
-            "lower limit is" if upper is not None else "upper limit is" if lower is not None else "limits are"
-        )
-        notes.append(f"{name or 'a part'}: its {which} not known; taken as without")
+        which = "limits are" if lower is upper else "lower limit is" if lower is None else "upper limit is"
+        notes.append(f"{told} {which} not known; taken as without")
     bottom, top = lower or NO_BOTTOM, upper or NO_TOP
     if top == NO_BOTTOM or (top.height_m == 0.0 and bottom.height_m in (0.0, -math.inf)):
-        notes.append(f"{name or 'a part'}: its upper limit is 0, or the surface; taken as without")
+        notes.append(f"{told} upper limit is 0, or the surface; taken as without")
         top = NO_TOP
     if bottom == NO_TOP or (bottom.datum is top.datum and bottom.height_m > top.height_m):
-        notes.append(
-            f"{name or 'a part'}: its lower limit lies above the upper one; taken the other way round"
-        )
+        notes.append(f"{told} lower limit lies above the upper one; taken the other way round")
         bottom, top = (NO_BOTTOM if bottom == NO_TOP else top), (NO_TOP if bottom == NO_TOP else bottom)
     return bottom, top
+
+
+def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
+    """Limits of an airspace from attributes, named in any case; a number alone is metres above mean sea level.
+
+    Raises:
+        WorldFileError: it is a facility map, whose ceilings are those up to which one may fly.
+    """
+    said = {key.lower().replace("_", ""): value for key, value in tags.items() if value is not None}
+    if "ceiling" in said and any(key.startswith(("apt1", "mapeff")) for key in said):
+        raise WorldFileError(
+            "is a facility map of the FAA, up to whose ceilings one may fly; give the airspace"
+        )
+    found: list[Limit | None] = []
+    for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
+        matches = ((key, _NAMES[side].fullmatch(key)) for key in said)
+        key, tail = next(((key, match[1]) for key, match in matches if match), ("", ""))
+        unit = "ft" if "f" in tail else "m" if tail.startswith("m") and tail != "msl" else ""
+        reference = "agl" if "agl" in tail or "gnd" in tail else "msl" if "msl" in tail else ""
+        unit, reference = unit or _said(said, side, _UNITS), reference or _said(said, side, _REFERENCES)
+        found.append(limit_told(said[key], unit, reference, notes, name) if key else none)
+    return band_of(found[0], found[1], notes, name)
+
+
+def _said(said: Mapping[str, Any], side: str, names: tuple[tuple[str, ...], tuple[str, ...]]) -> str:
+    """What an attribute says of one limit, else one that says it of both; empty where none does."""
+    own = [each for each in said if each.startswith(_BEGINS[side]) and any(part in each for part in names[0])]
+    return next((str(said[each]) for each in (*own, *names[1]) if each in said), "")
+
+
+def has_limits(tags: Mapping[str, Any]) -> bool:
+    """Whether attributes give the limits of an airspace."""
+    named = [key.lower().replace("_", "") for key, value in tags.items() if value is not None]
+    return any(pattern.fullmatch(key) for key in named for pattern in _NAMES.values())
+
+
+def metres_of(value: Any) -> float | None:
+    """A length in metres unless it says otherwise: `12`, `12.5 m`, `40 ft`, `7'4"`; None where it says none."""
+    if isinstance(value, bool) or value is None:
+        return None
+    if isinstance(value, int | float):
+        return float(value) if math.isfinite(value) else None
+    if _THOUSANDS.search(str(value)):
+        return None
+    text = str(value).strip().lower().replace("\N{RIGHT SINGLE QUOTATION MARK}", "'").replace(",", ".")
+    if (match := _LENGTH.fullmatch(text)) and match[2] in _LENGTHS_M:
+        return float(match[1]) * _LENGTHS_M[match[2]]
+    if match := _FEET.fullmatch(text):
+        return (float(match[1]) + float(match[2] or 0.0) / 12.0) * FOOT_M
+    return None
+
+
+def _largest(value: Any) -> float:
+    """A length, of a text that is none the largest number in it: lists and ranges stand for the highest."""
+    plain = metres_of(value)
+    numbers = map(float, _NUMBER.findall(str(value)[:100])) if plain is None else (plain,)
+    return max((each for each in numbers if math.isfinite(each)), default=0.0)
 
 
 @dataclass
@@ -126,13 +218,11 @@ class Doubts:
 
     Attributes:
         guessed: buildings of which no height is known.
-        strange: heights that say nothing, and how often each comes.
-        rough: heights that are approximate, lists or ranges, likewise.
+        odd: heights that are no plain length, and how often each comes.
     """
 
     guessed: int = 0
-    strange: Counter[str] = field(default_factory=Counter)
-    rough: Counter[str] = field(default_factory=Counter)
+    odd: Counter[str] = field(default_factory=Counter)
 
     def notes(self, reading: Reading) -> list[str]:
         """A line of each."""
@@ -142,65 +232,79 @@ class Doubts:
                 f"{counted(self.guessed, 'building')} without height and levels taken as "
                 f"{reading.default_height_m:g} m high (default_height_m)"
             )
-        if self.strange:
-            first = next(iter(self.strange))
+        if self.odd:
             notes.append(
-                f"{counted(self.strange.total(), 'height')} of buildings say nothing, {first} the first"
-            )
-        if self.rough:
-            first = next(iter(self.rough))
-            notes.append(
-                f"{counted(self.rough.total(), 'height')} of buildings approximate, a list or a range, {first} the "
-                "first: taken as they stand, of several the one that makes the building larger"
+                f"{counted(self.odd.total(), 'height')} of buildings no plain length, {next(iter(self.odd))} the "
+                "first: the largest number in it is taken, in metres; of a bottom the ground; nothing below 0"
             )
         return notes
+
+    def top_m(self, tags: Mapping[str, Any], names: tuple[str, ...]) -> float | None:
+        """The first of some attributes that is above zero; None where none is."""
+        for name in names:
+            if (given := tags.get(name)) is not None:
+                plain = metres_of(given)
+                if plain is None or plain < 0.0:
+                    self.odd[f"{name}={str(given)[:20]!r}"] += 1
+                if (largest := _largest(given)) > 0.0:
+                    return largest
+        return None
+
+    def bottom_m(self, tags: Mapping[str, Any], names: tuple[str, ...]) -> float:
+        """The first of some attributes that is a plain length; 0 where none is."""
+        for name in names:
+            if (given := tags.get(name)) is not None:
+                if (plain := metres_of(given)) is not None:
+                    return plain
+                self.odd[f"{name}={str(given)[:20]!r}"] += 1
+        return 0.0
 
 
 def building(
     tags: Mapping[str, Any], footprint: Any, reading: Reading, doubts: Doubts, name: str = ""
 ) -> Part:
-    """A building from its tags.
+    """A building from its tags, as OpenStreetMap has them, named in any case.
 
-    The rule: `height`, which is that of the whole building; else storeys (`building:levels`) of 3 m each, and above
-    them the roof, `roof:height` or else `roof:levels` of 3 m each; else `default_height_m`. It
-    begins at `min_height`, else `building:min_level` times 3 m, else at the ground. Names are told in any case. A
-    height of zero or less says nothing: some files mean by -1 that it is not known.
-
-    Args:
-        tags: attributes by name, as OpenStreetMap has them.
-        footprint: shapely geometry.
-        reading: has the default height.
-        doubts: are added to.
-        name: for messages.
+    `height` is that of the whole building; else there are storeys (`building:levels`) of 3 m each and above them the
+    roof, `roof:height` or else `roof:levels` of 3 m each; else `default_height_m`. It begins at `min_height`, else at
+    `building:min_level` times 3 m, else at the ground. A height of zero or less says nothing.
     """
     tags = {key.lower(): value for key, value in tags.items()}
-    top = _first(tags, _HEIGHT, doubts)
-    levels = None if top is not None else _first(tags, _LEVELS, doubts)
-    if top is None and levels is not None:
-        roof = _first(tags, ("roof:height", "roof_height"), doubts)
-        if roof is None:
-            roof = (_first(tags, ("roof:levels", "roof_levels"), doubts) or 0.0) * LEVEL_M
-        top = levels * LEVEL_M + roof
+    top = doubts.top_m(tags, _HEIGHT)
+    if top is None and (levels := doubts.top_m(tags, _LEVELS)) is not None:
+        roof = doubts.top_m(tags, ("roof:height", "roof_height"))
+        top = LEVEL_M * levels + (
+            LEVEL_M * (doubts.top_m(tags, ("roof:levels",)) or 0.0) if roof is None else roof
+        )
     if top is None:
         top = reading.default_height_m
         doubts.guessed += 1
-    bottom = _first(tags, _MIN_HEIGHT, doubts, least=True)
-    if bottom is None:
-        bottom = (_first(tags, _MIN_LEVEL, doubts, least=True) or 0.0) * LEVEL_M
+    bottom = doubts.bottom_m(tags, ("min_height", "render_min_height"))
+    bottom = bottom or LEVEL_M * doubts.bottom_m(tags, ("building:min_level", "min_level"))
     begin = NO_BOTTOM if bottom <= 0.0 else Limit(min(bottom, top), Datum.GROUND)
     return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
+
+
+def is_building(tags: Mapping[str, Any]) -> bool:
+    """Whether attributes are those of a building: it is named one, or has a height and no limits."""
+    if any(str(tags.get(name) or "no") != "no" for name in ("building", "building:part")):
+        return True
+    lower = {key.lower(): value for key, value in tags.items()}
+    high = any(_largest(lower[name]) > 0.0 for name in (*_HEIGHT, *_LEVELS) if lower.get(name) is not None)
+    return high and not has_limits(tags)
+
+
+def name_of(tags: Mapping[str, Any]) -> str:
+    """The name of a feature for messages."""
+    named = {key.lower(): value for key, value in tags.items()}
+    name = named.get("name") or named.get("identifier") or ""
+    return (name if isinstance(name, str) else str(named.get("identifier") or ""))[:40]
 
 
 def parts_of(
     features: Sequence[tuple[Mapping[str, Any], Any]], reading: Reading, notes: list[str]
 ) -> tuple[Part, ...]:
-    """Features as parts: buildings by their heights, all others by their limits.
-
-    Args:
-        features: attributes and footprint of each.
-        reading: has the default height of buildings.
-        notes: are added to.
-    """
+    """Features, attributes and footprint each, as parts: buildings by their heights, all others by their limits."""
     parts, doubts, bare = [], Doubts(), 0
     for tags, footprint in features:
         name = name_of(tags)
@@ -213,138 +317,3 @@ def parts_of(
     if bare:
         notes.append(f"{counted(bare, 'polygon')} without height limits taken as solid at every altitude")
     return tuple(parts)
-
-
-def name_of(tags: Mapping[str, Any]) -> str:
-    """The name of a feature for messages."""
-    named = {key.lower(): value for key, value in tags.items()}
-    name = named.get("name") or named.get("identifier") or ""
-    return (name if isinstance(name, str) else str(named.get("identifier") or ""))[:40]
-
-
-def is_building(tags: Mapping[str, Any]) -> bool:
-    """Whether attributes are those of a building."""
-    if any(str(tags.get(name) or "no") != "no" for name in ("building", "building:part")):
-        return True
-    lower = {key.lower(): value for key, value in tags.items()}
-    return any(_first(lower, names) is not None for names in (_HEIGHT, _LEVELS)) and not has_limits(tags)
-
-
-def has_limits(tags: Mapping[str, Any]) -> bool:
-    """Whether attributes give the limits of an airspace."""
-    return any(tags[key] is not None and _parted(key)[0] in (*_LOWER, *_UPPER) for key in tags)
-
-
-def _parted(key: str) -> tuple[str, frozenset[str]]:
-    """The name of an attribute without underscores, and the unit and the reference that it ends with."""
-    words = key.lower().split("_")
-    count = next((k for k, word in enumerate(reversed(words)) if word not in _TAILS), len(words))
-    return "".join(words[: len(words) - count]), frozenset(words[len(words) - count :])
-
-
-def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
-    """Limits of an airspace from attributes, named in any case; a number alone is in metres unless a unit says feet.
-
-    A limit without a reference is taken as above mean sea level, which is noted.
-    """
-    lower = {key.lower(): value for key, value in tags.items() if value is not None}
-    if "ceiling" in lower and any(key.startswith(_GRID) for key in lower):
-        return _above_the_grid(lower, notes)
-    parted = [(*_parted(key), value) for key, value in lower.items()]
-    said = {key.replace("_", ""): str(value) for key, value in lower.items()}
-    found: list[Limit | None] = []
-    bare = alone = False
-    for names, none, word in ((_LOWER, NO_BOTTOM, "lower"), (_UPPER, NO_TOP, "upper")):
-        given = next((each for known in names for each in parted if each[0] == known), None)
-        if given is None:
-            found.append(none)
-            continue
-        _, ends, value = given
-        unit = "ft" if ends & {"ft", "feet"} else _said(said, word, _UNITS, _BOTH_UNITS)
-        alone |= not unit and not ends & {"m", "metres", "meters"} and _is_number(value)
-        reference = " ".join(ends & {"agl", "gnd", "amsl", "msl"})
-        reference = (reference or _said(said, word, _REFERENCES, _BOTH_REFERENCES)).upper()
-        datum = Datum.GROUND if _GROUND.search(reference) else Datum.SEA
-        limit = _limit(value, (unit or "m").lower(), datum)
-        found.append(limit)
-        told = unit.upper() == "FL" or _REFERENCE.search(reference) is not None
-        bare |= not told and limit is not None and _bare(value, limit)
-    if alone:
-        notes.append(f"{name or 'a part'}: its limits name no unit; taken as metres")
-    if bare:
-        notes.append(f"{name or 'a part'}: its limits name no reference; taken as above mean sea level")
-    return band_of(found[0], found[1], notes, name)
-
-
-def _said(said: Mapping[str, str], word: str, has: tuple[str, ...], both: tuple[str, ...]) -> str:
-    """What an attribute says of one of the limits, else one that says it of both; empty where none does."""
-    own = (each for each in said if each.startswith(_BEGINS[word]) and any(part in each for part in has))
-    return next((said[each] for each in (*own, *both) if each in said), "")
-
-
-def _is_number(value: Any) -> bool:
-    """Whether a limit is a number other than zero, and says nothing of its unit."""
-    try:
-        return not isinstance(value, Mapping) and float(value) not in (0.0, -9998.0)
-    except (TypeError, ValueError):
-        return False
-
-
-def _bare(value: Any, limit: Limit) -> bool:
-    """Whether a limit is a height of which nothing says what it is counted from."""
-    if isinstance(value, Mapping):
-        return "referenceDatum" not in value and "reference" not in value
-    if not math.isfinite(limit.height_m) or limit.height_m == 0.0:
-        return False
-    return not re.search(r"FL|SL|AGL|GND|SFC|GROUND|RELATIVE|ALT|STD|QNH|SEA", str(value).upper())
-
-
-def _above_the_grid(tags: Mapping[str, Any], notes: list[str]) -> tuple[Limit, Limit]:
-    """A cell of a facility map of the FAA: its ceiling is the height up to which one may fly."""
-    ceiling = metres_of(tags["ceiling"])
-    if ceiling is None:
-        return NO_BOTTOM, NO_TOP
-    notes.append("cells of a facility map of the FAA: solid above their ceiling, in feet above ground")
-    return (NO_BOTTOM if ceiling <= 0.0 else Limit(ceiling * FOOT_M, Datum.GROUND)), NO_TOP
-
-
-def _limit(value: Any, unit: str, datum: Datum) -> Limit | None:
-    """A limit as a number, a text, or a mapping as openAIP has it: unit 1 feet, 6 flight level; datum 0 ground."""
-    if isinstance(value, Mapping):
-        reference = value.get("referenceDatum", value.get("reference"))
-        ground = reference == 0 or _GROUND.search(str(reference).upper()) is not None
-        datum = Datum.GROUND if ground else Datum.SEA
-        unit = {1: "ft", 6: "fl"}.get(value.get("unit"), str(value.get("unit"))).lower()  # type: ignore[arg-type]
-        value = metres_of(value.get("value"))
-    if isinstance(value, bool) or not isinstance(value, int | float | None):
-        return limit_of(str(value), unit.startswith("f"), datum)
-    if value is None or value <= NO_NUMBER:
-        return None
-    if unit == "fl":
-        return Limit(value * 100.0 * FOOT_M)
-    if datum is Datum.GROUND and value == 0:
-        return NO_BOTTOM
-    return Limit(value * (FOOT_M if unit.startswith("f") else 1.0), datum)
-
-
-def _first(
-    tags: Mapping[str, Any], names: tuple[str, ...], doubts: Doubts | None = None, least: bool = False
-) -> float | None:
-    """The first of some attributes that is a length or a number; of several the largest, or the least.
-
-    Args:
-        tags: attributes by lower-case name.
-        names: of which the first that says something counts.
-        doubts: are added to by what is rough, or says nothing: no number, or none above zero.
-        least: of the bottom of a building, which may be 0.
-    """
-    for name in names:
-        if (given := tags.get(name)) is None:
-            continue
-        found, rough = lengths_of(given)
-        said = bool(found) and (least or max(found) > 0.0)
-        if doubts is not None and (rough or not said) and found != (0.0,):
-            (doubts.rough if said else doubts.strange)[f"{name}={str(given)[:20]!r}"] += 1
-        if said:
-            return min(found) if least else max(found)
-    return None

@@ -10,14 +10,12 @@ import numpy as np
 
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
-from harness.world_files.bounded import check_file, read_bytes, text_of
-from harness.world_files.parts import Affine, Contents, FloatArray, Raster, Reading, WorldFileError
+from harness.world_files.bounded import read_bytes, text_of
+from harness.world_files.parts import Contents, FloatArray, Raster, Reading, WorldFileError
 from harness.world_files.readers import raster
 
-FREE: Final = frozenset(b".GS")
-"""Ground, ground and shallow water of the MovingAI format (Sturtevant, Benchmarks for grid-based pathfinding, 2012)."""
-BLOCKED: Final = frozenset(b"@OTW")
-"""Out of bounds, trees and deep water."""
+FREE, BLOCKED = b".GS", b"@OTW"
+"""Ground and shallow water; out of bounds, trees and deep water of the MovingAI format (Sturtevant, 2012)."""
 MODES: Final = ("trinary", "scale", "raw")
 """Ways of ROS map_server to tell occupied, free and unknown from a grey."""
 IMAGES: Final = {b"P": "PNM", b"\x89": "PNG", b"B": "BMP", b"\xff": "JPEG"}
@@ -43,15 +41,14 @@ def read_moving_ai(path: Path, reading: Reading) -> Contents:
             f"has {len(body)} rows, not all of {columns} cells; must have {rows}: it may be torn"
         )
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
-    strange = set(np.unique(cells).tolist()) - FREE - BLOCKED
+    strange = set(np.unique(cells).tolist()) - set(FREE + BLOCKED)
     if strange:
         raise WorldFileError(f"has the cell {chr(min(strange))!r}; must be one of . G S @ O T W")
     occupied = np.isin(cells, list(BLOCKED)).astype(np.float64)
     size = reading.metres_per_cell or 1.0
     notes = () if reading.metres_per_cell else ("says not how large a cell is: 1 m (metres_per_cell)",)
-    return Contents(
-        "moving_ai", None, occupied=Raster(occupied, (size, 0, 0, 0, -size, rows * size)), notes=notes
-    )
+    place = (size, 0, 0, 0, -size, rows * size)
+    return Contents("moving_ai", None, occupied=Raster(occupied, place), notes=notes)
 
 
 def read_ros(path: Path, reading: Reading) -> Contents:
@@ -64,7 +61,12 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     Raises:
         WorldFileError: it is not such a map, or its image cannot be read.
     """
-    keys = _yaml(path)
+    try:
+        keys = strict_yaml.parse(text_of(read_bytes(path, 100_000)), "map").plain()
+    except InputError as error:
+        raise WorldFileError(str(error).removeprefix("map:")) from error
+    if not isinstance(keys, dict) or not isinstance(keys.get("image"), str):
+        raise WorldFileError("names no image; must be a map of ROS map_server")
     mode = str(keys.get("mode", "trinary")).lower()
     if mode not in MODES:
         raise WorldFileError(f"has the mode {mode[:20]!r}; must be one of {', '.join(MODES)}")
@@ -72,7 +74,7 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     if not _is_number(size) or not 0 < size < 1e6:
         raise WorldFileError("has no positive resolution; must be a map of ROS map_server")
     origin = keys.get("origin", (0.0, 0.0, 0.0))
-    if not (isinstance(origin, tuple) and len(origin) >= 2 and all(map(_is_number, origin))):
+    if not (isinstance(origin, tuple) and len(origin) in (2, 3) and all(map(_is_number, origin))):
         raise WorldFileError("has an origin that is not [x, y, yaw]")
     over, under = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
     if not all(_is_number(each) and 0.0 <= each <= 1.0 for each in (over, under)):
@@ -84,30 +86,26 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     elif not keys.get("negate", 0):
         share = 1.0 - share
     solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
-    scale = (reading.metres_per_cell or size) / size
-    yaw = float(origin[2]) if len(origin) > 2 else 0.0
-    place = _affine(scale * origin[0], scale * origin[1], scale * size, len(solid), yaw)
+    # The lower left corner is given, and the map is turned counter-clockwise about it by `yaw` radians.
+    x, y, yaw = (*origin, 0.0)[:3]
+    cell = reading.metres_per_cell or size
+    west, south, rows = x * cell / size, y * cell / size, len(solid)
+    cos, sin = cell * math.cos(yaw), cell * math.sin(yaw)
+    place = (cos, sin, west - rows * sin, sin, -cos, south + rows * cos)
     return Contents("ros_map", None, occupied=Raster(solid, place))
 
 
 def _greys(path: Path) -> FloatArray:
     """(rows, columns) greys of an image from 0 to 255, of colours their mean, NaN where it is not opaque."""
     try:
-        check_file(path)
+        read_bytes(path, first=1)
         with raster.opened(path, IMAGES.get(read_bytes(path, first=1), "PNM")) as source:
-            greys = np.empty((source.height, source.width))
-            palette = source.colormap(1) if source.colorinterp[0].name == "palette" else None
+            bands = source.read().astype(np.float64)
             full = 255.0 if source.dtypes[0] == "uint8" else 65_535.0
-            for rows, window in raster.strips(source):
-                bands = source.read(window=window, masked=False).astype(np.float64)
-                if palette is not None:
-                    table = np.array([palette[index] for index in range(len(palette))], dtype=np.float64)
-                    bands = np.moveaxis(table[bands[0].astype(np.int64)], 2, 0)
-                alpha = len(bands) in (2, 4)
-                greys[rows] = bands[: len(bands) - alpha].mean(axis=0) * 255.0 / full
-                if alpha:
-                    greys[rows][bands[-1] < full] = np.nan
-            return greys
+            if source.colorinterp[0].name == "palette":
+                colours = source.colormap(1)
+                table = np.array([colours[index] for index in range(len(colours))], dtype=np.float64)
+                bands = np.moveaxis(table[bands[0].astype(np.int64)], 2, 0)
     except WorldFileError as error:
         if "pip install" in str(error):
             raise
@@ -115,23 +113,12 @@ def _greys(path: Path) -> FloatArray:
         raise WorldFileError(
             f"names the image {path.name}, which {said}; must be PGM, PNG, BMP or JPEG"
         ) from error
-
-
-def _yaml(path: Path) -> dict[str, Any]:
-    try:
-        keys = strict_yaml.parse(text_of(read_bytes(path, 100_000)), "map").plain()
-    except InputError as error:
-        raise WorldFileError(str(error).removeprefix("map:")) from error
-    if not isinstance(keys, dict) or not isinstance(keys.get("image"), str):
-        raise WorldFileError("names no image; must be a map of ROS map_server")
-    return keys
+    has_alpha = len(bands) in (2, 4)
+    greys: FloatArray = bands[: len(bands) - has_alpha].mean(axis=0) * 255.0 / full
+    if has_alpha:
+        greys[bands[-1] < full] = np.nan
+    return greys
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _affine(west: float, south: float, size: float, rows: int, yaw: float) -> Affine:
-    """The place of a raster whose lower left corner is given, turned counter-clockwise about that by `yaw` radians."""
-    cos, sin, height = size * math.cos(yaw), size * math.sin(yaw), rows
-    return cos, sin, west - height * sin, sin, -cos, south + height * cos

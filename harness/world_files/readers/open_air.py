@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -14,34 +13,22 @@ from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, text_of
 from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Limit, Part, Reading, WorldFileError
 from harness.world_files.readers import limits
-from harness.world_files.readers.footprints import (
-    NAUTICAL_MILE_M,
-    Place,
-    arc,
-    circle,
-    corridor,
-    on_earth,
-    polar,
-)
+from harness.world_files.readers.footprints import Place, arc, circle, corridor, on_earth, polar
 
-_ANGLE: Final = r"(\d+(?:\.\d+)?)(?:[:\s°']+(\d+(?:\.\d+)?))?(?:[:\s']+(\d+(?:\.\d+)?))?"
-_PLACES: Final = (
-    re.compile(rf"{_ANGLE}[\s\"']*(?P<ns>[NS])[\s,]*{_ANGLE}[\s\"']*(?P<ew>[EW])", re.IGNORECASE),
-    re.compile(rf"\b(?P<ns>[NS])\s*{_ANGLE}[\s\"',]*(?P<ew>[EW])\s*{_ANGLE}", re.IGNORECASE),
-)
+MILE_M: Final = 1852.0
+_ANGLE: Final = r"([\d.:\s°'\",]+)"
+_SIDES: Final = (rf"{_ANGLE}([NS]){_ANGLE}([EW])", rf"([NS]){_ANGLE}([EW]){_ANGLE}")
 """A place with its sides behind the numbers, or before them."""
-READ: Final = ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")
-DRAWN: Final = ("AT", "AY", "AF", "AG", "AX", "AI", "TO", "TC", "SP", "SB", "TP", "T")
-"""Labels, kinds, radio and drawing, which do not say where an airspace is. Other commands are named in a note."""
 
 
 @dataclass
 class _Airspace:
-    """One airspace while it is read."""
+    """One airspace while it is read; of its limits each that is given."""
 
     kind: str
     name: str = ""
-    limits: dict[str, list[Limit | None]] = field(default_factory=lambda: {"lower": [], "upper": []})
+    lower: list[Limit | None] = field(default_factory=list)
+    upper: list[Limit | None] = field(default_factory=list)
     center: Place | None = None
     clockwise: bool = True
     width_m: float = 0.0
@@ -56,25 +43,35 @@ class _Airspace:
 
     def take(self, command: str, rest: str) -> None:
         """One command of it."""
+        name, _, value = (part.strip() for part in rest.partition("="))
         if command == "AN":
             self.name = rest[:40]
         elif command in ("AL", "AH"):
-            self.limits["lower" if command == "AL" else "upper"].append(limits.limit_of(rest))
-        elif command == "V":
-            self._set(*(part.strip() for part in rest.partition("=")[::2]))
+            (self.lower if command == "AL" else self.upper).append(limits.limit_of(rest))
         elif command in ("DP", "DY"):
             (self.ring if command == "DP" else self.line).append(_places(rest, 1)[0])
-        elif self.center is None:
+        elif command == "V" and name.upper() == "X":
+            self.center = _places(value, 1)[0]
+        elif command == "V" and name.upper() == "D":
+            self.clockwise = not value.startswith("-")
+        elif command == "V" and name.upper() == "W":
+            self.width_m = _numbers(value, 1)[0] * MILE_M
+        elif command in ("DC", "DA", "DB"):
+            self._round(command, rest)
+
+    def _round(self, command: str, rest: str) -> None:
+        """A circle or an arc."""
+        if self.center is None:
             raise WorldFileError("has an arc or circle before its centre `V X=`")
-        elif command == "DC":
-            self.shapes.append(circle(self.center, _numbers(rest, 1)[0] * NAUTICAL_MILE_M))
+        if command == "DC":
+            self.shapes.append(circle(self.center, _numbers(rest, 1)[0] * MILE_M))
         elif command == "DA":
             radius, begin, end = _numbers(rest, 3)
             if begin != end and (end - begin) % 360.0 == 0.0:
-                self.shapes.append(circle(self.center, radius * NAUTICAL_MILE_M))
+                self.shapes.append(circle(self.center, radius * MILE_M))
             else:
-                self.ring += arc(self.center, begin, end, (radius * NAUTICAL_MILE_M,) * 2, self.clockwise)
-        elif command == "DB":
+                self.ring += arc(self.center, begin, end, (radius * MILE_M,) * 2, self.clockwise)
+        else:
             first, last = _places(rest, 2)
             (begin, near), (end, far) = (polar(self.center, place) for place in (first, last))
             if first == last and not self.ring:  # else a small arc whose ends were rounded
@@ -82,16 +79,8 @@ class _Airspace:
             else:
                 self.ring += [first, *arc(self.center, begin, end, (near, far), self.clockwise)[1:-1], last]
 
-    def _set(self, name: str, value: str) -> None:
-        if name.upper() == "X":
-            self.center = _places(value, 1)[0]
-        elif name.upper() == "D":
-            self.clockwise = not value.startswith("-")
-        elif name.upper() == "W":
-            self.width_m = _numbers(value, 1)[0] * NAUTICAL_MILE_M
-
     def parts(self, notes: list[str]) -> list[Part]:
-        """What it is. Of limits that are given twice the wider ones are taken; what is missing is no limit."""
+        """What it is; a limit that is missing, or given more than once, is none."""
         import shapely
 
         found = [*self.shapes]
@@ -101,13 +90,12 @@ class _Airspace:
             found.append(corridor(self.line, self.width_m))
         if not found:
             return []
-        band = []
-        for which, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
-            given = self.limits[which]
+        band: list[Limit | None] = []
+        for side, given, none in (("lower", self.lower, NO_BOTTOM), ("upper", self.upper, NO_TOP)):
             if len(given) != 1:
-                told = "given more than once; the widest is taken" if given else "missing; taken as without"
-                notes.append(f"{self.name or 'an airspace'}: its {which} limit is {told}")
-            band.append(_widest(given or [none], none))
+                told = "given more than once" if given else "missing"
+                notes.append(f"{self.name or 'an airspace'}: its {side} limit is {told}; taken as without")
+            band.append(given[0] if len(given) == 1 else none)
         bottom, top = limits.band_of(band[0], band[1], notes, self.name)
         return [Part(shape, bottom, top, name=self.name) for shape in found]
 
@@ -129,80 +117,64 @@ def read(path: Path, reading: Reading) -> Contents:
             spaces.append(_Airspace(rest))
         elif command == "AN" and (not spaces or spaces[-1].is_drawn):  # of one without a class
             spaces.append(_Airspace("", rest[:40]))
-        elif spaces and command in READ:
+        elif spaces and command in ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V"):
             try:
                 spaces[-1].take(command, rest)
             except WorldFileError as error:
                 raise WorldFileError(f"line {number}: {error}") from error
-        elif command and command not in DRAWN:
+        elif command:
             ignored[command] += 1
     notes: list[str] = []
-    each_parts = [each.parts(notes) for each in spaces]
-    if not any(each_parts):
+    parts = [each.parts(notes) for each in spaces]
+    if not any(parts):
         raise WorldFileError("has no airspace with an area; must be OpenAir with some")
-    classes = Counter(each.kind or "none" for each in spaces)
-    told = ", ".join(f"{count} {kind[:12]}" for kind, count in classes.most_common(6))
-    told += ", and others" if len(classes) > 6 else ""
+    classes = Counter(each.kind or "none" for each in spaces).most_common()
+    told = ", ".join(f"{count} {kind[:12]}" for kind, count in classes[:6]) + ", and others" * (
+        len(classes) > 6
+    )
     notes.append(f"airspaces of every class are solid ({told}): take out what may be flown in")
     if timed := ignored.pop("AA", 0):
         notes.append(f"{counted(timed, 'time')} of activation passed over: taken as always active")
     if ignored:
-        words = ", ".join(repr(word[:12]) for word, _ in ignored.most_common(4))
-        lines = counted(ignored.total(), "line")
-        notes.append(f"{lines} with commands that are not known passed over: {words}")
-    if empty := sum(not each for each in each_parts):
+        words, lines = ", ".join(repr(word[:12]) for word in [*ignored][:4]), counted(ignored.total(), "line")
+        notes.append(f"{lines} with commands that say nothing of a shape passed over: {words}")
+    if empty := sum(not each for each in parts):
         notes.append(f"{counted(empty, 'airspace')} without an area passed over")
-    return Contents(
-        "openair", WGS84, tuple(part for parts in each_parts for part in parts), notes=tuple(notes)
-    )
+    return Contents("openair", WGS84, tuple(part for each in parts for part in each), notes=tuple(notes))
 
 
 def _numbers(text: str, count: int) -> Sequence[float]:
-    try:
-        numbers = [float(word) for word in text.replace(",", " ").split()[:count]]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+    words = text.replace(",", " ").split()[:count]
+    if len(words) != count or not all(re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)", word) for word in words):
         raise WorldFileError(f"has {text[:40]!r}; must be {counted(count, 'number')}")
-    return numbers
-
-
-def _widest(given: Sequence[Limit | None], none: Limit) -> Limit | None:
-    """The lowest of lower limits, the highest of upper ones; `none` where that cannot be told."""
-    known = [each for each in given if each is not None]
-    if len(given) == 1 or not known:
-        return given[0]
-    if none in known or len({each.datum for each in known}) > 1:
-        return none
-    return (min if none is NO_BOTTOM else max)(known, key=lambda each: each.height_m)
+    return [float(word) for word in words]
 
 
 def _places(text: str, count: int) -> list[Place]:
-    found = [*_PLACES[0].finditer(text)] or [*_PLACES[1].finditer(text)]
-    if len(found) < count or count == 2 != len(found):
+    word = text.upper()
+    before = word[:1] in ("N", "S")
+    found = re.findall(_SIDES[before], word)[:count]
+    if len(found) < count or not word.startswith("".join(map("".join, found))):
         wanted = "a place, as 46:30:00 N 009:15:00 E" if count == 1 else "two places"
         raise WorldFileError(f"has {text[:40]!r}; must be {wanted}")
     places = []
-    for match in found[:count]:
-        angles = [each for each in match.groups() if each is None or not each.isalpha()]
-        signs = (-1 if match["ns"].upper() == "S" else 1), (-1 if match["ew"].upper() == "W" else 1)
-        latitude, longitude = _degrees(angles[:3], 2), _degrees(angles[3:], 3)
-        places.append(on_earth(signs[1] * longitude, signs[0] * latitude))
+    for each in found:
+        north, ns, east, ew = (each[1], each[0], each[3], each[2]) if before else each
+        latitude, longitude = _degrees(north, 2), _degrees(east, 3)
+        places.append(on_earth(-longitude if ew == "W" else longitude, -latitude if ns == "S" else latitude))
     return places
 
 
-def _degrees(angle: Sequence[str | None], digits: int) -> float:
-    """An angle of degrees, minutes and seconds, of which the last two may be missing, or not be marked.
-
-    Args:
-        angle: the three numbers.
-        digits: of whole degrees where the others follow without a mark: `265644.00N 0500434.00E`.
-    """
-    whole, _, part = (angle[0] or "0").partition(".")
-    if angle[1] is None and len(whole) in (digits + 2, digits + 4):
-        packed = [whole[:digits], *(whole[k : k + 2] for k in range(digits, len(whole), 2))]
-        angle = [*packed[:-1], f"{packed[-1]}.{part or 0}"]
-    numbers = [float(each or 0.0) for each in angle]
-    if max(numbers[1:]) > 60.0:  # 60 of them are written where numbers are rounded
-        raise WorldFileError(f"has {max(numbers[1:]):g} minutes or seconds; must be at most 60")
-    return sum(number / 60.0**k for k, number in enumerate(numbers))
+def _degrees(text: str, digits: int) -> float:
+    """An angle of degrees, minutes and seconds; unmarked ones follow `digits` of degrees, as in `0500434.00E`."""
+    numbers = re.findall(r"\d+(?:\.\d+)?", text)
+    whole, _, part = numbers[0].partition(".") if numbers else ("", "", "")
+    if len(numbers) == 1 and len(whole) in (digits + 2, digits + 4):
+        numbers = [whole[:digits], *(whole[k : k + 2] for k in range(digits, len(whole), 2))]
+        numbers[-1] += f".{part or 0}"
+    if not 1 <= len(numbers) <= 3 or any(float(each) > 60.0 for each in numbers[1:]):
+        # Where numbers are rounded, 60 seconds are written.
+        raise WorldFileError(
+            f"has the angle {text.strip()!r}; must be degrees, and minutes and seconds of at most 60"
+        )
+    return sum(float(number) / 60.0**k for k, number in enumerate(numbers))

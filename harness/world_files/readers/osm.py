@@ -14,10 +14,9 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from harness.files.wording import counted
-from harness.world_files.bounded import MAX_BYTES, check_file, check_xml, read_bytes
+from harness.world_files.bounded import MAX_BYTES, check_xml, read_bytes
 from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
 from harness.world_files.readers import limits
-from harness.world_files.readers.lengths import lengths_of
 
 TALL: Final = frozenset(
     ("chimney", "communications_tower", "cooling_tower", "gasometer", "mast", "silo", "storage_tank", "tower",
@@ -42,21 +41,25 @@ def read_xml(path: Path, reading: Reading) -> Contents:
         raise WorldFileError(
             "has ways of JOSM that are new or deleted; upload them, or give a file without them"
         )
+    osmium = _osmium()
     if data.rfind(b"<node ") < data.find(b"<way "):
-        return _read(path, reading)
+        return read_pbf(path, reading)
+    # Written again with nodes before ways before relations, as osmium needs them and Overpass does not.
     with TemporaryDirectory() as folder:
-        return _read(_in_order(path, Path(folder) / "ordered.osm.pbf"), reading)
+        ordered = Path(folder) / "ordered.osm.pbf"
+        with osmium.SimpleWriter(str(ordered)) as writer:
+            for kind in (osmium.osm.NODE, osmium.osm.WAY, osmium.osm.RELATION):
+                for each in osmium.FileProcessor(str(path), kind):
+                    writer.add(each)
+        return read_pbf(ordered, reading)
 
 
-def _in_order(path: Path, ordered: Path) -> Path:
-    """Writes a file again with nodes before ways before relations, as osmium needs them and Overpass does not."""
-    import osmium
-
-    with osmium.SimpleWriter(str(ordered)) as writer:
-        for kind in (osmium.osm.NODE, osmium.osm.WAY, osmium.osm.RELATION):
-            for each in osmium.FileProcessor(str(path), kind):
-                writer.add(each)
-    return ordered
+def _osmium() -> Any:
+    try:
+        import osmium
+    except ImportError as error:
+        raise WorldFileError("is OpenStreetMap, which osmium reads: pip install 'wayproof[maps]'") from error
+    return osmium
 
 
 def read_pbf(path: Path, reading: Reading) -> Contents:
@@ -65,25 +68,17 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
     Raises:
         WorldFileError: it is damaged, has no building, or osmium is not installed.
     """
-    check_file(path)
-    return _read(path, reading)
-
-
-def _read(path: Path, reading: Reading) -> Contents:
-    try:
-        import osmium
-    except ImportError as error:
-        raise WorldFileError("is OpenStreetMap, which osmium reads: pip install 'wayproof[maps]'") from error
     import shapely
 
-    tall_keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
+    read_bytes(path, first=1)
+    osmium = _osmium()
+    keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
     shape_of = osmium.geom.WKBFactory()
     parts: list[Part] = []
     doubts, told = limits.Doubts(), Counter[str]()
-    outlines: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = {}
-    highest_m = 0.0
+    ways: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = {}
     try:
-        for each in osmium.FileProcessor(str(path)).with_locations().with_areas().with_filter(tall_keys):
+        for each in osmium.FileProcessor(str(path)).with_locations().with_areas().with_filter(keys):
             tags = {tag.k: tag.v for tag in each.tags}
             if each.is_area():
                 name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
@@ -91,26 +86,24 @@ def _read(path: Path, reading: Reading) -> Contents:
                     shape = shapely.from_wkb(shape_of.create_multipolygon(each))
                     shape = shape.geoms[0] if len(shape.geoms) == 1 else shape
                     parts.append(limits.building(tags, shape, reading, doubts, name))
-                    outlines.pop(name, None)
+                    ways.pop(name, None)
                 continue
             kind = "point" if each.is_node() else "way" if each.is_way() else "relation"
             if is_building(tags) and kind != "point":
                 nodes = each.nodes if kind == "way" else ()
                 places = [(node.lon, node.lat) for node in nodes if node.location.valid()]
-                outlines[f"{kind} {each.id}"] = tags, places  # its area comes later, or none
-            elif is_tall(tags) or lengths_of(tags.get("height")).metres:
+                ways[f"{kind} {each.id}"] = tags, places  # its area comes later, or none
+            elif is_tall(tags) or limits.metres_of(tags.get("height")) is not None:
                 told[kind] += 1
-                highest_m = max(highest_m, *lengths_of(tags.get("height")).metres, 0.0)
     except (RuntimeError, ValueError, OSError, MemoryError) as error:
         raise WorldFileError(
             f"cannot be read by osmium ({' '.join(str(error).split())[:80]}); it may be torn"
         ) from error
-    for name, (tags, places) in outlines.items():
-        if len(set(places)) >= 3:
+    for name, (tags, places) in ways.items():
+        is_there = len(set(places)) >= 3
+        told["closed" if is_there else "broken"] += 1
+        if is_there:
             parts.append(limits.building(tags, shapely.Polygon(places), reading, doubts, name))
-            told["closed"] += 1
-        else:
-            told["broken"] += 1
     if not parts:
         raise WorldFileError("has no building with an outline; must be an extract of OpenStreetMap with some")
     notes = doubts.notes(reading)
@@ -118,10 +111,8 @@ def _read(path: Path, reading: Reading) -> Contents:
         notes.append(f"{counted(told['closed'], 'building')} with an open outline closed by a straight line")
     if told["broken"]:
         notes.append(f"{counted(told['broken'], 'building')} whose outline is not there passed over")
-    plain = [counted(told[kind], kind) for kind in ("point", "way", "relation") if told[kind]]
-    if plain:
-        top = f", the highest {highest_m:g} m" if highest_m else ""
-        notes.append(f"{' and '.join(plain)} with a height, or a mast, without an area passed over{top}")
+    if plain := [counted(told[kind], kind) for kind in ("point", "way", "relation") if told[kind]]:
+        notes.append(f"{' and '.join(plain)} with a height, or a mast, without an area passed over")
     return Contents("osm", WGS84, tuple(parts), notes=tuple(notes))
 
 

@@ -12,16 +12,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from harness.files.input_file import InputError
 from harness.files.zip_archive import member_path
-from harness.world_files.bounded import check_file, read_bytes
+from harness.world_files.bounded import read_bytes
 from harness.world_files.parts import FOOT_M, WGS84, Contents, FloatArray, Raster, Reading, WorldFileError
-from harness.world_files.plane import has_heights, unit_that_is_no_metre, vertical_unit_m
+from harness.world_files.plane import axis_units
 
 MAX_CELLS: Final = 60_000_000
 """Most cells of a raster: half a gigabyte of heights."""
-STRIP_CELLS: Final = 2_000_000
-"""Rows are read in strips of at most this many cells."""
 CACHE_MB: Final = 64
 """Size of GDAL's cache, which is a twentieth of the machine's memory otherwise."""
 MAX_TILE_BYTES: Final = 30_000_000
@@ -34,8 +31,6 @@ UNITS_M: Final = {
     **dict.fromkeys(("m", "metre", "meter", "metres", "meters"), 1.0),
     **dict.fromkeys(("ft", "foot", "feet", "international foot"), FOOT_M),
     **dict.fromkeys(("us survey foot", "us-ft", "ftus", "us_survey_foot", "foot_us", "sfoot"), 1200 / 3937),
-    **dict.fromkeys(("cm", "centimetre", "centimeter"), 0.01),
-    **dict.fromkeys(("dm", "decimetre", "decimeter"), 0.1),
 }
 """Lengths in metres of the units of height by the names that GDAL writes."""
 
@@ -71,33 +66,21 @@ def opened(path: Path | str, driver: str) -> Iterator[Any]:
         raise WorldFileError(f"cannot be read as a raster ({said}); it may be torn: get it again") from error
 
 
-def strips(source: Any) -> Iterator[tuple[slice, Any]]:
-    """Rows of a raster of rasterio, a few million cells at a time, and the window that reads them."""
-    from rasterio.windows import Window
-
-    step = max(STRIP_CELLS // source.width, 1)
-    for start in range(0, source.height, step):
-        stop = min(start + step, source.height)
-        yield slice(start, stop), Window(0, start, source.width, stop - start)
-
-
 def read(path: Path, reading: Reading) -> Contents:
     """Reads a raster of one band of heights; an SRTM tile may be packed as .zip or .gz.
 
     Raises:
         WorldFileError: it cannot be read, has no place on earth where it must have one, or is too large.
     """
-    check_file(path)
+    read_bytes(path, first=1)
     notes: list[str] = []
     with opened(*_inside(path)) as source:
         _check_bands(source)
         if source.driver == "AAIGrid":
             _check_grid(path, source.height * source.width)
-        values = np.empty((source.height, source.width))
-        for rows, window in strips(source):
-            band = source.read(1, window=window, masked=True)
-            values[rows] = band.data
-            values[rows][np.ma.getmaskarray(band) | np.isin(band.data, VOIDS)] = np.nan
+        band = source.read(1, masked=True)
+        values = band.data.astype(np.float64)
+        values[np.ma.getmaskarray(band) | np.isin(band.data, VOIDS)] = np.nan
         affine = _placed(source)
         crs = reading.crs or _crs(source, affine)
         if crs is None and source.driver != "AAIGrid":
@@ -120,10 +103,7 @@ def _inside(path: Path) -> tuple[Path | str, str]:
     if begin in (b"II", b"MM"):
         return path, "GTiff"
     if begin == b"PK":
-        try:
-            return member_path(path, (".hgt",), MAX_TILE_BYTES), "SRTMHGT"
-        except InputError as error:
-            raise WorldFileError(str(error)) from error
+        return member_path(path, (".hgt",), MAX_TILE_BYTES), "SRTMHGT"
     if begin == b"\x1f\x8b":
         return f"/vsigzip/{path.absolute()}", "SRTMHGT"
     if path.suffix.lower() != ".hgt":
@@ -168,19 +148,20 @@ def _crs(source: Any, affine: tuple[float, ...]) -> str | None:
 
 def _to_metres(values: FloatArray, source: Any, crs: str) -> list[str]:
     """Makes a raster's numbers heights in metres, in place, and says what was done."""
-    named = source.units[0]
-    if named and named.strip().lower() not in UNITS_M:
+    named = (source.units[0] or "").strip().lower()
+    if named and named not in UNITS_M:
         raise WorldFileError(
-            f"has heights in {named[:20]!r}, which is no unit that is known; convert it to metres"
+            f"has heights in {named[:20]!r}, which is no unit that is known; make them metres"
         )
-    unit_m = UNITS_M[named.strip().lower()] if named else vertical_unit_m(crs)
+    units = axis_units(crs)
+    unit_m = UNITS_M[named] if named else units.height_m or 1.0
     factor, offset_m = source.scales[0] * unit_m, source.offsets[0] * unit_m
     if factor == 0.0 or not math.isfinite(factor + offset_m):
         raise WorldFileError("has a scale or an offset of its heights that is no number")
     if (factor, offset_m) == (1.0, 0.0):
-        plane_unit = "" if named or has_heights(crs) else unit_that_is_no_metre(crs)
-        told = f"its heights name no unit: taken as metres, although its plane is in {plane_unit}"
-        return [told] if plane_unit else []
+        unclear = not named and units.height_m is None and units.plane_m != 1.0
+        told = f"its heights name no unit: taken as metres, although its plane is in {units.plane}"
+        return [told] if unclear else []
     values *= factor
     values += offset_m
     more = f" plus {offset_m:g} m" if offset_m else ""

@@ -9,22 +9,25 @@ from typing import Any, Final
 
 from harness.files.wording import counted
 from harness.world_files.bounded import json_of
-from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, WGS84, Contents, Datum, Limit, Part, Reading
+from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Limit, Part, Reading
 from harness.world_files.parts import WorldFileError as Fault
 from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import circle
 from harness.world_files.readers.geo_json import features_of, polygon_of, simple, whole
-from harness.world_files.readers.lengths import metres_of, names_unit
 
-FLIGHT_LEVEL_M: Final = 100.0 * FOOT_M
-UNITS_M: Final = {
-    **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
-    **dict.fromkeys(("ft", "f", "foot", "feet"), FOOT_M),
-    "fl": FLIGHT_LEVEL_M,
+UNITS: Final = {
+    **dict.fromkeys(("", "m", "metre", "metres", "meter", "meters"), "m"),
+    **dict.fromkeys(("ft", "f", "foot", "feet"), "ft"),
+    "fl": "fl",
 }
-"""Lengths in metres of the units of limits."""
-FREE: Final = "NO_RESTRICTION"
-"""Restriction of a zone that forbids nothing."""
+"""Units of limits by the names that files use."""
+PASSED: Final = (
+    ("empty", "zone", "without a geometry passed over"),
+    ("flat", "geometry", "without an area passed over"),
+    ("free", "zone", "without restriction passed over"),
+    ("at times", "zone", "that apply at times only taken as always there"),
+)
+"""What is said of zones that are passed over or simplified."""
 
 
 def read_ed269(path: Path, reading: Reading) -> Contents:
@@ -44,11 +47,9 @@ def read_ed269(path: Path, reading: Reading) -> Contents:
     for zone in content:
         if not isinstance(zone, dict) or not isinstance(zone.get("geometry"), list):
             raise Fault("has a zone without a list `geometry`; must be ED-269")
-        times = zone.get("applicability") or ()
-        kind = _kind(zone.get("restriction"), zone["geometry"])
-        told[kind] += 1
-        if kind:
+        if _is_passed(zone.get("restriction"), zone["geometry"], told):
             continue
+        times = zone.get("applicability") or ()
         told["at times"] += any(
             isinstance(each, dict) and (each.get("permanent") == "NO" or "schedule" in each)
             for each in ((times,) if isinstance(times, dict) else times)
@@ -63,15 +64,13 @@ def _ed269_part(volume: Any, name: str, notes: list[str]) -> Part:
     if not isinstance(projection, dict):
         raise Fault(f"has zone {name!r} without a horizontalProjection")
     round_ = projection.get("type") == "Circle"
-    footprint = (
-        _disc(projection.get("center"), projection.get("radius")) if round_ else polygon_of(projection)
-    )
-    if footprint is None:
+    shape = _disc(projection.get("center"), projection.get("radius")) if round_ else polygon_of(projection)
+    if shape is None:
         raise Fault(f"has zone {name!r} whose projection is neither a circle nor a polygon with an area")
-    if round_ and _unit_m(volume.get("uomDimensions")) != 1.0:
+    if round_ and _unit(volume.get("uomDimensions")) != "m":
         notes.append(f"{name or 'a zone'}: its radius is taken as metres, its limits as feet")
     band = _band(volume, volume.get("uomDimensions"), ("Limit", "VerticalReference"), notes, name)
-    return Part(footprint, *band, name=name)
+    return Part(shape, *band, name=name)
 
 
 def read_ed318(path: Path, reading: Reading) -> Contents:
@@ -84,47 +83,42 @@ def read_ed318(path: Path, reading: Reading) -> Contents:
     parts: list[Part] = []
     told = Counter[str]()
     for tags, geometry in features_of(whole(path)):
-        kind = _kind(str(tags.get("type", "")).upper(), geometry)
-        told[kind] += 1
-        if kind:
+        if _is_passed(str(tags.get("type", "")).upper(), geometry, told):
             continue
         told["at times"] += bool(tags.get("limitedApplicability"))
         name = limits.name_of(tags)
         for one in simple(geometry):
-            extent, layer = one.get("extent"), one.get("layer")
-            disc = isinstance(extent, dict) and one.get("type") == "Point"
-            footprint = _disc(one.get("coordinates"), extent.get("radius")) if disc else polygon_of(one)  # type: ignore[union-attr]
-            if footprint is None:
+            extent, layer = one.get("extent"), one.get("layer") or {}
+            if isinstance(extent, dict) and one.get("type") == "Point":
+                shape = _disc(one.get("coordinates"), extent.get("radius"))
+            else:
+                shape = polygon_of(one)
+            if not isinstance(layer, dict):
+                raise Fault(f"has zone {name!r} whose layer is no mapping; must be ED-318")
+            if shape is None:
                 told["flat"] += 1
-                continue
-            layer = layer if isinstance(layer, dict) else {}
-            parts.append(
-                Part(footprint, *_band(layer, layer.get("uom"), ("", "Reference"), notes, name), name=name)
-            )
+            else:
+                band = _band(layer, layer.get("uom"), ("", "Reference"), notes, name)
+                parts.append(Part(shape, *band, name=name))
     return _contents("ed318", parts, told, notes)
 
 
-def _kind(restriction: Any, geometry: Any) -> str:
-    """Why a zone is passed over; empty where it is not."""
-    return "free" if restriction == FREE else "" if geometry else "empty"
+def _is_passed(restriction: Any, geometry: Any, told: Counter[str]) -> bool:
+    """Whether a zone is passed over, as it forbids nothing or has no geometry; it is counted."""
+    why = "free" if restriction == "NO_RESTRICTION" else "" if geometry else "empty"
+    told[why] += 1
+    return bool(why)
 
 
 def _contents(kind: str, parts: list[Part], told: Counter[str], notes: list[str]) -> Contents:
     if not parts:
         raise Fault("has no zone with an area that forbids something; must have some")
-    for why, what, sentence in (
-        ("empty", "zone", "without a geometry passed over"),
-        ("flat", "geometry", "without an area passed over"),
-        ("free", "zone", "without restriction passed over"),
-        ("at times", "zone", "that apply at times only taken as always there"),
-    ):
-        if told[why]:
-            notes.append(f"{counted(told[why], what)} {sentence}")
+    notes += [f"{counted(told[why], what)} {sentence}" for why, what, sentence in PASSED if told[why]]
     return Contents(kind, WGS84, tuple(parts), notes=tuple(notes))
 
 
 def _disc(center: Any, radius: Any) -> Any:
-    metres = metres_of(radius)
+    metres = limits.metres_of(radius)
     if metres is None:
         raise Fault("has a circle without a radius")
     try:
@@ -139,31 +133,15 @@ def _band(
 ) -> tuple[Limit, Limit]:
     """Bottom and top of a zone; `ends` are what follows `lower` and `upper` in the names of limit and reference."""
     found: list[Limit | None] = []
-    for word, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
-        value = says.get(f"{word}{ends[0]}")
-        reference = str(says.get(f"{word}{ends[1]}") or "").upper()
-        found.append(none if value is None else _limit(value, reference, _unit_m(unit), notes, name))
+    for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
+        value, reference = says.get(f"{side}{ends[0]}"), str(says.get(f"{side}{ends[1]}") or "")
+        told = limits.limit_told(value, _unit(unit), reference, notes, name)
+        found.append(none if value is None else told)
     return limits.band_of(found[0], found[1], notes, name)
 
 
-def _unit_m(name: Any) -> float:
-    word = str(name or "m").strip().lower()
-    if word not in UNITS_M:
+def _unit(name: Any) -> str:
+    word = str(name or "").strip().lower()
+    if word not in UNITS:
         raise Fault(f"has limits in {word[:20]!r}; must be in m, ft or FL")
-    return UNITS_M[word]
-
-
-def _limit(value: Any, reference: str, unit_m: float, notes: list[str], name: str) -> Limit | None:
-    """A limit above ground (AGL) or above mean sea level (AMSL, flight levels; WGS84 is taken for it)."""
-    number = metres_of(value)
-    if number is None:
-        return None
-    level = unit_m == FLIGHT_LEVEL_M
-    ground = reference in ("AGL", "SFC", "GND") and not level
-    if ground and number == 0.0:
-        return NO_BOTTOM
-    if not ground and not level and reference not in ("AMSL", "MSL"):
-        told = "are above the ellipsoid" if reference in ("WGS84", "W84", "HAE") else "name no reference"
-        note = f"{name or 'a zone'}: its limits {told}; taken as above mean sea level"
-        notes += [] if note in notes[-1:] else [note]
-    return Limit(number if names_unit(value) else number * unit_m, Datum.GROUND if ground else Datum.SEA)
+    return UNITS[word]

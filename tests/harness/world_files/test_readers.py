@@ -26,8 +26,7 @@ from harness.world_files.parts import (
     WorldFileError,
 )
 from harness.world_files.plane import Mapping, Place
-from harness.world_files.readers.lengths import Lengths, lengths_of, metres_of
-from harness.world_files.readers.limits import limit_of
+from harness.world_files.readers.limits import limit_of, metres_of
 from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, osm, zipped
 
 
@@ -228,31 +227,6 @@ def test_limits_are_read_as_airspace_files_write_them(text: str, limit: Limit | 
 )
 def test_heights_of_buildings_are_read_in_their_unit(value: object, metres: float | None) -> None:
     assert metres_of(value) == (None if metres is None else pytest.approx(metres))
-
-
-@pytest.mark.parametrize(
-    ("value", "lengths"),
-    [
-        ("15", Lengths((15.0,))),
-        (15, Lengths((15.0,))),
-        ("~15", Lengths((15.0,), rough=True)),
-        ("15; 18;", Lengths((15.0, 18.0), rough=True)),
-        ("10\N{EN DASH}12", Lengths((10.0, 12.0), rough=True)),
-        ("3-4;6", Lengths((3.0, 4.0, 6.0), rough=True)),
-        ("-3", Lengths((-3.0,))),
-        ("2-1", Lengths(())),
-        ("1-2-3", Lengths(())),
-        ("~", Lengths(())),
-        (";", Lengths(())),
-        ("~1,200 ft", Lengths(())),
-        ("900-1,200", Lengths(())),
-        (None, Lengths(())),
-    ],
-)
-def test_rough_lengths_say_so(value: object, lengths: Lengths) -> None:
-    found = lengths_of(value)
-    assert found.metres == pytest.approx(lengths.metres)
-    assert (found.rough and bool(found.metres)) == lengths.rough
 
 
 def in_plane(shape: Any, longitude: float, latitude: float) -> Any:

@@ -145,57 +145,30 @@ def test_openstreetmap_in_any_order(body: tuple[str, str], tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("tags", "top_m", "said"),
+    ("tags", "bottom_m", "top_m", "said"),
     [
-        ({"building": "yes", "height": -1}, 6.0, True),
-        ({"building": "yes", "height": "like 20"}, 6.0, True),
-        ({"building": "yes", "height": "20?", "building:levels": "5"}, 15.0, True),
-        ({"building": "yes", "building:levels": "3;5"}, 15.0, False),
-        ({"building": "yes", "building:levels": "4-3"}, 6.0, True),
-        ({"building": "yes", "building:levels": "0-3"}, 6.0, True),
-        ({"building": "yes", "height": "15;high"}, 6.0, True),
-        ({"building": "yes", "height": "12 metres"}, 12.0, False),
-        ({"building": "yes", "height": "40 feet"}, 40 * FOOT_M, False),
-        ({"HEIGHT": 21.5}, 21.5, False),
-        ({"num_floors": 3, "height": None}, 9.0, False),
-        ({"building": "yes", "est_height": "9"}, 9.0, False),
+        ({"building": "yes", "height": -1}, -math.inf, 6.0, True),
+        ({"building": "yes", "height": "20?", "building:levels": "5"}, -math.inf, 20.0, True),
+        ({"building": "yes", "height": "12 metres"}, -math.inf, 12.0, False),
+        ({"building": "yes", "height": "40 feet"}, -math.inf, 40 * FOOT_M, False),
+        ({"HEIGHT": 21.5}, -math.inf, 21.5, False),
+        ({"num_floors": 3, "height": None}, -math.inf, 9.0, False),
+        ({"building": "yes", "est_height": "9"}, -math.inf, 9.0, False),
+        # A list, a range or a guess is as high as its largest number, and begins at the ground.
+        ({"height": "~15"}, -math.inf, 15.0, True),
+        ({"building": "yes", "height": "15;18"}, -math.inf, 18.0, True),
+        ({"building": "yes", "building:levels": "3-4"}, -math.inf, 12.0, True),
+        ({"building": "yes", "height": "20", "min_height": "~3-4"}, -math.inf, 20.0, True),
     ],
 )
-def test_a_height_that_says_nothing_is_told(
-    tags: dict[str, Any], top_m: float, said: bool, tmp_path: Path
+def test_a_height_that_is_no_plain_length_is_told(
+    tags: dict[str, Any], bottom_m: float, top_m: float, said: bool, tmp_path: Path
 ) -> None:
     found = read_any(geojson(tmp_path / "a.geojson", feature(tags)))
     (part,) = found.parts
-    assert part.top.height_m == pytest.approx(top_m)
-    assert any("say nothing" in note for note in found.notes) == said
-
-
-@pytest.mark.parametrize(
-    ("tags", "bottom_m", "top_m"),
-    [
-        ({"height": "~15"}, -math.inf, 15.0),
-        ({"height": "~ 15 m"}, -math.inf, 15.0),
-        ({"height": "ca. 40 ft"}, -math.inf, 40 * FOOT_M),
-        ({"height": "15;18"}, -math.inf, 18.0),
-        ({"height": "10-12 m"}, -math.inf, 12.0),
-        ({"building:levels": "3-4"}, -math.inf, 12.0),
-        ({"building:levels": "~5"}, -math.inf, 15.0),
-        ({"height": "20", "min_height": "~3-4"}, 3.0, 20.0),
-    ],
-)
-def test_a_rough_height_is_taken_as_it_stands_and_told(
-    tags: dict[str, str], bottom_m: float, top_m: float, tmp_path: Path
-) -> None:
-    """As OpenStreetMap's mappers write them; they were taken as the default height."""
-    found = read_any(geojson(tmp_path / "a.geojson", feature({"building": "yes", **tags})))
-    (part,) = found.parts
     assert part.bottom.height_m == bottom_m
     assert part.top.height_m == pytest.approx(top_m)
-    name, value = list(tags.items())[-1]
-    assert found.notes == (
-        f"1 height of buildings approximate, a list or a range, {name}={value!r} the first: taken as they stand, of "
-        "several the one that makes the building larger",
-    )
+    assert any("no plain length" in note for note in found.notes) == said
 
 
 @pytest.mark.parametrize(
@@ -206,7 +179,7 @@ def test_a_rough_height_is_taken_as_it_stands_and_told(
             Limit(500 * FOOT_M, Datum.GROUND),
             Limit(18_000 * FOOT_M),
         ),
-        ({"UPPER_VAL": -9998, "LOWER_VAL": 0}, Limit(0.0), NO_TOP),
+        ({"UPPER_VAL": -9998, "LOWER_VAL": 0}, NO_BOTTOM, NO_TOP),
         (
             {"lower": "1500 ft AGL", "upper": "FL 65"},
             Limit(1500 * FOOT_M, Datum.GROUND),
@@ -287,7 +260,7 @@ def test_places_of_openair(place: str, tmp_path: Path) -> None:
         (
             "AL FL20\nAH FL50\nAH FL65\n",
             Limit(2000 * FOOT_M),
-            Limit(6500 * FOOT_M),
+            NO_TOP,
             ["upper limit is given more"],
         ),
         (
@@ -328,7 +301,9 @@ def test_an_airspace_without_a_class_is_one_of_its_own(tmp_path: Path) -> None:
         f"{b}\n{a}\n{c}" for a, b, c in (each.split("\n", 2) for each in (first, "AC Q\n" + second))
     )
     assert [part.name for part in read_any(written(tmp_path / "c.txt", turned)).parts] == ["one", "two"]
-    with pytest.raises(WorldFileError, match="line 5: has 75 minutes or seconds; must be at most 60"):
+    with pytest.raises(
+        WorldFileError, match="line 5: has the angle '47:75:00'; must be degrees, and minutes"
+    ):
         read_any(written(tmp_path / "d.txt", first.replace("47:00:00", "47:75:00", 1)))
 
 
@@ -341,7 +316,6 @@ def test_openair_names_what_it_passes_over(tmp_path: Path) -> None:
     assert any("1 R" in note for note in notes)
     assert any("activation" in note for note in notes)
     assert any("'QQ'" in note for note in notes)
-    assert not any("AT" in note for note in notes)
 
 
 ITEM = "{}\t0\t3\t{}\t{}\t0\t0\t0\t{}\t{}\t0\t1\n"
@@ -565,9 +539,6 @@ def test_a_city_object_with_a_vertex_that_is_not_there_is_named(index: Any, tmp_
             {"minAltitude": 10, "minAltitudeType": "AGL", "maxAltitude": 500, "maxAltitudeType": "QNH"},
             Limit(10.0, Datum.GROUND), Limit(500.0),
         ),
-        # a facility map of the FAA: up to the ceiling one may fly
-        ({"CEILING": 200, "UNIT": "Feet", "APT1_FAAID": "SEA"}, Limit(200 * FOOT_M, Datum.GROUND), NO_TOP),
-        ({"CEILING": 0, "UNIT": "Feet", "MAP_EFF": "2026"}, NO_BOTTOM, NO_TOP),
         ({"lower": "GND", "upper": "UNLTD"}, NO_BOTTOM, NO_TOP),
     ],
 )  # fmt: skip
@@ -609,7 +580,10 @@ def test_a_limit_without_a_unit_is_noted(tags: dict[str, Any], said: bool, tmp_p
     assert ("A: its limits name no unit; taken as metres" in notes) == said
 
 
-def test_limits_that_cannot_be_told_are_both_noted(tmp_path: Path) -> None:
+def test_limits_that_cannot_be_told_are_both_noted_and_facility_maps_refused(tmp_path: Path) -> None:
+    grid = {"CEILING": 200, "UNIT": "Feet", "APT1_FAAID": "SEA"}
+    with pytest.raises(WorldFileError, match="is a facility map of the FAA"):
+        read_any(geojson(tmp_path / "b.geojson", feature(grid)))
     odd = {"lower": {"metric": 0}, "upper": {"metric": 9}, "name": "A"}
     notes = read_any(geojson(tmp_path / "a.geojson", feature(odd))).notes
     assert "A: its limits are not known; taken as without" in notes
@@ -747,9 +721,7 @@ def test_towers_that_are_points_are_counted(tmp_path: Path) -> None:
     )
     path.write_text(path.read_text().replace('<osm version="0.6">', f'<osm version="0.6">{tags}'))
     count = sum(tall for _, tall in POINTS)
-    assert read_any(path).notes == (
-        f"{count} points with a height, or a mast, without an area passed over, the highest 179.832 m",
-    )
+    assert read_any(path).notes == (f"{count} points with a height, or a mast, without an area passed over",)
 
 
 @pytest.mark.parametrize(
