@@ -48,3 +48,9 @@ def _before_several_processes_test(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The files beside this one come first: among the flights theirs are the longest, for which all would wait."""
     items.sort(key=lambda item: item.path.parent != Path(__file__).parent)
+
+
+@pytest.fixture(autouse=True)
+def _no_progress_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However slow the machine is, standard error has no lines of progress."""
+    monkeypatch.setattr("harness.cli.terminal.LINE_EVERY_S", 86_400.0)

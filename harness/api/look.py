@@ -34,9 +34,9 @@ def flight_html(title: str, metrics: Mapping[str, Any]) -> str:
     from rich.text import Text
 
     if metrics.get("check") is not None:
-        from harness.cli.check_terminal import verdict_rows as rows
+        from harness.cli.flight_rows import verdict_rows as rows
     else:
-        from harness.cli.terminal import flight_rows as rows
+        from harness.cli.flight_rows import flight_rows as rows
     return _table(title, (), [(name, Text.from_markup(text).plain) for name, text in rows(metrics).items()])
 
 

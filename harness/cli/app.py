@@ -15,13 +15,13 @@ from typing import Annotated, Final
 
 import typer
 
+from harness.cli.bench import bench, envelope
 from harness.cli.certify import certify
 from harness.cli.check import check
 from harness.cli.compare import compare
-from harness.cli.envelope import envelope
 from harness.cli.export import export
 from harness.cli.falsify import falsify
-from harness.cli.flights import bench, fly
+from harness.cli.fly import fly
 from harness.cli.formats import schema, validate
 from harness.cli.names import list_names
 from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag
@@ -38,23 +38,11 @@ COMPLETION: Final = "_WAYPROOF_COMPLETE"
 """The variable by which a shell asks for completions, which typer ends with sys.exit."""
 
 app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
-for command in (
-    fly,
-    check,
-    world,
-    compare,
-    sweep,
-    falsify,
-    certify,
-    replay,
-    validate,
-    schema,
-    view,
-    report,
-    export,
-    bench,
-    envelope,
-):
+COMMANDS: Final = (
+    *(fly, check, world, compare, sweep, falsify, certify, replay),
+    *(validate, schema, view, report, export, bench, envelope),
+)
+for command in COMMANDS:
     app.command(cls=Command)(command)
 app.command("list", cls=Command)(list_names)
 
@@ -149,9 +137,8 @@ def _report(error: Exception) -> int:
         say(str(error), err=True)
         return BAD_INPUT
     if isinstance(error, typer.TyperException):
-        text = " ".join(error.format_message().split()).replace(
-            "Value error, ", ""
-        )  # typer checks with pydantic
+        # typer checks with pydantic
+        text = " ".join(error.format_message().split()).replace("Value error, ", "")
         whose = getattr(getattr(error, "ctx", None), "command_path", "wayproof")
         say(f"wayproof: {text} (see {whose} --help)", err=True)
         return BAD_INPUT

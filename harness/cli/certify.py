@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import os
 import shlex
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -18,18 +17,18 @@ from harness.cli.options import (
     ConditionsOption,
     GuidanceOption,
     JsonOption,
+    OutOption,
     PlannerOption,
+    QuietOption,
+    ResumeOption,
     SeedOption,
     SettingsOption,
     TurbulenceOption,
     WindOption,
     WorkersOption,
-    air,
-    bad_input,
-    chosen,
-    flag,
+    overrides,
     print_json,
-    settings_of,
+    resumable,
     sources,
     told_apart,
 )
@@ -88,11 +87,9 @@ def certify(
         str | None, typer.Option("--scenario", metavar="WORLD", help="Of a path: obstacles, bounds, air.")
     ] = None,
     workers: WorkersOption = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="The folder. Default: its own in runs/NAME.")
-    ] = None,
-    resume: Annotated[bool, flag("--resume", "Fly only the days missing in DIR.")] = False,
-    quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
+    out: OutOption = None,
+    resume: ResumeOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Flies a scenario or a path on many days, and says how often a claim holds, with confidence bounds.
@@ -113,109 +110,79 @@ def certify(
     """
     from harness.analysis.claims import CLAIMS
     from harness.certification.certification import MOST_RUNS, Terms
-    from harness.certification.certification import certify as fly_days
     from harness.certification.subject import Asked, days_of, distributions
-    from harness.cli.terminal import print_table
     from harness.scenario.shipped import scenario_path
 
     terms = Terms(probability, confidence)
-    options = [*chosen(planner, aircraft, seed, guidance, conditions), *air(wind, turbulence)]
-    replaced = settings_of(settings, options)
+    replaced = overrides(
+        settings,
+        planner=planner,
+        aircraft=aircraft,
+        guidance=guidance,
+        wind=wind,
+        turbulence=turbulence,
+        seed=seed,
+        conditions=conditions,
+    )
     try:
         drawn = distributions(vary or ())
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--vary") from error
     if claim is not None and claim not in CLAIMS:
         raise typer.BadParameter(f"{claim[:60]!r} is not {', '.join(CLAIMS)}", param_hint="--claim")
-    asked = Asked(
-        subject, [*options, *replaced], drawn, claim, runs or MOST_RUNS, (sources(planner), sources(guidance))
-    )
+    asked = Asked(subject, replaced, drawn, claim, runs or MOST_RUNS, (sources(planner), sources(guidance)))
     days = days_of(asked, None if world is None else scenario_path(world))
     days.check()
-    apart = told_apart([*asked.settings, *((key, str(each)) for key, each in drawn.items())], named=())
+    apart = told_apart([*replaced, *((key, str(each)) for key, each in drawn.items())], named=())
     folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{apart}"
-    certificate = _fly(
-        fly_days,
-        days,
-        folder,
-        workers or os.cpu_count() or 1,
-        terms,
-        resume=resume,
-        bar=days_bar,
-        silent=quiet,
-    )
+    found = _fly(days, folder, workers, terms, resume=resume, silent=quiet)
     if as_json:
-        print_json(certificate.plain())
+        print_json(found.plain())
     elif not quiet:
-        print_table(
-            f"{certificate.subject}: {certificate.planner}, {certificate.aircraft}",
-            certificate_rows(certificate),
-        )
-        say(f"certificate: {folder / 'certificate.json'}")
-        if certificate.failing_runs:
-            first = folder / "runs" / str(certificate.failing_runs[0])
+        _print(found, f"{found.subject}: {found.planner}, {found.aircraft}", folder)
+        if found.failing_runs:
+            first = folder / "runs" / str(found.failing_runs[0])
             say(f"view: {shlex.join(['wayproof', 'view', str(first)])}")
-    return 0 if certificate.verdict == "shown" else FAILED
+    return 0 if found.verdict == "shown" else FAILED
 
 
 def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
     """Flies a given path on a fixed number of days, and prints how often it was flown as given."""
     from harness.certification.certification import Terms
-    from harness.certification.certification import certify as fly_days
-    from harness.cli.terminal import print_table
 
     days.check()
-    workers, resume = os.cpu_count() or 1, (folder / "campaign.json").exists()
-    found = _fly(fly_days, days, folder, workers, Terms(), resume=resume, bar=days_bar, silent=silent)
+    found = _fly(days, folder, None, Terms(), resume=(folder / "campaign.json").exists(), silent=silent)
     if not silent:
-        print_table(f"{found.subject}: {found.runs} days", certificate_rows(found))
-        say(f"certificate: {folder / 'certificate.json'}")
+        _print(found, f"{found.subject}: {found.runs} days", folder)
 
 
 def _fly(
-    fly_days: Any,
-    days: Days,
-    folder: Path,
-    workers: int,
-    terms: Terms,
-    *,
-    resume: bool,
-    bar: Any,
-    silent: bool,
+    days: Days, folder: Path, workers: int | None, terms: Terms, *, resume: bool, silent: bool
 ) -> Certificate:
-    from contextlib import nullcontext
-
+    """Flies days into a folder, with progress on standard error."""
     from harness.campaign.results import INDEX
     from harness.campaign.workers import local_workers
-    from harness.files.errors import RunFolderError
-
-    try:
-        with local_workers(workers) as flyers, nullcontext() if silent else bar(len(days)) as report:
-            found: Certificate = fly_days(days, folder, flyers, terms, resume=resume, progress=report)
-            return found
-    except RunFolderError as error:
-        raise bad_input(error) from error
-    except OSError as error:
-        say(f"wayproof: {error}; what is done is in {folder}, --resume goes on", err=True)
-        raise typer.Exit(FAILED) from error
-    except KeyboardInterrupt:
-        begun = (folder / INDEX).exists()
-        left = f"what is done is in {folder}, --resume goes on" if begun else "nothing was written"
-        say(f"wayproof: interrupted; {left}", err=True)
-        raise
-
-
-@contextmanager
-def days_bar(most: int) -> Iterator[Callable[[Tally], None]]:
-    """A bar of days that count, on standard error; a line every ten seconds where that is not a terminal.
-
-    Args:
-        most: number of days that may be flown.
-    """
+    from harness.certification.certification import certify as fly_days
     from harness.cli.terminal import step_bar
 
-    with step_bar() as bar:
-        yield lambda tally: bar(tally.runs, most, f"held on {tally.held} of {tally.runs} days")
+    with (
+        resumable(folder, INDEX),
+        local_workers(workers or os.cpu_count() or 1) as flyers,
+        nullcontext() if silent else step_bar() as bar,
+    ):
+
+        def report(tally: Tally) -> None:
+            if bar is not None:
+                bar(tally.runs, len(days), f"held on {tally.held} of {tally.runs} days")
+
+        return fly_days(days, folder, flyers, terms, resume=resume, progress=report)
+
+
+def _print(found: Certificate, title: str, folder: Path) -> None:
+    from harness.cli.terminal import print_table
+
+    print_table(title, certificate_rows(found))
+    say(f"certificate: {folder / 'certificate.json'}")
 
 
 def certificate_rows(certificate: Certificate) -> dict[str, str]:
@@ -232,11 +199,8 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
         f"{share(certificate.probability_upper, up=True)} (each bound at confidence {sure})",
         "bounds": certificate.method,
     }
-    asked = (
-        ""
-        if certificate.probability is None
-        else f": holds on at least {certificate.probability:.6g} of the days"
-    )
+    claimed = certificate.probability
+    asked = "" if claimed is None else f": holds on at least {claimed:.6g} of the days"
     rows["verdict"] = f"[{STYLE[certificate.verdict]}]{certificate.verdict}[/]{asked}"
     for number, each in enumerate(certificate.failures[:SHOWN]):
         cause = f", {plain(each.cause)}" if each.cause else ""
@@ -253,6 +217,5 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
 
 def share(value: float, up: bool = False) -> str:
     """A probability, rounded outwards: never more than is known."""
-    digits = 5
-    scaled = value * 10**digits
-    return f"{(math.ceil(scaled) if up else math.floor(scaled)) / 10**digits:.{digits}f}"
+    scaled = value * 1e5
+    return f"{(math.ceil(scaled) if up else math.floor(scaled)) / 1e5:.5f}"

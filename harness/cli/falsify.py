@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -12,23 +13,28 @@ import typer
 
 from harness.cli.options import (
     AircraftOption,
+    ConditionsOption,
+    GuidanceOption,
     JsonOption,
+    OutOption,
     PlannerOption,
+    QuietOption,
     ScenarioArgument,
     SeedOption,
     SettingsOption,
-    bad_input,
-    chosen,
+    TurbulenceOption,
+    WindOption,
+    faults_told,
     load,
+    overrides,
     print_json,
-    settings_of,
     told_apart,
 )
 from harness.cli.standard_output import say
+from harness.files.wording import counted
 
 if TYPE_CHECKING:
-    from harness.falsify.breaking_point import Until
-    from harness.falsify.keys import Vary
+    from harness.falsify.breaking_point import Breaking
     from harness.scenario.scenario import Scenario
 
 RUNS_A_KEY: Final = 40
@@ -42,6 +48,10 @@ def falsify(
     ],
     planner: PlannerOption = None,
     aircraft: AircraftOption = None,
+    guidance: GuidanceOption = None,
+    conditions: ConditionsOption = None,
+    wind: WindOption = None,
+    turbulence: TurbulenceOption = None,
     seed: SeedOption = None,
     settings: SettingsOption = None,
     until: Annotated[
@@ -60,10 +70,8 @@ def falsify(
     tolerance: Annotated[
         float, typer.Option(metavar="SHARE", help="Precision, as a share of each range.")
     ] = 0.01,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="The folder. Default: its own in runs/SCENARIO."),
-    ] = None,
+    out: OutOption = None,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Searches for the mildest condition that makes a flight fail, and writes it as a scenario.
@@ -83,77 +91,64 @@ def falsify(
     """
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
-    ranges = [range_of(text) for text in vary]
-    options = chosen(planner, aircraft, seed)
-    fixed = [*options, *settings_of(settings, options)]
-    return _search(
-        scenario, fixed, ranges, until, runs or RUNS_A_KEY * len(ranges), seeds, tolerance, out, as_json
-    )
-
-
-def _search(
-    scenario: str,
-    fixed: list[tuple[str, str]],
-    ranges: list[tuple[str, float, float]],
-    until: Until,
-    runs: int,
-    seeds: int,
-    tolerance: float,
-    out: Path | None,
-    as_json: bool,
-) -> int:
-    from harness.cli.falsify_terminal import breaking_rows, last_line
     from harness.cli.terminal import print_table, step_bar
     from harness.falsify.breaking_point import FALSIFIED, INDEX
     from harness.falsify.breaking_point import falsify as search
     from harness.falsify.keys import vary_of
-    from harness.files.errors import RunFolderError
+
+    ranges = [range_of(text) for text in vary]
+    fixed = overrides(
+        settings,
+        planner=planner,
+        aircraft=aircraft,
+        guidance=guidance,
+        wind=wind,
+        turbulence=turbulence,
+        seed=seed,
+        conditions=conditions,
+    )
 
     def loaded(replaced: Any) -> Scenario:
         return load(scenario, [*fixed, *replaced])
 
     varied = vary_of(loaded, ranges, [name for name, _ in fixed], tolerance)
-    folder = out or Path("runs") / loaded(()).name / f"{_folder_name(varied)}{told_apart(fixed, named=())}"
+    # Indices as `--set` takes them, which no shell takes for a pattern.
+    keys = [each.key.replace("[", ".").replace("]", "") for each in varied]
+    folder = (
+        out or Path("runs") / loaded(()).name / f"{'-'.join(['falsify', *keys])}{told_apart(fixed, named=())}"
+    )
     flights = 0
 
-    def ended(*step: Any) -> None:
-        nonlocal flights
-        flights += 1
-        if report is not None:
-            report(*step)
+    def left() -> str:
+        return f"the flights so far are in {folder / INDEX}" if flights else "no flight had ended yet"
 
-    try:
-        with step_bar() as report:
-            found = search(
-                loaded,
-                varied,
-                folder,
-                flown=_flown,
-                until=until,
-                conditions=runs,
-                seeds=seeds,
-                tolerance=tolerance,
-                progress=ended,
-            )
-    except RunFolderError as error:
-        raise bad_input(error) from error
-    except KeyboardInterrupt:
-        told = f"the flights so far are in {folder / INDEX}" if flights else "no flight had ended yet"
-        say(f"wayproof: interrupted; {told}", err=True)
-        raise
+    with faults_told(left), nullcontext() if quiet else step_bar() as bar:
+
+        def ended(*step: Any) -> None:
+            nonlocal flights
+            flights += 1
+            if bar is not None:
+                bar(*step)
+
+        found = search(
+            loaded,
+            varied,
+            folder,
+            flown=_flown,
+            until=until,
+            conditions=runs or RUNS_A_KEY * len(ranges),
+            seeds=seeds,
+            tolerance=tolerance,
+            progress=ended,
+        )
     if as_json:
         print_json(found.plain())
-        return 0
-    print_table(f"{found.scenario}: {found.planner}, {found.aircraft}", breaking_rows(found))
-    if found.found is not None:
-        say(f"again: {shlex.join(['wayproof', 'fly', str(folder / FALSIFIED)])}")
-    say(last_line(found))
+    elif not quiet:
+        print_table(f"{found.scenario}: {found.planner}, {found.aircraft}", breaking_rows(found))
+        if found.found is not None:
+            say(f"again: {shlex.join(['wayproof', 'fly', str(folder / FALSIFIED)])}")
+        say(last_line(found))
     return 0
-
-
-def _folder_name(vary: Sequence[Vary]) -> str:
-    """Of the keys, their indices as `--set` takes them, which no shell takes for a pattern."""
-    return "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in vary)])
 
 
 def _flown(scenario: Scenario) -> dict[str, Any]:
@@ -179,3 +174,64 @@ def range_of(text: str) -> tuple[str, float, float]:
     if not (key.strip() and equals and colon and math.isfinite(mild) and math.isfinite(hard)):
         raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=LO:HI with two numbers", param_hint="--vary")
     return key.strip(), mild, hard
+
+
+def breaking_rows(breaking: Breaking) -> dict[str, str]:
+    """Name and value of each row. Values are printed as they were flown, never rounded."""
+    from harness.cli.terminal import plain
+    from harness.falsify.keys import number_text
+
+    found, wanted = breaking.found, "trackable" if breaking.until == "untrackable" else "reached"
+    flights = len(breaking.trials)
+    told = f", {counted(flights, 'flight')}" if flights != breaking.conditions else ""
+    rows = {"tried": counted(breaking.conditions, "condition") + told}
+    for each in breaking.vary:
+        rows[plain(each.key)] = f"{number_text(each.mild)} (mild) to {number_text(each.hard)} (hard)"
+    if found is None:
+        rows["mildest found"] = f"none: every condition tried was {wanted}"
+    else:
+        share = max(found.displacement)
+        rows["mildest found"] = (
+            f"[bold red]{_values(breaking, found.values)}[/], {share:.1%} of the way"
+            if share
+            else "[bold red]already at the mild end[/]"
+        )
+        rows["how it failed"] = plain(
+            f"{found.figures['outcome']}: {found.figures['reason']}, seed {found.seed}"
+        )
+    if breaking.passes is not None:
+        rows["passes below"] = f"at {_values(breaking, breaking.passes)}"
+    if found is None or max(found.displacement):
+        rows["scan"] = (
+            f"{counted(breaking.steps, 'equal step')} of {1.0 / breaking.steps:.2%}; a narrower failing range may have "
+            "been missed, more --runs make the steps finer"
+        )
+    if not breaking.settled:
+        rows["not settled"] = "the conditions ran out first; give more with --runs"
+    return rows
+
+
+def last_line(breaking: Breaking) -> str:
+    """What came of it, in a sentence."""
+    from harness.falsify.keys import number_text
+
+    if breaking.found is None:
+        return f"not falsified: nothing failed in {counted(len(breaking.trials), 'flight')}"
+    if breaking.verdict == "fails_at_the_mild_end":
+        return "falsified: it fails already at the mild end"
+    keys = ", ".join(
+        f"{each.key}={number_text(value)}"
+        for each, value in zip(breaking.vary, breaking.found.values, strict=True)
+    )
+    return f"falsified: {keys}, the mildest found in {counted(breaking.conditions, 'condition')}"
+
+
+def _values(breaking: Breaking, values: Sequence[float]) -> str:
+    """A condition; with several keys, each value with its key."""
+    from harness.cli.terminal import plain
+    from harness.falsify.keys import number_text
+
+    if len(values) == 1:
+        return number_text(values[0])
+    pairs = zip(breaking.vary, values, strict=True)
+    return ", ".join(plain(f"{each.key} {number_text(value)}") for each, value in pairs)

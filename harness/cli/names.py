@@ -2,44 +2,35 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import fields
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 
-from harness.cli.standard_output import say
-
-if TYPE_CHECKING:
-    from aircraft.airframe import Airframe
+from harness.cli.options import completing
+from harness.cli.standard_output import folded, say
 
 LISTED: Final = ("planners", "aircraft", "guidance", "scenarios", "worlds", "campaigns", "metrics")
 _AIRCRAFT_ROW: Final = "{:10} {:>7} {:>10} {:>6} {:>6} {:8} "
 _WIDTH: Final = 80
-_INTERRUPT_S: Final = 0.1
-"""How often it is looked whether the process was asked to end."""
-
-
-def _listed(incomplete: str) -> list[str]:
-    """What can be listed, for the shell to complete."""
-    return [name for name in LISTED if name.startswith(incomplete)]
 
 
 def list_names(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="WHAT", help=f"{', '.join(LISTED[:-1])} or {LISTED[-1]}.", autocompletion=_listed
+            metavar="WHAT",
+            help=f"{', '.join(LISTED[:-1])} or {LISTED[-1]}.",
+            autocompletion=completing(lambda: LISTED),
         ),
     ],
 ) -> int:
     """Prints the names that a scenario or a command can use; for planners and guidance laws also their keys.
 
-    `list aircraft` first measures, in flight, each aircraft that is new to this machine: about a minute for the fleet
-    on all processors. The figures are kept.
+    `list aircraft` first measures, in flight, each aircraft that is new to this machine: some seconds each. The figures
+    are kept.
 
     For example: wayproof list planners
     """
@@ -71,7 +62,7 @@ def _print_shipped(what: str) -> None:
     files = shipped_campaigns() if what == "campaigns" else shipped_scenarios()
     width = max(map(len, files), default=0)
     for name, path in files.items():
-        say(_row(f"{name:{width}}  ", summary(path)))
+        say(folded(f"{name:{width}}  ", summary(path)))
 
 
 def _print_metrics() -> None:
@@ -100,7 +91,7 @@ def _print_worlds() -> None:
         families.setdefault(name.partition("/")[0], []).append(name)
     for family, names in families.items():
         source = summary(worlds[names[0]]).replace(", see ../LICENCES.md", "")
-        say(_row(f"{family:15} {len(names):3}  ", f"{names[0]}: {source}"))
+        say(folded(f"{family:15} {len(names):3}  ", f"{names[0]}: {source}"))
 
 
 def _print_kinds(kinds: Mapping[str, Any]) -> None:
@@ -122,78 +113,28 @@ def _default(value: object) -> str:
 
 def _print_aircraft() -> None:
     """A row for each of the fleet; columns are those of `_AIRCRAFT_ROW`."""
-    from aircraft.airframes import aircraft_names, is_surveyed
+    from aircraft.airframes import AircraftError, aircraft_names, airframe, is_surveyed
     from harness.cli.terminal import step_bar
 
     names = aircraft_names()
     new, faults = [name for name in names if not is_surveyed(name)], {}
     if new:
         many = f"{len(new)} aircraft are" if len(new) > 1 else f"{new[0]} is"
-        say(f"{many} flown for the figures, once; the whole fleet takes a minute", err=True)
+        say(f"{many} flown for the figures, once; some seconds each", err=True)
         with step_bar() as report:
-            faults = _survey(new, report)
-    say(_row(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "tested"), "what"))
+            for done, name in enumerate(new):
+                report(done, len(new), name)
+                try:
+                    airframe(name)
+                except AircraftError as error:
+                    faults[name] = str(error)
+    say(folded(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "tested"), "what"))
     for name in names:
         fault = faults.get(name)
-        say(f"{name:10} cannot be flown: {fault}" if fault else _aircraft_row(name))
+        say(f"{name:10} cannot be flown: {fault}" if fault else _aircraftfolded(name))
 
 
-def _survey(names: Sequence[str], report: Callable[[int, int, str], None] | None) -> dict[str, str]:
-    """Flies aircraft for their figures, which are kept, in processes beside this one; returns why some cannot be."""
-    import multiprocessing
-    import os
-    from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
-
-    from harness.files.spawning import without_main
-    from harness.flight.signals import held_back
-
-    spawn = multiprocessing.get_context("spawn")
-    workers = min(len(names), os.cpu_count() or 1)
-    before = set(multiprocessing.active_children())
-    faults: dict[str, str] = {}
-    with without_main(), ProcessPoolExecutor(workers, mp_context=spawn, initializer=_begin) as pool:
-        coming = {pool.submit(_fault, name): name for name in names}
-        try:
-            # An interrupt that is raised inside `concurrent.futures` leaves a future locked.
-            with held_back() as let_interrupt_through:
-                flying = set(coming)
-                while flying:
-                    let_interrupt_through()
-                    ended, flying = wait(flying, timeout=_INTERRUPT_S, return_when=FIRST_COMPLETED)
-                    faults |= {coming[one]: fault for one in ended if (fault := one.result())}
-                    if ended and report is not None:
-                        done = len(names) - len(flying)
-                        last = ", ".join(coming[one] for one in ended)
-                        report(done, len(names), f"{done} of {len(names)} flown, the last {last}")
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in set(multiprocessing.active_children()) - before:
-                child.terminate()
-            raise
-    return faults
-
-
-def _begin() -> None:
-    """What a process of ours does first: standard output and interrupts are the parent's alone."""
-    import os
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.dup2(2, 1)
-
-
-def _fault(name: str) -> str | None:
-    """Has the figures of an aircraft kept; returns why it cannot be flown, if it cannot."""
-    from aircraft.airframes import AircraftError, airframe
-
-    try:
-        airframe(name)
-    except AircraftError as error:
-        return str(error)
-    return None
-
-
-def _aircraft_row(name: str) -> str:
+def _aircraftfolded(name: str) -> str:
     from aircraft.airframes import AircraftError, airframe
     from aircraft.envelope import performance
 
@@ -202,18 +143,6 @@ def _aircraft_row(name: str) -> str:
         radius_m = performance(frame, frame.cruise_mps).turn_radius_m
     except AircraftError as error:
         return f"{name:10} cannot be flown: {error}"
-    return _row(_cells(frame, radius_m), frame.summary)
-
-
-def _cells(frame: Airframe, radius_m: float) -> str:
     low, high = frame.airspeed_range_mps
-    cells = (f"{frame.mass_kg:.0f}", f"{low:g}-{high:g}", f"{frame.cruise_mps:g}", f"{radius_m:.0f}")
-    return _AIRCRAFT_ROW.format(frame.name, *cells, "yes" if frame.verified else "no")
-
-
-def _row(cells: str, text: str) -> str:
-    """A row whose last column goes on below itself where a terminal is too narrow for it."""
-    if not sys.stdout.isatty():
-        return cells + text
-    room = max(shutil.get_terminal_size().columns - len(cells), 20)
-    return cells + f"\n{' ' * len(cells)}".join(textwrap.wrap(text, room))
+    figures = (f"{frame.mass_kg:.0f}", f"{low:g}-{high:g}", f"{frame.cruise_mps:g}", f"{radius_m:.0f}")
+    return folded(_AIRCRAFT_ROW.format(name, *figures, "yes" if frame.verified else "no"), frame.summary)

@@ -1,10 +1,13 @@
-"""What the commands share: their arguments, how they load a scenario, what they print, their exit status."""
+"""What the commands share: their options and what these replace, how errors and interrupts are told, exit status."""
 
 from __future__ import annotations
 
+import json
+import os
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from inspect import cleandoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -21,7 +24,7 @@ if TYPE_CHECKING:
 
 FAILED: Final = 1
 BAD_INPUT: Final = 2
-IN_THE_NAME: Final = ("name", "seed", "planner.kind", "aircraft.model")
+IN_THE_NAME: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")
 """Keys that the default folder of a run is called after; of a model that is a folder, by the folder's last name."""
 
 
@@ -57,68 +60,70 @@ def flag(name: str, text: str) -> Any:
     return typer.Option(name, help=text)
 
 
-def _shipped(incomplete: str) -> list[str]:
-    """Names for the shell to complete a scenario with; files it finds itself."""
+def completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """What a shell completes an argument with; files it finds itself."""
+
+    def begin_so(incomplete: str) -> list[str]:
+        return [name for name in names() if name.startswith(incomplete)]
+
+    return begin_so
+
+
+def _scenarios() -> Iterable[str]:
     from harness.scenario.shipped import shipped_scenarios
 
-    return [name for name in shipped_scenarios() if name.startswith(incomplete)]
+    return shipped_scenarios()
 
 
-def planners(incomplete: str) -> list[str]:
-    """Kinds for the shell to complete a planner with."""
+def _planners() -> Iterable[str]:
     from planner.registry import planner_kinds
 
-    return [kind for kind in planner_kinds() if kind.startswith(incomplete)]
+    return planner_kinds()
 
 
-def laws(incomplete: str) -> list[str]:
-    """Kinds for the shell to complete a guidance law with."""
+def _laws() -> Iterable[str]:
     from aircraft.guidance.registry import guidance_kinds
 
-    return [kind for kind in guidance_kinds() if kind.startswith(incomplete)]
+    return guidance_kinds()
 
 
-def aircraft(incomplete: str) -> list[str]:
-    """Names for the shell to complete an aircraft with."""
+def _aircraft() -> Iterable[str]:
     from aircraft.airframes import aircraft_names
 
-    return [name for name in aircraft_names() if name.startswith(incomplete)]
+    return aircraft_names()
 
 
 _SCENARIO: Any = typer.Argument(
     metavar="SCENARIO",
     help="A file, or a name that `wayproof list scenarios` prints.",
-    autocompletion=_shipped,
+    autocompletion=completing(_scenarios),
+)
+_AIRCRAFT: Any = typer.Option(
+    metavar="NAME",
+    help="A name that `wayproof list aircraft` prints, or a folder.",
+    autocompletion=completing(_aircraft),
+)
+_KIND: Final = "or FILE.py:NAME, MODULE:NAME."
+_PLANNER: Any = typer.Option(
+    metavar="KIND", help=f"Replaces planner.kind; {_KIND}", autocompletion=completing(_planners)
+)
+_GUIDANCE: Any = typer.Option(
+    metavar="KIND", help=f"Replaces guidance.kind; {_KIND}", autocompletion=completing(_laws)
+)
+_CONDITIONS: Any = typer.Option(
+    metavar="DAY", help="Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."
 )
 ScenarioArgument = Annotated[str, _SCENARIO]
 OptionalScenario = Annotated[str | None, _SCENARIO]
-PlannerOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="KIND",
-        help="Replaces planner.kind; or FILE.py:NAME, MODULE:NAME.",
-        autocompletion=planners,
-    ),
-]
-AircraftOption = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=aircraft)
-]
-GuidanceOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="KIND", help="Replaces guidance.kind; or FILE.py:NAME, MODULE:NAME.", autocompletion=laws
-    ),
-]
-ConditionsOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="DAY", help="Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."
-    ),
-]
+AircraftName = Annotated[str, _AIRCRAFT]
+AircraftOption = Annotated[str | None, _AIRCRAFT]
+PlannerOption = Annotated[str | None, _PLANNER]
+GuidanceOption = Annotated[str | None, _GUIDANCE]
+ConditionsOption = Annotated[str | None, _CONDITIONS]
 SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")]
 SettingsOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key of a scenario; can be repeated."),
 ]
 WindOption = Annotated[
     str | None, typer.Option(metavar="SPEED,FROM", help="Steady wind: m/s, degrees it blows from.")
@@ -129,6 +134,12 @@ TurbulenceOption = Annotated[
 WorkersOption = Annotated[
     int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
 ]
+OutOption = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="The folder to write. Default: one of its own in runs.")
+]
+QuietOption = Annotated[bool, flag("--quiet", "Print nothing but errors.")]
+NoRecordingOption = Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")]
+ResumeOption = Annotated[bool, flag("--resume", "Fly only what is missing in DIR.")]
 JsonOption = Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")]
 
 
@@ -136,10 +147,9 @@ def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
     """A scenario by file or shipped name, with keys replaced."""
     from harness.files.strict_yaml import InputError
     from harness.scenario.scenario import load_scenario
-    from harness.scenario.shipped import scenario_path
 
     try:
-        return load_scenario(scenario_path(scenario), overrides)
+        return load_scenario(scenario, overrides)
     except InputError as error:
         if _is_campaign(scenario):
             use = shlex.join(["wayproof", "sweep", scenario])
@@ -149,8 +159,6 @@ def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
 
 def _is_campaign(text: str) -> bool:
     """Whether what was given for a scenario is a campaign's file or name."""
-    import os
-
     from harness.campaign.campaign_file import is_campaign
     from harness.files.strict_yaml import InputError
     from harness.scenario.shipped import campaign_path
@@ -161,45 +169,56 @@ def _is_campaign(text: str) -> bool:
         return False
 
 
-def chosen(
+def overrides(
+    settings: Sequence[str] | None = None,
+    *,
     planner: str | None = None,
     aircraft: str | None = None,
-    seed: int | None = None,
     guidance: str | None = None,
-    conditions: str | None = None,
+    wind: str | None = None,
+    turbulence: str | None = None,
+    **keys: Any,
 ) -> list[tuple[str, str]]:
-    """What the options replace; a name is text, whatever YAML takes it for."""
-    import json
+    """Key paths of a scenario and what options replace them with, those of --set last; a name is text.
 
-    given = {
-        "planner.kind": planner and planner_kind(planner),
-        "aircraft.model": aircraft,
-        "seed": seed,
-        "guidance.kind": guidance and law_kind(guidance),
-        "conditions": conditions,
-    }
-    return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
-
-
-def air(wind: str | None, turbulence: str | None, conditions: str | None = None) -> list[tuple[str, str]]:
-    """What --wind, --turbulence and --conditions replace."""
-    import json
-
-    given = {
-        "environment.wind": wind_of(wind),
-        "environment.turbulence": turbulence_of(turbulence),
-    }
-    return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
-
-
-def wind_of(text: str | None) -> dict[str, float] | None:
-    """The key `environment.wind` that --wind SPEED,FROM means; None where it is not given.
+    Args:
+        settings: of --set, KEY.PATH=VALUE each.
+        planner: and the others: of the options of these names; None: not given.
+        aircraft: likewise.
+        guidance: likewise.
+        wind: likewise.
+        turbulence: likewise.
+        **keys: further values by key path, its points written as two underscores.
 
     Raises:
-        typer.BadParameter: it is no such text.
+        typer.BadParameter: one cannot be used, or --set gives a key that another option gives with another value.
     """
-    if text is None:
-        return None
+    from harness.scenario.sections import SHIELDED
+
+    shielded = planner is not None and planner.endswith(SHIELDED)
+    given = {
+        "planner.kind": planner and planner_kind(planner).removesuffix(SHIELDED),
+        "planner.shield": "loiter" if shielded else None,
+        "aircraft.model": aircraft,
+        "guidance.kind": guidance and law_kind(guidance),
+        "environment.wind": wind and _wind(wind),
+        "environment.turbulence": turbulence and _turbulence(turbulence),
+        **{name.replace("__", "."): value for name, value in keys.items()},
+    }
+    options = [(name, json.dumps(value)) for name, value in given.items() if value is not None]
+    found = [_setting(text) for text in settings or ()]
+    for name, value in found:
+        for key, other in options:
+            if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
+                raise typer.BadParameter(
+                    f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
+                    param_hint="--set",
+                )
+    return [*options, *found]
+
+
+def _wind(text: str) -> dict[str, float]:
+    """The key `environment.wind` that --wind SPEED,FROM means."""
     try:
         speed, direction = (float(part) for part in text.split(","))
     except ValueError:
@@ -207,12 +226,18 @@ def wind_of(text: str | None) -> dict[str, float] | None:
     return {"speed_mps": speed, "from_deg": direction}
 
 
-def turbulence_of(text: str | None) -> dict[str, str] | None:
-    """The key `environment.turbulence` that --turbulence [MODEL:]INTENSITY means; None where it is not given."""
-    if text is None:
-        return None
+def _turbulence(text: str) -> dict[str, str]:
+    """The key `environment.turbulence` that --turbulence [MODEL:]INTENSITY means."""
     model, colon, intensity = text.rpartition(":")
     return {"model": model if colon else "tustin", "intensity": intensity}
+
+
+def _setting(text: str) -> tuple[str, str]:
+    """KEY.PATH=VALUE as its two parts."""
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
+    return name.strip(), value
 
 
 def planner_kind(text: str) -> str:
@@ -222,13 +247,6 @@ def planner_kind(text: str) -> str:
 
     shielded = SHIELDED if text.endswith(SHIELDED) else ""
     return _kind(text.removesuffix(SHIELDED), PLANNER, "--planner") + shielded
-
-
-def sources(*names: str | None) -> tuple[str, ...]:
-    """Those of some names that are FILE.py:NAME or MODULE:NAME: a process that flies has to import them too."""
-    from harness.scenario.given import is_source
-
-    return tuple(name for name in names if name is not None and is_source(name))
 
 
 def law_kind(text: str) -> str:
@@ -247,33 +265,12 @@ def _kind(text: str, part: LoopPart, option: str) -> str:
         raise typer.BadParameter(str(error), param_hint=option) from error
 
 
-def _setting(text: str) -> tuple[str, str]:
-    """KEY.PATH=VALUE as its two parts."""
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
-    return name.strip(), value
+def sources(*names: str | None) -> tuple[str, ...]:
+    """Those of some names that are FILE.py:NAME or MODULE:NAME: a process that flies has to import them too."""
+    from harness.scenario.given import is_source
+    from harness.scenario.sections import SHIELDED
 
-
-def settings_of(texts: Sequence[str] | None, options: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """What --set replaces, beside what other options do.
-
-    Args:
-        texts: KEY.PATH=VALUE, each.
-        options: key paths and values of the other options.
-
-    Raises:
-        typer.BadParameter: one is no such text, or its key is given by another option with another value.
-    """
-    found = [_setting(text) for text in texts or ()]
-    for name, value in found:
-        for key, other in options:
-            if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
-                raise typer.BadParameter(
-                    f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
-                    param_hint="--set",
-                )
-    return found
+    return tuple(name.removesuffix(SHIELDED) for name in names if name is not None and is_source(name))
 
 
 def straight_m(scenario: Scenario) -> float:
@@ -281,13 +278,6 @@ def straight_m(scenario: Scenario) -> float:
     import math
 
     return math.dist(scenario.mission.start_m, scenario.mission.goal_m)
-
-
-def bad_input(error: ValueError) -> Exception:
-    """A fault of what was given, as the error that ends with BAD_INPUT."""
-    from harness.files.strict_yaml import InputError
-
-    return InputError(f"wayproof: {error}")
 
 
 def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_THE_NAME) -> str:
@@ -300,7 +290,6 @@ def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_TH
     Returns:
         Eight digits after a dash, the same for the same settings; nothing without any.
     """
-    import json
     from hashlib import sha256
 
     from harness.files.strict_yaml import as_spelt
@@ -310,8 +299,34 @@ def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_TH
     return f"-{sha256(json.dumps(others).encode()).hexdigest()[:8]}" if others else ""
 
 
-def tell_interrupted(what: str, folder: Path, index: str, schema: str) -> None:
-    """Says after Ctrl-C what became of a folder.
+def bad_input(error: ValueError) -> Exception:
+    """A fault of what was given, as the error that ends with BAD_INPUT."""
+    from harness.files.strict_yaml import InputError
+
+    return InputError(f"wayproof: {error}")
+
+
+@contextmanager
+def faults_told(left: Callable[[], str]) -> Iterator[None]:
+    """Ends with BAD_INPUT for a folder or an aircraft that cannot be used, and says after Ctrl-C what is left.
+
+    Args:
+        left: what became of what was begun, for the line after an interrupt.
+    """
+    from aircraft.airframes import AircraftError
+    from harness.files.errors import RunFolderError
+
+    try:
+        yield
+    except (AircraftError, RunFolderError) as error:
+        raise bad_input(error) from error
+    except KeyboardInterrupt:
+        say(f"wayproof: interrupted; {left()}", err=True)
+        raise
+
+
+def marked_incomplete(what: str, folder: Path, index: str, schema: str) -> Callable[[], str]:
+    """What became of a folder that was being written, for `faults_told`.
 
     Args:
         what: that was to be written: "run".
@@ -319,21 +334,37 @@ def tell_interrupted(what: str, folder: Path, index: str, schema: str) -> None:
         index: file of the folder that says whether it is complete.
         schema: of that file.
     """
-    from harness.files.input_file import read_index
 
-    begun = read_index(folder / index, schema)
-    left = (
-        f"the {what} in {folder} is marked incomplete"
-        if begun is not None and begun.get("complete") is False
-        else "nothing was written"
-    )
-    say(f"wayproof: interrupted; {left}", err=True)
+    def left() -> str:
+        from harness.files.input_file import read_index
+
+        begun = read_index(folder / index, schema)
+        if begun is not None and begun.get("complete") is False:
+            return f"the {what} in {folder} is marked incomplete"
+        return "nothing was written"
+
+    return left
+
+
+@contextmanager
+def resumable(folder: Path, index: str) -> Iterator[None]:
+    """The same for many flights, which --resume goes on with; a full disk or a cluster that is gone ends with FAILED.
+
+    Args:
+        folder: where they are kept.
+        index: file of the folder that is there once something was begun.
+    """
+    done = f"what is done is in {folder}, --resume goes on"
+    try:
+        with faults_told(lambda: done if (folder / index).exists() else "nothing was written"):
+            yield
+    except OSError as error:
+        say(f"wayproof: {error}; {done}", err=True)
+        raise typer.Exit(FAILED) from error
 
 
 def print_json(content: Any) -> None:
     """Prints a result for scripts."""
-    import json
-
     text = json.dumps(content, indent=2, ensure_ascii=False)
     if printable(text) != text:
         # JSON has spelt out what ASCII has of them; what say() would make of the others is no JSON.

@@ -10,14 +10,17 @@ import typer
 
 from harness.cli.options import (
     FAILED,
+    AircraftName,
     GuidanceOption,
     JsonOption,
+    NoRecordingOption,
+    OutOption,
     SettingsOption,
     bad_input,
-    chosen,
+    faults_told,
     flag,
+    overrides,
     print_json,
-    settings_of,
 )
 from harness.cli.standard_output import say
 
@@ -127,7 +130,7 @@ def _summary(folder: Path, by: Sequence[str] | None, run_reports: bool) -> int:
     """The answers of a campaign once more, by other keys or with the reports of its runs."""
     from harness.campaign.report import write_summary
     from harness.campaign.summary import summarise
-    from harness.cli.campaign_terminal import print_summary
+    from harness.cli.summary_table import print_summary
 
     chosen = [[_column(key.strip()) for key in each.split(",")] for each in by] if by else None
     summary = summarise(folder, by=chosen)
@@ -223,9 +226,7 @@ def replay(
             help="A table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...).",
         ),
     ],
-    aircraft: Annotated[
-        str, typer.Option(metavar="NAME", help="A name that `wayproof list aircraft` prints, or a folder.")
-    ],
+    aircraft: AircraftName,
     mission: Annotated[
         Path | None,
         typer.Option(
@@ -238,31 +239,26 @@ def replay(
     steady_wind: Annotated[
         bool, flag("--steady-wind", "Fly one wind, not the wind as it changed in the log.")
     ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder to write. Default: its own in runs/replay.")
-    ] = None,
-    no_recording: Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")] = False,
+    out: OutOption = None,
+    no_recording: NoRecordingOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Flies the mission of a flown log with the simulated aircraft, in the wind of that day, and compares the two.
 
     For example: wayproof replay thor75.parquet --aircraft ultrastick25e --mission thor75.json
     """
-    from aircraft.airframes import AircraftError
-    from harness.cli.terminal import print_grid
-    from harness.files.errors import RunFolderError, WriteError
+    from harness.cli.terminal import print_table
+    from harness.files.errors import WriteError
     from harness.replays.page import rows_of
     from harness.replays.replay import replay as flown_anew
 
-    options = chosen(guidance=guidance)
-    overrides = [*options, *settings_of(settings, options)]
+    replaced = overrides(settings, guidance=guidance)
     folder = out or Path("runs") / "replay" / log.stem
     try:
-        found = flown_anew(
-            log, aircraft, folder, mission, overrides, windows=not steady_wind, recording=not no_recording
-        )
-    except (RunFolderError, AircraftError) as error:
-        raise bad_input(error) from error
+        with faults_told(lambda: f"what was written is in {folder}"):
+            found = flown_anew(
+                log, aircraft, folder, mission, replaced, windows=not steady_wind, recording=not no_recording
+            )
     except OSError as error:
         raise WriteError.of("the replay", folder, error) from error
     if as_json:
@@ -275,7 +271,7 @@ def replay(
         f"{', flown as it changes' if told['wind_windows'] else ''}"
     )
     laps = ", ".join(map(str, told["settled_laps"]))
-    print_grid(f"{log.name}: laps {laps}", ("", "flown", "simulated", "difference"), rows_of(told))
+    print_table(f"{log.name}: laps {laps}", rows_of(told), ("", "flown", "simulated", "difference"))
     say(f"distance between the tracks: p50 {between['p50']:.2f} m, p95 {between['p95']:.2f} m")
     for note in told["notes"]:
         say(f"note: {note}")

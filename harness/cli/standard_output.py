@@ -6,7 +6,9 @@ Standard output outlives its reader: what nobody takes any more is lost, and not
 from __future__ import annotations
 
 import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
@@ -19,6 +21,15 @@ from harness.files.wording import printable
 def say(text: str, *, err: bool = False) -> None:
     """A line of text, control characters in it spelt out, on standard output or standard error."""
     typer.echo(printable(text), err=err)
+
+
+def folded(head: str, text: str) -> str:
+    """A line whose text goes on below its beginning where a terminal is too narrow for it."""
+    if not sys.stdout.isatty():
+        return head + text
+    room = max(shutil.get_terminal_size().columns - len(head), 20)
+    first, *others = textwrap.wrap(text, room) or [""]
+    return "\n".join([head + first, *(" " * len(head) + line for line in others)])
 
 
 def results_alone() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,39 +15,46 @@ import typer
 from harness.cli.options import (
     FAILED,
     ConditionsOption,
+    GuidanceOption,
     JsonOption,
+    OutOption,
+    QuietOption,
+    ResumeOption,
+    SeedOption,
     SettingsOption,
     TurbulenceOption,
     WindOption,
     WorkersOption,
-    air,
-    bad_input,
-    chosen,
+    completing,
     flag,
+    overrides,
     planner_kind,
     print_json,
-    settings_of,
+    resumable,
     sources,
 )
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from harness.campaign.runs import CampaignRuns
     from harness.campaign.workers import Workers
 
 
-def _campaigns(incomplete: str) -> list[str]:
-    """Names for the shell to complete a campaign with; files it finds itself."""
+def _campaigns() -> Iterable[str]:
     from harness.scenario.shipped import shipped_campaigns
 
-    return [name for name in shipped_campaigns() if name.startswith(incomplete)]
+    return shipped_campaigns()
 
 
 def sweep(
     campaign: Annotated[
         str,
         typer.Argument(
-            metavar="CAMPAIGN", help="A campaign file, or a shipped one's name.", autocompletion=_campaigns
+            metavar="CAMPAIGN",
+            help="A campaign file, or a shipped one's name.",
+            autocompletion=completing(_campaigns),
         ),
     ],
     planners: Annotated[
@@ -59,10 +66,11 @@ def sweep(
             help="Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME.",
         ),
     ] = None,
+    guidance: GuidanceOption = None,
     conditions: ConditionsOption = None,
     wind: WindOption = None,
     turbulence: TurbulenceOption = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Replaces the campaign's seed.")] = None,
+    seed: SeedOption = None,
     settings: SettingsOption = None,
     workers: WorkersOption = None,
     scheduler: Annotated[
@@ -76,12 +84,10 @@ def sweep(
         bool,
         flag("--unencrypted", "Allow a --scheduler beyond this machine without TLS, in a trusted network."),
     ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="The campaign's folder. Default: runs/NAME.")
-    ] = None,
-    resume: Annotated[bool, flag("--resume", "Fly only the runs missing in DIR.")] = False,
+    out: OutOption = None,
+    resume: ResumeOption = False,
     dry_run: Annotated[bool, flag("--dry-run", "Print the runs; fly and write nothing.")] = False,
-    quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> int:
     """Flies a campaign: many flights on all processors or a cluster, one row each in results.parquet.
@@ -106,15 +112,21 @@ def sweep(
     from harness.campaign.report import write_summary
     from harness.campaign.summary import summarise
     from harness.campaign.workers import dask_workers, local_workers
-    from harness.cli.campaign_terminal import print_summary
+    from harness.cli.summary_table import print_runs, print_summary
     from harness.scenario.shipped import campaign_path
 
     named = [each.strip() for each in planners.split(",")] if planners else []
-    options = [*chosen(seed=seed, conditions=conditions), *air(wind, turbulence)]
-    fixed = [*options, *settings_of(settings, options)]
-    runs = checked(campaign_path(campaign), named, fixed)
+    replaced = overrides(
+        settings, guidance=guidance, wind=wind, turbulence=turbulence, seed=seed, conditions=conditions
+    )
+    runs = checked(campaign_path(campaign), named, replaced, sources(guidance))
     if dry_run:
-        _print_runs(runs, as_json)
+        if as_json:
+            from dataclasses import asdict
+
+            print_json([asdict(runs.run(number)) for number in range(len(runs))])
+        else:
+            print_runs(runs)
         return 0
     folder = out or Path("runs") / runs.campaign.name
     local = partial(local_workers, workers or os.cpu_count() or 1)
@@ -136,24 +148,34 @@ def _warn(text: str) -> None:
 
 
 def checked(
-    path: Path, planners: Sequence[str] = (), settings: Sequence[tuple[str, str]] = ()
+    path: Path,
+    planners: Sequence[str] = (),
+    settings: Sequence[tuple[str, str]] = (),
+    laws: tuple[str, ...] = (),
 ) -> CampaignRuns:
-    """The runs of a campaign file, every scenario of them made once; the rest as `load_campaign` takes it."""
+    """The runs of a campaign file, every scenario of them made once.
+
+    Args:
+        path: and the others: as `load_campaign` takes them.
+        planners: likewise; FILE.py:NAME and MODULE:NAME too.
+        settings: likewise.
+        laws: guidance laws that who flies has to import.
+    """
     from harness.campaign.campaign_file import is_scenario, load_campaign
     from harness.campaign.runs import CampaignRuns
-    from harness.cli.campaign_terminal import check_bar
+    from harness.cli.terminal import step_bar
     from harness.files.strict_yaml import InputError
 
     try:
         kinds = [planner_kind(each) for each in planners]
-        runs = CampaignRuns(load_campaign(path, kinds, settings), sources(*planners))
+        runs = CampaignRuns(load_campaign(path, kinds, settings), sources(*planners), laws)
     except InputError as error:
         if is_scenario(path):
             use = shlex.join(["wayproof", "fly", str(path)])
             raise InputError(f"{path}: this is a scenario: use `{use}`") from error
         raise
-    with check_bar(len(runs)) as report:
-        runs.check(report)
+    with step_bar() as bar:
+        runs.check(lambda done: bar(done, len(runs), "scenarios checked"))
     return runs
 
 
@@ -161,42 +183,28 @@ def _fly(
     runs: CampaignRuns, path: Path, workers: AbstractContextManager[Workers], *, resume: bool, silent: bool
 ) -> tuple[dict[str, int], bool]:
     """Flies what is missing; returns how many runs ended how, and whether all are over."""
-    from contextlib import nullcontext
-
+    from harness.campaign.flight import Answer
     from harness.campaign.folder import CampaignFolder
     from harness.campaign.results import INDEX
     from harness.campaign.sweep import fly_missing, told_left
-    from harness.cli.campaign_terminal import sweep_bar
-    from harness.files.errors import RunFolderError
+    from harness.cli.terminal import step_bar
 
-    try:
-        with (
-            workers as flyers,
-            CampaignFolder(path, runs, resume=resume) as folder,
-            nullcontext() if silent else sweep_bar(len(runs), len(folder.done)) as report,
-        ):
-            broken_off = fly_missing(runs, folder, flyers, report)
-            if broken_off:
-                say(f"wayproof: {told_left(broken_off)}", err=True)
-            return folder.outcomes(), not broken_off
-    except RunFolderError as error:
-        raise bad_input(error) from error
-    except OSError as error:
-        say(f"wayproof: {error}; what is done is in {path}, --resume goes on", err=True)
-        raise typer.Exit(FAILED) from error
-    except KeyboardInterrupt:
-        begun = (path / INDEX).exists()
-        left = f"what is done is in {path}, --resume goes on" if begun else "nothing was written"
-        say(f"wayproof: interrupted; {left}", err=True)
-        raise
+    with (
+        resumable(path, INDEX),
+        workers as flyers,
+        CampaignFolder(path, runs, resume=resume) as folder,
+        nullcontext() if silent else step_bar() as bar,
+    ):
+        over, not_reached = len(folder.done), 0
 
+        def report(answer: Answer) -> None:
+            nonlocal over, not_reached
+            over += 1
+            not_reached += answer.row["outcome"] != "reached"
+            if bar is not None:
+                bar(over, len(runs), f"flights, {not_reached} not at the goal" if not_reached else "flights")
 
-def _print_runs(runs: CampaignRuns, as_json: bool) -> None:
-    if as_json:
-        from dataclasses import asdict
-
-        print_json([asdict(runs.run(number)) for number in range(len(runs))])
-    else:
-        from harness.cli.campaign_terminal import print_runs
-
-        print_runs(runs)
+        broken_off = fly_missing(runs, folder, flyers, report)
+        if broken_off:
+            say(f"wayproof: {told_left(broken_off)}", err=True)
+        return folder.outcomes(), not broken_off

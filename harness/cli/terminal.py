@@ -1,4 +1,4 @@
-"""What a person sees on a terminal: progress while flying, and tables of results."""
+"""What a person sees on a terminal: progress while flying, and the one table of results."""
 
 from __future__ import annotations
 
@@ -8,88 +8,98 @@ from contextlib import contextmanager
 from typing import Any, Final, TypeAlias
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, JustifyMethod
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from harness.cli.standard_output import say
-from harness.files.wording import printable, tallied
+from harness.files.wording import printable
 
-Report: TypeAlias = Callable[[float, float, str], None]
+FlightReport: TypeAlias = Callable[[float, float, str], None]
 """Takes simulated time (s), distance to go (m) and what is being done."""
 
-_OUTCOME_STYLE = {"reached": "bold green", "unreachable": "bold yellow"}
-
-
-@contextmanager
-def progress_bar(straight_m: float) -> Iterator[Report | None]:
-    """A progress bar on standard error, or None where that is not a terminal.
-
-    Args:
-        straight_m: distance from start to goal.
-    """
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield None
-        return
-    columns = (
-        BarColumn(bar_width=20),
-        TextColumn("{task.fields[time_s]:7.0f} s  {task.fields[speed_up]:5.0f} x real time"),
-        TextColumn("{task.fields[to_go_m]:8.0f} m to go  {task.description}"),
-    )
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("starting up", total=straight_m, time_s=0.0, speed_up=0.0, to_go_m=straight_m)
-
-        def report(time_s: float, to_go_m: float, state: str) -> None:
-            elapsed_s = bar.tasks[0].elapsed or 0.0
-            bar.update(
-                task,
-                completed=max(0.0, straight_m - to_go_m),
-                description=plain(state),
-                time_s=time_s,
-                to_go_m=max(0.0, to_go_m),
-                speed_up=time_s / elapsed_s if elapsed_s > 0 else 0.0,
-            )
-
-        yield report
-
-
-@contextmanager
-def step_bar() -> Iterator[Callable[[int, int, str], None]]:
-    """A bar of steps done on standard error; a line every ten seconds where that is not a terminal."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        state = ["begun"]
-
-        def note(done: int, of: int, what: str) -> None:
-            state[0] = f"{done} of {of}: {plain(what)}"
-
-        with progress_lines(lambda: state[0]):
-            yield note
-        return
-    with Progress(
-        BarColumn(bar_width=20), TextColumn("{task.description}"), console=console, transient=True
-    ) as bar:
-        task = bar.add_task("")
-
-        def report(done: int, of: int, what: str) -> None:
-            bar.update(task, completed=done, total=of, description=plain(what))
-
-        yield report
-
+StepReport: TypeAlias = Callable[[int, int, str], None]
+"""Takes how many steps are done, of how many, and what is being done."""
 
 LINE_EVERY_S: Final = 10.0
 """Without a terminal, progress is a line on standard error at this interval."""
 
+MOST_COLUMNS: Final = 80
+"""Tables are never wider."""
+
+LEAST_NAME: Final = 14
+"""Figures are kept in one line where they leave the first column this width."""
+
+OUTCOME_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
+"""Colour of an outcome; all others are bold red."""
+
 
 @contextmanager
-def progress_lines(state: Callable[[], str]) -> Iterator[None]:
-    """Prints a line on standard error every ten seconds, for those who read a log.
+def progress_bar(straight_m: float) -> Iterator[FlightReport]:
+    """A progress bar of one flight on standard error; a line every ten seconds where that is not a terminal.
 
     Args:
-        state: what the line says.
+        straight_m: distance from start to goal.
     """
+    columns = (
+        TextColumn("{task.fields[time_s]:7.0f} s  {task.fields[speed_up]:5.0f} x real time"),
+        TextColumn("{task.fields[to_go_m]:8.0f} m to go  {task.description}"),
+    )
+    with _bar(*columns, time_s=0.0, speed_up=0.0, to_go_m=straight_m) as show:
+
+        def report(time_s: float, to_go_m: float, state: str) -> None:
+            left_m, told = max(0.0, to_go_m), plain(state)
+            line = f"{time_s:.0f} s flown, {left_m:.0f} m to go, {told}"
+            show(max(0.0, straight_m - to_go_m), straight_m, told, line, time_s=time_s, to_go_m=left_m)
+
+        yield report
+
+
+@contextmanager
+def step_bar() -> Iterator[StepReport]:
+    """A bar of steps done, with the time left, on standard error; without a terminal, lines likewise."""
+    with _bar(TextColumn("{task.description}"), TimeRemainingColumn()) as show:
+
+        def report(done: int, of: int, what: str) -> None:
+            told = f"{done} of {of}: {plain(what)}" if what else f"{done} of {of}"
+            show(done, of, told, told)
+
+        yield report
+
+
+@contextmanager
+def _bar(*columns: TextColumn | TimeRemainingColumn, **fields: Any) -> Iterator[Callable[..., None]]:
+    """What shows progress: it takes what is done, the whole, a description, a line for a log, and fields."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        state = ["starting up"]
+
+        def note(_done: float, _whole: float, _told: str, line: str, **_fields: float) -> None:
+            state[0] = line
+
+        with _progress_lines(lambda: state[0]):
+            yield note
+        return
+    bar = Progress(
+        BarColumn(bar_width=20), *columns, console=console, transient=True, speed_estimate_period=120.0
+    )
+    with bar:
+        task = bar.add_task("starting up", total=None, **fields)
+
+        def show(done: float, whole: float, told: str, _line: str, **values: Any) -> None:
+            if "time_s" in values:
+                elapsed_s = bar.tasks[0].elapsed or 0.0
+                values["speed_up"] = values["time_s"] / elapsed_s if elapsed_s > 0 else 0.0
+            bar.update(task, completed=done, total=whole, description=told, **values)
+
+        yield show
+
+
+@contextmanager
+def _progress_lines(state: Callable[[], str]) -> Iterator[None]:
+    """Prints a line on standard error every ten seconds, for those who read a log."""
     over = threading.Event()
 
     def tell() -> None:
@@ -105,167 +115,48 @@ def progress_lines(state: Callable[[], str]) -> Iterator[None]:
         thread.join()
 
 
-def print_grid(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table with a heading over each column, on standard output; figures are right-aligned."""
-    console = Console()
-    table = Table(title=plain(title), box=box.SIMPLE, title_justify="left", pad_edge=False)
-    for index, column in enumerate(columns):
-        table.add_column(printable(column), justify="right" if index else "left", overflow="fold")
-    for row in rows:
-        table.add_row(*map(printable, row))
-    console.print(table, width=min(80, console.width))
+def print_table(
+    title: str, rows: Mapping[str, str] | Sequence[Sequence[str]], columns: Sequence[str] = ()
+) -> None:
+    """Prints a table on standard output, at most `MOST_COLUMNS` wide; what is too long goes on below itself.
 
-
-def print_table(title: str, rows: Mapping[str, str]) -> None:
-    """Two columns, name and value, on standard output and never wider than 80."""
-    console = Console()
-    table = Table(title=plain(title), box=box.SIMPLE, show_header=False, title_justify="left", pad_edge=False)
-    table.add_column(style="dim", no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, value in rows.items():
-        table.add_row(printable(name), printable(value))
-    console.print(table, width=min(80, console.width))
-
-
-def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """The rows of the table at the end of a flight, from the content of `metrics.json`."""
-    style = _OUTCOME_STYLE.get(metrics["outcome"], "bold red")
-    compute, timing = metrics["compute_ms"], metrics["timing"]
-    return {
-        "outcome": f"[{style}]{metrics['outcome']}[/]: {plain(metrics['reason'])}",
-        "length flown": f"{legible(metrics['flown_length_m'])} m, "
-        f"planned {legible(metrics['planned_length_m'])} m",
-        "flight time": f"{legible(metrics['flight_time_s'])} s",
-        "least clearance": f"{legible(metrics['min_clearance_m'])} m, "
-        f"below the wanted one for {legible(metrics['clearance_violation_s'])} s",
-        **_over_ground(metrics),
-        **error_rows(metrics),
-        "altitude error": f"{spread(metrics['altitude_error_m'])} m",
-        "trackable": _tracked(metrics),
-        **{each["kind"]: plain(each["text"]) for each in metrics.get("findings", ())},
-        "replans": str(metrics["replans"]),
-        "planner time": f"p99 {legible(compute['p99'])} / max {legible(compute['max'])} ms a search",
-        "wall time": f"{legible(timing['wall_s'])} s, {legible(timing['realtime_factor'])} x real time",
-    }
-
-
-def _over_ground(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """A row on the height above ground, where that is known."""
-    least_m = metrics.get("min_altitude_above_ground_m")
-    return {} if least_m is None else {"above ground": f"at least {legible(least_m)} m"}
-
-
-def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """Rows on how far the true and the believed position were off the path; one where navigation was perfect.
-
-    The names are those of performance-based navigation (ICAO Doc 9613).
+    Args:
+        title: text of others too: what rich takes for markup in it is shown as it is.
+        rows: name and value of each row; or the cells of each, where `columns` are given. They may have markup.
+        columns: heading of each column; all but the first hold figures and are aligned to the right.
     """
-    legs, margin_m = metrics["trackability"], metrics.get("navigation_margin_m")
-    total = metrics.get("total_system_error_m", metrics["cross_track_m"])
-    threshold_m = legs[0].get("threshold_m") if legs else None
-    allowed = "" if threshold_m is None else f", allowed {threshold_m:.3g} m"
-    kept = f", of which {legible(margin_m)} m are the navigation margin that was planned" if margin_m else ""
-    rows = {"total system error": f"{spread(total)} m{allowed}{kept}"}
-    if metrics.get("navigation_error_m") is not None:
-        rows["  flight technical error"] = f"{spread(metrics['flight_technical_error_m'])} m"
-        rows["  navigation error"] = f"{spread(metrics['navigation_error_m'])} m"
-    return rows
-
-
-def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
-    """The rows of the table of `wayproof bench`."""
-    planner = result["planner_ms"]
-    rows = {
-        "closed loop": f"{result['closed_loop_ratio']:.3f} x bare JSBSim at the same step rate",
-        "with recording": f"{result['closed_loop_recording_ratio']:.3f} x bare JSBSim at the same step rate",
-        "outside JSBSim": f"{result['outside_us']:.1f} us a guidance interval",
-        "step rate": f"{result['step_rate_hz']} Hz, a bare step {result['bare_step_us']:.2f} us",
-        "planner, processor time": ", ".join(
-            f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")
-        ),
-        "rounds": f"{result['rounds']}, {'steady' if result['steady'] else 'not steady: the machine is busy'}",
-    }
-    return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
-
-
-def _tracked(metrics: Mapping[str, Any]) -> str:
-    """Whether all legs were tracked, and why some were not; of plans that are judged together, how many they are."""
-    if metrics["trackable"]:
-        return "yes"
-    legs = metrics["trackability"]
-    plans = metrics["replans"] + 1
-    together = (
-        f" ({plans} plans; one flown for less than 5 s is judged with the next)" if plans > len(legs) else ""
+    console = Console()
+    table = Table(
+        title=plain(title), box=box.SIMPLE, show_header=bool(columns), title_justify="left", pad_edge=False
     )
-    bad = [leg for leg in legs if not leg["trackable"]]
-    causes = [leg["cause"] for leg in bad]
-    return (
-        f"no: {len(bad)} of {len(legs)} legs, {tallied(causes, 'legs')}{together}"
-        if bad
-        else "no: no plan was flown"
+    if len(columns) > 4:
+        table.padding = 0
+    width, lines = min(MOST_COLUMNS, console.width), list(rows.items() if isinstance(rows, Mapping) else rows)
+    figures = zip(columns[1:], *(cells[1:] for cells in lines if columns and len(cells) > 1), strict=True)
+    narrow = (
+        sum(1 + max(Text.from_markup(cell).cell_len for cell in each) for each in figures)
+        <= width - LEAST_NAME
     )
+    for index, heading in enumerate(columns):
+        side: JustifyMethod = "right" if index else "left"
+        table.add_column(printable(heading), justify=side, overflow="fold", no_wrap=bool(index) and narrow)
+    if not columns:
+        table.add_column(style="dim", no_wrap=True)
+        table.add_column(overflow="fold")
+    for cells in lines:
+        table.add_row(*map(printable, cells))
+    console.print(table, width=width)
 
 
-def envelope_tables(card: Mapping[str, Any]) -> list[tuple[str, Sequence[str], list[Sequence[str]]]]:
-    """Title, headings and rows of each table of `wayproof envelope`."""
-    low, high = card["airspeed_range_mps"]
-    facts = {
-        "mass": f"{card['mass_kg']:g} kg",
-        "level flight": f"{low:g} to {high:g} m/s, cruise {card['cruise_mps']:g} m/s",
-        "bank limit": f"{card['bank_limit_deg']:g} deg, rolled into at {card['roll_rate_dps']:g} deg/s",
-        "tracking": "held by tests" if card["verified"] else "not held by tests",
-    }
-    tables: list[tuple[str, Sequence[str], list[Sequence[str]]]] = [
-        (card["aircraft"], ("", ""), list(facts.items()))
-    ]
-    margins: list[Sequence[str]] = [
-        (name, f"{law['gain']:.1f}", f"{law['delay_s']:.2f}") for name, law in card["laws"].items()
-    ]
-    heads = ("law on a line", "gain margin", "delay margin s")
-    tables.append(("guidance at cruise, calm air", heads, margins))
-    for page in card["at"]:
-        title = (
-            f"turns at {page['airspeed_mps']:g} m/s; 90 % of 30 deg in {page['roll_in_s']:g} s; speed and altitude "
-            f"kept up to {page['level_bank_deg']:g} deg; climbs at up to {page['climb_mps']:.3g} m/s, sinks at up to "
-            f"{page['descent_mps']:.3g}"
-        )
-        tables.append((title, tuple(_TURN_COLUMNS.values()), _rows(page["turns"], _TURN_COLUMNS)))
-        title = f"paths at {page['airspeed_mps']:g} m/s"
-        tables.append((title, tuple(_PATH_COLUMNS.values()), _rows(page["tracked"], _PATH_COLUMNS)))
-    return tables
+def print_line(text: str, style: str | None = None) -> None:
+    """Prints a line that may have markup on standard output, wrapped at `MOST_COLUMNS`."""
+    console = Console()
+    console.print(printable(text), style=style, highlight=False, width=min(MOST_COLUMNS, console.width))
 
 
-_TURN_COLUMNS = {
-    "bank_deg": "bank deg",
-    "radius_m": "radius m",
-    "load_factor": "load factor",
-    "altitude_lost_m": "altitude lost m",
-    "airspeed_lost_mps": "speed lost m/s",
-}
-_PATH_COLUMNS = {
-    "wind_mps": "wind m/s",
-    "tightest_radius_m": "tightest radius tracked m",
-    "planned_radius_m": "planned radius m",
-}
-
-
-def _rows(entries: Sequence[Mapping[str, float | None]], columns: Mapping[str, str]) -> list[Sequence[str]]:
-    return [tuple(legible(entry[name]) for name in columns) for entry in entries]
-
-
-def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequence[str]]]:
-    """Headings and rows of the table of `wayproof bench tracking`; limits are behind the figures."""
-    figures = ("cross_track_p95_m", "cross_track_max_m", "altitude_p95_m")
-    rows: list[Sequence[str]] = []
-    for case in result["cases"]:
-        limits = case["limits"]
-        if case["lost"]:
-            rows.append((case["case"], *("-" for _ in figures), "-", "[bold red]control is lost[/]"))
-            continue
-        cells = [f"{case[name]:.3f}" + (f" <= {limits[name]:.2g}" if limits else "") for name in figures]
-        verdict = {True: "kept", False: "[bold red]not kept[/]", None: "-"}[case["kept"]]
-        rows.append((case["case"], *cells, f"{case['bank_saturation']:.1%}", verdict))
-    return ("air", "cross-track p95", "max m", "altitude p95", "saturated", "limits"), rows
+def coloured(outcome: str) -> str:
+    """An outcome in its colour."""
+    return f"[{OUTCOME_STYLE.get(outcome, 'bold red')}]{plain(outcome)}[/]"
 
 
 def plain(text: str) -> str:

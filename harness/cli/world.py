@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from harness.cli.options import aircraft as aircraft_names
+from harness.cli.options import AircraftName
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -33,9 +33,7 @@ def world(
         float, typer.Option("--altitude-m", metavar="H", help="Flight altitude above mean sea level.")
     ],
     out: Annotated[Path, typer.Option(metavar="SCENARIO.yaml", help="The scenario to write.")],
-    aircraft: Annotated[
-        str, typer.Option(metavar="NAME", help="The aircraft.", autocompletion=aircraft_names)
-    ] = "aerosonde",
+    aircraft: AircraftName = "aerosonde",
     start: Annotated[
         str | None,
         typer.Option(

@@ -14,7 +14,7 @@ import rerun as rr
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import AircraftState, Route
 from harness.analysis.metrics import metrics
-from harness.cli.terminal import flight_rows
+from harness.cli.flight_rows import flight_rows
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.observer import Caution
 from harness.flight.record import BELIEVED_FIELDS, TRACK_FIELDS, Flight, Outcome, digest

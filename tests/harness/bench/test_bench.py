@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import harness.bench.costs
 from harness.bench.costs import bench, block_shares, watched
 from harness.bench.stopwatch import Stopwatch
-from harness.cli.terminal import bench_rows
+from harness.cli.bench import bench_rows
 from harness.flight.closed_loop import fly
 from harness.flight.record import digest
 from harness.run.scenario_flight import make_loop

@@ -27,7 +27,8 @@ from harness.bench.tracking import (
     fly_course,
     tracked,
 )
-from harness.cli.terminal import print_grid, tracking_rows
+from harness.cli.bench import tracking_rows
+from harness.cli.terminal import print_table
 from tests.harness.bench.courses_table import AIRCRAFT
 
 AIRFRAMES = Path(__file__).parents[3] / "aircraft" / "airframes.yaml"
@@ -150,7 +151,8 @@ def test_the_table_names_what_is_not_kept(
     monkeypatch.setattr(tracking, "CASES", (CALM, strict))
     result = bench_tracking("aerosonde", 1)
     assert [case["kept"] for case in result["cases"]] == [True, False]
-    print_grid("title", *tracking_rows(result))
+    columns, rows = tracking_rows(result)
+    print_table("title", rows, columns)
     shown = capsys.readouterr().out.splitlines()
     assert max(map(len, shown)) <= 80
     assert sum("not kept" in line for line in shown) == 1
@@ -187,5 +189,6 @@ def test_an_aircraft_that_is_lost_is_a_row_of_the_table(
     assert case["kept"] is False
     assert case["cross_track_max_m"] is None
     assert "control is lost after" in case["lost"]
-    print_grid("title", *tracking_rows(result))
+    columns, rows = tracking_rows(result)
+    print_table("title", rows, columns)
     assert "control is lost" in capsys.readouterr().out

@@ -26,7 +26,7 @@ from harness.campaign.questions import QUESTIONS, percent
 from harness.campaign.report import PAGE, PLAIN, write_summary
 from harness.campaign.summary import CURVE_POINTS, Cell, Summary, summarise, wilson
 from harness.cli.app import main
-from harness.cli.campaign_terminal import print_summary
+from harness.cli.summary_table import print_summary
 from harness.files.strict_yaml import InputError
 from harness.files.wording import printable
 from harness.run.scenario_flight import fly_to_folder, kinematic_loop

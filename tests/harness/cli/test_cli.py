@@ -16,10 +16,9 @@ from typing import Any
 import pytest
 
 from harness.cli import app as cli
-from harness.cli import flights
 from harness.cli.app import main
 from harness.files.errors import RunFolderError
-from harness.scenario import scenario, shipped
+from harness.scenario import scenario
 
 ROOT = Path(__file__).parents[3]
 CAMPAIGN = ROOT / "scenarios" / "campaigns" / "forest_planners.yaml"
@@ -421,13 +420,6 @@ def test_bench_refuses_what_makes_no_sense(
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("wayproof")
-
-
-def test_the_default_run_folder_is_that_of_the_contract(tmp_path: Path) -> None:
-    text = shipped.shipped_scenarios()["paper_circles"].read_text()
-    (tmp_path / "s.yaml").write_text(text.replace("name: paper_circles", "name: other"))
-    loaded = scenario.load_scenario(tmp_path / "s.yaml", [("seed", "7")])
-    assert flights._default_folder(loaded) == Path("runs/other/rolling_window-aerosonde-7")
 
 
 @dataclass

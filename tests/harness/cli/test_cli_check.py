@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from harness.cli.app import main
-from harness.cli.check_terminal import verdict_rows
-from harness.cli.terminal import flight_rows
+from harness.cli.flight_rows import flight_rows, verdict_rows
 from harness.files.input_file import InputError
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import parse_scenario

@@ -13,7 +13,6 @@ import pytest
 from aircraft import airframes
 from aircraft.guidance.registry import guidance_kinds
 from aircraft.model_files import AircraftError
-from harness.cli import names
 from harness.cli.app import main
 from harness.scenario import shipped
 from planner import registry
@@ -81,17 +80,14 @@ def test_aircraft_are_listed_with_their_figures(
 
 
 @pytest.mark.flights
-def test_new_aircraft_are_flown_beside_this_process_and_kept(
+def test_new_aircraft_are_flown_once_and_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(airframes, "aircraft_names", lambda: ("aerosonde", "SGS"))
-    told: list[tuple[int, int, str]] = []
-    assert not airframes.is_surveyed("aerosonde")
-    faults = names._survey(["aerosonde", "SGS"], lambda *progress: told.append(progress))
+    assert main(["list", "aircraft"]) == 0
+    assert capfd.readouterr().err.startswith("2 aircraft are flown for the figures")
     assert airframes.is_surveyed("aerosonde")
-    assert list(faults) == ["SGS"]
-    assert [done for done, _, _ in told] == [1, 2]
     assert main(["list", "aircraft"]) == 0
     said = capfd.readouterr()
     assert said.err.startswith("SGS is flown for the figures")
@@ -101,18 +97,6 @@ def test_new_aircraft_are_flown_beside_this_process_and_kept(
 def test_whether_an_aircraft_is_surveyed_is_not_asked_of_nobody() -> None:
     with pytest.raises(AircraftError):
         airframes.is_surveyed("no-such-aircraft")
-
-
-def test_the_last_column_goes_on_below_itself(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    cells = "x" * 50 + " "
-    assert names._row(cells, "word " * 20) == cells + "word " * 20
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    monkeypatch.setenv("COLUMNS", "80")
-    first, second, *_ = names._row(cells, "word " * 20).splitlines()
-    assert first == cells + " ".join(["word"] * 6)
-    assert second == " " * 51 + " ".join(["word"] * 6)
 
 
 def test_what_of_another_distribution_cannot_be_loaded_is_told_in_a_line(

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from harness.cli.app import main
+from harness.cli.bench import bench_rows
+from harness.cli.flight_rows import flight_rows
 from harness.cli.options import print_json
 from harness.cli.standard_output import say
-from harness.cli.terminal import (
-    bench_rows,
-    flight_rows,
-    print_grid,
-    print_table,
-    progress_bar,
-)
+from harness.cli.terminal import print_table, progress_bar, step_bar
 from harness.files.wording import printable
 
 METRICS: dict[str, Any] = {
@@ -69,7 +66,7 @@ def test_control_characters_of_others_never_reach_a_terminal(capsys: pytest.Capt
     assert printable(EVIL) == SPELT
     assert printable("na\u00efve \u2013 10 \u00b0\n\tb") == "na\u00efve \u2013 10 \u00b0\n\tb"
     print_table(EVIL, flight_rows({**METRICS, "reason": EVIL}))
-    print_grid(EVIL, ("", EVIL), [(EVIL, EVIL)])
+    print_table(EVIL, [(EVIL, EVIL)], ("", EVIL))
     say(EVIL)
     say(EVIL, err=True)
     print_json({"reason": EVIL})
@@ -128,13 +125,21 @@ def test_no_color_is_respected(
     assert ("\x1b[1;31m" in capsys.readouterr().out) is coloured
 
 
-def test_there_is_no_progress_where_nobody_looks(
+def test_without_a_terminal_progress_is_a_line_at_times(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("FORCE_COLOR", raising=False)
+    monkeypatch.setattr("harness.cli.terminal.LINE_EVERY_S", 0.01)
     with progress_bar(1000.0) as report:
-        assert report is None
-    assert capsys.readouterr().err == ""
+        report(120.0, 250.0, "cruise")
+        time.sleep(0.2)
+    with step_bar() as step:
+        step(2, 5, "forest")
+        time.sleep(0.2)
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "wayproof: 120 s flown, 250 m to go, cruise\n" in said.err
+    assert "wayproof: 2 of 5: forest\n" in said.err
 
 
 def test_progress_on_a_terminal_shows_time_and_distance_to_go(
@@ -143,7 +148,6 @@ def test_progress_on_a_terminal_shows_time_and_distance_to_go(
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "100")
     with progress_bar(1000.0) as report:
-        assert report is not None
         report(120.0, 250.0, "cruise")
     said = capsys.readouterr()
     assert said.out == ""
@@ -151,7 +155,6 @@ def test_progress_on_a_terminal_shows_time_and_distance_to_go(
     assert "120 s" in said.err
     assert "cruise" in said.err
     with progress_bar(1000.0) as report:
-        assert report is not None
         report(180.0, -1.2, "at the end")
     assert " 0 m to go  at the end" in capsys.readouterr().err
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from aircraft.airframes import AircraftError
 from harness.cli.app import main
-from harness.cli.falsify_terminal import breaking_rows, last_line
+from harness.cli.falsify import breaking_rows, last_line
 from harness.falsify.breaking_point import FALSIFIED, INDEX
 from harness.falsify.keys import number_text, scenario_at, vary_of
 from harness.files.errors import RunFolderError

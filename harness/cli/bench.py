@@ -1,0 +1,206 @@
+"""The commands that measure: `bench` the closed loop, `envelope` an aircraft."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Final
+
+import typer
+
+from harness.cli.options import (
+    FAILED,
+    AircraftOption,
+    JsonOption,
+    bad_input,
+    law_kind,
+    load,
+    print_json,
+    straight_m,
+)
+
+
+def bench(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENARIO", help="A file or shipped name; or the word tracking.", show_default=True
+        ),
+    ] = "paper_circles",
+    aircraft: AircraftOption = None,
+    seeds: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="With tracking: courses in each air. Default: 20.")
+    ] = None,
+    guidance: Annotated[
+        str | None, typer.Option(metavar="KIND", help="With tracking: the guidance law. Default: preview.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> int:
+    """Measures the time of the closed loop on this machine over that of bare JSBSim, block by block.
+
+    It flies the scenario up to 21 times, which takes some minutes for a long one.
+
+    `bench tracking` measures the largest errors of an aircraft on random courses of 14 turns in calm air, wind and
+    turbulence; its exit status is 1 if one is above its limit.
+
+    For example: wayproof bench aerosonde_forest --json
+    """
+    if scenario == "tracking":
+        return _bench_tracking(aircraft or "aerosonde", seeds or 20, as_json, guidance or "preview")
+    if guidance or aircraft or seeds:
+        raise typer.BadParameter("--aircraft, --seeds and --guidance go with `bench tracking`")
+    loaded = load(scenario)
+
+    from aircraft.airframes import AircraftError
+    from harness.bench.costs import bench as measure
+    from harness.cli.terminal import print_table, progress_bar
+
+    try:
+        with progress_bar(straight_m(loaded)) as report:
+            result = measure(loaded, report)
+    except AircraftError as error:
+        raise bad_input(error) from error
+    if as_json:
+        print_json(result)
+    else:
+        print_table(f"bench of {loaded.name}", bench_rows(result))
+    return 0
+
+
+def _bench_tracking(name: str, seeds: int, as_json: bool, guidance: str) -> int:
+    """The table of tracking errors of an aircraft."""
+    from aircraft.airframes import AircraftError
+    from aircraft.guidance.registry import guidance_kinds
+    from harness.bench.tracking import bench_tracking
+    from harness.cli.terminal import print_table, step_bar
+
+    guidance = law_kind(guidance)
+    if guidance not in guidance_kinds():
+        known = ", ".join(sorted(guidance_kinds()))
+        raise typer.BadParameter(f"there is no guidance law {guidance!r}; known are: {known}")
+    try:
+        with step_bar() as report:
+            result = bench_tracking(name, seeds, report, guidance)
+    except AircraftError as error:
+        raise bad_input(error) from error
+    if as_json:
+        print_json(result)
+    else:
+        flown = f"{result['aircraft']} under {guidance} at {result['airspeed_mps']:g} m/s"
+        columns, rows = tracking_rows(result)
+        print_table(f"{flown}, worst of {seeds} courses a case", rows, columns)
+    return FAILED if any(row["kept"] is False for row in result["cases"]) else 0
+
+
+def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
+    """Name and value of each row of the table of `bench`."""
+    planner, same = result["planner_ms"], "x bare JSBSim at the same step rate"
+    rows = {
+        "closed loop": f"{result['closed_loop_ratio']:.3f} {same}",
+        "with recording": f"{result['closed_loop_recording_ratio']:.3f} {same}",
+        "outside JSBSim": f"{result['outside_us']:.1f} us a guidance interval",
+        "step rate": f"{result['step_rate_hz']} Hz, a bare step {result['bare_step_us']:.2f} us",
+        "planner, processor time": ", ".join(
+            f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")
+        ),
+        "rounds": f"{result['rounds']}, {'steady' if result['steady'] else 'not steady: the machine is busy'}",
+    }
+    return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
+
+
+def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequence[str]]]:
+    """Headings and rows of the table of `bench tracking`; limits are behind the figures."""
+    figures = ("cross_track_p95_m", "cross_track_max_m", "altitude_p95_m")
+    rows: list[Sequence[str]] = []
+    for case in result["cases"]:
+        limits = case["limits"]
+        if case["lost"]:
+            rows.append((case["case"], *("-" for _ in figures), "-", "[bold red]control is lost[/]"))
+            continue
+        cells = [f"{case[name]:.3f}" + (f" <= {limits[name]:.2g}" if limits else "") for name in figures]
+        verdict = {True: "kept", False: "[bold red]not kept[/]", None: "-"}[case["kept"]]
+        rows.append((case["case"], *cells, f"{case['bank_saturation']:.1%}", verdict))
+    return ("air", "cross-track p95", "max m", "altitude p95", "saturated", "limits"), rows
+
+
+def envelope(
+    aircraft: Annotated[
+        str,
+        typer.Argument(metavar="AIRCRAFT", help="A name that `wayproof list aircraft` prints, or a folder."),
+    ],
+    airspeeds: Annotated[
+        list[float] | None,
+        typer.Option("--airspeed-mps", metavar="V", help="True airspeed; can be repeated. Default: cruise."),
+    ] = None,
+    winds: Annotated[
+        list[float] | None,
+        typer.Option("--wind", metavar="M/S", help="Wind to track in; can be repeated. Default: 30 % of V."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> int:
+    """Flies an aircraft and prints what it can do: speeds, turns, roll-in, the tightest path that it tracks.
+
+    The figures are kept until the model or wayproof changes. The planned radius in the table is the one that planners
+    get: the tightest radius tracked, and a margin.
+
+    For example: wayproof envelope c172p --wind 8
+    """
+    from aircraft.airframes import AircraftError
+    from harness.bench.envelope_card import envelope_card
+    from harness.cli.terminal import step_bar
+
+    for name, values in (("--airspeed-mps", airspeeds or ()), ("--wind", winds or ())):
+        for value in values:
+            if not 0.0 <= value < 1000.0:
+                raise typer.BadParameter(f"{value:g} is not a speed from 0 to 1000 m/s", param_hint=name)
+    try:
+        with step_bar() as report:
+            card = envelope_card(aircraft, airspeeds or (), winds or (), report)
+    except AircraftError as error:
+        raise bad_input(error) from error
+    if as_json:
+        print_json(card)
+    else:
+        _print_card(card)
+    return 0
+
+
+_TURN_COLUMNS: Final = {
+    "bank_deg": "bank deg",
+    "radius_m": "radius m",
+    "load_factor": "load factor",
+    "altitude_lost_m": "altitude lost m",
+    "airspeed_lost_mps": "speed lost m/s",
+}
+_PATH_COLUMNS: Final = {
+    "wind_mps": "wind m/s",
+    "tightest_radius_m": "tightest radius tracked m",
+    "planned_radius_m": "planned radius m",
+}
+
+
+def _print_card(card: Mapping[str, Any]) -> None:
+    """The tables of `envelope`."""
+    from harness.cli.terminal import legible, print_table
+
+    low, high = card["airspeed_range_mps"]
+    facts = {
+        "mass": f"{card['mass_kg']:g} kg",
+        "level flight": f"{low:g} to {high:g} m/s, cruise {card['cruise_mps']:g} m/s",
+        "bank limit": f"{card['bank_limit_deg']:g} deg, rolled into at {card['roll_rate_dps']:g} deg/s",
+        "tracking": "held by tests" if card["verified"] else "not held by tests",
+    }
+    print_table(card["aircraft"], facts)
+    laws = card["laws"].items()
+    margins = [(name, f"{law['gain']:.1f}", f"{law['delay_s']:.2f}") for name, law in laws]
+    print_table("guidance at cruise, calm air", margins, ("law on a line", "gain margin", "delay margin s"))
+    for page in card["at"]:
+        at = f"at {page['airspeed_mps']:g} m/s"
+        kept = f"speed and altitude kept up to {page['level_bank_deg']:g} deg"
+        climbs = f"climbs at up to {page['climb_mps']:.3g} m/s, sinks at up to {page['descent_mps']:.3g}"
+        turns = f"turns {at}; 90 % of 30 deg in {page['roll_in_s']:g} s; {kept}; {climbs}"
+        for title, key, columns in (
+            (turns, "turns", _TURN_COLUMNS),
+            (f"paths {at}", "tracked", _PATH_COLUMNS),
+        ):
+            rows = [[legible(entry[name]) for name in columns] for entry in page[key]]
+            print_table(title, rows, tuple(columns.values()))

@@ -1,0 +1,217 @@
+"""The command `fly`: one flight, watched live perhaps."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from harness.cli.options import (
+    FAILED,
+    AircraftOption,
+    ConditionsOption,
+    GuidanceOption,
+    JsonOption,
+    NoRecordingOption,
+    OptionalScenario,
+    OutOption,
+    PlannerOption,
+    QuietOption,
+    SeedOption,
+    SettingsOption,
+    TurbulenceOption,
+    WindOption,
+    faults_told,
+    flag,
+    load,
+    marked_incomplete,
+    overrides,
+    print_json,
+    straight_m,
+    told_apart,
+)
+from harness.cli.review import open_viewer
+from harness.cli.standard_output import say
+
+if TYPE_CHECKING:
+    from harness.scenario.scenario import Scenario
+    from harness.watching.watched_flight import Onlookers
+
+FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
+"""Exit status of `fly` by outcome; FAILED for the others."""
+
+
+def fly(
+    scenario: OptionalScenario = None,
+    planner: PlannerOption = None,
+    aircraft: AircraftOption = None,
+    guidance: GuidanceOption = None,
+    conditions: ConditionsOption = None,
+    wind: WindOption = None,
+    turbulence: TurbulenceOption = None,
+    seed: SeedOption = None,
+    settings: SettingsOption = None,
+    results: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="FILE", help="A campaign's results.parquet, instead of SCENARIO."),
+    ] = None,
+    run: Annotated[int | None, typer.Option(metavar="K", help="With --from: which run.")] = None,
+    out: OutOption = None,
+    no_recording: NoRecordingOption = False,
+    view: Annotated[bool, flag("--view", "Open the recording after the flight.")] = False,
+    live: Annotated[bool, flag("--live", "Show the flight in the viewer while it is flown.")] = False,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X", help="With --live: simulated seconds a second. Default: as fast as it goes."
+        ),
+    ] = None,
+    web: Annotated[bool, flag("--web", "With --live: show it in a browser, served on 127.0.0.1.")] = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> int:
+    """Flies a scenario with a planner, and writes a run folder.
+
+    For example: wayproof fly paper_circles --seed 3 --set planner.clearance_m=400
+
+    Exit status:
+
+    0 goal reached with no collision and inside the area
+
+    1 flown, but goal not reached; or with --from not as the campaign flew it
+
+    2 bad input or usage, nothing flown
+
+    3 the planner proved the goal unreachable and the aircraft is safe
+    """
+    if view and no_recording:
+        raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
+    if speed is not None and not 0.0 < speed <= 1e6:
+        raise typer.BadParameter(f"--speed is {speed:g}; must be above 0 and at most 1e6")
+    for option, needs_live in (("--speed", speed is not None), ("--web", web)):
+        if needs_live and not live:
+            raise typer.BadParameter(f"{option} goes with --live")
+    given = overrides(
+        settings,
+        planner=planner,
+        aircraft=aircraft,
+        guidance=guidance,
+        wind=wind,
+        turbulence=turbulence,
+        seed=seed,
+        conditions=conditions,
+    )
+    loaded, digest = _asked(scenario, results, run, given)
+    origin = [] if results is None else [("from", str(results.resolve())), ("run", str(run))]
+    folder = out or _default_folder(loaded, told_apart([*given, *origin]))
+    with _viewer(web, speed) if live else nullcontext((None, lambda: None)) as (onlookers, wait):
+        metrics = _fly(loaded, folder, onlookers, recording=not no_recording, silent=quiet)
+        otherwise = bool(digest) and not given and metrics["digest"] != digest
+        if otherwise:
+            say(
+                f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what the planner or the "
+                "aircraft is made of, have changed since",
+                err=True,
+            )
+        if as_json:
+            print_json(metrics)
+        elif not quiet:
+            _print_flight(loaded, metrics, folder, bool(digest) and not given and not otherwise)
+        wait()
+    if view:
+        open_viewer([folder])
+    return FAILED if otherwise else FLY_STATUS.get(metrics["outcome"], FAILED)
+
+
+def _asked(
+    scenario: str | None, results: Path | None, run: int | None, given: list[tuple[str, str]]
+) -> tuple[Scenario, str | None]:
+    """What to fly, and the digest that a campaign's results have of it."""
+    if (scenario is None) == (results is None):
+        raise typer.BadParameter("give either a SCENARIO or --from with --run")
+    if results is None or run is None:
+        if scenario is None or run is not None:
+            raise typer.BadParameter("--from and --run go together")
+        return load(scenario, given), None
+    from harness.campaign.replay import flown_run
+
+    return flown_run(results, run, given)
+
+
+def _default_folder(scenario: Scenario, apart: str) -> Path:
+    model, planner = Path(scenario.aircraft.model).name, scenario.planner.label.replace(":", "-")
+    return Path("runs") / scenario.name / f"{planner}-{model}-{scenario.seed}{apart}"
+
+
+def _fly(
+    scenario: Scenario, folder: Path, onlookers: Onlookers | None, *, recording: bool, silent: bool
+) -> dict[str, Any]:
+    """Flies into a folder, with progress on standard error."""
+    from harness.cli.terminal import progress_bar
+    from harness.run.scenario_flight import fly_to_folder
+    from harness.run_files.run_folder import MANIFEST, SCHEMA
+
+    progress = nullcontext() if silent else progress_bar(straight_m(scenario))
+    with faults_told(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
+        if onlookers is None:
+            return fly_to_folder(scenario, folder, recording, report)
+        from harness.watching.watched_flight import fly_watched
+
+        return fly_watched(scenario, folder, recording, report, onlookers)
+
+
+def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
+    """The table of a flight, and where its files are."""
+    from harness.cli.flight_rows import flight_rows
+    from harness.cli.terminal import plain, print_table
+    from harness.scenario.conditions import told
+    from harness.world.motion_assumptions import scenario_outside_assumptions
+
+    law = scenario.guidance.kind
+    under = "" if law == type(scenario.guidance)().kind else f", {law}"
+    rows = {"conditions": plain(told(scenario))} | flight_rows(metrics)
+    outside = scenario_outside_assumptions(scenario)
+    if outside:
+        more = f" (and {len(outside) - 1} more: `wayproof validate` names them)" if len(outside) > 1 else ""
+        rows["not covered"] = plain(outside[0] + more)
+    print_table(f"{scenario.name}: {scenario.planner.label}, {scenario.aircraft.model}{under}", rows)
+    if as_the_campaign:
+        say("digest: as the campaign flew it")
+    say(f"run folder: {folder}")
+
+
+@contextmanager
+def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Onlookers, Callable[[], None]]]:
+    """A viewer of our own, open no longer than the block, and what waits until it is closed.
+
+    Raises:
+        InputError: there is no screen for the viewer.
+    """
+    from contextlib import ExitStack
+
+    from harness.files.input_file import InputError
+    from harness.recording.viewer import ViewerError, following_viewer
+    from harness.watching.watched_flight import Onlookers
+
+    with ExitStack() as stack:
+        try:
+            process, url = stack.enter_context(
+                following_viewer(web, lambda address: say(f"{address} (Ctrl-C ends it)", err=True))
+            )
+        except ViewerError as error:
+            raise InputError(f"wayproof: {error}") from error
+
+        def wait() -> None:
+            if sys.stdout is not None:
+                sys.stdout.flush()
+            try:
+                process.wait()
+            except KeyboardInterrupt:
+                return
+
+        gone = "wayproof: the viewer has gone; the flight goes on"
+        yield Onlookers(url, speed, lambda: say(gone, err=True)), wait

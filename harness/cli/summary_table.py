@@ -1,0 +1,113 @@
+"""What a person sees of a campaign on a terminal: what would be flown, and the answers in 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from harness.analysis.metric import number
+from harness.campaign.questions import QUESTIONS, difference, ratio
+from harness.campaign.runs import CampaignRuns
+from harness.campaign.summary import Cell, Summary, Table
+from harness.cli.standard_output import folded, say
+from harness.cli.terminal import coloured, plain, print_line, print_table
+from harness.files.strict_yaml import Scalar
+from harness.files.wording import counted
+
+FIRST, LAST = 15, 5
+"""Numbers of the first and last runs that are shown where there are more runs than both together."""
+
+CELL: Final = 28
+"""A longer value is cut short."""
+
+SHOWN_WORST: Final = 5
+LEGEND: Final = "length: median/p95; clear: least, runs below the wanted; planner: p50/p99/max"
+
+
+def print_runs(runs: CampaignRuns) -> None:
+    """What would be flown, a line a run, those in the middle left out where there are many."""
+    campaign = runs.campaign
+    say(
+        f"{campaign.name}: {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}, root seed {campaign.seed}, "
+        f"recordings: {campaign.recordings}"
+    )
+    last = max(len(runs) - LAST, FIRST)
+    for index in range(len(runs)):
+        if FIRST <= index < last:
+            if index == FIRST:
+                say("...")
+            continue
+        run = runs.run(index)
+        varied = [f"{name}={_shown(value)}" for name, value in run.varied.items()]
+        names = run.scenario, run.world, run.planner, run.aircraft, f"seed {run.seed}"
+        say(folded(f"run {run.run}, case {run.case}: ", ", ".join([*names, *varied])))
+
+
+def _shown(value: Scalar) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else "none" if value is None else str(value)
+    return text if len(text) <= CELL else f"{text[: CELL - 3]}..."
+
+
+def print_summary(summary: Summary, all_tables: bool = False) -> None:
+    """Prints the answers on standard output.
+
+    Args:
+        summary: the answers.
+        all_tables: every table, not the first alone.
+    """
+    total = summary.total
+    runs = (
+        f"{total.runs} of {counted(summary.planned or 0, 'run')}"
+        if summary.missing
+        else counted(total.runs, "run")
+    )
+    ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
+    print_line(plain(f"{summary.name}: {runs}" + (f": {ended}" if ended else "")))
+    if summary.never:
+        print_line(plain(summary.never))
+    if summary.missing:
+        are, them = ("is missing", "it") if summary.missing == 1 else ("are missing", "them")
+        print_line(f"[bold yellow]not complete[/]: {summary.missing} {are}, --resume flies {them}")
+    if not total.runs:
+        return
+    heads = ("", "runs", *(question.short for question in QUESTIONS))
+    whole = ("all runs", *_cells(total))
+    for table in summary.tables if all_tables else summary.tables[:1]:
+        keys = [table.rows.key, *([table.columns.key] if table.columns else [])]
+        print_table(" x ".join(keys), [*_lines(table), whole], heads)
+    if not summary.tables:
+        print_table("", [whole], heads)
+    print_line(LEGEND, style="dim")
+    for duel in summary.duels:
+        first, second = plain(duel.first), plain(duel.second)
+        print_line(
+            f"{first} against {second} in {counted(duel.pairs, 'pair')} of flights: goals reached "
+            f"{difference(duel.success)} points ({duel.only_first} by {first} alone, {duel.only_second} by {second} "
+            f"alone); length {ratio(duel.length)} times, where both reached ({duel.both_reached})"
+        )
+    failed = [run for run in summary.worst if run.outcome != "reached"]
+    for run in failed[:SHOWN_WORST]:
+        near = "" if run.min_clearance_m is None else f", least clearance {number(run.min_clearance_m)} m"
+        print_line(f"{coloured(run.outcome)} run {run.run} ({plain(run.name)}){near}")
+    if failed:
+        say(f"again: {failed[0].command}")
+    kept = next((run for run in summary.worst if run.view), None)
+    if kept is not None:
+        say(f"view: {kept.view}")
+
+
+def _cells(cell: Cell) -> list[str]:
+    return [str(cell.runs), *(question.brief(cell) if cell.runs else "" for question in QUESTIONS)]
+
+
+def _lines(table: Table) -> list[Sequence[str]]:
+    """A line a cell; with two keys, the first one's value stands above the lines of the second."""
+    lines: list[Sequence[str]] = []
+    for label, cells in zip(table.rows.labels, table.cells, strict=True):
+        if table.columns is None:
+            lines.append((plain(label), *_cells(cells[0])))
+            continue
+        lines.append((f"[bold]{plain(label)}[/]",))
+        for name, cell in zip(table.columns.labels, cells, strict=True):
+            lines.append((f" {plain(name)}", *_cells(cell)))
+    return lines
