@@ -75,7 +75,8 @@ FINDINGS: Mapping[str, str] = {
     "its survey or its specific excess power at that height and speed allows",
     "descent too steep": "the aircraft was off its altitude, airspeed or load factor, on a path that sinks faster than "
     "its survey, or idle throttle at that height and speed, allows",
-    NAVIGATION_ERROR: "where the true position was furthest off, the believed one was within the limits",
+    NAVIGATION_ERROR: "where the true position was furthest off, the believed one was within the limits, or the "
+    "larger part of the error lay between the two",
     "lost control": "the flight ended with loss of control",
     "tracking error": "none of the other causes",
 }

@@ -32,21 +32,14 @@ COUNTED_BEAMS: Final = 20
 def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) -> dict[str, Any]:
     """All figures of a flight, ready for JSON: a figure that does not exist is None, never NaN or infinity.
 
-    Distances are of the flown track as logged. `planned_length_m` is the curve length of those parts of the
-    plans that were in effect. `min_clearance_m` is that of the rows, or at a contact between the last two;
-    `min_altitude_above_ground_m` is over the true ground, None where that is not known. Cross-track
-    figures are of the rows flown under a plan, altitude figures of all rows, all of them of the true position.
-    Errors have the names of performance-based navigation (ICAO Doc 9613): `total_system_error_m` is how far the true
-    position is off the path, `flight_technical_error_m` how far the believed one is; without a given path the first is
-    `cross_track_m`. `navigation_error_m`, how far from there the aircraft believed to be, `navigation_jump_m`, the most
-    that this error changes from one row to the next (as a vector), and `navigation_margin_m`, what was planned for it,
-    are there unless navigation is perfect. `plan_delay_s` is from the latest scan that a plan could know of until it
-    took effect, `lost_returns` how much of what beams met the sensor lost. `clearance_violation_s` counts the
-    intervals at whose end, or at a contact in them, the distance to an obstacle edge was below the wanted clearance.
-    `replans` counts the plans accepted after the first. `compute_ms` is processor time of all calls in which the
-    planner searched, `timing.planner_wall_ms` the wall-clock time of the same. `smoothness` is defined in
-    `harness.analysis.smoothness`, `trackability` in `harness.analysis.trackability`; `error` is the traceback of what
-    the planner raised.
+    `planned_length_m` is the curve length of those parts of the plans that were in effect. `min_clearance_m` is that
+    of the rows, or at a contact between the last two. Cross-track figures are of the rows flown under a plan, altitude
+    figures of all rows, all of the true position. Errors have the names of performance-based navigation (ICAO Doc
+    9613): `total_system_error_m` is how far the true position is off the path, `flight_technical_error_m` how far the
+    believed one is. `navigation_error_m`, `navigation_jump_m` (the most that this error changes from row to row, as a
+    vector) and `navigation_margin_m` are there unless navigation is perfect. `clearance_violation_s` counts the
+    intervals at whose end the distance to an obstacle edge was below the wanted clearance. `compute_ms` is processor
+    time of all calls in which the planner searched, `timing.planner_wall_ms` the wall-clock time of the same.
 
     Args:
         flight: the flight; its track has at least one row.
@@ -66,12 +59,11 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     lost = flight.reason if flight.outcome is Outcome.LOST_CONTROL else None
     verdicts = legs(track, flight.plans, limits, lost, given)
     followed = track.cross_track_m[track.plan_index >= 0]
-    planned_m = planned_length_m(flight)
     return {
         "outcome": flight.outcome.value,
         "reason": flight.reason,
         "flown_length_m": float(flown_lengths(track).sum()),
-        "planned_length_m": planned_m,
+        "planned_length_m": planned_length_m(flight),
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
         "min_clearance_m": _finite(nearest_m.min()),
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
@@ -82,7 +74,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         **_navigation(track, limits),
         "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
         "smoothness": {
-            "planned": dataclasses.asdict(smoothness(planned, window, planned_m)),
+            "planned": dataclasses.asdict(smoothness(planned, window)),
             "flown": dataclasses.asdict(smoothness(flown_profile(track), window)),
         },
         "bank_saturation_fraction": float(saturated(track, limits.bank_limit_rad).mean()),
@@ -149,14 +141,10 @@ def percentiles(values: Sequence[float]) -> dict[str, float | None]:
 
 
 def lost_returns(counts: IntArray | None) -> dict[str, float | None]:
-    """Which share of the beams that met something returned nothing: of all scans, and of the worst.
+    """`share` of the beams that met something and returned nothing, and `max` in the worst scan; None without a sensor.
 
     Args:
         counts: `Flight.lost_returns`.
-
-    Returns:
-        `share` and `max`, from 0 to 1; None without a sensor. `max` is over the scans in which at least
-        `COUNTED_BEAMS` beams met something, or the same as `share` where none did.
     """
     if counts is None:
         return {"share": None, "max": None}

@@ -47,9 +47,7 @@ class Profile(NamedTuple):
 
 @dataclass(frozen=True)
 class Smoothness:
-    """Figures of a path of length L; 0 for a straight one.
-
-    Figures called normalised are free of units, and the same for a path and for its enlargement.
+    """Figures of a path; 0 for a straight one.
 
     Attributes:
         heading_change_deg: total absolute change of direction, the sum of |k_i| l_i.
@@ -59,51 +57,24 @@ class Smoothness:
         max_curvature_rate_1pm2: largest |k(s + w) - k(s)| / w over a window w. The rate of curvature is what
             an aircraft turns into roll rate (Kanayama and Hartman, Smooth local path planning for autonomous
             vehicles, 1989); the window makes it finite where a line meets an arc.
-        angle_over_length_radpm: total absolute change of direction over L, the sum of |k_i| l_i / L (AOL of
-            Heiden et al., Bench-MR: a motion planning benchmark for wheeled mobile robots, IEEE RA-L 6(3),
-            2021).
-        bending_energy_normalised: bending energy times L; (2 pi)^2 for any full circle (Bruckstein and
-            Netravali, On minimal energy trajectories, CVGIP 49, 1990, on why the energy is scaled so).
-        max_curvature_normalised: largest |k_i| times L.
-        max_curvature_rate_normalised: largest rate of curvature times L^2.
     """
 
     heading_change_deg: float
     bending_energy_1pm: float
     max_curvature_1pm: float
     max_curvature_rate_1pm2: float
-    angle_over_length_radpm: float
-    bending_energy_normalised: float
-    max_curvature_normalised: float
-    max_curvature_rate_normalised: float
 
 
-def smoothness(profile: Profile, window_m: float, length_m: float | None = None) -> Smoothness:
-    """The figures of a curvature profile.
-
-    Args:
-        profile: pieces of constant curvature.
-        window_m: w of the curvature rate, > 0.
-        length_m: L; default: that of the profile. A profile in which corners count as arcs is longer than
-            its path.
-    """
+def smoothness(profile: Profile, window_m: float) -> Smoothness:
+    """The figures of a curvature profile; `window_m` is the w of the curvature rate, > 0."""
     length, curvature = profile
     bent = np.abs(curvature)
-    whole = float(length.sum()) if length_m is None else length_m
     # Sums, not products of vectors: BLAS would wake its threads for these, which then spin for longer.
-    turned = float((bent * length).sum())
-    energy = float((bent * bent * length).sum())
-    sharpest = float(bent.max(initial=0.0))
-    rate = _max_rate(profile, window_m)
     return Smoothness(
-        heading_change_deg=math.degrees(turned),
-        bending_energy_1pm=energy,
-        max_curvature_1pm=sharpest,
-        max_curvature_rate_1pm2=rate,
-        angle_over_length_radpm=turned / whole if whole > 0.0 else 0.0,
-        bending_energy_normalised=energy * whole,
-        max_curvature_normalised=sharpest * whole,
-        max_curvature_rate_normalised=rate * whole * whole,
+        heading_change_deg=math.degrees(float((bent * length).sum())),
+        bending_energy_1pm=float((bent * bent * length).sum()),
+        max_curvature_1pm=float(bent.max(initial=0.0)),
+        max_curvature_rate_1pm2=_max_rate(profile, window_m),
     )
 
 

@@ -166,7 +166,7 @@ def _judge(
     threshold = limits.cross_track_threshold_m
     cause = None
     wide = given is None and off.max() > threshold
-    if wide and _believed_within(leg.believed_cross_track_m, 0.0, threshold, off.argmax()):
+    if wide and _is_misled(leg.believed_cross_track_m, leg.cross_track_m, threshold, off.argmax()):
         cause = NAVIGATION_ERROR
     elif wide:
         cause = cross_track_cause(track, first + int(off.argmax()), plans, limits, force)
@@ -176,8 +176,11 @@ def _judge(
         begins, rows_of_mean = int(slow.argmax()), len(leg) - len(slow) + 1
         steep = _steep(track, first + begins, rows_of_mean, given)
         cause = steep or speed_cause(leg.part(begins, begins + rows_of_mean), limits)
-    elif high.max() > limits.max_altitude_error_m and _believed_within(
-        leg.believed_up_m, wanted_m, limits.max_altitude_error_m, high.argmax()
+    elif high.max() > limits.max_altitude_error_m and _is_misled(
+        None if leg.believed_up_m is None else leg.believed_up_m - wanted_m,
+        leg.up_m - wanted_m,
+        limits.max_altitude_error_m,
+        high.argmax(),
     ):
         cause = NAVIGATION_ERROR
     elif high.max() > limits.max_altitude_error_m:
@@ -198,14 +201,15 @@ def _judge(
     )
 
 
-def _believed_within(
-    believed: FloatArray | None, wanted: FloatArray | float, most: float, row: np.intp
-) -> bool:
-    """Whether the aircraft believed to be near enough at a row, that of the largest true error; not where unknown.
+def _is_misled(believed: FloatArray | None, true: FloatArray, most: float, row: np.intp) -> bool:
+    """Whether it is navigation that is off at the row of the largest true error: the larger part of it, or all that is
+    beyond the limit. Not where the belief is not known.
 
     At other rows it may have been off: it flies to where its first fix says that it should be.
     """
-    return believed is not None and bool(np.abs(believed - wanted)[row] <= most)
+    if believed is None or not np.isfinite(believed[row]):
+        return False
+    return bool(abs(believed[row]) <= max(most, abs(true[row] - believed[row])))
 
 
 def _steep(track: Track, first: int, rows: int, given: AsGiven | None) -> str | None:
@@ -245,7 +249,8 @@ def _cause_off_given(
 ) -> str:
     """Why the aircraft is too far off the path as given, at the row where that is worst."""
     allowed_m, along_m = float(given.allowed_m[worst]), float(track.arc_length_m[worst])
-    if _believed_within(given.believed_off_m, 0.0, allowed_m, np.intp(worst)):
+    believed_m = given.believed_off_m
+    if believed_m is not None and believed_m[worst] <= max(allowed_m, track.navigation_error_m[worst]):
         return NAVIGATION_ERROR
     for corner in given.corners:
         reach_m = max(corner.half_m, ABOUT * allowed_m)

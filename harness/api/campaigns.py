@@ -39,7 +39,7 @@ def compare(
         planners: kinds, in order; or `FILE.py:NAME`, `MODULE:NAME`.
         out: the comparison's folder.
         recording: whether to record each flight and an overlay of all.
-        guidance: kinds of guidance laws, in order; or `FILE.py:NAME`, `MODULE:NAME`. Default: the scenario's own.
+        guidance: guidance laws, likewise; default: the scenario's own.
         kinematic: a point that follows every plan exactly flies in place of the aircraft.
         workers: flights at a time; default: one a processor.
 
@@ -54,11 +54,12 @@ def compare(
     given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [each if isinstance(each, Scenario) else load_scenario(each) for each in given]
     kinds = _named(planners, PLANNER, "planners")
-    laws = None if guidance is None else _named(guidance, GUIDANCE, "guidance")
     chosen = [{"planner.kind": kind} for kind in kinds]
-    if laws is not None:
+    of_laws = ""
+    if guidance is not None:
+        laws = _named(guidance, GUIDANCE, "guidance")
         chosen = [keys | {"guidance.kind": law} for keys in chosen for law in laws]
-    of_laws = "" if laws is None else f", guidance={laws}"
+        of_laws = f", guidance={laws}"
     with as_input_errors():
         compared = fly_and_compare(
             [each.with_(keys) for each in loaded for keys in chosen],
@@ -76,11 +77,7 @@ def compare(
 
 
 def _named(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
-    """The kinds that names mean: those given as FILE.py:NAME or MODULE:NAME are imported.
-
-    Raises:
-        InputError: one is not a name, or cannot be imported.
-    """
+    """The kinds that names mean; those given as FILE.py:NAME or MODULE:NAME are imported."""
     from harness.scenario.given import registered
 
     if isinstance(names, str) or not names or not all(isinstance(each, str) for each in names):
@@ -109,8 +106,7 @@ def sweep(
         campaign: its file, or the name of one that comes with wayproof.
         out: its folder; default: `runs/NAME`.
         workers: flights at a time; default: one a processor.
-        scheduler: address of a Dask cluster that flies instead, such as `tls://HOST:8786`. It can run code on this
-            machine.
+        scheduler: address of a Dask cluster, such as `tls://HOST:8786`. It can run code on this machine.
         resume: fly only the runs missing in the folder.
         progress: called with the answer of every run that has ended.
 
@@ -145,10 +141,7 @@ def sweep(
 
 
 def load_campaign(folder: str | Path) -> CampaignResult:
-    """Reads the folder of a campaign, complete or not.
-
-    Args:
-        folder: where `sweep` wrote; not the campaign's file, which `sweep` flies.
+    """Reads the folder of a campaign, where `sweep` wrote, complete or not.
 
     Raises:
         InputError: the folder holds no campaign, or a file of it cannot be read.
@@ -186,17 +179,16 @@ def certify(
         found.verdict, found.held, found.runs, found.probability_lower
 
     Args:
-        subject: a scenario, its file, or the name of one that comes with wayproof; or a path: a file that `check`
-            takes, or points (n, 2), east and north in metres.
+        subject: a scenario, its file or name; or a path: a file that `check` takes, or points (n, 2) in metres.
         claim: `reached`, `no-contact`, `trackable`, or of a path `as-given`. Default: `reached`, of a path `as-given`.
-        probability: the claim is to hold on at least this share of the days; the flights end once that is shown or
-            refuted. None: all `runs` days are flown, and nothing is to be shown.
+        probability: share of the days on which the claim is to hold; the flights end once that is shown or refuted.
+            None: all `runs` days are flown, and nothing is to be shown.
         confidence: of each bound.
         runs: number of days, at most.
         vary: what is drawn anew every day: texts as `KEY=LO:HI`, `KEY=MEAN~SIGMA`, `KEY=A,B`; or by key path
             `(low, high)`, such a text without its key, or a distribution as a campaign file has it.
         conditions: replaces the scenario's `conditions`.
-        aircraft: replaces the scenario's `aircraft.model`; of a path the aircraft, by default `aerosonde`.
+        aircraft: replaces the scenario's `aircraft.model`; of a path by default `aerosonde`.
         scenario: of a path: the world with obstacles, bounds and air.
         settings: further keys to replace, by key path; values as YAML.
         out: the folder; default: `runs/NAME/certify-CLAIM`.
@@ -229,12 +221,5 @@ def certify(
         days.check()
         folder = Path(out) if out is not None else Path("runs") / days.campaign.name / f"certify-{days.claim}"
         with local_workers(workers or os.cpu_count() or 1) as flyers:
-            return fly_days(
-                days,
-                folder,
-                flyers,
-                terms,
-                resume=resume,
-                progress=progress,
-                command=in_python(f"wayproof.certify({days.campaign.name!r}, {days.claim!r})"),
-            )
+            command = in_python(f"wayproof.certify({days.campaign.name!r}, {days.claim!r})")
+            return fly_days(days, folder, flyers, terms, resume=resume, progress=progress, command=command)

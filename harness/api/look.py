@@ -4,24 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-    from harness.campaign.summary import Summary
-
-COMPARED: Final = (
-    "scenario",
-    "planner",
-    "outcome",
-    "flown_length_m",
-    "ratio",
-    "min_clearance_m",
-    "cross_track_p95_m",
-    "planner_p99_ms",
-)
-"""The columns of a comparison that are shown; all are in its table."""
 
 
 def flight_html(title: str, metrics: Mapping[str, Any]) -> str:
@@ -41,40 +27,20 @@ def flight_html(title: str, metrics: Mapping[str, Any]) -> str:
 
 
 def comparison_html(title: str, table: pa.Table) -> str:
-    """A row a scenario and planner.
+    """A row a scenario and planner, with the figures that a terminal shows.
 
     Args:
         title: stands above it.
         table: as `ComparisonResult.table`.
     """
-    names = [name for name in COMPARED if name in table.column_names]
-    rows = [[_number(row[name]) for name in names] for row in table.select(names).to_pylist()]
-    return _table(title, [name.replace("_", " ") for name in names], rows)
+    from harness.analysis.rows import COMPARED, ON_TERMINAL
 
-
-def campaign_html(title: str, summary: Summary) -> str:
-    """The answers of a campaign: all runs, and the groups of its first table.
-
-    Args:
-        title: stands above it.
-        summary: the answers.
-    """
-    from harness.campaign.questions import QUESTIONS
-
-    cells = [("all runs", summary.total)]
-    for table in summary.tables[:1]:
-        for label, row in zip(table.rows.labels, table.cells, strict=True):
-            columns = table.columns.labels if table.columns else ("",)
-            cells += [
-                (f"{label} {name}".strip(), cell)
-                for name, cell in zip(columns, row, strict=True)
-                if cell.runs
-            ]
+    shown = [metric for metric in COMPARED.values() if metric.short in ON_TERMINAL]
     rows = [
-        (label, str(cell.runs), *(question.brief(cell) if cell.runs else "" for question in QUESTIONS))
-        for label, cell in cells
+        (row["scenario"], row["planner"], *(metric.text(row[metric.name]) for metric in shown))
+        for row in table.to_pylist()
     ]
-    return _table(title, ("", "runs", *(question.short for question in QUESTIONS)), rows)
+    return _table(title, ["scenario", "planner", *(metric.label for metric in shown)], rows)
 
 
 def _table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -85,9 +51,3 @@ def _table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> s
 
 def _cells(texts: Sequence[str], tag: str) -> str:
     return "".join(f'<{tag} style="text-align:left">{escape(text)}</{tag}>' for text in texts)
-
-
-def _number(value: object) -> str:
-    if value is None:
-        return "-"
-    return f"{value:,.4g}" if isinstance(value, float) else str(value)

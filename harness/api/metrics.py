@@ -13,7 +13,7 @@ from typing import Any, Final
 from harness.analysis.registry import METRICS
 
 OPTIONAL: Final = frozenset(metric.path.partition(".")[0] for metric in METRICS if not metric.derived) | {
-    *("shield", "findings", "contact", "contacts", "breaches", "check", "height_above_ground_m"),
+    *("shield", "findings", "contact", "contacts", "breaches", "check", "height_above_ground_m")
 }
 """Figures that are None where a run does not have them: a run without a given path has no `check`."""
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from harness.api.look import campaign_html, comparison_html, flight_html
+from harness.api.look import comparison_html, flight_html
 from harness.api.metrics import Metrics
 from harness.files.input_file import InputError
 from harness.scenario.scenario import Scenario
@@ -183,6 +183,3 @@ class CampaignResult:
         """A line for people."""
         ends = ", ".join(f"{number} {outcome}" for outcome, number in self.outcomes.items())
         return f"CampaignResult({len(self.table)} runs: {ends}; {self.folder})"
-
-    def _repr_html_(self) -> str:
-        return campaign_html(repr(self)[len("CampaignResult(") : -1], self.summary)

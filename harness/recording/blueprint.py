@@ -117,16 +117,7 @@ WHOLE_ONLY = ("bank/pitch", BELIEVED_OFF)
 SEARCH, DELAYS = "search/flown", f"{PLAN_DELAY}/flown"
 """Below SERIES: time of the search of each plan, and how late it took effect, drawn as points."""
 
-OVERLAY: tuple[Colour, ...] = (
-    TRACK,
-    CHOSEN,
-    GUIDE,
-    GOAL,
-    WINDOW,
-    HIT,
-    (240, 228, 66),
-    (200, 200, 210),
-)
+OVERLAY: tuple[Colour, ...] = (TRACK, CHOSEN, GUIDE, GOAL, WINDOW, HIT, (240, 228, 66), (200, 200, 210))
 """Colours of overlaid runs, in order."""
 
 

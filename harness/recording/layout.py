@@ -202,10 +202,7 @@ def flight_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial3DView:
 
 
 def series_views(
-    frame: Frame,
-    runs: Sequence[str],
-    only: Sequence[str] | None = None,
-    without: Sequence[str] = (),
+    frame: Frame, runs: Sequence[str], only: Sequence[str] | None = None, without: Sequence[str] = ()
 ) -> list[rrb.TimeSeriesView]:
     """The time series, one a question, each over the whole flight.
 

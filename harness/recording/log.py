@@ -308,9 +308,7 @@ class RerunLog:
             return
         times = [look.time_column(np.array([scans[row].time_s for row in rows]))]
         self._rec.send_columns(
-            f"{look.PLAN}/{look.SENSED}",
-            times,
-            rr.Points2D.columns(positions=new.points_m).partition(counts),
+            f"{look.PLAN}/{look.SENSED}", times, rr.Points2D.columns(positions=new.points_m).partition(counts)
         )
         posts = np.full((len(new.points_m), 2, 3), self._scene.base_m)
         posts[:, :, :2] = new.points_m[:, None]

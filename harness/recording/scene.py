@@ -160,9 +160,7 @@ def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
 def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any] | None) -> None:
     """Logs the summary: what was asked, what came out (if known), what the colours mean."""
     rec.log(
-        look.SUMMARY,
-        rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN),
-        static=True,
+        look.SUMMARY, rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN), static=True
     )
 
 
@@ -246,11 +244,7 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
     rec.log(
         f"{look.WORLD}/ends",
         rr.LineStrips3D(
-            poles,
-            colors=ends,
-            radii=rr.Radius.ui_points(1.5),
-            labels=["start", "goal"],
-            show_labels=True,
+            poles, colors=ends, radii=rr.Radius.ui_points(1.5), labels=["start", "goal"], show_labels=True
         ),
         static=True,
     )

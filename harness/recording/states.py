@@ -126,9 +126,7 @@ def plan_text(accepted: AcceptedPlan) -> str:
 
 
 def send_events(
-    rec: rr.RecordingStream,
-    events: Sequence[tuple[float, str, look.Colour]],
-    after_s: float = -math.inf,
+    rec: rr.RecordingStream, events: Sequence[tuple[float, str, look.Colour]], after_s: float = -math.inf
 ) -> float:
     """Writes lines into the log of events; a `Caution` is a warning.
 

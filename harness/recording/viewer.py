@@ -90,10 +90,7 @@ def open_viewer(
             if told:
                 tell(told)
         if web:
-            with (
-                contextlib.suppress(KeyboardInterrupt),
-                served(shown, Path(scratch)) as (viewer, address),
-            ):
+            with contextlib.suppress(KeyboardInterrupt), served(shown, Path(scratch)) as (viewer, address):
                 tell(f"{address} (Ctrl-C ends it)")
                 webbrowser.open(address)
                 viewer.wait()

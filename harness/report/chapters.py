@@ -140,10 +140,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
         path = planner_figure(scene, drawn, 0)
         caption = f"The track from S to G in {scene.name}{_enlarged(scene, drawn)}."
     strips = figures.profiles(scene, [(0, drawn)])
-    pictures = [
-        _picture(folder / "path", path, caption),
-        _picture(folder / "profiles", strips, PROFILES),
-    ]
+    pictures = [_picture(folder / "path", path, caption), _picture(folder / "profiles", strips, PROFILES)]
     facts = (
         {"conditions": told(scenario)}
         | _facts(scene, optimum)

@@ -334,8 +334,7 @@ class PathEnd:
             return Ending(Outcome.REACHED, f"at the end of the path after {time_s:.0f} s")
         if time_s >= self._limit_s:
             return Ending(
-                Outcome.TIMEOUT,
-                f"not at the end of the path after {time_s:.0f} s, twice what it should take",
+                Outcome.TIMEOUT, f"not at the end of the path after {time_s:.0f} s, twice what it should take"
             )
         return None
 

@@ -53,8 +53,7 @@ Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
 
 
 def make_loop(
-    scenario: Scenario,
-    make_model: Callable[[StartConditions, Atmosphere], FlightModel] | None = None,
+    scenario: Scenario, make_model: Callable[[StartConditions, Atmosphere], FlightModel] | None = None
 ) -> Loop:
     """All parts of a scenario's flight.
 

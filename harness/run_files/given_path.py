@@ -30,6 +30,10 @@ AT_ONCE = 10_000
 SHORTEST_M = 1e-6
 """A shorter segment is left out."""
 
+PAST_RAD = np.radians(140.0)
+"""A sharper corner is flown past and back: from there on an aircraft that does so comes nearer to both legs (flown: at
+140 degrees 118 m off against 125 m, at 150 degrees 178 m against 128 m)."""
+
 SHARPEST_RAD = np.pi - 1e-3
 """A sharper corner leads back: it has no arc that touches both legs."""
 
@@ -139,8 +143,8 @@ def fly_by(
         points_m: (m, 2) points, not all in one place.
         radius_m: smallest radius that the aircraft should fly, > 0; (m,) if it differs from point to point.
         free_cut_m: a corner may be passed at this distance wherever that makes its arc wider, > 0; likewise.
-        overshoot: corners sharper than a right angle are flown as autopilots do, which begin to turn no earlier than
-            one radius before: past the next leg and back onto it.
+        overshoot: corners sharper than `PAST_RAD` are flown past the next leg and back onto it, the turn beginning one
+            radius before the corner.
         tightest: corners that would be cut by more than `LIMIT_SHARE` of what they may be passed at are flown more
             tightly, down to this; None: they are not.
         every: every corner is among the corners, however little it is cut.
@@ -233,7 +237,7 @@ def _shapes(turn: FloatArray, overshoot: bool) -> _Shapes:
     and two radii from the first.
     """
     angle = np.abs(turn)
-    past = overshoot & (angle > 0.5 * np.pi)
+    past = overshoot & (angle > PAST_RAD)
     back = ~past & (angle > SHARPEST_RAD)
     half = 0.5 * np.where(back | past, 0.0, angle)
     along, beside = np.sin(angle) - np.cos(angle), np.sin(angle) + np.cos(angle)

@@ -35,14 +35,10 @@ def test_circle_in_closed_form(radius: float, turn: float, cuts: int) -> None:
     assert figures.bending_energy_1pm == pytest.approx(turn / radius)
     assert figures.max_curvature_1pm == pytest.approx(1.0 / radius)
     assert figures.max_curvature_rate_1pm2 == 0.0
-    assert figures.angle_over_length_radpm == pytest.approx(1.0 / radius)
-    assert figures.bending_energy_normalised == pytest.approx(turn**2)
-    assert figures.max_curvature_normalised == pytest.approx(turn)
-    assert figures.max_curvature_rate_normalised == 0.0
 
 
 def test_straight_line_is_zero_in_all() -> None:
-    nothing = Smoothness(*[0.0] * 8)
+    nothing = Smoothness(*[0.0] * 4)
     assert smoothness(profile((1000.0, 0.0)), 25.0) == nothing
     assert smoothness(Profile(np.zeros(0), np.zeros(0)), 25.0) == nothing
 
@@ -56,22 +52,6 @@ def test_clothoid_in_closed_form() -> None:
     assert figures.bending_energy_1pm == pytest.approx(rate**2 * length**3 / 3, rel=1e-6)
     assert figures.max_curvature_1pm == pytest.approx(rate * length, rel=1e-3)
     assert figures.max_curvature_rate_1pm2 == pytest.approx(rate, rel=1e-6)
-    assert figures.angle_over_length_radpm == pytest.approx(rate * length / 2)
-    assert figures.bending_energy_normalised == pytest.approx(rate**2 * length**4 / 3, rel=1e-6)
-    assert figures.max_curvature_rate_normalised == pytest.approx(rate * length**2, rel=1e-6)
-
-
-@given(scale=st.floats(0.1, 100.0))
-def test_normalised_figures_do_not_change_with_the_scale(scale: float) -> None:
-    small = smoothness(profile((300.0, 0.0), (200.0, 0.01), (300.0, -0.004)), 25.0)
-    large = smoothness(
-        profile((300.0 * scale, 0.0), (200.0 * scale, 0.01 / scale), (300.0 * scale, -0.004 / scale)),
-        25.0 * scale,
-    )
-    for name in ("bending_energy_normalised", "max_curvature_normalised", "max_curvature_rate_normalised"):
-        assert getattr(large, name) == pytest.approx(getattr(small, name))
-    assert large.heading_change_deg == pytest.approx(small.heading_change_deg)
-    assert large.angle_over_length_radpm == pytest.approx(small.angle_over_length_radpm / scale)
 
 
 def test_line_into_arc_has_the_rate_of_the_window() -> None:
@@ -127,12 +107,6 @@ def test_planned_corner_is_turned_over_the_window(
     assert figures.heading_change_deg == pytest.approx(90.0)
     assert figures.bending_energy_1pm == pytest.approx((math.pi / 2) ** 2 / 25.0)
     assert figures.max_curvature_1pm == pytest.approx(math.pi / 2 / 25.0)
-
-
-def test_angle_over_length_of_a_polyline_takes_the_length_of_the_polyline() -> None:
-    """A right angle in 500 m, turned over a window that makes the profile longer than the path."""
-    bent = profile((100.0, 0.0), (25.0, math.pi / 2 / 25.0), (400.0, 0.0))
-    assert smoothness(bent, 25.0, 500.0).angle_over_length_radpm == pytest.approx(math.pi / 2 / 500.0)
 
 
 @given(radius=st.floats(50.0, 1e4), chords=st.integers(8, 200))
