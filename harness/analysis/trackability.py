@@ -202,10 +202,10 @@ def _judge(
 
 
 def _is_misled(believed: FloatArray | None, true: FloatArray, most: float, row: np.intp) -> bool:
-    """Whether it is navigation that is off at the row of the largest true error: the larger part of it, or all that is
-    beyond the limit. Not where the belief is not known.
+    """Whether the larger part of the largest true error, or all of it beyond the limit, is navigation's.
 
-    At other rows it may have been off: it flies to where its first fix says that it should be.
+    It is not where the belief is unknown. At other rows the aircraft may have believed to be off: it flies to where its
+    first fix says that it should be.
     """
     if believed is None or not np.isfinite(believed[row]):
         return False
