@@ -14,7 +14,7 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
-from planner.baselines import bendy_ruler, bug1, bug2, dubins_tree, mppi, tangent_bug, vfh_plus
+from planner.baselines import bendy_ruler, bug, dubins_tree, mppi, tangent_bug, vfh_plus
 from planner.interface import Mission, Planner
 from planner.paper import config as paper_config
 from planner.paper import rolling as paper
@@ -68,15 +68,15 @@ BUILT_IN = (
     PlannerKind(
         kind="bug1",
         summary="Bug1 (Lumelsky, Stepanov): round every obstacle, and on from its point nearest to the goal",
-        config=bug1.Bug1Config,
-        make=bug1.Bug1,
+        config=bug.BugConfig,
+        make=bug.Bug1,
         point=True,
     ),
     PlannerKind(
         kind="bug2",
         summary="Bug2 (Lumelsky, Stepanov): along the M-line, round obstacles until the line is met again",
-        config=bug2.Bug2Config,
-        make=bug2.Bug2,
+        config=bug.BugConfig,
+        make=bug.Bug2,
         point=True,
     ),
     PlannerKind(

@@ -10,7 +10,7 @@ V at which the edges of free sectors touch an obstacle within the sensing range.
 1. Motion to the goal: move to the V of the graph with the least d(x, V) + d(V, T) among those nearer to the goal
    T than the aircraft x (and than the last boundary that was left), and along the obstacle it touches while that
    leads nearer to T. Where there is no such V, a local minimum: go to 2.
-2. Follow the boundary of the obstacle that blocks the goal, cutting across its dents, until
+2. Follow the boundary of the obstacle that blocks the goal, straight to the furthest place of it in sight, until
    (a) a V is in sight that is nearer to T than any place of that boundary sensed so far, d_reach < d_followed:
    move to it (transition) and go to 1;
    (b) the whole boundary has been gone round: the goal is enclosed and cannot be reached.
@@ -19,15 +19,15 @@ V at which the edges of free sectors touch an obstacle within the sensing range.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.baselines.walk import Enclosed, Mark, PointConfig, Walker, WalkLeg, cut, length_of, mark_at
-from planner.geometry.curves import Point, Segment, along
-from planner.interface import Mission
-from planner.rolling_window.window import Window
+from planner.baselines.polyline import NOWHERE, Mark, length_of, mark_at, piece
+from planner.baselines.walk import Enclosed, PointConfig, Walker, WalkLeg, place_at_end
+from planner.geometry.curves import Point
+from planner.interface import FloatArray, Mission
 
 PROGRESS_SHARE = 0.05
 """What is to be nearer to the goal is nearer by this share of the kept distance."""
@@ -38,8 +38,8 @@ LOOKS = 40.0
 SHORTER = 0.005
 """A way to the goal is dropped only for one that is shorter by this share."""
 
-SHORTCUTS = 24
-"""So many places of a boundary are tried for a way across its dents."""
+SHORTCUTS = 16
+"""So many places of a boundary are tried for a straight way to it."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,14 @@ class Toward:
 
 @dataclass(frozen=True)
 class BoundaryFollowing:
-    """BoundaryFollowing a boundary.
+    """Following a boundary.
 
     Attributes:
         hit: where it was begun.
         side: 1 for the obstacle on the left, -1 for on the right.
         anchor: the place on the boundary from which it is followed on.
         walked_m: how much of it lies before the anchor.
-        on_boundary: at the anchor, not on a way across a dent.
+        on_boundary: at the anchor, not on a straight way to it.
         followed_m: d_followed, how near to the goal this boundary and all left before come.
     """
 
@@ -79,7 +79,7 @@ TangentBugState = Toward | BoundaryFollowing | Enclosed
 
 @dataclass(frozen=True)
 class TangentNode:
-    """A place V of the local tangent graph, and which obstacle it touches on which side (0: none)."""
+    """A place V of the local tangent graph, and on which side it touches an obstacle (0: none)."""
 
     place: Point
     to_goal_m: float
@@ -102,14 +102,14 @@ class TangentBug(Walker[TangentBugState]):
         """Motion to the goal."""
         return Toward(math.inf)
 
-    def after(self, state: TangentBugState, flown: Sequence[Segment]) -> TangentBugState:
+    def after(self, state: TangentBugState, flown: FloatArray) -> TangentBugState:
         """Moves the anchor along with the aircraft."""
         if not isinstance(state, BoundaryFollowing):
             return state
         followed = min(state.followed_m, self._nearest_m(state.anchor))
-        if not state.on_boundary or not flown:
+        if not state.on_boundary or not len(flown):
             return replace(state, followed_m=followed)
-        place, walked = mark_at(flown, math.inf).place, state.walked_m + length_of(flown)
+        place, walked = place_at_end(flown, state.anchor), state.walked_m + length_of(flown)
         return replace(state, anchor=place, walked_m=walked, followed_m=followed)
 
     def follows(self, place: Point, state: TangentBugState) -> tuple[Point, ...]:
@@ -127,12 +127,12 @@ class TangentBug(Walker[TangentBugState]):
         return self.mission.sensor_range_m / LOOKS
 
     def prefers(self, new: tuple[WalkLeg[TangentBugState], ...], left_m: float) -> bool:
-        """A change of behaviour, a way across a dent, or a shorter or a free way to the goal."""
+        """A change of behaviour, a straight way to the boundary, or a shorter or a free way to the goal."""
         state = new[0].state
         if isinstance(state, BoundaryFollowing):
-            return not state.on_boundary and length_of(new[0].segments) > self.look_again_m()
+            return not state.on_boundary and length_of(new[0].way) > self.look_again_m()
         was_caught = any(isinstance(leg.state, BoundaryFollowing) for leg in self.legs)
-        shorter = sum(length_of(leg.segments) for leg in new) < (1.0 - SHORTER) * left_m
+        shorter = sum(length_of(leg.way) for leg in new) < (1.0 - SHORTER) * left_m
         return was_caught or shorter or math.isfinite(self.breach_m)
 
     def walk(self, place: Point, state: TangentBugState) -> Iterator[WalkLeg[TangentBugState]]:
@@ -148,10 +148,10 @@ class TangentBug(Walker[TangentBugState]):
                 yield WalkLeg(state, line)
                 return
             node = self._best(place, self._nodes(place), state.limit_m)
-            slide = self._slide(place, node) if node is not None else ()
-            onto = mark_at(slide, math.inf).place if slide else place
+            slide = self._slide(place, node) if node is not None else NOWHERE
+            onto = place_at_end(slide, place)
             if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self._progress_m:
-                state = self._caught(place, line, state.limit_m)
+                state = self._caught(place, place_at_end(line, place), state.limit_m)
             else:
                 yield WalkLeg(state, slide)
                 place = onto
@@ -168,29 +168,15 @@ class TangentBug(Walker[TangentBugState]):
         reach = self.mission.sensor_range_m
         clear, blocking = self.known.first_hit(place, self.goal)
         ahead = min(clear, reach, math.dist(place, self.goal))
-        nodes = [self._node(place, self._towards(place, ahead), 0.0)]
-        labels = self.known.labels
-        wanted = {int(labels[blocking])} if clear < reach else set()
+        nodes = [self._node(place, mark_at(np.array([place, self.goal]), ahead).place, 0.0)]
+        parts = {blocking} if clear < reach else set()
         if also is not None:
-            wanted.add(int(labels[self.known.seat(also)[0]]))
-        distance = np.hypot(*(self.known.points_m - place).T)
-        near = np.flatnonzero((distance < reach) & (distance > self.known.radii_m * (1.0 + 1e-9)))
-        window = Window(
-            place, self.known.points_m[near], labels[near], self.known.cell_m, self.known.radii_m[near]
-        )
-        for label in sorted(wanted & set(np.unique(window.labels).tolist())):
-            for edge in window.sector_edges(place, [label]):
-                touch = place[0] + edge.touch_m * edge.ux, place[1] + edge.touch_m * edge.uy
-                disc, _ = self.known.seat(touch)
-                x, y = self.known.points_m[disc].tolist()
-                left = edge.ux * (y - touch[1]) - edge.uy * (x - touch[0])
-                nodes.append(self._node(place, touch, math.copysign(1.0, left)))
-        return nodes
-
-    def _towards(self, place: Point, distance_m: float) -> Point:
-        whole = max(math.dist(place, self.goal), 1e-9)
-        share = distance_m / whole
-        return place[0] + share * (self.goal[0] - place[0]), place[1] + share * (self.goal[1] - place[1])
+            parts.add(self.known.part_at(also))
+        touched = self.known.tangents(place, parts, reach)
+        # Where something hides an edge, the edges of that are taken as well.
+        hiding = {self.known.first_hit(place, corner)[1] for corner, _, seen in touched if not seen} - parts
+        touched += self.known.tangents(place, hiding, reach)
+        return nodes + [self._node(place, corner, side) for corner, side, seen in touched if seen]
 
     def _node(self, place: Point, touch: Point, side: float) -> TangentNode:
         to_goal = math.dist(touch, self.goal)
@@ -208,39 +194,34 @@ class TangentBug(Walker[TangentBugState]):
                 nearer.append(node)
         return min(nearer, key=lambda node: node.way_m, default=None)
 
-    def _slide(self, place: Point, node: TangentNode) -> tuple[Segment, ...]:
+    def _slide(self, place: Point, node: TangentNode) -> FloatArray:
         """To a node and along the obstacle while that leads nearer to the goal and the goal is behind it."""
         way, met = self.straight(place, node.place)
         if met and length_of(way) < math.dist(place, node.place) - self._progress_m:
             return way
-        segments = (*way, *self.boundary(node.place, node.side, self.horizon_m))
-        here = math.dist(node.place, self.goal)
-        arc_length_m = length_of(way)
-        for segment in segments[len(way) :]:
-            end = along(segment, segment[5])[:2]
-            there = math.dist(end, self.goal)
-            if there > here or not self.known.turned_back(segment[:2], self.goal):
+        along = self.known.boundary(node.place, node.side, self.horizon_m)
+        to_goal = np.hypot(*(along - self.goal).T).tolist()
+        last = 0
+        while last < len(along) - 1 and to_goal[last + 1] <= to_goal[last]:
+            if (
+                not self.known.first_hit((float(along[last, 0]), float(along[last, 1])), self.goal)[0]
+                < self.keep_m
+            ):
                 break
-            here = there
-            arc_length_m += segment[5]
-        return cut(segments, arc_length_m)
+            last += 1
+        return np.concatenate((way, along[: last + 1]))
 
-    def _caught(self, place: Point, line: Sequence[Segment], limit_m: float) -> BoundaryFollowing:
+    def _caught(self, place: Point, hit: Point, limit_m: float) -> BoundaryFollowing:
         """A local minimum: the boundary ahead is followed to the side of the better node."""
         nodes = [node for node in self._nodes(place) if node.side]
         side = min(nodes, key=lambda node: node.way_m).side if nodes else self.side
-        hit = along(line[0], line[0][5])[:2] if line else place
-        first = mark_at(self.boundary(hit, side, self.keep_m), 0.0)
+        first = mark_at(self.known.boundary(hit, side, self.keep_m), 0.0)
         on_boundary = math.dist(place, hit) < self._progress_m
         return BoundaryFollowing(first, side, hit, 0.0, on_boundary, min(limit_m, self._nearest_m(hit)))
 
     def _nearest_m(self, anchor: Point) -> float:
         """How near to the goal the boundary at a place comes, as far as it has been sensed."""
-        labels = self.known.labels
-        mine = labels == labels[self.known.seat(anchor)[0]]
-        east, north = self.goal
-        points = self.known.points_m[mine]
-        return float((np.hypot(points[:, 0] - east, points[:, 1] - north) - self.known.radii_m[mine]).min())
+        return min(self.known.nearest_to_goal_m(anchor), math.dist(anchor, self.goal))
 
     def _leave(self, place: Point, state: BoundaryFollowing) -> TangentNode | None:
         """The node to leave the boundary for: d_reach < d_followed."""
@@ -249,62 +230,33 @@ class TangentBug(Walker[TangentBugState]):
         return min(nearer, key=lambda node: node.way_m, default=None)
 
     def _follow(self, place: Point, state: BoundaryFollowing) -> Iterator[WalkLeg[TangentBugState]]:
-        """Along the boundary, the first part of it cut short by a way across a dent."""
-        segments = self.boundary(state.anchor, state.side, self.horizon_m)
-        off = math.dist(place, state.anchor) > self._progress_m or not state.on_boundary
-        least_m = 0.0 if off else 2.0 * self.look_again_m()
-        # From off it, more than half of what is left of the round is seen past the other side of the obstacle.
-        left_m = self.passes(segments, state.hit, self.keep_m - state.walked_m)
-        ahead = cut(segments, 0.5 * left_m if off else left_m)
-        arc_length_m = self._beyond_a_dent(place, ahead, state.side, least_m)
-        if off and not arc_length_m and not self._sees(place, state.anchor):
-            arc_length_m = self._seen_from(place, ahead)
-        if off or arc_length_m > 0.0:
-            onto = mark_at(segments, arc_length_m).place
-            way, _ = self.straight(place, onto)
-            if off or length_of(way) < arc_length_m - self._progress_m:
-                yield WalkLeg(replace(state, on_boundary=False), way)
-                skipped = cut(segments, arc_length_m)
-                if math.isfinite(self.passes(skipped, state.hit, self.keep_m - state.walked_m)):
-                    yield WalkLeg(self._gone_round())
-                    return
-                state = replace(state, anchor=onto, walked_m=state.walked_m + arc_length_m)
-                segments = self.boundary(onto, state.side, self.horizon_m)
-        closed = self.passes(segments, state.hit, self.keep_m - state.walked_m)
-        yield WalkLeg(replace(state, on_boundary=True), cut(segments, closed))
+        """Along the boundary, the first part of it cut short where its next places are in sight."""
+        way = self.known.boundary(state.anchor, state.side, self.horizon_m)
+        closed = self.passes(way, state.hit, self.keep_m - state.walked_m)
+        skip_m = self._in_sight(place, state, piece(way, 0.0, closed))
+        if not (skip_m or state.on_boundary or self.known.sees(place, state.anchor)):
+            yield from self.walk(place, Toward(state.followed_m))  # something has come before it
+            return
+        if skip_m > 0.0 or not state.on_boundary:
+            onto = mark_at(way, skip_m).place
+            state = replace(state, anchor=onto, walked_m=state.walked_m + skip_m)
+            line, _ = self.straight(place, onto)
+            yield WalkLeg(replace(state, on_boundary=False), line)
+        yield WalkLeg(replace(state, on_boundary=True), piece(way, skip_m, closed))
         if math.isfinite(closed):
-            yield WalkLeg(self._gone_round())
+            yield WalkLeg(Enclosed(f"{self.enclosed()}: its whole boundary has been gone round"))
 
-    def _gone_round(self) -> Enclosed:
-        return Enclosed(f"{self.enclosed()}: its whole boundary has been gone round")
-
-    def _beyond_a_dent(self, place: Point, segments: Sequence[Segment], side: float, least_m: float) -> float:
-        """The furthest arc length of a boundary in sight across a dent; 0 where none is beyond the least.
-
-        A dent lies on the other side of the way than the obstacle. A way that encloses the obstacle leads round it:
-        its end is in sight as well, behind.
-        """
-        arc_lengths_m = np.linspace(0.0, length_of(segments), SHORTCUTS + 1)
-        corners = np.array([mark_at(segments, arc_length_m).place for arc_length_m in arc_lengths_m]) - place
-        doubled = np.cumsum(corners[:-1, 0] * corners[1:, 1] - corners[:-1, 1] * corners[1:, 0])
-        dents = 0.5 * side * doubled <= self.keep_m * np.hypot(*corners[1:].T)
-        return self._seen_from(place, segments, least_m, dents.tolist())
-
-    def _seen_from(
-        self, place: Point, segments: Sequence[Segment], least_m: float = 0.0, among: Sequence[bool] = ()
-    ) -> float:
-        """The furthest arc length of a boundary in sight from a place, of some; 0 where none is beyond the least."""
-        whole = length_of(segments)
-        for i in range(SHORTCUTS, 0, -1):
-            arc_length_m = whole * i / SHORTCUTS
-            if arc_length_m <= least_m:
-                break
-            if among and not among[i - 1]:
+    def _in_sight(self, place: Point, state: BoundaryFollowing, way: FloatArray) -> float:
+        """The furthest arc length of a boundary in sight with nothing between it and the straight way there."""
+        whole = length_of(way)
+        least_m = 2.0 * self.look_again_m() if state.on_boundary else 0.0
+        for share in (np.arange(SHORTCUTS, 0, -1) / SHORTCUTS).tolist():
+            ahead = piece(way, 0.0, share * whole)
+            onto = place_at_end(ahead, place)
+            shorter = math.dist(place, onto) < share * whole - self._progress_m
+            if share * whole <= least_m or (state.on_boundary and not shorter):
                 continue
-            if self._sees(place, mark_at(segments, arc_length_m).place):
-                return arc_length_m
+            outline = np.concatenate(([place], ahead))
+            if self.known.sees(place, onto) and self.known.encloses_nothing(outline):
+                return float(share * whole)
         return 0.0
-
-    def _sees(self, place: Point, target: Point) -> bool:
-        """Whether a straight way leads to a target, but for a little."""
-        return self.known.first_hit(place, target)[0] > math.dist(place, target) - self._progress_m

@@ -19,12 +19,12 @@ from typing import Generic, Literal, Self, TypeVar
 
 import numpy as np
 
-from planner.baselines.boundary import GrownObstacles
-from planner.baselines.boundary_path import Contact
-from planner.geometry.clearance import distances, first_breach
-from planner.geometry.curves import SHORTEST_M, Point, Segment, along, between, end_of, pose_at
+from planner.baselines.grown import GrownObstacles
+from planner.baselines.polyline import NOWHERE, Mark, beside, length_of, piece
+from planner.geometry.clearance import first_breach
+from planner.geometry.curves import SHORTEST_M, Point, end_of, pose_at
 from planner.geometry.margin import MARGIN_KEY, margin_of
-from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.world_stability import WorldStability
 
 BREACH_SHARE = 0.25
@@ -33,9 +33,6 @@ BREACH_SHARE = 0.25
 SAME_PLACE = 0.5
 """Places on a boundary passed in one sense and nearer than this share of the kept distance are the same: no two
 stretches of a boundary that run the same way can be that near to each other."""
-
-GAP_M = 1e-3
-"""A path that would jump further than this between two segments is joined by a straight line."""
 
 WalkState = TypeVar("WalkState")
 
@@ -66,30 +63,17 @@ class PointConfig:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WalkLeg(Generic[WalkState]):
     """A part of a walk on which the state of the algorithm is one.
 
     Attributes:
         state: as it is where the leg begins.
-        segments: the way; none where the algorithm ends.
+        way: (n, 2) corners, m; none where the algorithm ends.
     """
 
     state: WalkState
-    segments: tuple[Segment, ...] = ()
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A place on a boundary and the unit vector in which it was passed."""
-
-    place: Point
-    ux: float
-    uy: float
-
-    def reversed(self) -> Mark:
-        """The same place passed the other way."""
-        return Mark(self.place, -self.ux, -self.uy)
+    way: FloatArray = field(default_factory=lambda: NOWHERE)
 
 
 @dataclass(frozen=True)
@@ -111,8 +95,6 @@ class Enclosed:
 class Walker(ABC, Generic[WalkState]):
     """The frame of a planner whose vehicle is a point: when to walk anew, and from which state.
 
-    The algorithms that it frames read half of its attributes: goal, side, kept distance, horizon, legs, what is known.
-
     Args:
         config: resolved keys.
         mission: what stays the same for the flight.
@@ -122,8 +104,7 @@ class Walker(ABC, Generic[WalkState]):
         config = config.resolved(mission)
         assert config.margin_m is not None
         assert config.horizon_m is not None
-        self.mission, self.goal = mission, mission.goal_m
-        self.horizon_m = config.horizon_m
+        self.mission, self.goal, self.horizon_m = mission, mission.goal_m, config.horizon_m
         self.side = (
             -1.0 if config.turn == "left" else 1.0
         )  # turning left, the obstacle comes to be on the right
@@ -135,16 +116,16 @@ class Walker(ABC, Generic[WalkState]):
         self._tried_again = False
         self._plan: Plan | None = None
         self.legs: tuple[WalkLeg[WalkState], ...] = ()
-        self.breach_m = math.inf
-        self._look_at_m = math.inf
+        self.breach_m = self._look_at_m = math.inf
+        self._flown_m = 0.0
 
     @abstractmethod
     def begin(self, place: Point) -> WalkState:
         """The state at the start of the flight."""
 
     @abstractmethod
-    def after(self, state: WalkState, flown: Sequence[Segment]) -> WalkState:
-        """The state after a part of a leg."""
+    def after(self, state: WalkState, flown: FloatArray) -> WalkState:
+        """The state after a part of a leg, (n, 2)."""
 
     @abstractmethod
     def walk(self, place: Point, state: WalkState) -> Iterable[WalkLeg[WalkState]]:
@@ -171,16 +152,17 @@ class Walker(ABC, Generic[WalkState]):
         fresh, taken_back = self.known.take_in(request.seen)
         self._unrest.note(request.time_s, request.seen)
         path = request.flown.path if request.flown and request.flown is self._plan else None
+        if path is None and request.refused is not None and self.legs:
+            # Not begun anew: the shield only held.
+            state, place = self._state_at(self._flown_m), request.position_m
+            return self._found(self._taken_up(place, state, taken_back), request, place)
         if path is None:
             return self._begun(request)
+        self._flown_m = request.arc_length_m
         arc_length_m, end = request.arc_length_m, self.legs[-1].state
         left = path.length_m - arc_length_m
         if isinstance(end, Enclosed) and left < SAME_PLACE * self.keep_m:
-            doubtful = taken_back or (self.known.taken_back and not self._tried_again)
-            if doubtful or not self._unrest.settled(request.time_s):
-                self._tried_again |= doubtful
-                return self._begun(request)
-            return Plan(PlanStatus.UNREACHABLE, end.sentence)
+            return self._ended(request, end, taken_back)
         if len(fresh):
             breach = first_breach(path, fresh, self._breach_keep_m, arc_length_m)
             self.breach_m = min(self.breach_m, breach)
@@ -195,157 +177,89 @@ class Walker(ABC, Generic[WalkState]):
         place = pose_at(path, arc_length_m)[:2]
         if math.dist(place, request.position_m) > self.mission.off_path_m:
             place = request.position_m
-        state = self._state_at(path, arc_length_m)
-        if taken_back and any(map(self._has_gone, self.follows(place, state))):
-            state = self.begin(place)
-        legs = tuple(self.walk(place, state))
-        if self._begins_off_m(legs, place) > self.mission.off_path_m:
-            # Off its boundary, as an aircraft that cuts corners comes to be, the way back to it is blocked.
-            legs = tuple(self.walk(place, self.begin(place)))
+        legs = self._taken_up(place, self._state_at(arc_length_m), taken_back)
         if not must and not self.prefers(legs, left):
             self._look_at_m = arc_length_m + self.look_again_m()
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
         return self._found(legs, request, place)
 
-    def _begins_off_m(self, legs: Sequence[WalkLeg[WalkState]], place: Point) -> float:
-        """How far from a place a walk begins."""
-        first = next((segment for leg in legs for segment in leg.segments), None)
-        return 0.0 if first is None else math.dist(first[:2], place)
-
     def _begun(self, request: PlanRequest) -> Plan:
         """A walk from the beginning of the algorithm."""
         place = request.position_m
-        return self._found(tuple(self.walk(place, self.begin(place))), request)
+        return self._found(tuple(self.walk(place, self.begin(place))), request, place)
 
-    def _has_gone(self, followed: Point) -> bool:
-        """Whether there is no boundary any more where one was."""
-        return math.dist(followed, self.known.seat(followed)[1]) > self.keep_m
+    def _ended(self, request: PlanRequest, end: Enclosed, taken_back: bool) -> Plan:
+        """At the end of the algorithm: it is begun anew where the world may not be what it was."""
+        doubtful = taken_back or (self.known.taken_back and not self._tried_again)
+        if doubtful or not self._unrest.settled(request.time_s):
+            self._tried_again |= doubtful
+            return self._begun(request)
+        return Plan(PlanStatus.UNREACHABLE, end.sentence)
 
-    def _state_at(self, path: Path, arc_length_m: float) -> WalkState:
+    def _taken_up(self, place: Point, state: WalkState, taken_back: bool) -> tuple[WalkLeg[WalkState], ...]:
+        """The walk from a state on; from the beginning where the boundary that was followed has gone."""
+        gone = taken_back and any(self.known.off_m(each) > self.keep_m for each in self.follows(place, state))
+        return tuple(self.walk(place, self.begin(place) if gone else state))
+
+    def _state_at(self, arc_length_m: float) -> WalkState:
         """The state of the algorithm at an arc length of the path in effect."""
         begin = 0.0
         for leg in self.legs:
-            end = begin + length_of(leg.segments)
+            end = begin + length_of(leg.way)
             if arc_length_m < end - SHORTEST_M or leg is self.legs[-1]:
                 break
             begin = end
-        return self.after(leg.state, between(path, begin, arc_length_m))
+        return self.after(leg.state, piece(leg.way, 0.0, arc_length_m - begin))
 
-    def _found(
-        self, legs: tuple[WalkLeg[WalkState], ...], request: PlanRequest, place: Point | None = None
-    ) -> Plan:
-        here = place or request.position_m
-        legs = tuple(connected(legs, here, self.mission.off_path_m))
-        segments = [segment for leg in legs for segment in leg.segments]
+    def _found(self, legs: tuple[WalkLeg[WalkState], ...], request: PlanRequest, place: Point) -> Plan:
+        legs = tuple(connected(legs, place))
+        corners = np.concatenate([leg.way for leg in legs])
+        apart = np.hypot(*np.diff(corners, axis=0).T) > SHORTEST_M
+        corners = corners[np.concatenate(([True], apart))] if len(corners) else corners
         end = legs[-1].state
-        if not segments:
+        if len(corners) < 2:
             reason = end.sentence if isinstance(end, Enclosed) else "there is no room to move"
             proven = isinstance(end, Enclosed) and self._unrest.settled(request.time_s)
             return Plan(PlanStatus.UNREACHABLE if proven else PlanStatus.NO_PATH, reason)
-        last = along(segments[-1], segments[-1][5])[:2]
         self.legs, self.breach_m, self._look_at_m = legs, math.inf, self.look_again_m()
-        self._plan = Plan(
-            PlanStatus.FOUND,
-            self.says(legs[0].state),
-            np.array([*(segment[:2] for segment in segments), last]),
-            Path(np.array(segments)),
-            partial(PlanPicture, np.array([here, self.goal]), self.mission.sensor_range_m, np.zeros((0, 4))),
-        )
+        self._flown_m = 0.0
+        picture = partial(PlanPicture, np.array([place, self.goal]), self.mission.sensor_range_m)
+        self._plan = Plan(PlanStatus.FOUND, self.says(legs[0].state), corners, Path.through(corners), picture)
         return self._plan
 
     def enclosed(self) -> str:
         """How a sentence on a goal that cannot be reached begins."""
         return f"an obstacle encloses the goal at a distance of {self.keep_m:.0f} m from its edge"
 
-    def straight(self, place: Point, target: Point) -> tuple[tuple[Segment, ...], bool]:
-        """The line from a place towards a target, up to the first obstacle, and whether it meets one."""
+    def straight(self, place: Point, target: Point) -> tuple[FloatArray, bool]:
+        """(n, 2) the line from a place towards a target, up to the first obstacle, and whether it meets one."""
         clear, _ = self.known.first_hit(place, target)
         whole = math.dist(place, target)
         length = min(whole, clear)
         if length <= SHORTEST_M:
-            return (), clear < whole
-        ux, uy = (target[0] - place[0]) / whole, (target[1] - place[1]) / whole
-        return ((*place, ux, uy, 0.0, length),), clear < whole
+            return NOWHERE, clear < whole
+        return piece(np.array([place, target]), 0.0, length), clear < whole
 
-    def boundary(self, place: Point, side: float, length_m: float) -> tuple[Segment, ...]:
-        """The way along the boundary next to a place.
-
-        Args:
-            place: on the boundary or near it.
-            side: 1 for the obstacle on the left, -1 for on the right.
-            length_m: how much of the boundary.
-        """
-        disc, seat = self.known.seat(place)
-        contacts: list[Contact] = []
-        length = 0.0
-        for contact in self.known.contacts(disc, seat, side):
-            contacts.append(contact)
-            length += float(self.known.radii_m[contact.disc]) * (contact.end_rad - contact.begin_rad)
-            if length >= length_m:
-                break
-        return tuple(self.known.path_along(place, contacts, side))
-
-    def passes(self, segments: Sequence[Segment], mark: Mark, from_m: float) -> float:
+    def passes(self, way: FloatArray, mark: Mark, from_m: float) -> float:
         """Arc length at which a way passes a mark in its sense, not before an arc length; infinite for never."""
-        begin, best, best_at = 0.0, SAME_PLACE * self.keep_m, math.inf
-        for segment in segments:
-            end = begin + segment[5]
-            if end >= from_m:
-                reach = math.dist(segment[:2], mark.place) - segment[5]
-                distance, at = nearest_on_segment(segment, mark.place) if reach < best else (math.inf, 0.0)
-                if distance < best and _same_way(segment, at, mark) and begin + at >= from_m:
-                    best, best_at = distance, begin + at
-                elif math.isfinite(best_at) and begin - best_at > self.keep_m:
-                    break
-            begin = end
-        return best_at
+        if len(way) < 2:
+            return math.inf
+        away, at, along = beside(way, mark.place)
+        same = (away < SAME_PLACE * self.keep_m) & (along @ (mark.ux, mark.uy) > 0.0) & (at >= from_m)
+        if not same.any():
+            return math.inf
+        same &= at < at[same].min() + self.keep_m
+        return float(at[same][away[same].argmin()])
 
 
-def length_of(segments: Iterable[Segment]) -> float:
-    """Length of a way (m)."""
-    return sum(segment[5] for segment in segments)
+def place_at_end(way: FloatArray, otherwise: Point) -> Point:
+    """Where a way ends; a way without a place ends elsewhere."""
+    return (float(way[-1, 0]), float(way[-1, 1])) if len(way) else otherwise
 
 
-def _same_way(segment: Segment, at_m: float, mark: Mark) -> bool:
-    _, _, tx, ty = along(segment, at_m)
-    return tx * mark.ux + ty * mark.uy > 0.0
-
-
-def connected(
-    legs: Sequence[WalkLeg[WalkState]], begin: Point | None = None, off_m: float = math.inf
-) -> Iterator[WalkLeg[WalkState]]:
-    """Legs with a straight line wherever a segment begins off where the one before ends, as beside a boundary.
-
-    Args:
-        legs: the walk.
-        begin: where the vehicle is.
-        off_m: the walk may begin so far from there without a line.
-    """
-    at, gap_of_m = begin, off_m
+def connected(legs: Sequence[WalkLeg[WalkState]], begin: Point) -> Iterator[WalkLeg[WalkState]]:
+    """Legs that begin where the one before ends, the first one where the vehicle is: by a straight line."""
+    at = np.array([begin])
     for leg in legs:
-        segments: list[Segment] = []
-        for segment in leg.segments:
-            gap_m = 0.0 if at is None else math.dist(at, segment[:2])
-            if at is not None and gap_m > gap_of_m:
-                ux, uy = (segment[0] - at[0]) / gap_m, (segment[1] - at[1]) / gap_m
-                segments.append((*at, ux, uy, 0.0, gap_m))
-            segments.append(segment)
-            at, gap_of_m = along(segment, segment[5])[:2], GAP_M
-        yield replace(leg, segments=tuple(segments))
-
-
-def nearest_on_segment(segment: Segment, place: Point) -> tuple[float, float]:
-    """Distance of a place from a segment, and where along it (m)."""
-    distance, arc_length_m = distances(Path(np.array([segment])), np.array([place]))
-    return float(distance[0]), float(arc_length_m[0])
-
-
-def cut(segments: Sequence[Segment], arc_length_m: float) -> tuple[Segment, ...]:
-    """The way up to an arc length."""
-    return tuple(between(Path(np.array(segments)), 0.0, arc_length_m)) if segments else ()
-
-
-def mark_at(segments: Sequence[Segment], arc_length_m: float) -> Mark:
-    """The place at an arc length of a way, and its direction there."""
-    x, y, ux, uy = pose_at(Path(np.array(segments)), arc_length_m)
-    return Mark((x, y), ux, uy)
+        yield replace(leg, way=np.concatenate((at, leg.way))) if len(leg.way) else leg
+        at = leg.way[-1:] if len(leg.way) else at

@@ -25,6 +25,7 @@ import numpy as np
 from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, Segment, along, between, on_loiter, place_on
+from planner.geometry.path_samples import poses_at
 from planner.geometry.terrain import Tally
 from planner.interface import (
     FloatArray,
@@ -62,11 +63,13 @@ class Adopted:
     """A path of the inner planner, and how far along it has been certified.
 
     Attributes:
-        plan: the planner's answer.
+        plan: the planner's answer, checked.
+        own: the same as the object that the planner gave; it gets this one back as `PlanRequest.flown`.
         certified_m: arc length of its path beside the turn that the plan in effect ends with.
     """
 
     plan: Plan
+    own: Plan
     certified_m: float = 0.0
 
 
@@ -96,6 +99,7 @@ class Shield:
         )
         self._adopted: Adopted | None = None  # what the plan in effect comes from
         self._proposed: Adopted | None = None
+        self._own = Plan(PlanStatus.KEPT, "")  # the inner planner's last answer, as it gave it
         self._refused: Refused | None = None
         self._threats: Threats | None = None
         self._ever_changed = False
@@ -148,12 +152,13 @@ class Shield:
         flown, arc_length_m = None, 0.0
         effective, adopted = self._monitor.plan, self._adopted
         if adopted is not None and effective is not None and not effective.holds(here_m):
-            flown = adopted.plan
-            assert flown.path is not None
-            arc_length_m = _nearest_m(flown.path, request.position_m, adopted.certified_m)
+            flown = adopted.own
+            assert adopted.plan.path is not None
+            arc_length_m = _nearest_m(adopted.plan.path, request.position_m, adopted.certified_m)
         told = request._replace(flown=flown, arc_length_m=arc_length_m, refused=self._refused)
         try:
-            return checked_plan(self._inner.plan(told), request.position_m, self._mission)
+            self._own = self._inner.plan(told)
+            return checked_plan(self._own, request.position_m, self._mission)
         except KeyboardInterrupt:
             raise
         except NoWayToBegin as error:
@@ -172,7 +177,7 @@ class Shield:
     def _certified(self, request: PlanRequest, here_m: float, answer: Plan) -> CommittedPlan | None:
         """A new committed plan along a new path, or further along the one that is flown; None without one."""
         if answer.status is PlanStatus.FOUND:
-            return self._committed(request, here_m, Adopted(answer), new=True)
+            return self._committed(request, here_m, Adopted(answer, self._own), new=True)
         effective = self._monitor.plan
         if self._adopted is None or not request.scanned or effective is None or effective.course.to_goal:
             return None
@@ -231,7 +236,7 @@ class Shield:
             True,
             not found.path.loiter,
         )
-        self._proposed = Adopted(adopted.plan, track.station_m(found.loiter_entry_m))
+        self._proposed = Adopted(adopted.plan, adopted.own, track.station_m(found.loiter_entry_m))
         return CommittedPlan(plan, found.path, course, found.loiter_entry_m)
 
     def _start(self, request: PlanRequest, here_m: float) -> tuple[list[Segment], Pose, float]:
@@ -285,14 +290,13 @@ class Shield:
         """The way up to where the flight is over, where it leads into the goal circle and is seen to be free."""
         mission = self._mission
         inside_m = mission.goal_radius_m - mission.tracking_error_m
-        step_m = 0.1 * max(inside_m, 1.0)
-        for i in range(int(min(way.length_m, cut_m) / step_m) + 1):
-            if math.dist(place_on(way, i * step_m)[0][:2], mission.goal_m) <= inside_m:
-                flown = Path(
-                    np.array(between(way, 0.0, i * step_m + mission.tracking_error_m) or way.segments)
-                )
-                return certifier.certify_up_to(i * step_m, flown, request.seen, mission.bounds_m)
-        return None
+        at = np.arange(0.0, min(way.length_m, cut_m), 0.1 * max(inside_m, 1.0))
+        inside = np.hypot(*(poses_at(way, at)[:, :2] - mission.goal_m).T) <= inside_m
+        if not inside.any():
+            return None
+        over_m = float(at[inside.argmax()])
+        flown = Path(np.array(between(way, 0.0, over_m + mission.tracking_error_m) or way.segments))
+        return certifier.certify_up_to(over_m, flown, request.seen, mission.bounds_m)
 
     def _not_taken(self, place: Point, reason: str, new: bool) -> None:
         if new:
@@ -332,18 +336,13 @@ class Shield:
 
 def first_exit_m(path: Path, bounds_m: tuple[float, float, float, float]) -> float:
     """Arc length before which a path stays in an area, to a hundredth of its length; infinite where it never leaves."""
-    xmin, ymin, xmax, ymax = bounds_m
-    count = 100
-    for i in range(count + 1):
-        east, north = place_on(path, path.length_m * i / count)[0][:2]
-        if not (xmin <= east <= xmax and ymin <= north <= ymax):
-            return path.length_m * max(i - 1, 0) / count
-    return math.inf
+    at = np.linspace(0.0, path.length_m, 101)
+    places = poses_at(path, at)[:, :2]
+    outside = ((places < bounds_m[:2]) | (places > bounds_m[2:])).any(axis=1)
+    return float(at[max(int(outside.argmax()) - 1, 0)]) if outside.any() else math.inf
 
 
 def _nearest_m(path: Path, place: Point, before_m: float) -> float:
     """Arc length of the place of a path that is nearest to a place, not beyond `before_m`."""
-    count = 200
-    end_m = min(path.length_m, before_m)
-    stations = [end_m * i / count for i in range(count + 1)]
-    return min(stations, key=lambda each: math.dist(place_on(path, each)[0][:2], place))
+    at = np.linspace(0.0, min(path.length_m, before_m), 201)
+    return float(at[np.hypot(*(poses_at(path, at)[:, :2] - place).T).argmin()])

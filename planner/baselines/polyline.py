@@ -1,0 +1,65 @@
+"""Ways of a point: polylines, (n, 2) east and north in metres, by arc length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.geometry.curves import Point
+from planner.interface import FloatArray
+
+NOWHERE: FloatArray = np.zeros((0, 2))
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A place on a boundary and the unit vector in which it was passed."""
+
+    place: Point
+    ux: float
+    uy: float
+
+    def reversed(self) -> Mark:
+        """The same place passed the other way."""
+        return Mark(self.place, -self.ux, -self.uy)
+
+
+def stations(way: FloatArray) -> FloatArray:
+    """(n,) arc length of each corner."""
+    return np.concatenate(((0.0,), np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
+
+
+def length_of(way: FloatArray) -> float:
+    """Length, m; 0 of a way without a place."""
+    return float(stations(way)[-1]) if len(way) else 0.0
+
+
+def piece(way: FloatArray, from_m: float, to_m: float) -> FloatArray:
+    """The part between two arc lengths; both are put on the way."""
+    if not len(way):
+        return way
+    at = stations(way)
+    ends = np.clip((from_m, max(from_m, to_m)), 0.0, at[-1])
+    inner = way[(at > ends[0]) & (at < ends[1])]
+    first, last = (np.array([[np.interp(end, at, axis) for axis in way.T]]) for end in ends)
+    return np.concatenate((first, inner, last))
+
+
+def mark_at(way: FloatArray, arc_length_m: float) -> Mark:
+    """The place at an arc length, and the direction there."""
+    at = stations(way)
+    i = int(np.clip(np.searchsorted(at, arc_length_m, side="right") - 1, 0, max(len(way) - 2, 0)))
+    edge = way[min(i + 1, len(way) - 1)] - way[i]
+    whole = max(float(np.hypot(*edge)), 1e-9)
+    east, north = (float(np.interp(arc_length_m, at, axis)) for axis in way.T)
+    return Mark((east, north), float(edge[0]) / whole, float(edge[1]) / whole)
+
+
+def beside(way: FloatArray, place: Point) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of each edge of a way: (n - 1,) its distance from a place, the arc length there, and (n - 1, 2) its direction."""
+    edges = np.diff(way, axis=0)
+    lengths = np.maximum(np.hypot(*edges.T), 1e-9)
+    share = np.clip(((np.array(place) - way[:-1]) * edges).sum(axis=1) / lengths**2, 0.0, 1.0)
+    away_m: FloatArray = np.hypot(*(way[:-1] + share[:, None] * edges - place).T)
+    return away_m, stations(way)[:-1] + share * lengths, edges / lengths[:, None]

@@ -1,0 +1,120 @@
+"""The boundary of grown obstacles against discs drawn by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.baselines.grown import GrownObstacles
+from planner.baselines.polyline import length_of
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges
+
+MISSION = Mission(
+    (9000.0, 9000.0), 50.0, (0.0, 0.0, 10_000.0, 10_000.0), 200.0, 100.0, 25.0, 1.0, 3.0, 3000.0
+)
+KEEP, SIMPLER_M = 220.0, 4.0
+MakePoints = Callable[..., FloatArray]
+
+
+class Seen:
+    spacing_m = 50.0
+    moving: tuple[MovingEdges, ...] = ()
+    last_contradiction_s = -math.inf
+
+    def __init__(self, points: FloatArray) -> None:
+        self.points, self.revision, self.last_removal_revision = points, 1, 0
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return self.points if revision < self.revision else np.zeros((0, 2))
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.zeros(len(points_m), dtype=np.bool_)
+
+
+def grown(points: FloatArray) -> GrownObstacles:
+    known = GrownObstacles(MISSION, KEEP - MISSION.clearance_m)
+    known.take_in(Seen(points))
+    return known
+
+
+def covers(known: GrownObstacles, place: tuple[float, float]) -> bool:
+    """Whether a line north of 1 m from a place runs through an obstacle."""
+    return known.first_hit((place[0], place[1] - 300.0), place)[0] < 300.0
+
+
+@settings(max_examples=20, derandomize=True)
+@given(
+    points=st.lists(
+        st.tuples(st.floats(4000.0, 5000.0), st.floats(4000.0, 5000.0)), min_size=1, max_size=14, unique=True
+    ),
+    side=st.sampled_from([1.0, -1.0]),
+)
+def test_a_boundary_goes_once_round_the_union_of_discs(
+    points: list[tuple[float, float]], side: float
+) -> None:
+    union = shapely.buffer(shapely.MultiPoint(points), KEEP, quad_segs=256)
+    part = min(shapely.get_parts(union), key=lambda each: each.distance(shapely.Point(3000.0, 4500.0)))
+    foot = part.exterior.interpolate(part.exterior.project(shapely.Point(3000.0, 4500.0)))
+    way = grown(np.array(points)).boundary((foot.x, foot.y), side, 1e9)
+    off = part.exterior.distance(shapely.points(way)).max()
+    assert off < SIMPLER_M + 1.0
+    assert length_of(way) == pytest.approx(part.exterior.length, rel=0.02)
+    np.testing.assert_allclose(way[0], way[-1], atol=1e-6)
+    ring = shapely.LinearRing(way)
+    assert ring.is_ccw == (side > 0.0)  # the obstacle is on the left of a way counter-clockwise
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_straight_wall_is_followed_on_a_straight_line(side: float, wall: MakePoints) -> None:
+    known = grown(wall((3000.0, 5000.0), (7000.0, 5000.0), 50.0))
+    way = known.boundary((4500.0, 5000.0 - side * KEEP), side, 1200.0)
+    np.testing.assert_allclose(np.abs(way[:, 1] - 5000.0), KEEP, atol=SIMPLER_M)
+    assert abs(way[-1, 0] - way[0, 0]) == pytest.approx(1200.0, abs=5.0)
+    assert len(way) < 8
+
+
+def test_the_bounds_are_a_wall_with_all_of_the_area_but_the_margin_inside() -> None:
+    known = grown(np.zeros((0, 2)))
+    assert not any(covers(known, place) for place in [(25.0, 5000.0), (5000.0, 9975.0), (9975.0, 9975.0)])
+    assert all(covers(known, place) for place in [(5.0, 5000.0), (5000.0, 9995.0), (9990.0, 400.0)])
+
+
+def test_what_is_taken_back_is_forgotten() -> None:
+    known = GrownObstacles(MISSION, 20.0)
+    seen = Seen(np.array([(5000.0, 5000.0), (3000.0, 3000.0)]))
+    assert known.take_in(seen)[1] is False
+    assert covers(known, (3000.0, 3100.0))
+    seen.points, seen.revision, seen.last_removal_revision = seen.points[:1], 2, 2
+    fresh, taken_back = known.take_in(seen)
+    assert taken_back
+    assert len(fresh) == 1
+    assert covers(known, (5000.0, 5100.0))
+    assert not covers(known, (3000.0, 3100.0))
+
+
+def test_lines_from_a_boundary_lead_inside_or_away() -> None:
+    known = grown(np.array([(5000.0, 5000.0)]))
+    assert known.leads_inside((5000.0 - KEEP, 5000.0), (9000.0, 5000.0))
+    assert not known.leads_inside((5000.0 + KEEP, 5000.0), (9000.0, 5000.0))
+    assert known.first_hit((4000.0, 5000.0), (6000.0, 5000.0))[0] == pytest.approx(
+        1000.0 - KEEP, abs=SIMPLER_M
+    )
+
+
+def test_tangents_touch_a_disc_on_either_side() -> None:
+    """From a place d from the centre of a disc of radius r they are sqrt(d^2 - r^2) long."""
+    known = grown(np.array([(5000.0, 5000.0)]))
+    found = known.tangents((4000.0, 5000.0), {known.part_at((4780.0, 5000.0))}, 3000.0)
+    assert sorted(side for _, side, _ in found) == [-1.0, 1.0]
+    for (east, north), side, seen in found:
+        assert seen
+        assert math.copysign(1.0, 5000.0 - north) == side  # the disc is on the left of the southern one
+        assert math.dist((east, north), (4000.0, 5000.0)) == pytest.approx(
+            math.sqrt(1000.0**2 - KEEP**2), abs=45.0
+        )
