@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
 import wayproof
-from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import Path
 from planner.shield import shield as shield_module
 from planner.shield.certificate import Certified, Certifier
+from tests.closed_loop.hostile import HOSTILE, Kinked, NotANumber, Outwards, Raising, Straight, Teleporting
 
 WORLD = {
     "area.bounds_m": [0, 0, 5000, 3000],
@@ -26,84 +24,13 @@ WORLD = {
 }
 
 
-class Inner:
-    """Straight at the goal, once and for all."""
-
-    def __init__(self, mission: Mission) -> None:
-        self.mission, self.random = mission, np.random.default_rng(7)
-
-    def plan(self, request: PlanRequest) -> Plan:
-        if request.flown is not None:
-            return Plan(PlanStatus.KEPT, "straight on")
-        return self.through(request.position_m, self.mission.goal_m)
-
-    @staticmethod
-    def through(*points_m: tuple[float, float]) -> Plan:
-        return Plan(PlanStatus.FOUND, "as I like it", np.array(points_m), Path.through(points_m))
-
-
-class Anywhere(Inner):
-    """Corners at random, also outside of the area, and others at every scan."""
-
-    def plan(self, request: PlanRequest) -> Plan:
-        steps = self.random.normal(0.0, 600.0, (4, 2)).cumsum(axis=0) + request.position_m
-        return self.through(request.position_m, *(tuple(each) for each in steps.tolist()))
-
-
-class Outwards(Inner):
-    """Out of the area, north."""
-
-    def plan(self, request: PlanRequest) -> Plan:
-        east, north = request.position_m
-        return self.through((east, north), (east, north + 9000.0))
-
-
-class Raising(Inner):
-    def plan(self, request: PlanRequest) -> Plan:
-        if request.time_s > 20.0:
-            raise ZeroDivisionError("no more")
-        return super().plan(request)
-
-
-class NotANumber(Inner):
-    def plan(self, request: PlanRequest) -> Plan:
-        if request.time_s > 20.0:
-            row = (*request.position_m, 1.0, 0.0, math.nan, 100.0)
-            return Plan(PlanStatus.FOUND, "", np.array([request.position_m]), Path(np.array([row])))
-        return super().plan(request)
-
-
-class Kinked(Inner):
-    """A zigzag of right angles, 60 m long each."""
-
-    def plan(self, request: PlanRequest) -> Plan:
-        here, goal = np.array(request.position_m), np.array(self.mission.goal_m)
-        ahead = (goal - here) / np.hypot(*(goal - here))
-        aside = np.array((-ahead[1], ahead[0]))
-        corners = [here + 60.0 * ((i + 1) // 2 * ahead + (i // 2 % 2) * aside) for i in range(60)]
-        places = [
-            corners[0],
-            *(b for a, b in pairwise(corners) if math.dist(a, b) > 1.0),
-        ]
-        return self.through(*(tuple(each) for each in np.array(places).tolist()))
-
-
-class Teleporting(Inner):
-    def plan(self, request: PlanRequest) -> Plan:
-        east, north = request.position_m
-        return self.through((east + 3000.0, north), self.mission.goal_m)
-
-
-HOSTILE = (Inner, Anywhere, Outwards, Raising, NotANumber, Kinked, Teleporting)
-
-
-def flown(inner: type[Inner]) -> wayproof.Run:
+def flown(inner: type[Straight]) -> wayproof.Run:
     scenario = wayproof.load_scenario("aerosonde_forest").with_(WORLD)
     return wayproof.fly(scenario, planner=inner)
 
 
 @pytest.mark.parametrize("inner", HOSTILE)
-def test_whatever_a_planner_answers_nothing_is_hit_and_the_area_not_left(inner: type[Inner]) -> None:
+def test_whatever_a_planner_answers_nothing_is_hit_and_the_area_not_left(inner: type[Straight]) -> None:
     run = flown(inner)
     assert run.outcome in ("reached", "timeout"), run.reason
     track = run.track.to_pandas()
@@ -123,7 +50,7 @@ def test_whatever_a_planner_answers_nothing_is_hit_and_the_area_not_left(inner: 
 
 def test_the_same_planner_without_the_shield_hits_something() -> None:
     scenario = wayproof.load_scenario("aerosonde_forest").with_({**WORLD, "planner.shield": "none"})
-    run = wayproof.fly(scenario, planner=Inner)
+    run = wayproof.fly(scenario, planner=Straight)
     assert run.outcome == "collision"
     assert run.metrics.shield is None
 
@@ -137,7 +64,7 @@ def test_without_a_part_of_the_shield_a_planner_does_harm(part: str, monkeypatch
             return Certified(path, path.length_m)
 
         monkeypatch.setattr(Certifier, "certify", without_a_turn)
-        assert flown(Inner).outcome in ("collision", "planner_failed")
+        assert flown(Straight).outcome in ("collision", "planner_failed")
     else:
         monkeypatch.setattr(shield_module, "can_be_flown", lambda *_: True)
         assert flown(Kinked).metrics.cross_track_m.max > 10.0

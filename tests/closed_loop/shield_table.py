@@ -1,0 +1,191 @@
+"""Shielded flights among trees and walls: `python -m tests.closed_loop.shield_table ROWS.csv [FLIGHTS]`.
+
+Flight number n takes planner n modulo their count, and one world of 2.0 x 1.4 km for all planners of a round. Each row
+goes into the CSV as it is flown; a second call goes on after the last. Contact and departure are judged by shapely from
+the track and the true obstacles. Those that people use are flown bare in the same world too. Prints the table.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import sys
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd  # type: ignore[import-untyped]
+from scipy.stats import beta
+from shapely import LineString, Point, Polygon, box
+
+import wayproof
+from planner.interface import Mission, Plan, Planner, PlanRequest
+from planner.registry import planner_kinds
+from planner.shield.shield import Shield
+from tests.closed_loop.hostile import HOSTILE
+
+KINDS: Final = ("improved_bug", "tangent_bug", "bug2", "bug1", "vfh_plus", "bendy_ruler", "mppi")
+OWN: Final = "rolling_window"
+"""It has the shield built in."""
+PLANNERS: Final = (OWN, *KINDS, *(each.__name__ for each in HOSTILE))
+PAIRED: Final = (*KINDS, "Straight", "Anywhere")
+AREA: Final = (0.0, 0.0, 2000.0, 1400.0)
+START, GOAL = (200.0, 700.0), (1800.0, 700.0)
+CLEARANCE_M: Final = 30.0
+
+
+class Timed:
+    """An inner planner whose processor time is added up."""
+
+    spent_s = 0.0
+
+    def __init__(self, inner: Planner) -> None:
+        self.inner = inner
+
+    def plan(self, request: PlanRequest) -> Plan:
+        began = time.thread_time()
+        try:
+            return self.inner.plan(request)
+        finally:
+            Timed.spent_s += time.thread_time() - began
+
+
+def obstacles(number: int) -> list[Polygon]:
+    """Trees, and in every third world a wall or a U that opens to the start, none within 230 m of the start."""
+    rng = np.random.default_rng(number)
+    made: list[Polygon] = []
+    if number % 3 == 0:
+        east, half, arm = rng.uniform(700.0, 1300.0), rng.uniform(100.0, 350.0), rng.choice([0.0, 250.0])
+        north = 700.0 + rng.uniform(-200.0, 200.0)
+        walls = [box(east, north - half, east + 20.0, north + half)]
+        walls += [box(east - arm, n, east, n + 20.0) for n in (north - half, north + half - 20.0) if arm]
+        made += walls
+    while len(made) < 3 + number % 10:
+        tree = Point(rng.uniform(0.0, 2000.0), rng.uniform(0.0, 1400.0)).buffer(rng.uniform(8.0, 70.0))
+        if tree.distance(Point(START)) > 230.0 and tree.distance(Point(GOAL)) > 100.0:
+            made.append(tree)
+    return made
+
+
+def flown(name: str, number: int, shield: str) -> dict[str, Any]:
+    """One flight, judged."""
+    shapes = obstacles(number)
+    course = 90.0 + float(np.random.default_rng(number + 10_000).uniform(-60.0, 60.0))
+    base = wayproof.load_scenario("aerosonde_forest").with_(
+        {
+            "area.bounds_m": list(AREA),
+            "obstacles": [
+                {"polygon": {"vertices_m": [list(p) for p in s.exterior.coords[:-1]]}} for s in shapes
+            ],
+            "mission": {
+                "start_m": list(START),
+                "goal_m": list(GOAL),
+                "course_deg": course % 360.0,
+                "time_limit_s": 130,
+                "goal_radius_m": 60,
+            },
+            "planner": {
+                "kind": OWN if name == OWN else "vfh_plus",
+                "clearance_m": CLEARANCE_M,
+                "shield": shield,
+            },
+            "sensor": {"range_m": 600},
+        }
+    )
+    hostile = {each.__name__: each for each in HOSTILE}
+
+    def make(mission: Mission) -> Planner:
+        if name in hostile:
+            return Timed(hostile[name](mission))
+        kind = planner_kinds()[name]
+        return Timed(kind.make(kind.config().resolved(mission), mission))
+
+    own_ms: list[float] = []
+    plain = Shield.plan
+
+    def timed(self: Shield, request: PlanRequest) -> Plan:
+        Timed.spent_s, began = 0.0, time.thread_time()
+        try:
+            return plain(self, request)
+        finally:
+            own_ms.append(1e3 * (time.thread_time() - began - Timed.spent_s))
+
+    Shield.plan = timed  # type: ignore[method-assign]
+    try:
+        run = wayproof.fly(base, planner=None if name == OWN else make)
+    finally:
+        Shield.plan = plain  # type: ignore[method-assign]
+    track = run.track.to_pandas()
+    line = LineString(track[["east_m", "north_m"]].to_numpy())
+    away = min(line.distance(each) for each in shapes)
+    figures = run.metrics.shield
+    return {
+        "planner": name,
+        "world": number,
+        "shield": shield,
+        "outcome": run.outcome,
+        "contact": int(away <= 0.0 or run.outcome == "collision"),
+        "departed": int(not box(*AREA).covers(line)),
+        "away_m": round(away, 3),
+        "length_m": round(run.metrics.flown_length_m, 2),
+        "calls": len(own_ms),
+        "own_p50_ms": round(float(np.percentile(own_ms, 50)), 3) if own_ms else math.nan,
+        "own_p99_ms": round(float(np.percentile(own_ms, 99)), 3) if own_ms else math.nan,
+        "refused": figures.refused_plans if figures else 0,
+        "interventions": figures.interventions if figures else 0,
+        "backup_s": figures.time_on_backup_s if figures else 0.0,
+        "plans": len(run.plans.to_pandas()),
+        "reason": run.reason,
+    }
+
+
+def upper(hits: int, flights: int) -> float:
+    """Upper 95 % bound of a share, Clopper and Pearson, one-sided."""
+    return float(beta.ppf(0.95, hits + 1, flights - hits)) if flights > hits else 1.0
+
+
+def table(rows: pd.DataFrame) -> str:
+    """A row a planner, in Markdown, and the bounds over all."""
+    told = [
+        "| planner | flights | reached | contacts | departures | least distance, m | length over bare: median (n) "
+        "| refused, share of calls | own time p50, p99, ms |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    safe, bare = rows[rows.shield == "loiter"], rows[rows.shield == "none"]
+    for name in PLANNERS:
+        mine = safe[safe.planner == name]
+        pair = mine.merge(bare[bare.planner == name], on="world", suffixes=("", "_bare"))
+        pair = pair[(pair.outcome == "reached") & (pair.outcome_bare == "reached")]
+        ratio = f"{(pair.length_m / pair.length_m_bare).median():.3f} ({len(pair)})" if len(pair) else "-"
+        refused = mine.refused.sum() / max(mine.calls.sum(), 1)
+        own = f"{mine.own_p50_ms.median():.1f}, {mine.own_p99_ms.median():.1f}" if mine.calls.sum() else "-"
+        told.append(
+            f"| `{name}` | {len(mine)} | {(mine.outcome == 'reached').sum()} | {mine.contact.sum()} | "
+            f"{mine.departed.sum()} | {mine.away_m.min():.1f} | {ratio} | {refused:.3f} | {own} |"
+        )
+    for what in ("contact", "departed"):
+        hits, flights = int(safe[what].sum()), len(safe)
+        bound = f"below {100 * upper(hits, flights):.2f} % at 95 %"
+        told += [f"{what}: {hits} of {flights}, {bound}; bare {bare[what].sum()} of {len(bare)}"]
+    return "\n".join(told)
+
+
+def main(file: Path, flights: int) -> None:
+    """Flies on from what a file has already, and prints the table of all."""
+    done = len(pd.read_csv(file).query("shield == 'loiter'")) if file.exists() else 0
+    for n in range(done, flights):
+        name, number = PLANNERS[n % len(PLANNERS)], n // len(PLANNERS)
+        for shield in ("none", "loiter") if name in PAIRED else ("loiter",):
+            row = flown(name, number, shield)
+            fresh = not file.exists()
+            with file.open("a", newline="") as to:
+                writer = csv.DictWriter(to, list(row))
+                if fresh:
+                    writer.writeheader()
+                writer.writerow(row)
+    print(table(pd.read_csv(file)))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 2000)
