@@ -50,21 +50,14 @@ KINDS: Final[dict[str, Callable[[Path, Reading], Contents]]] = {
 PACKED: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}
 """Kind of a ZIP archive by the ending of a file in it."""
 IMAGE: Final = "an image; give the YAML file of its ROS map"
-CLOUD: Final = "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)"
 GAZEBO: Final = "a Gazebo world; give its footprints as GeoJSON, or its cells as a MovingAI .map"
+FLIGHT: Final = "a flight, not a world; `wayproof check` takes flown paths"
 GIVEN_UP: Final = {
-    **dict.fromkeys((".pgm", ".png", ".bmp", ".jpg"), IMAGE),
-    **dict.fromkeys((".las", ".laz"), CLOUD),
-    **dict.fromkeys((".world", ".sdf"), GAZEBO),
-    **dict.fromkeys((".gz", ".bz2", ".7z"), "packed; unpack it and give the file"),
-    **dict.fromkeys((".shx", ".dbf", ".prj"), "part of a Shapefile; give the .shp file"),
-    **dict.fromkeys((".dxf", ".dwg"), "a drawing without a place on earth; give GeoPackage or GeoJSON"),
+    **{".pgm": IMAGE, ".png": IMAGE, ".world": GAZEBO, ".sdf": GAZEBO, ".igc": FLIGHT, ".gpx": FLIGHT},
     ".scen": "a list of MovingAI problems; give the .map file that it names",
     ".npy": "a plain array; save it as GeoTIFF or ESRI ASCII grid",
-    ".igc": "a flight, not a world; `wayproof check` takes flown paths",
-    ".gpx": "a track, not a world; `wayproof check` takes paths",
-    ".dt2": "DTED; convert it to GeoTIFF with gdal_translate",
-    ".obj": "a mesh; give CityJSON or GeoJSON of the footprints",
+    ".dxf": "a drawing without a place on earth; give GeoPackage or GeoJSON",
+    ".las": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
 }
 """Files that are not read, by ending, with what would do."""
 FAMILIES: Final = (

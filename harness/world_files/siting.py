@@ -37,9 +37,6 @@ PAD_TURNS: Final = 12.0
 """The area reaches this many turn radii beyond buildings and zones, which leaves room around them."""
 TRIES: Final = 6
 """Parts of a large file that are tried before there is said to be no room."""
-COUNTRY_DEG: Final = 5.0
-"""The origin of files that span more lies where most of them is."""
-
 Ends = tuple[tuple[float, float], tuple[float, float]]
 """Start and goal."""
 
@@ -160,9 +157,7 @@ def _origin(contents: Sequence[Contents], given: Ends | None) -> Place:
     latitude, longitude = found[:, np.isfinite(found).all(axis=0)]
     if not len(latitude):
         raise WorldFileError("nothing of these files has a place on earth; their crs may be another")
-    degrees = latitude, short_way(longitude)
-    large = max(map(np.ptp, degrees)) > COUNTRY_DEG
-    north, east = (float(np.median(x)) if large else 0.5 * float(x.min() + x.max()) for x in degrees)
+    north, east = (0.5 * float(x.min() + x.max()) for x in (latitude, short_way(longitude)))
     return _place(min(max(north, -84.0), 84.0), east)
 
 
@@ -219,13 +214,9 @@ def _areas(
     if max(sides) <= largest:
         told = f"the area reaches {pad:,.0f} m beyond what the file holds, to leave room to turn"
         return [(place, whole)], () if inside else (told,)
-    foci = _crowded(files, place, whole, largest)
-    if not inside:  # a zone larger than the area leaves room at the corners of what is about it
-        foci += [(whole[i], whole[j]) for i in (0, 2) for j in (1, 3)]
     half = [min(side, largest) / 2 for side in sides]
     areas: list[tuple[Place | None, Box]] = []
-    for focus in foci:
-        x, y = (min(max(v, whole[k] + half[k]), whole[k + 2] - half[k]) for k, v in enumerate(focus))
+    for x, y in _crowded(files, place, whole, half):
         if place is None:
             areas.append((None, (x - half[0], y - half[1], x + half[0], y + half[1])))
         else:  # with its origin in its middle, about which the plane is true to scale
@@ -239,8 +230,10 @@ def _areas(
     return areas, (told,)
 
 
-def _crowded(files: _Files, place: Place | None, whole: Box, side_m: float) -> list[tuple[float, float]]:
-    """Where in a large area to look: at parts with most others near them, half a side apart; else in the middle."""
+def _crowded(
+    files: _Files, place: Place | None, whole: Box, half: Sequence[float]
+) -> list[tuple[float, float]]:
+    """Middles of parts of a large area: those with most solids in them first, the outermost without any last."""
     import shapely
 
     middles: list[FloatArray] = [np.zeros((0, 2))]
@@ -249,15 +242,18 @@ def _crowded(files: _Files, place: Place | None, whole: Box, side_m: float) -> l
         if solid:
             points = shapely.get_coordinates(shapely.centroid(np.array(solid, dtype=object)))
             middles.append(np.column_stack(mapping.to_plane(points[:, 0], points[:, 1])))
+    axes = [
+        np.linspace(low + width, high - width, math.ceil((high - low) / width))
+        for low, high, width in zip(whole[:2], whole[2:], half, strict=True)
+    ]
     places = np.concatenate(middles)
-    places = places[((places >= whole[:2]) & (places <= whole[2:])).all(axis=1)]
-    some = places[:: max(len(places) // 2000, 1)]
-    near = np.array([(np.abs(places - each).max(axis=1) <= side_m / 3).sum() for each in some])
-    found: list[tuple[float, float]] = []
-    for x, y in some[np.argsort(-near, kind="stable")].tolist():
-        if len(found) < TRIES and all(max(abs(x - u), abs(y - v)) > side_m / 2 for u, v in found):
-            found.append((x, y))
-    return found or [((whole[0] + whole[2]) / 2, (whole[1] + whole[3]) / 2)]
+    within = [np.abs(places[:, k] - axes[k][:, None]) <= half[k] for k in (0, 1)]
+    count = within[0].astype(np.float64) @ within[1].T.astype(np.float64)
+    x, y = np.meshgrid(*axes, indexing="ij")
+    away = np.hypot(x - (whole[0] + whole[2]) / 2, y - (whole[1] + whole[3]) / 2)
+    order = np.lexsort((away.ravel(), -count.ravel())).tolist()
+    chosen = [*order[:TRIES], *order[TRIES:][-4:]]
+    return list(zip(x.ravel()[chosen].tolist(), y.ravel()[chosen].tolist(), strict=True))
 
 
 def _may_reach(part: Part, altitude_m: float) -> bool:

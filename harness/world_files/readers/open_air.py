@@ -36,42 +36,32 @@ class _Airspace:
     line: list[Place] = field(default_factory=list)
     shapes: list[Any] = field(default_factory=list)
 
-    @property
-    def is_drawn(self) -> bool:
-        """Whether something of its shape has been read."""
-        return bool(self.ring or self.line or self.shapes)
-
     def take(self, command: str, rest: str) -> None:
         """One command of it."""
-        name, _, value = (part.strip() for part in rest.partition("="))
-        if command == "AN":
+        name, _, value = rest.partition("=")
+        word = command if command != "V" else f"V{name.strip().upper()}"
+        if word == "AN":
             self.name = rest[:40]
-        elif command in ("AL", "AH"):
-            (self.lower if command == "AL" else self.upper).append(limits.limit_of(rest))
-        elif command in ("DP", "DY"):
-            (self.ring if command == "DP" else self.line).append(_places(rest, 1)[0])
-        elif command == "V" and name.upper() == "X":
+        elif word in ("AL", "AH"):
+            (self.lower if word == "AL" else self.upper).append(limits.limit_of(rest))
+        elif word in ("DP", "DY"):
+            (self.ring if word == "DP" else self.line).append(_places(rest, 1)[0])
+        elif word == "VX":
             self.center = _places(value, 1)[0]
-        elif command == "V" and name.upper() == "D":
-            self.clockwise = not value.startswith("-")
-        elif command == "V" and name.upper() == "W":
+        elif word == "VD":
+            self.clockwise = not value.strip().startswith("-")
+        elif word == "VW":
             self.width_m = _numbers(value, 1)[0] * MILE_M
-        elif command in ("DC", "DA", "DB"):
-            self._round(command, rest)
-
-    def _round(self, command: str, rest: str) -> None:
-        """A circle or an arc."""
-        if self.center is None:
+        elif word in ("DC", "DA", "DB") and self.center is None:
             raise WorldFileError("has an arc or circle before its centre `V X=`")
-        if command == "DC":
+        elif word == "DC" and self.center:
             self.shapes.append(circle(self.center, _numbers(rest, 1)[0] * MILE_M))
-        elif command == "DA":
+        elif word == "DA" and self.center:
             radius, begin, end = _numbers(rest, 3)
-            if begin != end and (end - begin) % 360.0 == 0.0:
-                self.shapes.append(circle(self.center, radius * MILE_M))
-            else:
-                self.ring += arc(self.center, begin, end, (radius * MILE_M,) * 2, self.clockwise)
-        else:
+            radius_m, whole = radius * MILE_M, begin != end and (end - begin) % 360.0 == 0.0
+            self.shapes += [circle(self.center, radius_m)] if whole else []
+            self.ring += [] if whole else arc(self.center, begin, end, (radius_m,) * 2, self.clockwise)
+        elif word == "DB" and self.center:
             first, last = _places(rest, 2)
             (begin, near), (end, far) = (polar(self.center, place) for place in (first, last))
             if first == last and not self.ring:  # else a small arc whose ends were rounded
@@ -83,11 +73,8 @@ class _Airspace:
         """What it is; a limit that is missing, or given more than once, is none."""
         import shapely
 
-        found = [*self.shapes]
-        if len(set(self.ring)) >= 3:
-            found.append(shapely.Polygon(self.ring))
-        if len(self.line) > 1 and self.width_m > 0:
-            found.append(corridor(self.line, self.width_m))
+        found = self.shapes + ([shapely.Polygon(self.ring)] if len(set(self.ring)) >= 3 else [])
+        found += [corridor(self.line, self.width_m)] if len(self.line) > 1 and self.width_m > 0 else []
         if not found:
             return []
         band: list[Limit | None] = []
@@ -111,15 +98,15 @@ def read(path: Path, reading: Reading) -> Contents:
     for number, line in enumerate(text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines(), 1):
         command, *more = line.partition("*")[0].split(None, 1) or ("",)
         command, rest = command.upper(), more[0].strip() if more else ""
-        if command == "AC" and spaces and not spaces[-1].kind and not spaces[-1].is_drawn:
-            spaces[-1].kind = rest  # its name stood before its class
-        elif command == "AC":
-            spaces.append(_Airspace(rest))
-        elif command == "AN" and (not spaces or spaces[-1].is_drawn):  # of one without a class
-            spaces.append(_Airspace("", rest[:40]))
-        elif spaces and command in ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V"):
+        last = spaces[-1] if spaces else None
+        is_drawn = last is not None and bool(last.ring or last.line or last.shapes)
+        if command == "AC" and last and not last.kind and not is_drawn:
+            last.kind = rest  # its name stood before its class
+        elif command == "AC" or (command == "AN" and (last is None or is_drawn)):
+            spaces.append(_Airspace(rest) if command == "AC" else _Airspace("", rest[:40]))
+        elif last and command in ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V"):
             try:
-                spaces[-1].take(command, rest)
+                last.take(command, rest)
             except WorldFileError as error:
                 raise WorldFileError(f"line {number}: {error}") from error
         elif command:
