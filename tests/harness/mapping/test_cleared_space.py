@@ -10,31 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from harness.mapping.cleared_space import NEARLY_RAD, nearly_towards, through_cells, through_places
+from harness.mapping.cleared_space import through_cells, through_places
 from planner.interface import BoolArray, FloatArray
 from tests.examples import examples
 
 RAYS = 48
 SEED = st.integers(0, 2**32 - 1)
-
-
-@given(
-    bearing=st.one_of(st.floats(0.0, math.tau), st.integers(0, 16).map(lambda part: part * math.pi / 8.0)),
-    start=st.floats(0.0, math.tau, exclude_max=True),
-    spacing=st.floats(2.1 * NEARLY_RAD, 2.0),
-)
-def test_the_ray_that_is_found_is_the_one_towards_a_place_or_next_to_it(
-    bearing: float, start: float, spacing: float
-) -> None:
-    east, north = 700.0 * math.sin(bearing), 700.0 * math.cos(bearing)
-    exact = (math.atan2(east, north) - start) % math.tau / spacing
-    found = nearly_towards(east, north, start, spacing)
-    # Bearings just before the first ray come a turn after it.
-    assert any(abs(found - round(exact + turns * math.tau / spacing)) <= 1 for turns in (-1, 0, 1))
-
-
-def test_a_place_where_the_sensor_is_has_some_ray() -> None:
-    assert nearly_towards(0.0, 0.0, 1.0, 0.1) >= 0
 
 
 def through(

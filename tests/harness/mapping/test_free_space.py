@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tracemalloc
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -13,7 +12,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.mapping.free_space import FreeSpace, _disc
+from harness.mapping.free_space import FreeSpace
 from harness.mapping.scan import RangeScan
 from harness.world.world import Circle
 from tests.examples import examples
@@ -49,14 +48,6 @@ def test_a_lost_return_shows_no_free_space_behind_the_wall() -> None:
     assert not fed([replace(first, ranges_m=ranges)]).contains(behind).any()
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_with_a_fifth_of_the_returns_lost_what_is_behind_walls_stays_unknown(seed: int) -> None:
-    world = world_of(WALL)
-    seen = fed(scans(sensor(world, seed, dropout=0.2), on_circle(100, 600.0)))
-    points = np.random.default_rng(seed).uniform(2000.0, 8000.0, (20_000, 2))
-    assert distance_to(world, points[seen.contains(points)]).min() > 0.0
-
-
 @settings(max_examples=examples(15))
 @given(seed=SEEDS, field=st.sampled_from([360.0, 360.0, 120.0]), heading=st.floats(0.0, 6.0))
 def test_seen_free_is_true_only_where_there_is_nothing(seed: int, field: float, heading: float) -> None:
@@ -86,15 +77,6 @@ def test_most_of_what_is_plainly_visible_is_seen_free(seed: int) -> None:
     plain = in_range & (gap > 2.0 * FREE_CELL)
     assert seen.contains(points[plain]).mean() > 0.97
     assert not seen.contains(points[gap == 0.0]).any()
-
-
-def test_nothing_beyond_the_range_is_known() -> None:
-    seen = fed(scans(sensor(world_of()), [MIDDLE]))
-    points = np.random.default_rng(3).uniform(0.0, 10_000.0, (20_000, 2))
-    away = np.hypot(*(points - MIDDLE).T)
-    free = seen.contains(points)
-    assert away[free].max() <= RANGE
-    assert free[away < RANGE - 2.0 * FREE_CELL].all()
 
 
 def test_nothing_is_known_before_the_first_scan_nor_outside_the_area() -> None:
@@ -149,15 +131,6 @@ def test_where_returns_get_lost_space_is_free_after_as_many_looks_as_make_a_miss
         assert not seen.contains(place).any()
     seen.update(scan)
     assert seen.contains(place).all()
-
-
-@pytest.mark.parametrize("lost", [0.99, 1.0])
-def test_a_sensor_that_returns_hardly_anything_shows_nothing_to_be_free(lost: float) -> None:
-    (scan,) = scans(sensor(world_of()), [MIDDLE])
-    seen = FreeSpace(BOUNDS, CLEARANCE, RANGE, lost=lost)
-    for _ in range(300):
-        seen.update(scan)
-    assert not seen.contains(np.random.default_rng(1).uniform(0.0, 10_000.0, (1000, 2))).any()
 
 
 @pytest.mark.parametrize("heading_deg", [0.0, 77.0, 200.0, 350.0])
@@ -246,16 +219,3 @@ def test_what_has_appeared_hides_what_is_behind_it_on_both_its_sides_and_no_more
     half = math.asin(1.5 * FREE_CELL / away)
     assert not free[(aside < half - off) & (distance > away - 0.25 * FREE_CELL)].any()
     assert free[(aside > half + off + 2.0 * scan.spacing_rad) | (distance < away - 1.75 * FREE_CELL)].all()
-
-
-def test_a_disc_of_cells_takes_no_more_room_than_its_answer() -> None:
-    """Numbers of eight bytes for each of its cells took a gigabyte where the range is longer than a wide area."""
-    for cells in (0, 1, 7, 50, 999):
-        away = np.arange(-cells, cells + 1) ** 2
-        assert np.array_equal(_disc(cells), away[:, None] + away <= cells * cells)
-    tracemalloc.start()
-    try:
-        disc = _disc(1500)
-        assert tracemalloc.get_traced_memory()[1] < 1.2 * disc.size
-    finally:
-        tracemalloc.stop()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tracemalloc
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -60,22 +58,6 @@ def test_what_a_scan_shows_of_a_crowd_is_told_by_the_nearest_edge(seed: int) -> 
     for point in new_edges.points_m.tolist():
         assert obstacles[shown[tuple(point)]].stands_for_ever
         assert shown[tuple(point)] in new_edges.first
-
-
-@pytest.mark.flights
-def test_what_a_scan_shows_of_a_large_crowd_takes_little_memory() -> None:
-    obstacles, scans = crowd(20_000, 20_000.0, 1), looks(np.random.default_rng(1), 5000.0, 15_000.0)
-    points = [returns_m(scan) for scan in scans]
-    Sensed(obstacles[:10], CELL_M).take(
-        scans, points
-    )  # What is imported and compiled at the first call stays.
-    sensed = Sensed(obstacles, CELL_M)
-    tracemalloc.start()
-    new_edges = sensed.take(scans, points)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert len(new_edges.first) > 100
-    assert peak < 20e6
 
 
 @given(st.lists(st.integers(3, 6), min_size=1, max_size=6))

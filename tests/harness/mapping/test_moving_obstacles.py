@@ -11,14 +11,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from harness.mapping import moving_obstacles
 from harness.mapping.followed_outline import bow
 from harness.mapping.moving_obstacles import COASTS_S, MovingObstacles
 from harness.mapping.scan import RangeScan
 from harness.world import ray_casting
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.world import World
-from planner.interface import BoolArray, ComplexArray, FloatArray, MovingEdges
+from planner.interface import MovingEdges
 from tests.examples import examples
 from tests.harness.sensing import CLEARANCE, SCAN_S, SPEED, block, flight, off, regular, sensor, world_of
 
@@ -99,24 +98,6 @@ def test_velocity_is_told(
     assert max(off_mps, default=0.0) < 5.0
 
 
-@pytest.mark.parametrize("speed", [2.0, 3.0])
-def test_what_shows_only_a_face_that_comes_nearer_is_told_as_soon(speed: float) -> None:
-    """No end of it is seen: where it goes along its face is not known, that it moves is."""
-    world, velocity = passing(speed, 0.21875, 400.0, 0.0625, 76.0, 5)
-    found = watched(flight(sensor(world), 20.0, START))
-    assert any(all_found for _, all_found in found)
-    assert max(errors(found, velocity)) < 1.5
-
-
-def test_velocity_is_told_anew_when_another_face_comes_into_view() -> None:
-    """Of a lone face only motion across it is known; with the next one all is, and what was believed is dropped."""
-    world, velocity = passing(5.0, 0.0, 400.0, 1.0, 105.0, 5)
-    found = watched(flight(sensor(world), 28.0, START))
-    off_mps = {time_s: errors([(time_s, each)], velocity) for time_s, each in found}
-    assert off_mps[15.0][0] > 1.5
-    assert all(max(off_mps[time_s]) < 0.1 for time_s in np.arange(19.0, 28.0, 0.5))
-
-
 @pytest.mark.parametrize(
     ("corners_m", "velocity", "discs"),
     [
@@ -186,20 +167,6 @@ def test_long_walls_that_appear_are_not_told_to_move_where_ranges_err_a_little(s
     wall = Obstacle(Polygon(tuple((float(x), float(y)) for x, y in ends)), active_s=(15.0, 500.0))
     found = watched(flight(sensor(world_of(wall), seed, range_noise_m=3.0), 60.0, START), noise_m=3.0)
     assert not any(any(each.velocity_mps) for _, all_found in found for each in all_found)
-
-
-def test_what_moves_has_an_outline_though_no_two_returns_of_it_are_near_each_other(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def apart(places: ComplexArray, _: FloatArray) -> BoolArray:
-        return np.zeros(len(places), dtype=np.bool_)
-
-    monkeypatch.setattr(moving_obstacles, "joined", apart)
-    world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
-    found = [each for _, all_found in watched(flight(sensor(world), 35.0, START)) for each in all_found]
-    assert len(found) > 20
-    assert min(len(each.points_m) for each in found) >= 3
-    assert abs(complex(*found[-1].velocity_mps) - velocity) < 0.2
 
 
 @pytest.mark.parametrize("corners", [0, 4])
@@ -328,41 +295,6 @@ def test_what_leaves_sight_moves_on_for_a_while() -> None:
     assert abs(complex(*last[0].velocity_mps) - velocity) < 1.0
     away = off(World([moves], world.bounds_m), last[0].points_m, times[-1])
     assert np.abs(away).max() < 40.0
-
-
-def test_latency_changes_nothing_but_when_it_is_known() -> None:
-    world, _ = passing(8.0, 0.7, 500.0, 0.3, 100.0, 4)
-    prompt = watched(flight(sensor(world), 30.0, START))
-    late = watched(flight(sensor(world, latency_s=2.0), 30.0, START))
-    for (time_s, one), (other_s, other) in zip(prompt, late, strict=True):
-        assert time_s == other_s
-        assert [each.velocity_mps for each in one] == [each.velocity_mps for each in other]
-
-
-def test_rays_that_met_it_are_told() -> None:
-    world, _ = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
-    still = block(2000.0, 2900.0, 4000.0, 2950.0)
-    both = World([*world.obstacles, Obstacle(still)], world.bounds_m)
-    seen = MovingObstacles(CLEARANCE, 0.0)
-    told = 0
-    for scan in flight(sensor(both), 30.0, START):
-        moving = seen.update(scan)
-        assert (moving is None) or moving.any()
-        if moving is not None:
-            told += 1
-            rays = np.flatnonzero(moving)
-            where = scan.from_sensor_m(rays) + complex(scan.east_m, scan.north_m)
-            points = np.column_stack((where.real, where.imag))
-            assert np.abs(off(world, points, scan.time_s)).max() < 1.0
-            of_it = np.abs(world.clearance(*_all_hits(scan))) < 1.0
-            assert len(rays) >= 0.7 * of_it.sum()
-    assert told > 20
-
-
-def _all_hits(scan: RangeScan) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
-    rays = np.flatnonzero(scan.ranges_m < math.inf)
-    where = scan.from_sensor_m(rays) + complex(scan.east_m, scan.north_m)
-    return np.column_stack((where.real, where.imag)), np.full(len(rays), scan.time_s)
 
 
 def test_where_it_was_is_told_when_it_is_found() -> None:

@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.mapping.free_space import FreeSpace
 from harness.mapping.scan import RangeScan
 from harness.mapping.sensed_map import SensedMap
-from harness.world.obstacle import Circle, Obstacle, Polygon
+from harness.world.obstacle import Circle, Obstacle
 from harness.world.world import World
 from planner.interface import MapView
 from tests.examples import examples
@@ -216,23 +215,6 @@ def test_with_much_noise_what_moves_is_followed(
     assert known_s[-1] > 40.0
 
 
-@pytest.mark.parametrize("seed", [3, 5, 6])
-def test_with_much_noise_what_comes_out_of_something_is_followed_though_little_of_it_is_new(
-    seed: int,
-) -> None:
-    corners = ((2811.0, 2300.0), (2677.0, 2169.0), (2857.0, 2118.0))
-    body = Obstacle(Polygon(corners), velocity_mps=(3.4, -3.2))
-    world = world_of(body, Circle((2809.0, 2170.0), 90.0), Circle((3117.0, 2049.0), 42.0))
-    mover, seen, told = World(world.obstacles[:1], BOUNDS), empty_world(noise_m=12.0), 0
-    for scan in flight(sensor(world, seed, range_noise_m=12.0), 45.0, (3000.0, 1500.0), speed=12.0):
-        seen.update(scan)
-        if scan.time_s > 25.0:
-            told += any(
-                np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 24.0 for each in seen.moving
-            )
-    assert told > 20  # of 39 scans
-
-
 @pytest.mark.parametrize("east", [2785.0, 2790.0, 2795.0])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_with_much_noise_what_stands_is_not_taken_for_a_part_of_what_passes_by(
@@ -252,33 +234,6 @@ def test_with_much_noise_what_stands_is_not_taken_for_a_part_of_what_passes_by(
             else:
                 assert np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 2.0 * NOISE
     assert told > 10
-
-
-@pytest.mark.parametrize(
-    ("seed", "east", "north", "radius", "velocity", "behind_s"),
-    [
-        (119, 2733.0, 2296.0, 145.0, (8.9, -0.6), 20.0),
-        (25, 2610.0, 2341.0, 131.0, (6.9, -1.8), 21.0),
-        (138, 2655.0, 2446.0, 109.0, (6.1, -1.5), 13.0),
-        (39, 2631.0, 2264.0, 84.0, (7.0, -0.9), 12.0),
-    ],
-)
-def test_with_much_noise_what_appeared_is_not_taken_for_a_part_of_what_comes_out_of_it(
-    seed: int, east: float, north: float, radius: float, velocity: tuple[float, float], behind_s: float
-) -> None:
-    """Their faces go on from one to the other without a step: only when each was seen first tells them apart."""
-    begin = (east - velocity[0] * behind_s, north - velocity[1] * behind_s)
-    moves = Obstacle(Circle(begin, radius), velocity_mps=velocity)
-    pops = Obstacle(Circle((east, 2250.0), 180.0), active_s=(12.0, 500.0))
-    seen, wrong = empty_world(noise_m=NOISE, false_returns=True), 0
-    mover = World([moves], BOUNDS)
-    for scan in flight(sensor(world_of(moves, pops), seed, **FLAWS), 50.0, (3000.0, 1500.0), speed=12.0):
-        seen.update(scan)
-        for each in seen.moving:
-            if each.velocity_mps != (0.0, 0.0):
-                wrong += math.dist(each.velocity_mps, velocity) > 4.0
-                assert np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 2.0 * NOISE
-    assert wrong <= 2
 
 
 def test_with_much_noise_what_appears_is_told_at_once_and_what_it_hides_is_not_free() -> None:
@@ -311,21 +266,6 @@ def test_with_much_noise_nothing_is_taken_to_move_that_stands(seed: int, fov_deg
         told += len(seen.moving) > 0
         assert all(each.velocity_mps == (0.0, 0.0) for each in seen.moving)
     assert told <= 12, "for a moment at most"
-
-
-def test_free_space_beyond_the_range_of_the_scan_stays() -> None:
-    free = FreeSpace(BOUNDS, CLEARANCE, RANGE)
-    eye = sensor(world_of())
-    for scan in flight(eye, 80.0, (3000.0, 500.0)):
-        free.update(scan)
-    here = eye.scan(3000.0, 1000.0, 0.0, 90.0)
-    behind = np.array([(3000.0, 1000.0 + away) for away in (300.0, 800.0, 1400.0, 1700.0, 2500.0)])
-    assert free.contains(behind).all()
-    assert not free.take_back(here, np.array([(5900.0, 5900.0)]))
-    assert free.contains(behind).all()
-    assert free.take_back(here, np.array([(3000.0, 1200.0)]))
-    assert free.contains(behind).tolist() == [False, False, False, True, True]
-    assert free.contains(np.array([(3000.0, 1100.0), (3300.0, 1300.0), (3000.0, 700.0)])).all()
 
 
 @pytest.mark.parametrize("noise_m", [15.0, 30.0, 60.0])

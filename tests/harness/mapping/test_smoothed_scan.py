@@ -65,21 +65,6 @@ def test_what_is_narrower_than_half_the_width_and_stands_alone_is_lost() -> None
     assert np.isinf(smoothed(exact, CLEARANCE).ranges_m).all()
 
 
-def test_the_ends_of_a_narrow_view_are_no_holes() -> None:
-    around = Circle(PLACE, 500.0)
-    for scan in scans(around, range_noise_m=NOISE, field_of_view_deg=180.0):
-        quiet = smoothed(scan, CLEARANCE)
-        assert np.abs(quiet.ranges_m - 500.0).max() < 3.0 * NOISE
-        assert (quiet.time_s, quiet.east_m, quiet.spacing_rad) == (scan.time_s, scan.east_m, scan.spacing_rad)
-
-
-def test_a_few_rays_are_enough() -> None:
-    for scan in scans(Circle(PLACE, 500.0), rays=5, count=3):
-        np.testing.assert_allclose(smoothed(scan, CLEARANCE).ranges_m, 500.0)
-    for scan in scans(rays=3, count=3):
-        assert (smoothed(scan, CLEARANCE).ranges_m == math.inf).all()
-
-
 def test_medians_are_those_of_what_was_returned() -> None:
     rng = np.random.default_rng(3)
     ring = np.where(rng.random(400) < 0.4, math.inf, rng.uniform(0.0, 100.0, 400).round())

@@ -26,13 +26,6 @@ def test_heights_are_those_of_the_nodes_and_bilinear_in_between() -> None:
     assert np.isnan(field.at(np.array([-101.0, 1e9]), np.array([60.0, 60.0]))).all()
 
 
-def test_next_to_a_node_without_a_height_the_ground_is_not_known() -> None:
-    field = hills()
-    field.heights_m[5, 5] = np.nan
-    east, north = -100.0 + 30 * np.array([4.5, 5.0, 6.0, 6.5]), 50.0 + 30 * np.array([5.5, 5.0, 5.0, 5.5])
-    assert np.isnan(field.at(east, north)).tolist() == [True, True, False, False]
-
-
 def test_a_field_comes_back_from_its_text_to_the_step() -> None:
     field = hills()
     field.heights_m[0, 3] = np.nan

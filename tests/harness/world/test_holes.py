@@ -12,7 +12,6 @@ from harness.files.input_file import InputError
 from harness.scenario.scenario import dump_scenario, parse_scenario
 from harness.scenario.sections import Sensor
 from harness.world.obstacle import Obstacle, Polygon
-from harness.world.optimum import shortest_path
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
 
@@ -59,13 +58,6 @@ def test_a_contact_is_found_on_the_way_out_of_a_hole() -> None:
     assert world.clearance_at(500.0, 500.0, 0.0) == pytest.approx(200.0)
     begin, end = (500.0, 500.0, 0.0), (1200.0, 500.0, 10.0)
     assert world.contact_between(begin, 200.0, end, 200.0) < 0.0
-
-
-def test_the_optimum_goes_through_a_hole_that_is_open_to_nothing_only_from_inside() -> None:
-    inside = shortest_path([Obstacle(RING)], BOUNDS, (400.0, 300.0), (600.0, 700.0), 20.0)
-    assert inside.length_m == pytest.approx(math.dist((400.0, 300.0), (600.0, 700.0)))
-    out = shortest_path([Obstacle(RING)], BOUNDS, (400.0, 300.0), (1200.0, 700.0), 20.0)
-    assert out.length_m is None
 
 
 def test_a_scenario_keeps_its_holes() -> None:

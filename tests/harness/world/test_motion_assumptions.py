@@ -41,10 +41,6 @@ def test_the_width_is_that_across_the_motion() -> None:
     assert told(Obstacle(Circle((0.0, 0.0), 501.0), (0.0, 10.0))) != ()
 
 
-def test_what_stands_is_not_told() -> None:
-    assert told(Obstacle(Circle((0.0, 0.0), 900.0)), Obstacle(Circle((0.0, 0.0), 900.0))) == ()
-
-
 def test_where_nothing_moves_no_world_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 100,000 buildings it took as long to make as the file to read."""
     text = (
@@ -59,24 +55,6 @@ def test_where_nothing_moves_no_world_is_made(monkeypatch: pytest.MonkeyPatch) -
     for standing in (text, f"{text}    velocity_mps: [0, 0]\n    active_s: [5, 9]\n"):
         assert scenario_outside_assumptions(parse_scenario(standing)) == ()
     assert made == []
-
-
-def test_times_at_which_both_are_there_count() -> None:
-    passing = Obstacle(Circle((-200.0, 5.0), 5.0), (10.0, 0.0))
-    assert told(passing, Obstacle(Polygon(SQUARE))) == (
-        "obstacles[0] and obstacles[1] touch or pass through each other; assumed is that moving obstacles do not",
-    )
-    assert told(passing, Obstacle(Polygon(SQUARE), active_s=(0.0, 19.0))) == ()
-    assert told(passing, Obstacle(Polygon(SQUARE), active_s=(22.0, 90.0))) == ()
-    assert told(passing, Obstacle(Polygon(SQUARE)), until_s=19.0) == ()
-
-
-def test_a_hole_is_free() -> None:
-    outer = ((-100.0, -100.0), (100.0, -100.0), (100.0, 100.0), (-100.0, 100.0))
-    hole = ((-90.0, -90.0), (-90.0, 90.0), (90.0, 90.0), (90.0, -90.0))
-    moving = Obstacle(Circle((-50.0, 0.0), 5.0), (1.0, 0.0))
-    assert told(Obstacle(Polygon(outer, (hole,))), moving) == ()
-    assert told(Obstacle(Polygon(outer)), moving) != ()
 
 
 def at(obstacle: Obstacle, times_s: FloatArray) -> tuple[Any, float]:

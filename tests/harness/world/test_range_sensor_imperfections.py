@@ -50,12 +50,6 @@ def test_noise_neither_makes_a_range_negative_nor_longer_than_the_range() -> Non
     assert np.isinf(ranges(EMPTY, range_noise_m=5.0)).all()
 
 
-def test_dropout_loses_the_share_of_returns_that_it_says() -> None:
-    lost = np.isinf(ranges(ROOM, scans=100, dropout=0.3))
-    assert lost.mean() == pytest.approx(0.3, abs=5 * 0.46 / math.sqrt(lost.size))
-    assert np.isinf(ranges(ROOM, dropout=1.0)).all()
-
-
 def test_what_was_lost_is_counted_scan_by_scan() -> None:
     """Half of what is met from here; a false return does not make up for what was lost."""
     half = World([Obstacle(Circle((700.0, 0.0), 500.0))], BOUNDS)
@@ -110,15 +104,3 @@ def test_a_perfect_sensor_draws_nothing_and_repeats_itself() -> None:
     first, second = (source.scan(0.0, 0.0, 0.3, time).ranges_m for time in (0.0, 0.5))
     np.testing.assert_array_equal(first, second)
     assert [stream.bit_generator.state for stream in streams] == before
-
-
-def test_the_same_seed_gives_the_same_scans_and_another_seed_others() -> None:
-    keys: dict[str, Any] = {"range_noise_m": 5.0, "dropout": 0.1, "false_return": 0.1}
-    np.testing.assert_array_equal(ranges(ROOM, 3, seed=4, **keys), ranges(ROOM, 3, seed=4, **keys))
-    assert (ranges(ROOM, seed=4, **keys) != ranges(ROOM, seed=5, **keys)).mean() > 0.8
-    root = np.random.SeedSequence(4, spawn_key=(2,))
-    twice = [
-        RangeSensor(ROOM, Sensor(range_m=1000.0, **keys), root).scan(0.0, 0.0, 0.0, 0.0) for _ in range(2)
-    ]
-    np.testing.assert_array_equal(twice[0].ranges_m, twice[1].ranges_m)
-    assert root.n_children_spawned == 0

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from harness.world_files.kinds import read
-from harness.world_files.parts import Contents, Raster, Reading, WorldFileError
+from harness.world_files.parts import Contents, Raster, Reading
 
 rasterio = pytest.importorskip("rasterio")
 pytestmark = pytest.mark.filterwarnings("ignore")  # of rasterio's own
@@ -65,26 +65,3 @@ def test_voids_that_are_not_declared(void: float, units: str | None, tmp_path: P
     found = terrain(made(tmp_path / "a.tif", heights, units=units)).values
     assert np.isnan(found[0]).all()
     assert np.isfinite(found[1:]).all()
-
-
-def test_one_without_a_place_is_not_put_at_the_corner_of_its_system(tmp_path: Path) -> None:
-    nowhere = made(tmp_path / "a.tif", crs=None, transform=None)
-    with pytest.raises(WorldFileError, match="says not where it lies"):
-        contents(nowhere, crs="EPSG:32632")
-
-
-@pytest.mark.parametrize(
-    ("crs", "units", "noted"),
-    [
-        ("EPSG:2263", None, True),
-        ("EPSG:2263", "m", False),
-        ("EPSG:32632", None, False),
-        ("EPSG:2263+6360", None, False),
-    ],
-)
-def test_heights_without_a_unit_over_a_plane_in_feet_are_told(
-    crs: str, units: str | None, noted: bool, tmp_path: Path
-) -> None:
-    notes = contents(made(tmp_path / "a.tif", crs=crs, units=units)).notes
-    told = "its heights name no unit: taken as metres, although its plane is in US survey foot"
-    assert (told in notes) is noted

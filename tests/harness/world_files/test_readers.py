@@ -10,9 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import shapely
-from PIL import Image
-from pyproj import CRS
 
 from harness.world_files.kinds import kind_of, read
 from harness.world_files.parts import (
@@ -27,22 +24,11 @@ from harness.world_files.parts import (
 )
 from harness.world_files.plane import Mapping, Place
 from harness.world_files.readers.limits import limit_of, metres_of
-from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, osm, zipped
+from tests.harness.world_files.making import SQUARE, feature, geojson, osm, zipped
 
 
 def read_any(path: Path, **reading: Any) -> Contents:
     return read(path, None, Reading(**reading))
-
-
-def test_a_geotiff_has_its_place_and_its_voids(tmp_path: Path) -> None:
-    heights = np.arange(12.0).reshape(3, 4)
-    heights[0, 0] = -9999.0
-    found = read_any(geotiff(tmp_path / "a.tif", heights, (780_000.0, 190_000.0), 10.0, 21781))
-    assert (found.kind, CRS(found.crs)) == ("geotiff", CRS("EPSG:21781"))
-    assert found.terrain is not None
-    assert found.terrain.affine == (10.0, 0.0, 780_000.0, 0.0, -10.0, 190_000.0)
-    assert np.isnan(found.terrain.values[0, 0])
-    assert found.terrain.values[2, 3] == 11.0
 
 
 def test_an_ascii_grid_has_rows_from_the_north(tmp_path: Path) -> None:
@@ -247,15 +233,6 @@ def test_an_arc_goes_round_its_centre_the_way_it_is_told(tmp_path: Path) -> None
     assert areas["-"] == pytest.approx(areas["+"], rel=1e-6)
 
 
-def test_a_circle_lies_inside_its_polygon(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
-    path.write_text("AC CTR\nAN c\nAL GND\nAH FL 100\nV X=47:00:00 N 008:00:00 E\nDC 3\n")
-    (part,) = read_any(path).parts
-    shape = in_plane(part.footprint, 8.0, 47.0)
-    assert shapely.Point(0, 0).buffer(3 * 1852.0, quad_segs=256).difference(shape).area < 1.0
-    assert shape.area == pytest.approx(math.pi * (3 * 1852.0) ** 2, rel=1e-3)
-
-
 def zone(kind: str, **limits: Any) -> dict[str, Any]:
     circle = {"type": "Circle", "center": [8.0, 47.0], "radius": 500}
     return {
@@ -342,21 +319,6 @@ def test_fences_keep_in_and_out(tmp_path: Path) -> None:
     rows = [f"{k}\t0\t3\t5002\t3\t0\t0\t0\t{x}\t{y}\t0\t1" for k, (x, y) in enumerate(ring)]
     items.write_text("QGC WPL 110\n" + "\n".join(rows) + "\n")
     assert [part.keep_in for part in read_any(items).parts] == [False]
-
-
-def test_a_ros_map_has_occupied_free_and_unknown_cells(tmp_path: Path) -> None:
-    Image.fromarray(np.array([[0, 254], [205, 254]], dtype=np.uint8)).save(tmp_path / "m.pgm")
-    path = tmp_path / "m.yaml"
-    path.write_text(
-        "image: m.pgm\nresolution: 0.05\norigin: [-1.0, -2.0, 0.0]\n"
-        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
-    )
-    found = read_any(path).occupied
-    assert found is not None
-    assert found.values[0].tolist() == [1.0, 0.0]
-    assert np.isnan(found.values[1, 0])
-    x, y = found.places(np.array([0.0]), np.array([2.0]))
-    assert (x[0], y[0]) == pytest.approx((-1.0, -2.0))
 
 
 def test_a_moving_ai_map_is_as_large_as_its_cells(tmp_path: Path) -> None:

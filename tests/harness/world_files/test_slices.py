@@ -12,12 +12,10 @@ import pytest
 import shapely
 
 from aircraft.frames import LocalPlane
-from harness.scenario.files_resolved import rings_of
 from harness.world_files.expansion import (
     Expanded,
     FileFault,
     FileSpec,
-    _rounded,
     corners_of,
     expanded,
     loaded_file,
@@ -27,7 +25,6 @@ from harness.world_files.plane import Mapping, Place, geodetic
 from tests.harness.world_files.making import SHARED, SQUARE, feature, geojson, geotiff
 from tests.longer import longer
 
-ALPS = Place(46.82, 9.83)
 AROUND = (-4000.0, -4000.0, 4000.0, 4000.0)
 
 real = pytest.mark.skipif(not SHARED.is_dir(), reason="real files are not beside this checkout")
@@ -270,13 +267,6 @@ def test_limits_above_ground_are_refused_where_the_ground_is_not_known(tmp_path:
     assert len(expanded([FileSpec(path, ground_m=100.0)], place, AROUND, 300.0).sources[0].polygons) == 0
 
 
-def test_a_building_stands_on_the_terrain(tmp_path: Path) -> None:
-    tower = {"building": "yes", "height": "100"}
-    spec = zone_on_slope(tmp_path, **tower)
-    assert len(at_slope(slope(tmp_path), spec, altitude_m=1400.0).sources[1].polygons) == 1  # 1300 + 100
-    assert len(at_slope(slope(tmp_path), spec, altitude_m=1420.0).sources[1].polygons) == 0
-
-
 def test_a_file_far_away_says_where_it_lies(tmp_path: Path) -> None:
     path = geojson(tmp_path / "a.geojson", feature({}))
     with pytest.raises(
@@ -309,39 +299,3 @@ def test_a_keep_in_fence_leaves_its_inside_free(tmp_path: Path) -> None:
     assert len(polygon.interiors) == 1
     assert shapely.Polygon(polygon.interiors[0]).area == pytest.approx(759.5 * 1111.9, rel=0.01)
     assert polygon.contains(shapely.Point(3000, 3000))
-
-
-def test_corners_are_rounded_to_a_millimetre_and_stay_valid(tmp_path: Path) -> None:
-    # Two corners nearer to each other than that, and a sliver that rounding would fold.
-    square = [(8.0, 47.0), (8.01, 47.0), (8.01, 47.01), (8.005, 47.01), (8.005 - 1e-10, 47.01), (8.0, 47.01)]
-    sliver = [(8.02, 47.0), (8.03, 47.0), (8.03, 47.000000001), (8.02, 47.0000000005)]
-    path = geojson(tmp_path / "a.geojson", *(feature({}, [*ring, ring[0]]) for ring in (square, sliver)))
-    (polygon,) = (
-        expanded([FileSpec(path)], Place(47.0, 8.0), (-2e3, -2e3, 5e3, 5e3), 100.0).sources[0].polygons
-    )
-    corners = shapely.get_coordinates(polygon)
-    assert polygon.is_valid
-    assert len(corners) == 5
-    assert np.array_equal(corners, np.round(corners, 3))
-
-
-def test_slivers_that_the_grid_makes_lines_are_left_out() -> None:
-    square = shapely.box(0.0, 0.0, 10.0, 10.0)
-    sliver = shapely.Polygon([(20.0001, 0.0), (20.0002, 0.0), (20.0004, 5.0)])
-    point = shapely.Polygon([(30.0001, 0.0001), (30.0002, 0.0), (30.0004, 0.0004)])
-    hole = square.difference(shapely.Polygon([(5.0001, 5.0), (5.0002, 5.0), (5.0004, 7.0)]))
-    assert [each.area for each in _rounded([sliver, square, point])] == [100.0]
-    (filled,) = _rounded([hole])
-    assert filled.is_valid
-    assert filled.area == pytest.approx(100.0, abs=1e-2)
-
-
-def test_the_rings_of_many_polygons_are_those_of_each() -> None:
-    holes = [shapely.box(x, 1, x + 1, 2).exterior.coords[:-1] for x in (1, 3)]
-    with_holes = shapely.Polygon(shapely.box(0, 0, 5, 5).exterior.coords[:-1], holes)
-    plain = shapely.Polygon([(0, 0), (1, 0), (0, 1)])
-    outline, *inner = rings_of([plain, with_holes, plain])[1]
-    assert list(outline) == list(with_holes.exterior.coords)[:-1]
-    assert [list(ring) for ring in inner] == [list(ring.coords)[:-1] for ring in with_holes.interiors]
-    assert rings_of([plain, with_holes])[0] == [((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))]
-    assert rings_of([]) == []

@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import shapely
-from PIL import Image
-from pyproj import CRS
 
 from harness.world_files.kinds import read
 from harness.world_files.parts import (
@@ -76,46 +73,6 @@ def test_a_geotiffs_heights_are_in_its_own_unit(how: dict[str, Any], metres: flo
     assert np.isnan(terrain.values).sum() == 1
 
 
-def test_a_picture_is_no_terrain(tmp_path: Path) -> None:
-    path = tmp_path / "a.tif"
-    Image.new("RGB", (4, 4)).save(path)
-    with pytest.raises(WorldFileError, match="bands"):
-        read_any(path)
-    Image.new("P", (4, 4)).save(path)
-    with pytest.raises(WorldFileError, match="palette"):
-        read_any(path)
-
-
-def test_an_ascii_grid_may_name_centres_and_its_system_beside_it(tmp_path: Path) -> None:
-    path = written(
-        tmp_path / "a.asc",
-        "NCOLS 2\r\nNROWS 2\r\nXLLCENTER 400005\r\nYLLCENTER 5200005\r\nCELLSIZE 10\r\nNODATA_VALUE -1\r\n"
-        "1 2\r\n3 -1\r\n",
-    )
-    found = read_any(path)
-    assert found.crs is None
-    written(tmp_path / "a.prj", CRS("EPSG:32632").to_wkt("WKT1_ESRI"))
-    found = read_any(path)
-    assert CRS(found.crs).to_epsg(50) == 32632
-    assert found.terrain is not None
-    x, y = found.terrain.places(np.array([0.0]), np.array([2.0]))
-    assert (x[0], y[0]) == (400_000.0, 5_200_000.0)
-    assert np.isnan(found.terrain.values[1, 1])
-
-
-def test_an_srtm_tile_of_one_second_north_and_west(tmp_path: Path) -> None:
-    tile = np.zeros((3601, 3601), dtype=">i2")
-    tile[0, 0] = 5
-    path = tmp_path / "N47W122.SRTMGL1.hgt"
-    path.write_bytes(tile.tobytes())
-    found = read_any(path)
-    assert found.terrain is not None
-    # The first sample lies on the north-western corner of the degree.
-    x, y = found.terrain.places(np.array([0.5]), np.array([0.5]))
-    assert (x[0], y[0]) == pytest.approx((-122.0, 48.0))
-    assert found.terrain.values[0, 0] == 5.0
-
-
 def nodes() -> str:
     return "".join(f'<node id="{k}" lon="{x}" lat="{y}"/>' for k, (x, y) in enumerate(CORNERS, 1))
 
@@ -171,55 +128,7 @@ def test_a_height_that_is_no_plain_length_is_told(
     assert any("no plain length" in note for note in found.notes) == said
 
 
-@pytest.mark.parametrize(
-    ("tags", "bottom", "top"),
-    [
-        (
-            {"LOWER_VAL": 500, "LOWER_UOM": "FT", "LOWER_CODE": "SFC", "UPPER_VAL": 180, "UPPER_UOM": "FL"},
-            Limit(500 * FOOT_M, Datum.GROUND),
-            Limit(18_000 * FOOT_M),
-        ),
-        ({"UPPER_VAL": -9998, "LOWER_VAL": 0}, NO_BOTTOM, NO_TOP),
-        (
-            {"lower": "1500 ft AGL", "upper": "FL 65"},
-            Limit(1500 * FOOT_M, Datum.GROUND),
-            Limit(6500 * FOOT_M),
-        ),
-        ({"Floor": "GND", "Ceiling": "3000ft"}, NO_BOTTOM, Limit(3000 * FOOT_M)),
-    ],
-)
-def test_limits_of_a_zone_in_other_peoples_words(
-    tags: dict[str, Any], bottom: Limit, top: Limit, tmp_path: Path
-) -> None:
-    (part,) = read_any(geojson(tmp_path / "a.geojson", feature(tags))).parts
-    for found, wanted in ((part.bottom, bottom), (part.top, top)):
-        assert same(found, wanted)
-
-
 SPACE = "AC R\nAN one\nAL {}\nAH {}\nDP 47:00:00 N 008:00:00 E\nDP 47:00:00 N 008:01:00 E\nDP 47:01:00 N 008:01:00 E\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "limit"),
-    [
-        ("3000ft AGL", Limit(3000 * FOOT_M, Datum.GROUND)),
-        ("3000AGL", Limit(3000 * FOOT_M, Datum.GROUND)),
-        ("1500ft ASFC", Limit(1500 * FOOT_M, Datum.GROUND)),
-        ("FL65", Limit(6500 * FOOT_M)),
-        ("2000MSL", Limit(2000 * FOOT_M)),
-        ("2000 ft ALT", Limit(2000 * FOOT_M)),
-        ("900mMSL", Limit(900.0)),
-        ("900 m", Limit(900.0)),
-        ("UNL", NO_TOP),
-        ("Ask on 122.8", NO_TOP),
-        ("FL95/FL115", NO_TOP),
-        ("SFC-2500", NO_TOP),
-    ],
-)
-def test_limits_of_openair(text: str, limit: Limit, tmp_path: Path) -> None:
-    (part,) = read_any(written(tmp_path / "a.txt", SPACE.format("GND", text))).parts
-    assert part.bottom == NO_BOTTOM
-    assert same(part.top, limit)
 
 
 @pytest.mark.parametrize(
@@ -251,24 +160,7 @@ def test_places_of_openair(place: str, tmp_path: Path) -> None:
     ("more", "bottom", "top", "notes"),
     [
         ("AL FL20\nAH FL65\n", Limit(2000 * FOOT_M), Limit(6500 * FOOT_M), []),
-        (
-            "AL GND\nAL FL80\n",
-            NO_BOTTOM,
-            NO_TOP,
-            ["lower limit is given more than once", "upper limit is missing"],
-        ),
-        (
-            "AL FL20\nAH FL50\nAH FL65\n",
-            Limit(2000 * FOOT_M),
-            NO_TOP,
-            ["upper limit is given more"],
-        ),
-        (
-            "AH FL50\nAH 900 ft AGL\n",
-            NO_BOTTOM,
-            NO_TOP,
-            ["lower limit is missing", "upper limit is given more"],
-        ),
+        ("AL FL20\nAH FL50\nAH FL65\n", Limit(2000 * FOOT_M), NO_TOP, ["upper limit is given more"]),
         ("", NO_BOTTOM, NO_TOP, ["lower limit is missing", "upper limit is missing"]),
     ],
 )
@@ -356,83 +248,6 @@ def test_a_fence_without_a_return_point_keeps_its_first_corner(
     assert ("has no return point: its first place is a corner" in found.notes) is noted
 
 
-@pytest.mark.parametrize(
-    ("mode", "negate", "wanted"),
-    [
-        ("trinary", 0, [1.0, math.nan, 0.0, 0.0]),
-        ("trinary", 1, [0.0, math.nan, 1.0, 1.0]),
-        ("scale", 0, [1.0, math.nan, 0.0, 0.0]),
-        ("raw", 0, [0.0, math.nan, math.nan, math.nan]),
-    ],
-)
-def test_the_modes_of_a_ros_map(mode: str, negate: int, wanted: list[float], tmp_path: Path) -> None:
-    Image.fromarray(np.array([[0, 128, 254, 255]], dtype=np.uint8)).save(tmp_path / "m.pgm")
-    path = written(
-        tmp_path / "m.yaml",
-        f"image: m.pgm\nmode: {mode}\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: {negate}\n"
-        "occupied_thresh: 0.65\nfree_thresh: 0.196\n",
-    )
-    occupied = read_any(path).occupied
-    assert occupied is not None
-    assert occupied.values[0].tolist() == pytest.approx(wanted, nan_ok=True)
-
-
-def test_a_ros_map_of_raw_numbers_and_one_that_is_turned(tmp_path: Path) -> None:
-    Image.fromarray(np.array([[0, 64, 66, 100, 101, 255]], dtype=np.uint8)).save(tmp_path / "m.png")
-    text = "image: m.png\nmode: {}\nresolution: 2\norigin: [10, 20, {}]\nnegate: 0\n"
-    raw = read_any(written(tmp_path / "m.yaml", text.format("raw", 0))).occupied
-    assert raw is not None
-    assert raw.values[0, [0, 2, 3]].tolist() == [0.0, 1.0, 1.0]
-    assert np.isnan(raw.values[0, [4, 5]]).all()
-    turned = read_any(written(tmp_path / "m.yaml", text.format("raw", math.pi / 2))).occupied
-    assert turned is not None
-    x, y = turned.places(
-        np.array([6.0]), np.array([1.0])
-    )  # the lower right corner, 12 m along the lower edge
-    assert (x[0], y[0]) == pytest.approx((10.0, 32.0))
-    (tmp_path / "m.png").rename(tmp_path / "elsewhere.png")
-    with pytest.raises(WorldFileError, match=r"names the image m\.png, which cannot be read \(No such file"):
-        read_any(written(tmp_path / "m.yaml", text.format("raw", 0.0)))
-    (tmp_path / "elsewhere.png").rename(tmp_path / "m.png")
-    with pytest.raises(WorldFileError, match="trinary, scale, raw"):
-        read_any(written(tmp_path / "m.yaml", text.format("octal", 0)))
-
-
-def test_geojson_in_an_older_files_own_system_with_several_polygons(tmp_path: Path) -> None:
-    square = [[[3e5 + x, 6.7e6 + y] for x, y in ((0, 0), (100, 0), (100, 100), (0, 100), (0, 0))]]
-    away = [[[x + 500, y] for x, y in square[0]]]
-    content = {
-        "type": "FeatureCollection",
-        "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3067"}},
-        "features": [
-            {
-                "type": "Feature",
-                "properties": {"height": 10},
-                "geometry": {"type": "MultiPolygon", "coordinates": [square, away]},
-            }
-        ],
-    }
-    path = tmp_path / "a.geojson"
-    path.write_text(json.dumps(content))
-    found = read_any(path)
-    assert found.crs == "EPSG:3067"
-    assert found.parts[0].footprint.area == pytest.approx(20_000.0)
-
-
-def test_layers_in_different_systems_are_refused(tmp_path: Path) -> None:
-    pyogrio = pytest.importorskip("pyogrio")
-    path = tmp_path / "a.gpkg"
-    for layer, crs in (("one", "EPSG:32632"), ("two", "EPSG:2154")):
-        square = np.array([shapely.to_wkb(shapely.box(4e5, 6.7e6, 4.1e5, 6.71e6))], dtype=object)
-        pyogrio.raw.write(
-            path, square, [np.array([12.0])], ["height"], layer=layer, crs=crs, geometry_type="Polygon"
-        )
-        if layer == "one":
-            assert read_any(path).parts[0].top == Limit(12.0, Datum.GROUND)
-    with pytest.raises(WorldFileError, match="different coordinate reference systems"):
-        read_any(path)
-
-
 def city(crs: str, objects: dict[str, Any], vertices: list[list[float]], **more: Any) -> dict[str, Any]:
     metadata = {"referenceSystem": crs}
     return {
@@ -491,26 +306,6 @@ def test_a_sequence_of_city_features_has_vertices_a_line(tmp_path: Path) -> None
         read_any(written(tmp_path / "b.city.jsonl", text.replace("[2010.0, 0.0, 7.0], ", "")))
 
 
-def test_city_objects_in_degrees_have_an_area_and_their_latitudes_may_come_first(tmp_path: Path) -> None:
-    places = [
-        [35.0 + 1e-4 * y, 139.0 + 1e-4 * x, z] for x, y, z in ((0, 0, 3), (1, 0, 3), (1, 1, 9), (0, 1, 9))
-    ]
-    for vertices in (places, [[y, x, z] for x, y, z in places]):
-        path = written(tmp_path / "a.city.json", json.dumps(city("EPSG:6697", {"a": floor()}, vertices)))
-        (part,) = read_any(path).parts
-        assert part.footprint.bounds == pytest.approx((139.0, 35.0, 139.0001, 35.0001))
-        assert part.footprint.area == pytest.approx(1e-8)
-
-
-@pytest.mark.parametrize("index", [-1, 4, 1.5, "1", None, 10**30])
-def test_a_city_object_with_a_vertex_that_is_not_there_is_named(index: Any, tmp_path: Path) -> None:
-    thing = floor()
-    thing["geometry"][0]["boundaries"][0][0][2] = index
-    path = written(tmp_path / "a.city.json", json.dumps(city("EPSG:7415", {"tower": thing}, SQUARE_M)))
-    with pytest.raises(WorldFileError, match="'tower' with a vertex that is not there"):
-        read_any(path)
-
-
 @pytest.mark.parametrize(
     ("tags", "bottom", "top"),
     [
@@ -565,21 +360,6 @@ def test_a_limit_without_a_reference_is_noted(tags: dict[str, Any], said: bool, 
     assert ("A: its limits name no reference; taken as above mean sea level" in notes) == said
 
 
-@pytest.mark.parametrize(
-    ("tags", "said"),
-    [
-        ({"minAlt": 2000, "maxAlt": "3700"}, True),
-        ({"minAlt": 0, "maxAlt": "2500 ft"}, False),
-        ({"maxAlt": 120, "altitudeUnit": "m"}, False),
-        ({"ceiling_m": 120}, False),
-        ({"upper": 120, "UPPER_UOM": "FT"}, False),
-    ],
-)
-def test_a_limit_without_a_unit_is_noted(tags: dict[str, Any], said: bool, tmp_path: Path) -> None:
-    notes = read_any(geojson(tmp_path / "a.geojson", feature({"name": "A", **tags}))).notes
-    assert ("A: its limits name no unit; taken as metres" in notes) == said
-
-
 def test_limits_that_cannot_be_told_are_both_noted_and_facility_maps_refused(tmp_path: Path) -> None:
     grid = {"CEILING": 200, "UNIT": "Feet", "APT1_FAAID": "SEA"}
     with pytest.raises(WorldFileError, match="is a facility map of the FAA"):
@@ -596,16 +376,6 @@ def test_features_a_line_are_a_collection(before: str, tmp_path: Path) -> None:
     assert [part.top.height_m for part in found.parts] == [5.0, 6.0, 7.0]
     with pytest.raises(WorldFileError, match="not whole JSON"):
         read_any(written(tmp_path / "b.geojsonl", "\n".join(lines)[:-5]))
-
-
-def test_a_feature_without_a_geometry_is_counted(tmp_path: Path) -> None:
-    bare = {"type": "Feature", "properties": {"height": 9}, "geometry": None}
-    found = read_any(geojson(tmp_path / "a.geojson", feature({"height": 5}), bare))
-    assert len(found.parts) == 1
-    assert "1 point or line without an area passed over" in found.notes
-
-
-AIRSPACE = "AC D\nAN Zürich CTR\nAL SFC\nAH 3500 ft\nV X=47:30:00 N 008:30:00 E\nDC 5\n"
 
 
 def test_kml_with_blanks_after_commas_and_lines_beside_its_polygon(tmp_path: Path) -> None:
@@ -675,23 +445,6 @@ def test_a_zone_whose_upper_limit_is_0_is_not_lost(reference: str, tmp_path: Pat
     assert part.top == NO_TOP
 
 
-def test_zones_of_ed318_that_apply_at_times_are_told(tmp_path: Path) -> None:
-    layer = {"lower": 0, "lowerReference": "AGL", "upper": 120, "upperReference": "AGL", "uom": "m"}
-    geometry = {
-        "type": "Point",
-        "coordinates": [8.0, 47.0],
-        "extent": {"subType": "Circle", "radius": 500},
-        "layer": layer,
-    }
-    times = {"limitedApplicability": [{"startDateTime": "2024-01-01T00:00:00Z"}]}
-    features = [{"type": "Feature", "geometry": geometry, "properties": tags} for tags in ({}, times)]
-    found = read_any(
-        written(tmp_path / "a.json", json.dumps({"type": "FeatureCollection", "features": features}))
-    )
-    assert found.kind == "ed318"
-    assert "1 zone that apply at times only taken as always there" in found.notes
-
-
 @pytest.mark.parametrize("place", [[2_600_000.0, 1_200_000.0], [8.0, 147.0], [-400.0, 47.0]])
 def test_coordinates_that_are_no_degrees_ask_for_their_system(place: list[float], tmp_path: Path) -> None:
     ring = [place, [place[0] + 0.5, place[1]], [place[0], place[1] + 0.5], place]
@@ -700,28 +453,6 @@ def test_coordinates_that_are_no_degrees_ask_for_their_system(place: list[float]
         read_any(path)
     if place[0] > 1e6:
         assert len(read_any(path, crs="EPSG:2056").parts) == 1
-
-
-POINTS = (
-    ({"man_made": "tower", "height": "150"}, True),
-    ({"power": "tower", "height": "60 m"}, True),
-    ({"power": "generator", "generator:source": "wind", "height": "590 ft"}, True),
-    ({"building": "yes"}, True),
-    ({"building": "entrance"}, False),
-    ({"natural": "tree", "height": "30"}, True),
-)
-
-
-def test_towers_that_are_points_are_counted(tmp_path: Path) -> None:
-    ring = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001)]
-    path = osm(tmp_path / "a.osm", [({"building": "yes", "height": "9"}, ring)])
-    tags = "".join(
-        f'<node id="{n}" lat="47" lon="8">{"".join(f"<tag k={k!r} v={v!r}/>" for k, v in t.items())}</node>'
-        for n, (t, _) in enumerate(POINTS, 1)
-    )
-    path.write_text(path.read_text().replace('<osm version="0.6">', f'<osm version="0.6">{tags}'))
-    count = sum(tall for _, tall in POINTS)
-    assert read_any(path).notes == (f"{count} points with a height, or a mast, without an area passed over",)
 
 
 @pytest.mark.parametrize(
@@ -793,52 +524,6 @@ def test_an_arc_all_the_way_round_is_a_circle(command: str, area: float, tmp_pat
     assert miles == pytest.approx(9.0 * area, rel=0.01)
 
 
-def test_a_small_arc_whose_ends_are_one_place_is_no_circle(tmp_path: Path) -> None:
-    corners = "".join(f"DP 50:0{y}:00 N 010:0{x}:00 E\n" for x, y in ((0, 0), (5, 0), (5, 5)))
-    arc = "DB 50:05:00 N 010:00:00 E, 50:05:00 N 010:00:00 E\n"
-    text = f"AC R\nAN square\nAL GND\nAH FL100\n{corners}V X=50:00:00 N 010:00:00 E\n{arc}"
-    (part,) = read_any(written(tmp_path / "a.txt", text)).parts
-    assert part.footprint.area == pytest.approx((5 / 60) ** 2)
-
-
-def test_names_of_zones_may_be_in_capitals(tmp_path: Path) -> None:
-    shape = {"type": "Polygon", "coordinates": [[[8, 47], [8.1, 47], [8.1, 47.1], [8, 47]]]}
-    zone = {"type": "Feature", "properties": {"NAME": "CTR", "UPPER": "900 ft MSL"}, "geometry": shape}
-    (part,) = read_any(geojson(tmp_path / "a.geojson", zone)).parts
-    assert part.name == "CTR"
-
-
-def test_city_objects_without_a_shape_are_counted(tmp_path: Path) -> None:
-    """One whose parts have the shapes is none of them."""
-    vertices = [[x, y, z] for z in (0, 9) for x, y in ((0, 0), (5, 0), (5, 5), (0, 5))]
-    solid = {"type": "MultiSurface", "lod": "1", "boundaries": [[[0, 1, 2, 3]], [[4, 5, 6, 7]]]}
-    content = {
-        "type": "CityJSON",
-        "version": "2.0",
-        "CityObjects": {
-            "a": {"type": "Building", "children": ["b", "c"]},
-            "b": {"type": "BuildingPart", "parents": ["a"], "geometry": [solid]},
-            "c": {"type": "BuildingPart", "parents": ["a"], "geometry": []},
-            "d": {"type": "Building", "attributes": {"measuredHeight": 9}},
-        },
-        "vertices": vertices,
-        "transform": {"scale": [1, 1, 1], "translate": [84000, 446000, 0]},
-        "metadata": {"referenceSystem": "https://www.opengis.net/def/crs/EPSG/0/7415"},
-    }
-    found = read_any(written(tmp_path / "a.city.json", json.dumps(content)))
-    assert [part.name for part in found.parts] == ["b"]
-    assert found.notes == ("passed over: 2 building without a shape",)
-
-
-def test_an_ascii_grid_may_begin_with_any_of_its_keys(tmp_path: Path) -> None:
-    """GDAL reads it so, too."""
-    text = "cellsize 10\nxllcorner 100\nyllcorner 200\nnrows 2\nncols 3\n1 2 3\n4 5 6\n"
-    found = read_any(written(tmp_path / "a.asc", text)).terrain
-    assert found is not None
-    assert found.values.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
-    assert found.affine == (10.0, 0.0, 100.0, 0.0, -10.0, 220.0)
-
-
 @pytest.mark.parametrize(
     ("uom", "upper", "top_m"),
     [("FL", 95, 2895.6), ("ft", 95, 28.956), ("FT", "95 ft", 28.956), ("m", "95", 95.0), (None, 95, 95.0)],
@@ -876,28 +561,3 @@ def test_limits_of_geozones_in_their_unit(
     assert found.notes == ()
     with pytest.raises(WorldFileError, match="has limits in 'nm'; must be in m, ft or FL"):
         read_any(written(tmp_path / "b.json", json.dumps(content).replace(json.dumps(uom), '"NM"')))
-
-
-def test_a_zone_of_ed318_without_a_geometry_is_counted(tmp_path: Path) -> None:
-    ring = [[[8, 47], [8.1, 47], [8.1, 47.1], [8, 47]]]
-    shape = {
-        "type": "Polygon",
-        "coordinates": ring,
-        "layer": {"upper": 9, "upperReference": "AGL", "uom": "m"},
-    }
-    zones = [
-        {"type": "Feature", "properties": {"identifier": "z"}, "geometry": each} for each in (shape, None)
-    ]
-    found = read_any(
-        written(tmp_path / "a.json", json.dumps({"type": "FeatureCollection", "features": zones}))
-    )
-    assert found.notes == ("1 zone without a geometry passed over",)
-
-
-@pytest.mark.parametrize("thresholds", [(65, 0.2), (0.65, 19.6), (-0.1, 0.2)])
-def test_thresholds_of_a_ros_map_are_shares(thresholds: tuple[float, float], tmp_path: Path) -> None:
-    """In percent, nothing was occupied."""
-    Image.fromarray(np.array([[0, 254]], dtype=np.uint8)).save(tmp_path / "m.pgm")
-    text = "image: m.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: {}\nfree_thresh: {}\n"
-    with pytest.raises(WorldFileError, match="must be shares between 0 and 1"):
-        read_any(written(tmp_path / "m.yaml", text.format(*thresholds)))
