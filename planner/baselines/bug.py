@@ -123,24 +123,24 @@ class Bug1(Walker[BugState]):
                 continue
             side = state.side if isinstance(state, Returning) else self.side
             way = self.known.boundary(place, side, left)
-            stop = self._stops(state, way)
+            stop, leaves = self._stops(state, way)
             flown = piece(way, 0.0, stop)
             yield WalkLeg(state, flown)
             if math.isinf(stop):
                 return
             left -= stop
             place = place_at_end(flown, place)
-            state = self._onward(place, state, flown)
+            state = Straight() if leaves else self._onward(place, state, flown)
 
     def _met(self, place: Point) -> Circling:
         hit = mark_at(self.known.boundary(place, self.side, self.keep_m), 0.0)
         return Circling(hit, hit, math.dist(place, self.goal))
 
-    def _stops(self, state: Circling | Returning, way: FloatArray) -> float:
-        """Arc length at which the boundary is not followed any more; infinite: not within the horizon."""
+    def _stops(self, state: Circling | Returning, way: FloatArray) -> tuple[float, bool]:
+        """Arc length to which the boundary is followed, infinite beyond the horizon, and whether it is left there."""
         if isinstance(state, Circling):
-            return self.passes(way, state.hit, self.keep_m - state.walked_m)
-        return self.passes(way, state.q, 0.0)
+            return self.passes(way, state.hit, self.keep_m - state.walked_m), False
+        return self.passes(way, state.q, 0.0), False
 
     def _onward(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
         """The state after the boundary has been followed to where it stops."""
@@ -183,12 +183,11 @@ class Bug2(Bug1):
         self._start = place
         return Straight()
 
-    def _stops(self, state: Circling | Returning, way: FloatArray) -> float:
-        return min(super()._stops(state, way), self._leaves(way, state))
+    def _stops(self, state: Circling | Returning, way: FloatArray) -> tuple[float, bool]:
+        closed, leave = super()._stops(state, way)[0], self._leaves(way, state)
+        return min(closed, leave), leave <= closed
 
     def _onward(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
-        if math.isfinite(self._leaves(flown, state)):
-            return Straight()
         return Enclosed(f"{self.enclosed()}: back at the hit point without a leave point")
 
     def _leaves(self, way: FloatArray, state: Circling | Returning) -> float:

@@ -223,6 +223,18 @@ def test_tangent_bug_takes_no_way_round_for_a_way_across_a_dent(range_m: float, 
     assert flight.length_m < 1.1 * math.dist(contract.START, mission.goal_m)
 
 
+@pytest.mark.parametrize("goal_north_m", [2000.3, 4711.7, 5000.2, 8123.9])
+@pytest.mark.parametrize("kind", OF_CONTACT)
+def test_a_line_that_leads_aslant_is_found_again(kind: str, goal_north_m: float, ring: MakePoints) -> None:
+    mission = replace(MISSION, goal_m=(17_000.0, goal_north_m))
+    flight = walk(kind, ring(10_000.0, 0.5 * (5000.0 + goal_north_m), 700.0, SPACING), mission=mission)
+    assert flight.reason == "reached"
+    places = np.cumsum(np.hypot(*np.diff(flight.track_m, axis=0).T))
+    assert places[-1] < math.dist(START, mission.goal_m) + (4.0 if kind == "bug1" else 1.0) * math.pi * (
+        700.0 + KEEP
+    )
+
+
 @pytest.mark.parametrize("aside", [-800.0, 800.0])
 def test_bug1_returns_to_the_nearest_point_by_the_shorter_way(aside: float, ring: MakePoints) -> None:
     radius = 1500.0 + KEEP
