@@ -88,11 +88,6 @@ def is_allowed_for(causes: Collection[str], error_m: float | None, margin_m: flo
 
     Such a flight is as the scenario means it to be. Nearly all flights with a receiver of the usual kind are so, and
     hide those in which something went wrong.
-
-    Args:
-        causes: of all legs that were not trackable.
-        error_m: largest distance from the true position to the believed one; None where navigation is perfect.
-        margin_m: what the planner kept beyond the clearance for it; likewise.
     """
     if error_m is None or margin_m is None:
         return False
@@ -123,15 +118,7 @@ def cross_track_cause(
 
 
 def corner_cause(corner: Corner, allowed_m: float, track: Track, row: int, force: InForce) -> str:
-    """Why a corner was passed too far off: whether any turn would do in calm air, whether any would in that wind.
-
-    Args:
-        corner: a corner of the path as given.
-        allowed_m: how far from it the aircraft may pass.
-        track: the flown track.
-        row: that belongs to the corner.
-        force: what was in force, row by row.
-    """
+    """Why a corner was passed too far off: whether any turn would do in calm air, whether any would in that wind."""
     half_rad = math.radians(abs(corner.turn_deg)) / 2.0
     outside = 1.0 / max(math.cos(half_rad), 1e-9) - 1.0
     needed = GRAVITY_MPS2 * math.tan(force.bank_limit_rad) * allowed_m / max(outside, 1e-9)

@@ -83,13 +83,7 @@ def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: flo
 
 
 def allowed_m(track: Track, tolerance_m: float, corners: Iterable[Corner]) -> FloatArray:
-    """(n,) what each row may be off the path as given: the tolerance, or about a corner what that may be passed at.
-
-    Args:
-        track: as in `deviation`.
-        tolerance_m: away from corners.
-        corners: those that may be passed at more than that, or less; where several are near, the largest counts.
-    """
+    """(n,) what each row may be off the path as given: the tolerance, or about a corner what that may be passed at."""
     of_corners = np.full(len(track), -np.inf)
     for corner in corners:
         about = at_corner(track, corner)

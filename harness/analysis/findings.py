@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.analysis.flight_limits import FlightLimits
-from harness.analysis.smoothness import tangent_of
+from harness.analysis.smoothness import flown_profile, smoothness, tangent_of
 from harness.flight.record import AcceptedPlan, Flight, FloatArray, Track
 
 SLACK_S: Final = 1.0
@@ -25,6 +25,9 @@ APART_DEG: Final = 15.0
 
 FEW_CONTRADICTIONS: Final = 2
 """Up to this many contradictions of plans are no finding: what is sensed for the first time may turn a plan round."""
+
+CONTRADICTED: Final = "plans contradict each other"
+"""Kind of the finding that `contradictions_s` are many."""
 
 BANKED_DEG: Final = 10.0
 """A bank command counts as to one side from this angle on."""
@@ -127,8 +130,9 @@ def _contradicted(flight: Flight) -> Finding | None:
     times = contradictions_s(flight.track, flight.plans)
     if len(times) <= FEW_CONTRADICTIONS:
         return None
+    turned_deg = smoothness(flown_profile(flight.track), 1.0).heading_change_deg
     text = (
         f"{len(times)} of {len(flight.plans)} plans lead to the other side of the course than the one before; "
-        f"{bank_reversals_per_min(flight.track):.1f} bank reversals a minute"
+        f"{bank_reversals_per_min(flight.track):.1f} bank reversals a minute, {turned_deg:.0f} deg turned in all"
     )
-    return Finding("plans contradict each other", times[0], text)
+    return Finding(CONTRADICTED, times[0], text)

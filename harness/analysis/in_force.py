@@ -89,11 +89,6 @@ def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand
 
     The curvature is the change of the plan's direction over a window of about one second, as long as it takes to roll:
     a joint shorter than that is no turn of its own, and a corner is a turn within the window.
-
-    Args:
-        lead: the rows.
-        plans: `plans[i]` is the plan of rows with `plan_index` i.
-        force: what was in force at these rows.
     """
     window = window_m(lead)
     reach = lead.arc_length_m.copy()

@@ -98,17 +98,7 @@ def row_of(
     kinematic: bool,
     guidance: str = "",
 ) -> Row:
-    """The row of a flight that came to an end.
-
-    Args:
-        scenario: its name.
-        planner: its kind.
-        metrics: content of `metrics.json`.
-        optimum_m: the clairvoyant optimum; None where there is none.
-        turn_radius_m: smallest radius of the aircraft.
-        kinematic: a point flew, which tracks anything.
-        guidance: the law, where several are compared.
-    """
+    """The row of a flight that came to an end."""
     flown = {name: metric.value(metrics) for name, metric in COMPARED.items() if not metric.derived}
     length, reached = metrics["flown_length_m"], metrics["outcome"] == "reached"
     flown |= {

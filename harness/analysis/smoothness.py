@@ -114,11 +114,6 @@ def planned_profile(track: Track, plans: Sequence[AcceptedPlan | PlanRow], windo
     Of every plan, the part between the stations at which it was taken up and replaced counts. A corner, where
     the tangent jumps, counts as an arc of length `window_m`: inside a plan, and where a plan takes over from
     another in a different direction.
-
-    Args:
-        track: the flown track, with stations.
-        plans: `plans[i]` is the plan of rows with `plan_index` i.
-        window_m: length over which a corner is taken to be turned.
     """
     pieces: list[tuple[float, float]] = []
     left: tuple[float, float] | None = None
@@ -133,13 +128,7 @@ def planned_profile(track: Track, plans: Sequence[AcceptedPlan | PlanRow], windo
 
 
 def turn_onto_first_plan_1pm(track: Track, plans: Sequence[AcceptedPlan | PlanRow], window_m: float) -> float:
-    """Curvature of the corner from the course of the aircraft onto the first plan, where it takes that up.
-
-    Args:
-        track: rows of a flown track; 0 is returned where they do not hold the beginning of the first plan.
-        plans: as `planned_profile` takes them.
-        window_m: length over which the corner is taken to be turned.
-    """
+    """Curvature of the corner from the course of the aircraft onto the first plan, where it takes that up."""
     flown = np.flatnonzero(track.plan_index >= 0)
     if not len(flown) or track.plan_index[flown[0]] != 0 or track.arc_length_m[flown[0]] > window_m:
         return 0.0

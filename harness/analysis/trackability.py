@@ -122,12 +122,7 @@ def legs(
 
 
 def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
-    """First and last row of every leg; a short one joins the next, a short last one the one before.
-
-    Args:
-        track: the flown track.
-        leg: (n,) a number that changes from one leg to the next.
-    """
+    """First and last row of every leg; a short one joins the next, a short last one the one before."""
     flown = np.flatnonzero(track.plan_index >= 0)
     if not len(flown):
         return []
@@ -224,14 +219,7 @@ def _judged_as_given(
     rows: IntArray,
     flown: tuple[Track, Sequence[AcceptedPlan], FlightLimits, InForce],
 ) -> Leg:
-    """A leg that is not trackable either where it is too far from the path as given.
-
-    Args:
-        leg: as judged by altitude, airspeed and load factor.
-        given: the path as given.
-        rows: those of the leg, its last corner whole.
-        flown: track, plans, limits and what was in force.
-    """
+    """A leg that is not trackable either where it is too far from the path as given."""
     off, cause = np.nan_to_num(given.deviation_m[rows]), leg.cause
     excess = off - given.allowed_m[rows]
     if len(rows) and excess.max() > 0.0:

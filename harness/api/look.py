@@ -11,12 +11,7 @@ if TYPE_CHECKING:
 
 
 def flight_html(title: str, metrics: Mapping[str, Any]) -> str:
-    """The table that `fly` and `check` print at their end.
-
-    Args:
-        title: stands above it.
-        metrics: the content of `metrics.json`.
-    """
+    """The table that `fly` and `check` print at their end."""
     from rich.text import Text
 
     if metrics.get("check") is not None:
@@ -27,12 +22,7 @@ def flight_html(title: str, metrics: Mapping[str, Any]) -> str:
 
 
 def comparison_html(title: str, table: pa.Table) -> str:
-    """A row a scenario and planner, with the figures that a terminal shows.
-
-    Args:
-        title: stands above it.
-        table: as `ComparisonResult.table`.
-    """
+    """A row a scenario and planner, with the figures that a terminal shows."""
     from harness.analysis.rows import COMPARED, ON_TERMINAL
 
     shown = [metric for metric in COMPARED.values() if metric.short in ON_TERMINAL]

@@ -78,10 +78,6 @@ class FlightResult:
     def show(self, width_px: int = 1000, height_px: int = 600) -> Any:
         """The recording in rerun's viewer: in a notebook as a widget, elsewhere in a window of its own.
 
-        Args:
-            width_px: of the widget.
-            height_px: of the widget.
-
         Raises:
             InputError: there is no recording, no screen, or a package that the viewer needs is missing.
         """

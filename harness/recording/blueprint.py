@@ -159,13 +159,7 @@ class Frame:
 
 
 def series_lines(name: str, colour: tuple[int, ...], width: float) -> rr.SeriesLines:
-    """Style of a curve. Where a pixel has many values it shows their least and greatest, so that no peak is lost.
-
-    Args:
-        name: in the legend.
-        colour: red, green, blue and perhaps opacity, 0 to 255.
-        width: of the line in points of the screen.
-    """
+    """Style of a curve. Where a pixel has many values it shows their least and greatest, so that no peak is lost."""
     return rr.SeriesLines(
         names=[name],
         colors=[colour],
@@ -255,10 +249,6 @@ def apart(times_s: Sequence[float], after_s: float = -math.inf) -> FloatArray:
     """Rising times, none of them twice: of several at once each is a nanosecond later.
 
     A table by time keeps one event of each time.
-
-    Args:
-        times_s: simulated times in order.
-        after_s: the last one before them.
     """
     rising = []
     for at_s in times_s:

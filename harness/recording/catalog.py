@@ -81,10 +81,6 @@ class Catalog:
 def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
     """Serves recordings as one dataset on 127.0.0.1, as long as the block lasts. To read a thousand takes seconds.
 
-    Args:
-        name: of the campaign.
-        recordings: files of runs, each with an identity of its own.
-
     Raises:
         RunFolderError: there are none.
         ViewerError: rerun's server is not installed or does not start.
@@ -123,12 +119,7 @@ def _figure(name: str) -> str:
 
 
 def _lay_out(dataset: Any, scratch: Path) -> None:
-    """Has the table of runs show its figures under plain headings, the worst run first, and a run our layout.
-
-    Args:
-        dataset: rerun's handle of it.
-        scratch: a folder for the layouts, which lies there as long as the server does.
-    """
+    """Has the table of runs show its figures under plain headings, the worst run first, and a run our layout."""
     import rerun.blueprint as rrb
     from rerun.blueprint.table import Column, SortBy, TableLayout
 
@@ -217,12 +208,6 @@ def window(
     """Opens the table of a campaign in a viewer; gives that, and rerun's handle of it.
 
     The viewer starts while the recordings are read.
-
-    Args:
-        name: of the campaign.
-        recordings: files of its runs.
-        scratch: an empty folder for the viewer's settings.
-        arguments: of the viewer besides.
 
     Raises:
         RunFolderError: the campaign has no recordings.

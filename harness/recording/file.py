@@ -63,13 +63,7 @@ class Sink(Protocol):
 
 
 class RunningViewer:
-    """A viewer, or a server of rerun, that a recording is sent to.
-
-    Args:
-        rec: the recording, before anything is logged.
-        url: as rerun+http://127.0.0.1:9876/proxy.
-        default_blueprint: the layout that the viewer takes.
-    """
+    """A viewer, or a server of rerun, that a recording is sent to."""
 
     def __init__(self, rec: rr.RecordingStream, url: str, default_blueprint: Layout) -> None:
         self._rec, self._url = rec, url
@@ -94,11 +88,6 @@ class RunningViewer:
 
 class RecordingFile:
     """Where a recording goes. `end` must be called, also when the flight breaks off.
-
-    Args:
-        rec: the recording, before anything is logged.
-        path: the file; its folder must exist.
-        default_blueprint: the layout that the file carries.
 
     Raises:
         OSError: the file cannot be made.
@@ -165,12 +154,7 @@ class RecordingFile:
 
 
 def end_of_whole(data: bytearray, begin: int) -> int:
-    """Where the last whole message ends.
-
-    Args:
-        data: part of a recording.
-        begin: where its first message begins.
-    """
+    """Where the last whole message ends."""
     end = 0
     while begin + _MESSAGE.size <= len(data):
         _, length = _MESSAGE.unpack_from(data, begin)

@@ -107,13 +107,7 @@ def blueprint(
 
 
 def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = ("",)) -> Layout:
-    """The layout of a recording, or of an overlay, by what it holds.
-
-    Args:
-        frame: what to frame the views on.
-        entities: paths of all that it holds, beginning with a slash.
-        runs: as in `blueprint`.
-    """
+    """The layout of a recording, or of an overlay, by what it holds."""
     lanes = sum(each.startswith(f"/{STATES}/") for each in entities)
     runs = runs if lanes or len(runs) > 1 else ()
     drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{SERIES}/")}
@@ -148,10 +142,6 @@ def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:
     """The plan view, north up, framed on the area.
 
     A 2-D view counts its second axis downwards; the transform at PLAN turns it round.
-
-    Args:
-        frame: what to frame the view on.
-        trails: entity of each run, as `runs` of `blueprint`, whose trail is shown up to the cursor.
     """
     xmin, ymin, xmax, ymax = frame.bounds_m
     margin = 0.03 * frame.span_m
@@ -170,12 +160,7 @@ def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:
 
 
 def flight_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial3DView:
-    """The 3-D view: the whole area, seen from the south-west and above.
-
-    Args:
-        frame: what to frame the view on.
-        trails: as in `plan_view`.
-    """
+    """The 3-D view: the whole area, seen from the south-west and above."""
     xmin, ymin, xmax, ymax = frame.bounds_m
     middle = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), frame.altitude_m)
     away = 1.25 * frame.span_m

@@ -29,12 +29,7 @@ OUTSIDE = re.compile(rb"<link\b[^>]*https?://[^>]*>|https://[^\"']*\.js\b")
 
 @contextlib.contextmanager
 def local_page(port: int, source_port: int) -> Iterator[None]:
-    """Serves the page of rerun's web server with the policy, for the length of the block.
-
-    Args:
-        port: of this machine, for browsers.
-        source_port: of this machine, where rerun serves the page.
-    """
+    """Serves the page of rerun's web server with the policy, for the length of the block."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:

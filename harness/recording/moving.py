@@ -69,11 +69,7 @@ def log_tracked_style(rec: rr.RecordingStream) -> None:
 
 
 class Changing:
-    """Obstacles that move, come or go: shows, moves and hides them as the flight goes on.
-
-    Args:
-        scene: what is known before the flight.
-    """
+    """Obstacles that move, come or go: shows, moves and hides them as the flight goes on."""
 
     def __init__(self, scene: look.Scene) -> None:
         self._scene, self._shown_until_s = scene, -math.inf

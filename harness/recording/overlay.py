@@ -93,10 +93,6 @@ def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:
 def send_recording(recording: Path, address: str) -> None:
     """Sends a recording, or an overlay, with its layout to a viewer that listens.
 
-    Args:
-        recording: the file.
-        address: of the viewer, `rerun+http://...`.
-
     Raises:
         RunFolderError: the recording cannot be read.
     """
@@ -220,14 +216,7 @@ def _end_lanes(
     figures: Sequence[Mapping[str, Any]],
     laned: Collection[int],
 ) -> None:
-    """Says in the lanes of each run from when on its flight is over, for the others go on.
-
-    Args:
-        rec: where to.
-        names: of the runs.
-        figures: of each, as `_metrics` gives them.
-        laned: places of those that have lanes.
-    """
+    """Says in the lanes of each run from when on its flight is over, for the others go on."""
     for place, (name, each) in enumerate(zip(names, figures, strict=True)):
         for lane in (look.PLANNER_LANE, look.TRACKING_LANE) if each and place in laned else ():
             own = f"{place + 1}-{rr.escape_entity_path_part(name)}/{lane}"
@@ -251,13 +240,7 @@ def _metrics(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, Any]:
 
 
 def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]], without: Sequence[str]) -> str:
-    """What came out of every run, side by side, as Markdown.
-
-    Args:
-        names: of the runs.
-        figures: of each, as `_metrics` gives them.
-        without: what is said of each where it has no such figure.
-    """
+    """What came out of every run, side by side, as Markdown."""
     rows = [
         " | ".join(
             [

@@ -36,10 +36,6 @@ Value = str | float | int | bool
 def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, Value]:
     """The figures of a run, each under a name with its unit.
 
-    Args:
-        scenario: as flown.
-        metrics: content of `metrics.json`.
-
     Returns:
         `severity` grows with how badly the run went: the outcome before the point, and for equal outcomes more the
         less clearance there was; navigation errors that were planned for are no fault. A figure that a run does not
@@ -84,13 +80,7 @@ def severity_told() -> str:
 
 
 def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> float:
-    """How badly a run went: its outcome before the point, and behind it more the less clearance there was.
-
-    Args:
-        outcome: a value of `harness.flight.record.Outcome`.
-        trackable: whether all legs were tracked, navigation errors that are planned for aside.
-        clearance_ratio: least clearance over the wanted one; None where there was nothing to keep clear of.
-    """
+    """How badly a run went: its outcome before the point, and behind it more the less clearance there was."""
     fair = trackable and (clearance_ratio is None or clearance_ratio >= 1.0)
     (not_fair,) = NOT_FAIR.values()
     whole = not_fair if outcome == "reached" and not fair else SEVERITY.get(outcome, 0.0)

@@ -86,12 +86,6 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
 def send_believed(rec: rr.RecordingStream, block: Track, piece_rows: int, last_m: FloatArray) -> FloatArray:
     """Shows where the aircraft believed to be, piece by piece as the trail, and how far off that was.
 
-    Args:
-        rec: where to.
-        block: rows of the track.
-        piece_rows: rows a piece.
-        last_m: (1, 3) the point that the first piece goes on from; (0, 3): from none.
-
     Returns:
         The last point.
     """
@@ -178,13 +172,7 @@ def lines_2d(
 
 
 def fan(center_m: FloatArray, edges: FloatArray, radius_m: float) -> FloatArray:
-    """Outline of a sector from its right edge anticlockwise to its left edge.
-
-    Args:
-        center_m: (2,) its corner.
-        edges: (4,) unit vectors of the right and the left edge.
-        radius_m: its radius.
-    """
+    """Outline of a sector from its right edge anticlockwise to its left edge."""
     right = math.atan2(edges[1], edges[0])
     width = (math.atan2(edges[3], edges[2]) - right) % math.tau or math.tau
     angle = right + np.linspace(0.0, width, max(int(width / 0.1), 1) + 1)

@@ -30,11 +30,6 @@ def thin_rows(entity: str, curve: FloatArray, every: int) -> IntArray:
     """The rows of a curve (n,) that a thin recording keeps: every so many, the extreme ones between, and the last.
 
     Without the extreme ones a plot would show less than the figures say: a peak is shorter than the rows are apart.
-
-    Args:
-        entity: as `thin_curves` has it; of the clearance the least value matters, else the farthest from 0.
-        curve: its values; NaN where there is none.
-        every: rows from one that is kept to the next.
     """
     size = np.nan_to_num(-curve if entity == "clearance/flown" else np.abs(curve), nan=-np.inf)
     groups = np.full((-(-len(size) // every), every), -np.inf)
@@ -44,12 +39,7 @@ def thin_rows(entity: str, curve: FloatArray, every: int) -> IntArray:
 
 
 def curves(block: Track, altitude_m: FloatArray) -> dict[str, FloatArray]:
-    """The curves of a whole recording, by entity below SERIES.
-
-    Args:
-        block: rows of the track.
-        altitude_m: (n,) to be held at each, above mean sea level.
-    """
+    """The curves of a whole recording, by entity below SERIES."""
     return {
         **thin_curves(block),
         "bank/pitch": block.pitch_deg,

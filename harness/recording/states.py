@@ -35,11 +35,7 @@ def over(metrics: Mapping[str, Any]) -> str:
 
 
 class States:
-    """Finds the changes of state, block by block.
-
-    Args:
-        bank_limit_deg: largest bank command of the guidance.
-    """
+    """Finds the changes of state, block by block."""
 
     def __init__(self, bank_limit_deg: float) -> None:
         self._limit_deg = bank_limit_deg - 0.01
@@ -130,11 +126,6 @@ def send_events(
 ) -> float:
     """Writes lines into the log of events; a `Caution` is a warning.
 
-    Args:
-        rec: where to.
-        events: simulated time, text, and colour of one that is no warning.
-        after_s: time of the last line before them.
-
     Returns:
         The time of the last line.
     """
@@ -156,11 +147,7 @@ def send_events(
 
 
 class Nearness:
-    """Tells when the aircraft comes nearer to an obstacle than was wanted, and when it is clear again.
-
-    Args:
-        wanted_m: clearance that was wanted.
-    """
+    """Tells when the aircraft comes nearer to an obstacle than was wanted, and when it is clear again."""
 
     def __init__(self, wanted_m: float) -> None:
         self._wanted_m, self._least_m = wanted_m, math.inf

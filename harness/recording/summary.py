@@ -32,12 +32,7 @@ The aircraft is drawn larger than it is; obstacles have no top.
 
 
 def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
-    """The page as Markdown.
-
-    Args:
-        scene: what is known before the flight.
-        metrics: content of `metrics.json`; None while flying.
-    """
+    """The page as Markdown."""
     mission = scene.mission
     # No heading: it would take three lines of a view that has room for five.
     lines = [escaped(scene.name), ""]

@@ -123,10 +123,6 @@ def need_screen() -> None:
 def served(rrd: Path, scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Serves a recording to browsers of this machine; gives the server and the address to open.
 
-    Args:
-        rrd: the recording, or an overlay.
-        scratch: an empty folder for the viewer's settings.
-
     Raises:
         ViewerError: the server does not start.
     """
@@ -139,9 +135,6 @@ def served(rrd: Path, scratch: Path) -> Iterator[tuple[subprocess.Popen[str], st
 @contextlib.contextmanager
 def web_viewer(scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
     """Serves the viewer's page to browsers of this machine.
-
-    Args:
-        scratch: an empty folder for the viewer's settings.
 
     Returns:
         The server, the page's address, and the address that takes recordings.
@@ -165,10 +158,6 @@ def following_viewer(
     web: bool = False, tell: Callable[[str], None] = lambda address: None
 ) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Opens an empty viewer for a flight that goes on; gives it, and the address that takes recordings.
-
-    Args:
-        web: in a browser instead of a window.
-        tell: is told the address for the browser.
 
     Raises:
         ViewerError: there is no screen, or the viewer does not start.
@@ -300,11 +289,6 @@ def viewer_process(
     arguments: Sequence[str], scratch: Path, port: int | None = None
 ) -> Iterator[subprocess.Popen[str]]:
     """Runs a viewer with arguments, and ends it with the block.
-
-    Args:
-        arguments: of the viewer's command line.
-        scratch: an empty folder for the viewer's settings.
-        port: waits until the viewer listens there.
 
     Raises:
         ViewerError: there is no viewer, or a headless one does not come to listen.

@@ -45,15 +45,7 @@ class ReportedFlight:
 def entry(
     scenario: Scenario, run: Run, optimum: Optimum, kinematic: bool = False, guidance: str = ""
 ) -> ReportedFlight:
-    """A flight that came to an end.
-
-    Args:
-        scenario: what was flown.
-        run: the run folder, read back.
-        optimum: the scenario's.
-        kinematic: a point flew instead of the aircraft.
-        guidance: the law, where several are compared.
-    """
+    """A flight that came to an end."""
     row = row_of(
         scenario.name,
         GIVEN if "check" in run.metrics else scenario.planner.label,
@@ -80,14 +72,7 @@ def optimum_of(scenario: Scenario) -> Optimum:
 
 
 def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight], optimum: Optimum) -> Chapter:
-    """Writes the figures of planners side by side; returns the scenario's part of the report.
-
-    Args:
-        folder: where the figures go.
-        scenario: with any of the planners.
-        entries: one a planner.
-        optimum: the scenario's.
-    """
+    """Writes the figures of planners side by side; returns the scenario's part of the report."""
     from harness.report import figures
     from harness.report.page import Chapter
     from harness.report.planner_figure import planner_figure
@@ -164,12 +149,7 @@ PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross
 
 
 def without_fix(scenario: Scenario, until_s: float) -> dict[str, str]:
-    """When there was no fix of the position, as a fact; nothing where there always was one.
-
-    Args:
-        scenario: what was flown.
-        until_s: when the flight ended, or would have to.
-    """
+    """When there was no fix of the position, as a fact; nothing where there always was one."""
     met = [
         (begin_s, min(end_s, until_s))
         for begin_s, end_s in scenario.navigation.outages_s

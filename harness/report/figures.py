@@ -60,11 +60,7 @@ class DrawnRun:
     plans: Sequence[AcceptedPlan | PlanRow]
 
     def nearest(self, clearance_m: float) -> int | None:
-        """The row at which it was nearest to an obstacle, or hit it; None if never below the wanted clearance.
-
-        Args:
-            clearance_m: the wanted one.
-        """
+        """The row at which it was nearest to an obstacle, or hit it; None if never below the wanted clearance."""
         below = self.track.clearance_m < clearance_m
         if not below.any():
             return None

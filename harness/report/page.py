@@ -57,15 +57,7 @@ class Chapter:
 def report_html(
     chapters: Sequence[Chapter], command: str, versions: Mapping[str, str], written: str, kinematic: bool
 ) -> str:
-    """The text of `report.html`.
-
-    Args:
-        chapters: the scenarios in order.
-        command: the command line that made the comparison.
-        versions: what it was made with, by name.
-        written: date and time.
-        kinematic: a point flew instead of the aircraft.
-    """
+    """The text of `report.html`."""
     return rendered(
         "comparison.html",
         chapters=chapters,

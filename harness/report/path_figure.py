@@ -42,14 +42,7 @@ ABOUT = 0.15
 
 
 def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics: Mapping[str, Any]) -> Figure:
-    """Draws a checked path.
-
-    Args:
-        scene: its scenario.
-        run: the flight.
-        given_m: (k, 2) the line as given.
-        metrics: content of `metrics.json`.
-    """
+    """Draws a checked path."""
     check = metrics["check"]
     flown = thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
     points = given_m.tolist() if len(given_m) <= MOST_POINTS else []

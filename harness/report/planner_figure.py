@@ -42,13 +42,7 @@ PLANNED_DASHES: Any = (0, (4, 2))
 
 
 def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:
-    """One planner's path as in the paper's Figures 2 and 3, and its near miss: where it was nearest to an obstacle.
-
-    Args:
-        scene: the scenario.
-        run: the flight.
-        index: number of the planner, for its colour.
-    """
+    """One planner's path as in the paper's Figures 2 and 3, and its near miss: where it was nearest to an obstacle."""
     nearest, marks = run.nearest(scene.clearance_m), legend_marks(scene, [run])
     heights_in = [map_height_in(scene)] + ([] if nearest is None else [CLOSE_UP_IN])
     with styled(sum(heights_in) + LEGEND_ROW_IN * math.ceil((4 + len(marks)) / 2)) as figure:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
+from harness.analysis.findings import CONTRADICTED
 from harness.analysis.rows import escaped, to_csv, to_markdown
+from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
@@ -15,6 +17,7 @@ from harness.report.page import JudgedBy, run_html
 from harness.report.remarks import Remark, remarks
 from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
 from harness.scenario.scenario import Scenario, parse_scenario
+from harness.world.optimum import Optimum
 
 
 def write_report(folder: Path) -> Path:
@@ -51,7 +54,10 @@ def _written(run: Run, folder: Path) -> Path:
         run.metrics["trackability"],
         run.metrics if "check" in run.metrics else None,
         judged=_judged_by(scenario),
-        remarks=[Remark(each["kind"], each["text"]) for each in run.metrics.get("findings", ())]
+        remarks=[
+            Remark(each["kind"], each["text"] + _beside(optimum, each["kind"]))
+            for each in run.metrics.get("findings", ())
+        ]
         + remarks(
             flight.row,
             scenario.planner.clearance_m or 0.0,
@@ -72,6 +78,14 @@ def _written(run: Run, folder: Path) -> Path:
     replace_text(page.with_suffix(".md"), f"{to_markdown([flight.row])}\n{repeat}")
     replace_text(page, text)
     return page
+
+
+def _beside(optimum: Optimum, kind: str) -> str:
+    """What the clairvoyant optimum turns in all, beside a finding about what was turned for nothing."""
+    if kind != CONTRADICTED or len(optimum.points_m) < 2:
+        return ""
+    turned = smoothness(polyline_profile(optimum.points_m, 1.0), 1.0).heading_change_deg
+    return f", the clairvoyant optimum {turned:.0f} deg"
 
 
 def _judged_by(scenario: Scenario) -> list[JudgedBy]:

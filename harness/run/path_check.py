@@ -58,10 +58,9 @@ def scenario_for(
     files: bool = True,
     ground: GroundSpec | None = None,
 ) -> Scenario:
-    """The mission of a path as a scenario: from its start to its end.
+    """The mission of a path as a scenario: from its start to its end, or to its furthest point where it leads back.
 
-    A path that ends about where it begins has its furthest point as the goal. Start and goal may lie anywhere, in an
-    obstacle too: that is then what the flight finds.
+    Start and goal may lie anywhere, in an obstacle too: that is then what the flight finds.
 
     Args:
         name: of the scenario.
@@ -88,16 +87,7 @@ def files_of(
     overrides: Sequence[tuple[str, str]] = (),
     world: FilePath | None = None,
 ) -> tuple[FileSpec, ...]:
-    """The files among the obstacles.
-
-    Args:
-        sections: as `scenario_for` takes them.
-        overrides: likewise.
-        world: likewise.
-
-    Raises:
-        InputError: a key path leads nowhere.
-    """
+    """The files among the obstacles, of sections, overrides and a world as `scenario_for` takes them."""
     root, _ = _root("path", np.array([(0.0, 0.0), (1.0, 0.0)]), sections, overrides, world)
     obstacles = root.at(("obstacles",))
     listed = obstacles.value if obstacles is not None and isinstance(obstacles.value, tuple) else ()
@@ -126,14 +116,13 @@ def _root(
     """The keys of `scenario_for`, and what their faults name."""
     root, source = _base(world)
     for key, section in _sections(name, points_m, sections, root).items():
-        before = root.at((key,))
-        keys = node_of_keys({key: section}).value
-        assert isinstance(keys, dict)
-        kept = before.value if before is not None and isinstance(before.value, dict) else {}
-        new = keys[key].value
-        root = with_key(
-            root, (key,), Node({**kept, **new}, keys[key].line) if isinstance(new, dict) else keys[key]
+        keys = (
+            node_of_keys(section) if isinstance(section, dict) else node_of(section, strict_yaml.COMMAND_LINE)
         )
+        before = root.at((key,))
+        if before is not None and isinstance(before.value, dict) and isinstance(keys.value, dict):
+            keys = Node({**before.value, **keys.value}, keys.line)
+        root = with_key(root, (key,), keys)
     return overridden(root, overrides), source
 
 
@@ -334,13 +323,6 @@ def fly_check(
     command: str | None = None,
 ) -> CheckedPath:
     """Flies a path, into a run folder if one is named.
-
-    Args:
-        check: the path, and what it is flown with.
-        out: the run folder; None: none is written.
-        recording: whether to write `flight.rrd` there.
-        progress: told of the flight as it goes on.
-        command: what the manifest says was called; default: the command line.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.

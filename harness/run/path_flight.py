@@ -299,14 +299,7 @@ class GivenPath:
 
 
 class PathEnd:
-    """A flight along a path: over at its end, or when it takes too long. Implements `Termination`.
-
-    Args:
-        where: the place of an aircraft on the path.
-        length_m: of the path.
-        near_m: so near to the path where it ends, the end is reached.
-        limit_s: time limit.
-    """
+    """A flight along a path: over at its end, or when it takes too long. Implements `Termination`."""
 
     contact_m = math.inf
 

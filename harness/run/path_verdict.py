@@ -52,11 +52,6 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
 
     On top of what a flight has: `deviation_from_given_m`, `contact`, `breaches`, and under `check` the verdict, the
     worst place, the corners, what was given, and what became of the items of a mission.
-
-    Args:
-        check: what was asked.
-        flight: what was flown.
-        limits: what it is measured against.
     """
     track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
     corners = [Corner(**vars(each), allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
@@ -114,30 +109,29 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
 def verdict(
     figures: Mapping[str, Any], told: Mapping[str, Any], seen: Kept, tolerance_m: float
 ) -> tuple[bool, str]:
-    """Whether a path can be flown as given, and a sentence that says so or why not.
-
-    Args:
-        figures: of the flight: outcome, reason, `trackable`, `trackability`.
-        told: the figures under `check`: corners, worst place, how much of the limits was used.
-        seen: what was touched and crossed.
-        tolerance_m: what the aircraft may be off away from corners.
-    """
+    """Whether a path can be flown as given, and a sentence that says so or why not."""
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
     off = [corner for corner in told["corners"] if not corner["kept"]]
     faults = [_first(seen.contacts, "touches")] if seen.contacts else []
     for kind, verb in (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves")):
         crossed = [each for each in seen.crossings if each.kind == kind]
         faults += [_first(crossed, verb)] if crossed else []
-    if bad:
-        faults.append(tallied(bad, "legs"))
+    faults += [tallied(bad, "legs")] if bad else []
+    worst, used, enough_m = told["worst"], told["limit_used"], told["corner_m_that_would_do"]
+    noun = "waypoint" if told["drawn"] else "item"
+    if worst["off_m"] > worst["allowed_m"]:
+        where = "" if worst["waypoint"] is None else f" at {noun} {worst['waypoint']}"
+        faults.append(f"{worst['off_m']:.3g} m off{where} where {worst['allowed_m']:.3g} m are allowed")
     elif off:
-        faults.append("turn radius too tight")
-    worst = told["worst"]
-    if worst["off_m"] > worst["allowed_m"] or off:
-        faults.append(_how_far(worst, "waypoint" if told["drawn"] else "item"))
-        enough_m = told["corner_m_that_would_do"]
-        if enough_m is not None:
-            faults.append(f"--corner-m {enough_m:g} would be yes")
+        reached = (
+            "not reached" if off[0]["flown_cut_m"] is None else f"passed {off[0]['most_off_m']:.3g} m off"
+        )
+        faults.append(f"{noun} {off[0]['waypoint']} {reached}, {off[0]['allowed_cut_m']:.3g} m are allowed")
+    if used["altitude"] > 1.0:
+        high_m = figures["altitude_error_m"]["max"]
+        faults.append(f"{high_m:.3g} m off in altitude where {high_m / used['altitude']:.3g} m are allowed")
+    if faults and enough_m is not None:
+        faults.append(f"--corner-m {enough_m:g} would be yes")
     if figures["outcome"] not in ("reached", "collision"):
         faults.append(str(figures["reason"]))
     if not faults and not figures["trackable"]:
@@ -145,14 +139,10 @@ def verdict(
     if faults:
         return False, "no: " + "; ".join(faults)
     how = "as drawn" if told["drawn"] else "with its corners cut by no more than allowed"
-    used = max(told["limit_used"]["off_path"] or 0.0, told["limit_used"]["altitude"])
-    return True, f"yes: flown {how}, within {tolerance_m:.3g} m; {used:.0%} of a limit used at most"
-
-
-def _how_far(worst: Mapping[str, Any], noun: str) -> str:
-    """How far off the worst place is."""
-    where = "" if worst["waypoint"] is None else f" at {noun} {worst['waypoint']}"
-    return f"{worst['off_m']:.3g} m off{where} where {worst['allowed_m']:.3g} m are allowed"
+    wide_m = max((corner["allowed_cut_m"] for corner in told["corners"]), default=0.0)
+    corners = f", corners within {wide_m:.3g} m" if wide_m > tolerance_m else ""
+    most = max(used["off_path"] or 0.0, used["altitude"])
+    return True, f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most"
 
 
 def _first(found: Sequence[Breach], verb: str) -> str:
@@ -293,11 +283,6 @@ def layer_contacts(
     """Contacts with what is solid at the altitudes of a track, and the least distance from it.
 
     Terrain is left out: contact with it is told from its true height.
-
-    Args:
-        track: what was flown.
-        scenario: gives the plane, the area and the ground.
-        files: those that are cut.
     """
     import shapely
 

@@ -57,10 +57,6 @@ def make_loop(
 ) -> Loop:
     """All parts of a scenario's flight.
 
-    Args:
-        scenario: a complete scenario.
-        make_model: makes the flight model; default: the scenario's JSBSim aircraft.
-
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
     """
@@ -127,12 +123,7 @@ def jsbsim_aircraft(
 
 
 def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
-    """What a scenario's flight is measured against.
-
-    Args:
-        scenario: a complete scenario.
-        planned: a planner makes the path, and keeps a margin for navigation errors; else it is given.
-    """
+    """What a scenario's flight is measured against."""
     performance, limits = performance_of(scenario), scenario.trackability
     frame = airframe_of(scenario.aircraft)
     guidance = frame.guidance_limits()
@@ -187,10 +178,9 @@ def fly_to_folder(
         recording: whether to write `flight.rrd`.
         progress: told of the flight as it goes on.
         make: makes the parts of the flight.
-        watching: look on besides those that write the folder.
+        watching: observers besides those that write the folder.
         pilot: stands in the recording's name; default: the planner's kind.
-        identity: of the recording among others; default: scenario, planner, aircraft, seed, and a hash of all
-            settings and versions.
+        identity: of the recording among others; default: its name with a hash of all settings and versions.
         varied: keys that a campaign varied, for the recording's properties.
         thin: whether the recording has no more than track, plans and obstacles.
         flown_by: flies the parts to an end.
@@ -240,14 +230,7 @@ def _recording(scene: Scene, loop: Loop, folder: RunFolder, identity: str | None
 
 
 def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None) -> Scene:
-    """What a recording shows before the flight.
-
-    Args:
-        scenario: a complete scenario.
-        loop: the parts of its flight.
-        text: the scenario as YAML, for the summary.
-        pilot: stands in the recording's name; default: the planner's kind, which searches.
-    """
+    """What a recording shows before the flight."""
     from harness.recording.blueprint import Scene
 
     wind = scenario.environment.wind
