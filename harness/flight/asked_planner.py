@@ -60,6 +60,11 @@ class AskedPlanner:
         report = getattr(self._planner, "report", None)
         return report if isinstance(report, ShieldReport) else None
 
+    @property
+    def backup(self) -> str:
+        """Why the shield flies its backup; empty while it flies the planner's path, and without a shield."""
+        return str(getattr(self._planner, "backup", "")) if self.shield is not None else ""
+
     def plan(self, request: PlanRequest) -> Answer:
         """The answer to a request; its `flown` is the `own` of the answer in effect.
 

@@ -23,6 +23,16 @@ class Caution(str):
     __slots__ = ()
 
 
+NOMINAL = "nominal"
+"""The shield flies the planner's path."""
+
+
+class ShieldState(str):
+    """The text of an event that tells what the shield flies from then on: nominal, or the backup and why."""
+
+    __slots__ = ()
+
+
 class Observer(Protocol):
     """What may look on while the loop runs. Nothing that it does reaches the loop."""
 

@@ -10,7 +10,7 @@ from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
 from harness.files.crash import in_a_line, sentence, trace
 from harness.flight.asked_planner import Answer, AskedPlanner, PlannerFailedError
-from harness.flight.observer import Caution, Observer
+from harness.flight.observer import NOMINAL, Caution, Observer, ShieldState
 from harness.flight.record import AcceptedPlan, Outcome
 from harness.flight.termination import Ending
 from planner.interface import MapView, Mission, Plan, Planner, PlanRequest, PlanStatus
@@ -53,6 +53,7 @@ class Plans:
         self._in_vain: set[str] = set()  # all that was told of why nothing was found since the last plan
         self._stuck = ""  # the last of it
         self._arc_length_m, self._loiters_from_m = 0.0, math.inf
+        self._backup = False  # what the shield flies
 
     @property
     def shield(self) -> ShieldReport | None:
@@ -89,6 +90,7 @@ class Plans:
             self.error = error.trace
             return Ending(Outcome.PLANNER_FAILED, str(error))
         plan = answer.plan
+        self._note_backup(state.time_s)
         self._told, self.wants_more_time = plan.reason, plan.wants_more_time
         if plan.status is PlanStatus.KEPT:
             return None
@@ -160,6 +162,15 @@ class Plans:
             arc_length_m=arc_length_m if flown else 0.0,
             scanned=self._scanned,
         )
+
+    def _note_backup(self, time_s: float) -> None:
+        """Tells observers when the shield goes over to its backup, and why, and when it is back."""
+        why = self._planner.backup
+        if bool(why) != self._backup:
+            self._backup = bool(why)
+            told = ShieldState(f"backup: {in_a_line(why)}" if why else NOMINAL)
+            for observer in self._observers:
+                observer.on_event(time_s, told)
 
     def _note_failure(self, time_s: float, reason: str) -> None:
         """Tells observers once of each reason why nothing is found."""

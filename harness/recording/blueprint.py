@@ -47,7 +47,7 @@ SENSED = "sensed"
 TRUE = "true_obstacles"
 """Below WORLD: the standing obstacles as solids from the start on; hidden but in overlays and thin recordings."""
 
-PLANNER_LANE, BANK_LANE, TRACKING_LANE = "planner", "saturation", "tracking"
+PLANNER_LANE, BANK_LANE, TRACKING_LANE, SHIELD_LANE = "planner", "saturation", "tracking", "shield"
 """Lanes of the state timeline, below STATES; shown in the order of their names."""
 
 Colour = tuple[int, int, int]

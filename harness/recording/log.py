@@ -19,7 +19,7 @@ import rerun as rr
 
 from aircraft.interface import AircraftState
 from harness.analysis.causes import NAVIGATION_ERROR
-from harness.flight.observer import Caution
+from harness.flight.observer import NOMINAL, Caution, ShieldState
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, RunningViewer, Sink, recording_stream
@@ -44,9 +44,11 @@ from harness.recording.states import (
     AT_LIMIT,
     FREE,
     TRACKABLE,
+    Change,
     Nearness,
     States,
     log_colours,
+    mode_of,
     over,
     plan_text,
     send_changes,
@@ -111,6 +113,8 @@ class RerunLog:
         self._scans: list[RangeScan] = []
         self._plans: list[AcceptedPlan] = []
         self._events: list[tuple[float, str, look.Colour]] = []
+        self._shield: list[Change] = []  # what it flies, from when on
+        self._shield_states: dict[str, look.Colour] = {}
         self._sensed = Sensed(scene.obstacles, CELL_SHARE * span_m)
         self._told_s = -math.inf
         self._states = States(math.degrees(scene.limits.bank_limit_rad))
@@ -159,6 +163,10 @@ class RerunLog:
     def on_event(self, time_s: float, text: str) -> None:
         """Adds a line to the log of events."""
         self._events.append((time_s, text, look.TOLD))
+        if isinstance(text, ShieldState) and not self._thin:
+            before = [] if self._shield or NOMINAL in self._shield_states else [(0.0, NOMINAL)]
+            self._shield += [*before, (time_s, mode_of(text))]
+            self._shield_states.setdefault(NOMINAL, look.CALM)
 
     def on_block(self, block: Track) -> None:
         """Draws consecutive rows of the track, and what happened meanwhile."""
@@ -176,6 +184,11 @@ class RerunLog:
         for lane, changes in self._states.changes(block).items():
             send_changes(self._rec, lane, changes)
         log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
+        if self._shield:
+            send_changes(self._rec, look.SHIELD_LANE, self._shield)
+            self._shield_states |= {told: look.HOLD for _, told in self._shield if told != NOMINAL}
+            log_colours(self._rec, look.SHIELD_LANE, self._shield_states)
+            self._shield = []
         drawn = curves(block, self._scene.held_m(block.arc_length_m))
         for empty in self._scene.empty_series:
             drawn.pop(f"{empty}/flown", None)

@@ -27,7 +27,7 @@ from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
-from harness.flight.observer import Caution
+from harness.flight.observer import Caution, ShieldState
 from harness.flight.record import BELIEVED_FIELDS, AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
 from harness.recording import viewer
@@ -312,13 +312,15 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Calla
     log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
     accepted = AcceptedPlan(0, 1.0, 2.5, plan)
     log.on_plan(accepted, STATE)
+    log.on_event(5.5, ShieldState("backup: stuck 12 m ahead"))
+    log.on_event(7.0, ShieldState("nominal"))
     log.on_block(track)
     flight = Flight(track, (accepted,), Outcome.TIMEOUT, "late", (2.5,), 10.0, 0.1)
     log.close(metrics(flight, LIMITS))
     entities = read(tmp_path / "a.rrd")
     lanes = {
         lane: list(zip(seconds(entities, f"/states/{lane}")[-len(states) :], states, strict=True))
-        for lane in ("planner", "saturation", "tracking")
+        for lane in ("planner", "saturation", "shield", "tracking")
         for states in [[str(cell[0]) for cell in column(entities, f"/states/{lane}", "state") if cell]]
     }
     assert lanes["planner"] == [
@@ -326,6 +328,7 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Calla
         (1.0, "obstacle ahead at … km, passing left"),
         (5.1, "holding"),
     ]
+    assert lanes["shield"] == [(0.0, "nominal"), (5.5, "backup: stuck … m ahead"), (7.0, "nominal")]
     assert lanes["saturation"] == [(0.0, "bank command below its limit"), (8.0, "bank command at its limit")]
     ((start, cause),) = lanes["tracking"]
     assert (start, cause == "trackable") == (1.0, False)
