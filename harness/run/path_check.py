@@ -20,7 +20,7 @@ from harness.run.path_flight import PathPlan, fly_along, planned
 from harness.run.path_verdict import measured
 from harness.run.scenario_flight import flight_limits, fly_to_folder, jsbsim_aircraft, make_loop
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
-from harness.run_files.mission.flying import corner_limit_m
+from harness.run_files.mission.vertices import corner_limit_m
 from harness.run_files.path_files import PathAsGiven
 from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of

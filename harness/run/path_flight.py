@@ -25,9 +25,8 @@ from harness.flight.observer import Observer, Progress
 from harness.flight.record import Flight, Outcome
 from harness.flight.termination import Ending
 from harness.run_files.given_path import FloatArray, FlyBy, Tightest, fly_by
-from harness.run_files.mission.flying import Flying, Ground
 from harness.run_files.mission.route import CLIMB_SHARE, mission_route
-from harness.run_files.mission.waypoint_run import without_steps
+from harness.run_files.mission.vertices import Flying, Ground, without_steps
 from harness.run_files.path_files import PathAsGiven
 from harness.scenario.craft import airframe_of
 from harness.scenario.performance import performance_of

@@ -26,12 +26,7 @@ def read_csv(text: str, source: str) -> PathAsRead:
     Raises:
         InputError: it is none.
     """
-    lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
-    rows = csv.reader(lines)
-    try:
-        filled = [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise InputError(f"{source}: is not CSV ({error})") from error
+    filled = _filled(text, source)
     line, header = filled[0] if filled else (1, [])
     header = [name.strip().lower() for name in header]
     names = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
@@ -40,16 +35,26 @@ def read_csv(text: str, source: str) -> PathAsRead:
             f"{source}:{line}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
             "latitude_deg,longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas"
         )
-    height = next((name for name in (*ALTITUDES, ABOVE_GROUND) if name in header), None)
-    wanted = names if height is None else (*names, height)
+    heights = [name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]
+    wanted = (*names, *heights)
     found = [_numbers(row, header, wanted, f"{source}:{number}") for number, row in filled[1:]]
     return PathAsRead(
         names in LOCAL,
         tuple((row[0], row[1]) for row in found),
-        tuple(row[2] for row in found) if height else (),
-        above_ground=height == ABOVE_GROUND,
+        tuple(row[2] for row in found if heights),
+        above_ground=heights == [ABOVE_GROUND],
         notes=_passed_over([name for name in header if name not in wanted]),
     )
+
+
+def _filled(text: str, source: str) -> list[tuple[int, list[str]]]:
+    """The rows that are neither blank nor a comment, with their lines."""
+    lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
+    rows = csv.reader(lines)
+    try:
+        return [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise InputError(f"{source}: is not CSV ({error})") from error
 
 
 def _numbers(row: list[str], header: list[str], wanted: tuple[str, ...], where: str) -> list[float]:

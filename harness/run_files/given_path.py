@@ -8,47 +8,38 @@ an arc has the turn radius of the aircraft. What is left is the corner that had 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+Row = tuple[float, float, float, float, float, float]
+"""A segment, as in `planner.interface.Path`."""
 
-GIVEN = "path as given"
+GIVEN: Final = "path as given"
 """Stands for the planner's name where there was none."""
-
-SAME_PLACE_M = 0.01
+SAME_PLACE_M: Final = 0.01
 """Points that are not further apart are one."""
-
-SAME_LINE_M = 0.01
+SAME_LINE_M: Final = 0.01
 """A point nearer than this to the line of those about it is taken to lie on it."""
-
-AT_ONCE = 10_000
+AT_ONCE: Final = 10_000
 """Points that are simplified together: GEOS calls itself once more for each that it keeps."""
-
-SHORTEST_M = 1e-6
+SHORTEST_M: Final = 1e-6
 """A shorter segment is left out."""
-
-PAST_RAD = np.radians(140.0)
+PAST_RAD: Final = np.radians(140.0)
 """A sharper corner is flown past and back: from there on an aircraft that does so comes nearer to both legs (flown: at
 140 degrees 118 m off against 125 m, at 150 degrees 178 m against 128 m)."""
-
-SHARPEST_RAD = np.pi - 1e-3
+SHARPEST_RAD: Final = np.pi - 1e-3
 """A sharper corner leads back: it has no arc that touches both legs."""
-
-FLATTEST = 1e-12
+FLATTEST: Final = 1e-12
 """Distance of the flattest corner from its arc, in radii."""
-
-
-LIMIT_SHARE = 0.9
+LIMIT_SHARE: Final = 0.9
 """Share of what a corner may be passed at by which it is cut at most, if the aircraft turns so tightly."""
-
 CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
 """Of a corner's limit only this share is used if the arc is then no tighter than so many least radii: the rest of both
 is left for gusts."""
-
-WIND_SAMPLES = 9
+WIND_SAMPLES: Final = 9
 """The ground speed is looked up in so many directions of a turn."""
 
 
@@ -163,49 +154,41 @@ def fly_by(
     radius = np.minimum(_fitting(length, least, shape), wanted)
     radius[shape.back] = 0.0
 
-    ends = np.concatenate(([0.0], radius * shape.after)), np.concatenate((radius * shape.before, [0.0]))
-    rows: list[tuple[float, float, float, float, float, float]] = []
-    begins: list[float] = []
-    station = 0.0
-    for leg in range(len(length)):
-        begin = place[leg] + ends[0][leg] * ahead[leg]
-        straight = length[leg] - ends[0][leg] - ends[1][leg]
-        if straight > SHORTEST_M:
-            rows.append((begin.real, begin.imag, ahead[leg].real, ahead[leg].imag, 0.0, straight))
-            station += float(straight)
-        if leg == len(turn):
-            break
-        begins.append(station)
-        touch = place[leg + 1] - ends[1][leg] * ahead[leg]
-        for row in _arcs(touch, ahead[leg], turn[leg], radius[leg], float(shape.back_turn[leg])):
-            rows.append(row)
-            station += row[5]
-    begun = np.array(begins)
-    middles = begun + radius * shape.corner
-    spans = radius * (np.abs(turn) + 2.0 * shape.back_turn)
+    before, after = radius * shape.before, radius * shape.after
+    straight = length - np.append(before, 0.0) - np.append(0.0, after)
+    begins = place[:-1] + np.append(0.0, after) * ahead
+    rows: list[Row] = []
+    begun, station = np.zeros(len(turn)), 0.0
+    for leg, long in enumerate(straight.tolist()):
+        if long > SHORTEST_M:
+            rows.append((begins[leg].real, begins[leg].imag, ahead[leg].real, ahead[leg].imag, 0.0, long))
+            station += long
+        if leg < len(turn):
+            begun[leg] = station
+            touch = place[leg + 1] - before[leg] * ahead[leg]
+            arcs = _arcs(touch, ahead[leg], turn[leg], radius[leg], float(shape.back_turn[leg]))
+            station += sum(row[5] for row in arcs)
+            rows += arcs
+    # Where along the rounded path each turn begins, passes its corner, ends.
+    middles, over = begun + radius * shape.corner, begun + radius * (np.abs(turn) + 2.0 * shape.back_turn)
     cut = np.where(shape.back, 0.0, radius * shape.cut)
+    half = np.maximum(middles - begun, over - middles)
+    told = np.column_stack((points[1:-1], np.degrees(turn), radius, cut, middles, half))
     corners = tuple(
-        CutCorner(
-            waypoint=int(kept[i + 1]),
-            east_m=float(place[i + 1].real),
-            north_m=float(place[i + 1].imag),
-            turn_deg=float(np.degrees(turn[i])),
-            radius_m=float(radius[i]),
-            cut_m=float(cut[i]),
-            arc_length_m=float(middles[i]),
-            half_m=float(max(middles[i] - begun[i], begun[i] + spans[i] - middles[i])),
-        )
+        CutCorner(int(kept[i + 1]), *told[i].tolist())
         for i in np.flatnonzero(every | shape.back | (cut > free * (1.0 + 1e-9))).tolist()
     )
     stations = np.concatenate(([0.0], middles, [station]))
-    along = np.stack((begun, middles, begun + spans), axis=1)
-    trims = radius * shape.before, radius * shape.after
-    given = _as_given(points, ahead, trims, along, station)
+    inner = np.stack(
+        (place[1:-1] - before * ahead[:-1], place[1:-1], place[1:-1] + after * ahead[1:]), axis=1
+    )
+    drawn = np.concatenate((place[:1], inner.ravel(), place[-1:]))
+    along = np.concatenate(([0.0], np.stack((begun, middles, over), axis=1).ravel(), [station]))
+    given = np.column_stack((drawn.real, drawn.imag, along))
     return FlyBy(points, np.array(rows), corners, kept, stations, given)
 
 
-@dataclass(frozen=True, eq=False)
-class _Shapes:
+class _Shapes(NamedTuple):
     """How corners are rounded, each (k,), lengths in radii of the turn.
 
     Attributes:
@@ -276,9 +259,7 @@ def _tightened(
     return tight
 
 
-def _arcs(
-    begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float
-) -> list[tuple[float, float, float, float, float, float]]:
+def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float) -> list[Row]:
     """The turn at a corner: an arc, and where it goes too far another one back."""
     rows = []
     side = 1.0 if turn > 0.0 else -1.0
@@ -290,30 +271,6 @@ def _arcs(
         turned = ahead * np.exp(1j * sign * angle)
         begin, ahead = begin + (turned - ahead) * radius_m / (1j * sign), turned
     return rows
-
-
-def _as_given(
-    points_m: FloatArray,
-    ahead: NDArray[Any],
-    trims_m: tuple[FloatArray, FloatArray],
-    along_m: FloatArray,
-    length_m: float,
-) -> FloatArray:
-    """`FlyBy.given_m` of (k + 2, 2) points with turns at the k between its ends.
-
-    Args:
-        points_m: the polyline.
-        ahead: (k + 1,) unit vectors along its legs.
-        trims_m: (k,) how far before its corner each turn begins, and how far behind it ends.
-        along_m: (k, 3) where along the rounded path it begins, passes the corner, ends.
-        length_m: of the rounded path.
-    """
-    corners = points_m[1:-1, 0] + 1j * points_m[1:-1, 1]
-    before, after = trims_m
-    places = np.stack((corners - before * ahead[:-1], corners, corners + after * ahead[1:]), axis=1).ravel()
-    inner = np.column_stack((places.real, places.imag, along_m.ravel()))
-    ends = np.column_stack((points_m[[0, -1]], (0.0, length_m)))
-    return np.concatenate((ends[:1], inner, ends[1:]))
 
 
 def _needed(points_m: FloatArray) -> NDArray[np.int64]:
@@ -330,13 +287,7 @@ def _needed(points_m: FloatArray) -> NDArray[np.int64]:
 
 
 def _fitting(length_m: FloatArray, radius_m: FloatArray, shape: _Shapes) -> FloatArray:
-    """(k,) the widest radii that there is room for; neighbours share the leg between them by what they need.
-
-    Args:
-        length_m: (k + 1,) of the legs.
-        radius_m: (k,) that are needed.
-        shape: of the turns.
-    """
+    """(k,) the widest radii that (k + 1,) legs leave room for; neighbours share a leg by what (k,) radii need."""
     before = np.append(radius_m * shape.before, 0.0)  # at the end of each leg
     after = np.append(0.0, radius_m * shape.after)  # at its begin
     asked = np.maximum(before + after, SHORTEST_M * SHORTEST_M)

@@ -45,31 +45,39 @@ def read_kml(text: str, source: str) -> PathAsRead:
         InputError: it is none, or holds no line or several.
     """
     root = _parsed(text, source, "kml")
-    for given_up in GIVEN_UP:
-        if next(_all(root, given_up), None) is not None:
-            raise InputError(f"{source}: has gx:{given_up}, which is not read; save it as plain lines")
-    lines: list[tuple[str, Element]] = []
-    fences: list[Fence] = []
-    for number, placemark in enumerate(_all(root, "Placemark"), start=1):
-        name = shown(_text(placemark, "name") or f"Placemark {number}")
-        lines += [(name, each) for each in placemark.iter() if _name(each) in LINES]
-        fences += [_polygon(each, name, source) for each in _all(placemark, "Polygon")]
+    for each in root.iter():
+        if _name(each) in GIVEN_UP:
+            raise InputError(f"{source}: has gx:{_name(each)}, which is not read; save it as plain lines")
+    placemarks = [
+        (shown(_text(each, "name") or f"Placemark {number}"), each)
+        for number, each in enumerate(_all(root, "Placemark"), start=1)
+    ]
+    lines = [(name, line) for name, each in placemarks for kind in LINES for line in _all(each, kind)]
+    fences = [_polygon(area, name, source) for name, each in placemarks for area in _all(each, "Polygon")]
     if len(lines) != 1:
         told = f" ({', '.join(name for name, _ in lines[:4])})" if lines else ""
         raise InputError(f"{source}: has {len(lines)} lines{told}; must have exactly one, the path")
     ((name, line),) = lines
-    others = Counter(kind for each in root.iter() if (kind := _name(each)) in PASSED)
-    others["LinearRing"] -= sum(
-        1 for kind in BOUNDARIES for each in _all(root, kind) for _ in _all(each, "LinearRing")
-    )
-    notes = _notes(others)
-    points = [_point(row, f"{source}: {name}: point {number}") for number, row in enumerate(_rows(line))]
-    mode = _text(line, "altitudeMode")
-    if mode not in (ABSOLUTE, RELATIVE):
-        if any(altitude for *_, altitude in points):
-            notes.append(f"altitudes passed over: their altitudeMode is {shown(mode or CLAMPED)}")
-        points = [(latitude, longitude, None) for latitude, longitude, _ in points]
+    points, notes = _with_altitudes(_points(line, f"{source}: {name}"), mode := _text(line, "altitudeMode"))
+    notes = [*_others(root), *notes]
     return of_points(points, f"{source}: {name}", Fences(tuple(fences)), notes, mode == RELATIVE)
+
+
+def _with_altitudes(points: list[Point], mode: str) -> tuple[list[Point], list[str]]:
+    """Points with the altitudes that their mode gives a meaning, and what is said of others."""
+    if mode in (ABSOLUTE, RELATIVE):
+        return points, []
+    passed = any(altitude for *_, altitude in points)
+    notes = [f"altitudes passed over: their altitudeMode is {shown(mode or CLAMPED)}"] if passed else []
+    return [(latitude, longitude, None) for latitude, longitude, _ in points], notes
+
+
+def _others(root: Element) -> list[str]:
+    """What is beside the path in a KML file and no polygon."""
+    others = Counter(kind for each in root.iter() if (kind := _name(each)) in PASSED)
+    rings = (ring for kind in BOUNDARIES for each in _all(root, kind) for ring in _all(each, "LinearRing"))
+    others["LinearRing"] -= sum(1 for _ in rings)
+    return _notes(others)
 
 
 def read_gpx(text: str, source: str) -> PathAsRead:
@@ -128,11 +136,13 @@ def _text(element: Element, name: str) -> str:
     return next(((each.text or "").strip() for each in _all(element, name)), "")
 
 
-def _rows(element: Element) -> list[list[str]]:
-    """Numbers of each position, one element a point in a gx:Track; blanks round a comma do not part positions."""
+def _points(element: Element, where: str, what: str = "point") -> list[Point]:
+    """Points of a line, one element each in a gx:Track; blanks round a comma do not part positions."""
     if _name(element) == "Track":
-        return [(each.text or "").split() for each in _all(element, "coord")]
-    return [part.split(",") for part in COMMA.sub(",", _text(element, "coordinates")).split()]
+        rows = [(each.text or "").split() for each in _all(element, "coord")]
+    else:
+        rows = [part.split(",") for part in COMMA.sub(",", _text(element, "coordinates")).split()]
+    return [_point(row, f"{where}: {what} {number}") for number, row in enumerate(rows)]
 
 
 def _point(row: list[str], where: str) -> Point:
@@ -144,7 +154,7 @@ def _point(row: list[str], where: str) -> Point:
 
 def _polygon(element: Element, name: str, source: str) -> Fence:
     rings = tuple(
-        tuple(_point(row, f"{source}: {name}: corner {number}")[:2] for number, row in enumerate(_rows(each)))
+        tuple(point[:2] for point in _points(each, f"{source}: {name}", "corner"))
         for boundary in BOUNDARIES
         for each in _all(element, boundary)
     )

@@ -1,26 +1,89 @@
 """Ways onto a circle and off it, as lines and arcs: for loiters.
 
-Frame: the plane as complex numbers, east + i north, metres; a direction is a number of size 1. A side is +1 for a turn
-to the left (counter-clockwise) and -1 for one to the right. Segments are rows of `planner.interface.Path`.
+Frame: the plane as complex numbers, east + i north, metres; a direction is a number of size 1. Segments are rows of
+`planner.interface.Path`.
 """
 
 from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
 
 Row = tuple[float, float, float, float, float, float]
 Pose = tuple[complex, complex]
 """A place and a direction."""
 
-SHORTEST_M = 1e-6
-NEAR = 1e-9
-
-ON_CIRCLE_M = 0.01
+SHORTEST_M: Final = 1e-6
+NEAR: Final = 1e-9
+ON_CIRCLE_M: Final = 0.01
 """A place no further from a circle lies on it."""
-
-SAME_DIRECTION = 1e-5
+STEP_RAD: Final = math.radians(2.0)
+"""Angle between places round a circle."""
+SAME_DIRECTION: Final = 1e-5
 """Directions that differ by less, in radians, are no corner."""
+
+
+class Circle(NamedTuple):
+    """A circle that is gone round.
+
+    Attributes:
+        center: of it.
+        radius_m: of it.
+        side: +1 to the left (counter-clockwise), -1 to the right.
+    """
+
+    center: complex
+    radius_m: float
+    side: int
+
+    def joined_from(self, place: complex) -> complex | None:
+        """Where a straight line from a place touches it, so that it goes on round it; None from inside."""
+        away = abs(place - self.center)
+        if away <= self.radius_m * (1.0 + NEAR):
+            return None
+        # Seen from the centre, the place and the point of touch are this far apart.
+        angle = math.acos(self.radius_m / away)
+        return self.center + (self.edge(place) - self.center) * cmath.exp(1j * self.side * angle)
+
+    def left_to(self, place: complex) -> complex | None:
+        """Where a line to a place leaves it; None to the inside."""
+        return self._replace(side=-self.side).joined_from(place)
+
+    def edge(self, place: complex) -> complex:
+        """Its point nearest to a place."""
+        return self.center + self.radius_m * (place - self.center) / abs(place - self.center)
+
+    def direction(self, place: complex) -> complex:
+        """Direction of flight at a place of it."""
+        return (place - self.center) / abs(place - self.center) * 1j * self.side
+
+    def round_from(self, begin: complex, end: complex) -> tuple[np.ndarray, np.ndarray]:
+        """Places round it from one of its places to another, and how far it is from each to the end."""
+        swept = max(self.side * cmath.phase((end - self.center) / (begin - self.center)), 0.0)
+        turned = np.linspace(0.0, swept, 2 + int(swept / STEP_RAD))
+        places = self.center + (begin - self.center) * np.exp(1j * self.side * turned)
+        return places, self.radius_m * (swept - turned)
+
+    def has(self, pose: Pose) -> bool:
+        """Whether a pose is on it, and goes round it."""
+        if abs(abs(pose[0] - self.center) - self.radius_m) > ON_CIRCLE_M:
+            return False
+        return abs(self.direction(pose[0]) - pose[1]) < 1e-3
+
+    def further_m(self, place: complex, target: complex | None, length_m: float) -> float:
+        """How much further round it is than a length from a place, to where the way to a target leaves it.
+
+        A target inside, or none, is left for where it is.
+        """
+        leave = None if target is None else self.left_to(target)
+        if leave is None:
+            return 0.0
+        here = (place - self.center) * cmath.exp(1j * self.side * length_m / self.radius_m)
+        return ((self.side * cmath.phase((leave - self.center) / here)) % math.tau) * self.radius_m
 
 
 def line(begin: complex, ahead: complex, length_m: float) -> list[Row]:
@@ -30,10 +93,11 @@ def line(begin: complex, ahead: complex, length_m: float) -> list[Row]:
     return [(begin.real, begin.imag, ahead.real, ahead.imag, 0.0, length_m)]
 
 
-def arc(begin: complex, ahead: complex, side: int, radius_m: float, angle_rad: float) -> list[Row]:
+def arc(pose: Pose, side: int, radius_m: float, angle_rad: float) -> list[Row]:
     """An arc; none where it is too short to be one."""
     if angle_rad * radius_m <= SHORTEST_M:
         return []
+    begin, ahead = pose
     return [(begin.real, begin.imag, ahead.real, ahead.imag, side / radius_m, angle_rad * radius_m)]
 
 
@@ -46,54 +110,38 @@ def end_of(row: Row) -> Pose:
     return begin + (turned - ahead) / (1j * bend), turned
 
 
-def joins_at(place: complex, center: complex, radius_m: float, side: int) -> complex | None:
-    """Where a straight line from a place touches a circle, so that it goes on round it; None from inside."""
-    away = abs(place - center)
-    if away <= radius_m * (1.0 + NEAR):
-        return None
-    # Seen from the centre, the place and the point of touch are this far apart.
-    angle = math.acos(radius_m / away)
-    return center + radius_m * (place - center) / away * cmath.exp(1j * side * angle)
+def length_of(rows: Sequence[Row]) -> float:
+    """Length of a way."""
+    return sum(row[5] for row in rows)
 
 
-def leaves_at(place: complex, center: complex, radius_m: float, side: int) -> complex | None:
-    """Where a line to a place leaves a circle that was gone round; None to the inside."""
-    return joins_at(place, center, radius_m, -side)
+def sampled(row: Row, pieces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places along a segment, east + i north, both ends among them, and how far along it each is."""
+    along = np.linspace(0.0, row[5], pieces + 1)
+    return np.array([end_of((*row[:5], part))[0] for part in along.tolist()]), along
 
 
-def direction_on(place: complex, center: complex, side: int) -> complex:
-    """Direction of flight at a place of a circle."""
-    out = (place - center) / abs(place - center)
-    return out * 1j * side
+def passes(rows: Sequence[Row], place: complex) -> tuple[float, float]:
+    """Where along a way it is nearest to a place, and how far off it is there."""
+    pieces = [sampled(row, 49) for row in rows]
+    begun = np.cumsum([0.0, *(row[5] for row in rows)])
+    along = np.concatenate([begin + each for begin, (_, each) in zip(begun, pieces, strict=False)])
+    off = np.abs(np.concatenate([places for places, _ in pieces]) - place)
+    return float(along[off.argmin()]), float(off.min())
 
 
-def onto(pose: Pose, center: complex, radius_m: float, side: int, turn_m: float) -> list[Row]:
-    """A way from a pose onto a circle: straight on as far as it takes, one turn, a line that touches the circle.
-
-    Args:
-        pose: where it begins.
-        center: of the circle.
-        radius_m: of the circle.
-        side: which way it is gone round.
-        turn_m: radius of the turn.
-    """
-    begin, ahead = pose
-    best: list[Row] | None = None
-    for turn in (1, -1):
-        way = _onto(begin, ahead, center, radius_m, side, turn_m, turn)
-        if way is not None and (best is None or sum(row[5] for row in way) < sum(row[5] for row in best)):
-            best = way
-    assert best is not None
-    return best
+def onto(pose: Pose, circle: Circle, turn_m: float) -> list[Row]:
+    """The shorter way from a pose onto a circle: straight on as far as it takes, one turn, a line that touches it."""
+    ways = (_onto(pose, circle, turn_m, turn) for turn in (1, -1))
+    return min((way for way in ways if way is not None), key=length_of)
 
 
-def _onto(
-    begin: complex, ahead: complex, center: complex, radius_m: float, side: int, turn_m: float, turn: int
-) -> list[Row] | None:
+def _onto(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[Row] | None:
     """`onto` with a turn to one side; the centres of turn and circle must be far enough apart for a common tangent."""
+    begin, ahead = pose
     # A common tangent of both, outer where they turn alike and inner where not, needs so much between the centres.
-    needed = abs(radius_m - turn_m) if turn == side else radius_m + turn_m
-    hub = begin + 1j * turn * turn_m * ahead - center
+    needed = abs(circle.radius_m - turn_m) if turn == circle.side else circle.radius_m + turn_m
+    hub = begin + 1j * turn * turn_m * ahead - circle.center
     along = hub.real * ahead.real + hub.imag * ahead.imag
     reach = needed * (1.0 + NEAR) + SHORTEST_M
     square = along * along - (abs(hub) ** 2 - reach * reach)
@@ -101,16 +149,15 @@ def _onto(
     start = begin + on * ahead
     pivot = start + 1j * turn * turn_m * ahead
     # Of the line: its direction d has the centre of turn at -1j turn turn_m, that of the circle likewise.
-    apart = center - pivot
-    offset = side * radius_m - turn * turn_m
-    sine = offset / abs(apart)
+    apart = circle.center - pivot
+    sine = (circle.side * circle.radius_m - turn * turn_m) / abs(apart)
     if abs(sine) > 1.0:
         return None
     straight = abs(apart) * math.sqrt(1.0 - sine * sine)
     out = apart / abs(apart) * cmath.exp(-1j * math.asin(sine))
     swept = (turn * cmath.phase(out / ahead)) % math.tau
     leave = pivot - 1j * turn * turn_m * out
-    return [*line(begin, ahead, on), *arc(start, ahead, turn, turn_m, swept), *line(leave, out, straight)]
+    return [*line(begin, ahead, on), *arc((start, ahead), turn, turn_m, swept), *line(leave, out, straight)]
 
 
 def towards(pose: Pose, place: complex, turn_m: float) -> list[Row]:
@@ -119,43 +166,11 @@ def towards(pose: Pose, place: complex, turn_m: float) -> list[Row]:
     ways = []
     for turn in (1, -1):
         pivot = begin + 1j * turn * turn_m * ahead
-        leave = leaves_at(place, pivot, turn_m, turn)
+        leave = Circle(pivot, turn_m, turn).left_to(place)
         if leave is not None:
             swept = (turn * cmath.phase((leave - pivot) / (begin - pivot))) % math.tau
             ways.append((swept * turn_m + abs(place - leave), turn, swept))
     if not ways:  # on the circles of both sides: at the pose itself
         return []
     _, turn, swept = min(ways)
-    return arc(begin, ahead, turn, turn_m, swept)
-
-
-def up_to(pose: Pose, target: complex | None, length_m: float, circle: tuple[complex, float, int]) -> float:
-    """How much further round a circle it is to where the way to a place leaves it.
-
-    Args:
-        pose: on the circle.
-        target: the place; None: it is left where it is.
-        length_m: so far round from the pose.
-        circle: centre, radius and side.
-    """
-    center, radius, side = circle
-    leave = None if target is None else leaves_at(target, center, radius, side)
-    if leave is None:
-        return 0.0
-    place = (pose[0] - center) * cmath.exp(1j * side * length_m / radius)
-    return ((side * cmath.phase((leave - center) / place)) % math.tau) * radius
-
-
-def turns_to(pose: Pose | None, place: complex) -> bool:
-    """Whether a line from a pose, if there is one, leads to a place only after a turn."""
-    if pose is None:
-        return False
-    way = place - pose[0]
-    return abs(way) > SHORTEST_M and abs(way / abs(way) - pose[1]) > SAME_DIRECTION
-
-
-def on_circle(pose: Pose, center: complex, radius: float, side: int) -> bool:
-    """Whether a pose is on a circle, and goes round it."""
-    if abs(abs(pose[0] - center) - radius) > ON_CIRCLE_M:
-        return False
-    return abs(direction_on(pose[0], center, side) - pose[1]) < 1e-3
+    return arc(pose, turn, turn_m, swept)

@@ -48,14 +48,19 @@ def read_plan(text: str, source: str) -> MissionAsRead:
         items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
         notes.append("a doJumpId is there twice: items are counted from 1 instead")
     notes += waiting_notes(items)
-    geofence = plan.get("geoFence")
-    fences = Fences(tuple(_fences(geofence, source)), inside_all(mission.get("firmwareType")))
+    fences = Fences(tuple(_fences(plan.get("geoFence"), source)), inside_all(mission.get("firmwareType")))
+    notes += _passed_over(plan)
+    return MissionAsRead(source, tuple(items), home, home_altitude_m, fences, tuple(notes))
+
+
+def _passed_over(plan: Keys) -> list[str]:
+    """What else is in a plan that does not change the path."""
+    geofence, rally = plan.get("geoFence"), plan.get("rallyPoints")
+    notes = []
     if isinstance(geofence, dict) and geofence.get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
-    rally = plan.get("rallyPoints")
     points = rally.get("points") if isinstance(rally, dict) else None
-    notes += rally_note(len(points) if isinstance(points, list) else 0)
-    return MissionAsRead(source, tuple(items), home, home_altitude_m, fences, tuple(notes))
+    return [*notes, *rally_note(len(points) if isinstance(points, list) else 0)]
 
 
 def _home(mission: Keys, where: str, notes: list[str]) -> tuple[tuple[float, float] | None, float]:

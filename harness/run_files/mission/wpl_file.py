@@ -40,15 +40,15 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
     if not read:
         raise InputError(f"{source}: has no items; the first is home, the others are the path")
     items, notes = _numbered(read)
-    home, items = (items[0], items[1:]) if _is_home(items[0]) else (None, items)
-    if home is not None and FRAMES.get(home.frame, SEA) != SEA and home.params[6] != 0.0:
-        altitude = f"its altitude, {home.params[6]:g} m, is taken as above the sea"
-        notes += (f"its first item is home, as autopilots have it, though of frame {home.frame}: {altitude}",)
+    place, altitude_m = None, 0.0
+    if _is_home(items[0]):
+        home, *items = items
+        place, altitude_m = home.position, home.params[6]
+        notes += _home_note(home, altitude_m)
     flown = tuple(item for item in items if item.command not in APART)
     if not flown and (instead := fence_items.nothing_but(items)):
         raise InputError(f"{source}: has no items to fly to, but {instead}")
     rally = sum(item.command == RALLY_POINT for item in items)
-    place, altitude_m = (None, 0.0) if home is None else (home.position, home.params[6])
     notes = (*notes, *fence_items.rally_note(rally), *waiting_notes(flown))
     return MissionAsRead(source, flown, place, altitude_m, fence_items.fences_of(items, place), notes)
 
@@ -66,6 +66,14 @@ def _item(cells: list[str], place: str) -> Item:
 def _is_home(first: Item) -> bool:
     """Whether the first item of a file is home."""
     return first.command == commands.WAYPOINT and (first.number == 0 or FRAMES.get(first.frame, SEA) == SEA)
+
+
+def _home_note(home: Item, altitude_m: float) -> tuple[str, ...]:
+    """What is to be said of a home whose altitude says that it is above something else than the sea."""
+    if FRAMES.get(home.frame, SEA) == SEA or altitude_m == 0.0:
+        return ()
+    told = f"its altitude, {altitude_m:g} m, is taken as above the sea"
+    return (f"its first item is home, as autopilots have it, though of frame {home.frame}: {told}",)
 
 
 def _numbered(items: list[Item]) -> tuple[list[Item], tuple[str, ...]]:

@@ -12,7 +12,7 @@ import pytest
 from pyproj import Geod
 
 from harness.files.strict_yaml import InputError
-from harness.run_files.mission.waypoint_run import altitude_m
+from harness.run_files.mission.vertices import altitude_m
 from harness.run_files.path_files import read_path
 
 WGS84 = Geod(ellps="WGS84")

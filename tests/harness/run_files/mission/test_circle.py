@@ -8,16 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.run_files.mission.circle import (
-    Pose,
-    Row,
-    direction_on,
-    end_of,
-    joins_at,
-    leaves_at,
-    onto,
-    towards,
-)
+from harness.run_files.mission.circle import Circle, Pose, Row, end_of, onto, towards
 
 PLACES = st.builds(complex, st.floats(-600, 600), st.floats(-600, 600))
 DIRECTIONS = st.floats(0, 6.28).map(lambda angle: cmath.exp(1j * angle))
@@ -38,10 +29,11 @@ def end(pose: Pose, rows: list[Row]) -> Pose:
 def test_a_circle_is_joined_along_its_tangent(
     place: complex, ahead: complex, center: complex, radius: float, turn: float, side: int
 ) -> None:
-    rows = onto((place, ahead), center, radius, side, turn)
+    circle = Circle(center, radius, side)
+    rows = onto((place, ahead), circle, turn)
     there, direction = end((place, ahead), rows)
     assert abs(there - center) == pytest.approx(radius, abs=1e-4)
-    assert direction == pytest.approx(direction_on(there, center, side), abs=1e-4)
+    assert direction == pytest.approx(circle.direction(there), abs=1e-4)
     assert all(abs(row[4]) in (0.0, pytest.approx(1.0 / turn)) for row in rows)
 
 
@@ -58,7 +50,8 @@ def test_a_turn_leads_towards_a_place(place: complex, ahead: complex, aim: compl
 def test_tangents_touch_in_the_direction_of_flight(
     place: complex, center: complex, radius: float, side: int
 ) -> None:
-    joins, leaves = joins_at(place, center, radius, side), leaves_at(place, center, radius, side)
+    circle = Circle(center, radius, side)
+    joins, leaves = circle.joined_from(place), circle.left_to(place)
     if abs(place - center) <= radius:
         assert (joins, leaves) == (None, None)
         return
@@ -67,5 +60,5 @@ def test_tangents_touch_in_the_direction_of_flight(
     assert joins is not None
     assert leaves is not None
     towards_it, from_it = (joins - place) / abs(joins - place), (place - leaves) / abs(place - leaves)
-    assert towards_it == pytest.approx(direction_on(joins, center, side), abs=1e-4)
-    assert from_it == pytest.approx(direction_on(leaves, center, side), abs=1e-4)
+    assert towards_it == pytest.approx(circle.direction(joins), abs=1e-4)
+    assert from_it == pytest.approx(circle.direction(leaves), abs=1e-4)

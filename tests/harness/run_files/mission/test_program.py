@@ -11,7 +11,7 @@ from harness.run_files.fences import Fences
 from harness.run_files.mission.items import Item, MissionAsRead
 from harness.run_files.mission.program import program
 from harness.run_files.mission.steps import Program, Told
-from harness.run_files.mission.waypoint_run import altitude_m
+from harness.run_files.mission.vertices import altitude_m
 
 HOME = (47.0, 8.0)
 

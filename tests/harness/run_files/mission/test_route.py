@@ -12,9 +12,9 @@ import pytest
 from harness.files.input_file import InputError
 from harness.run_files.given_path import FloatArray
 from harness.run_files.mission.circle import end_of
-from harness.run_files.mission.flying import Flying, Ground, MissionRoute
 from harness.run_files.mission.route import LANDING_HEIGHT_M, mission_route
 from harness.run_files.mission.steps import Loiter, MissionStep, Program
+from harness.run_files.mission.vertices import Flying, Ground, MissionRoute
 
 TURN_M = 100.0
 

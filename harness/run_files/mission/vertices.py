@@ -1,22 +1,78 @@
-"""Waypoints of a mission one after the other, up to the next circle: how they are rounded, and their legs."""
+"""Waypoints of a mission one after the other, up to the next circle: what they are flown with, how they are rounded."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from aircraft.guidance.altitude import VerticalProfile
 from aircraft.guidance.mission_legs import MissionLeg, straight
-from harness.run_files.given_path import SAME_PLACE_M, FloatArray, FlyBy, Tightest, fly_by
-from harness.run_files.mission.flying import Flying, corner_limit_m
+from harness.run_files.given_path import (
+    FLATTEST,
+    LIMIT_SHARE,
+    SAME_PLACE_M,
+    FloatArray,
+    FlyBy,
+    Tightest,
+    fly_by,
+)
 from harness.run_files.mission.items import GROUND, HOME, SEA
 from harness.run_files.mission.steps import MissionStep
 
+Ground = Callable[[FloatArray, FloatArray], FloatArray]
+"""East and north -> height of the ground above mean sea level, NaN where it is not known."""
+
+CORNER_M: Final = 90.0
+"""How far off a waypoint of a mission may be passed that says nothing itself: ArduPilot Plane's default WP_RADIUS."""
 FOLLOWED_M: Final = 50.0
 """The ground is looked up so often along a leg whose altitude is above it."""
+
+
+def corner_limit_m(acceptance_m: float, corner_m: float | None) -> float:
+    """How far off a waypoint may be passed: as is asked for all of them, else as it says itself, else `CORNER_M`."""
+    return corner_m if corner_m is not None else acceptance_m or CORNER_M
+
+
+@dataclass(frozen=True)
+class Flying:
+    """What a mission is flown with.
+
+    Attributes:
+        airspeed_mps: before the mission says otherwise.
+        airspeed_range_mps: what the aircraft holds.
+        turn_radius_m: for a turn at an airspeed that leaves the aircraft bank in hand.
+        climb_mps: fastest climb and descent at an airspeed.
+        free_cut_m: a corner may be passed at this distance only to make its arc wider.
+        ground: height of the ground; None: not known, then it is taken to be as high as home.
+        least_radius_m: of a turn at the bank limit at an airspeed, in calm air; None: the same.
+        heads_for_centres: a loiter is flown to as far as its circle on the line to its centre; else along a tangent.
+        corner_m: how far off every corner may be passed; None: as its item says, else `CORNER_M`.
+        wind_mps: east + i north where the wind blows to.
+    """
+
+    airspeed_mps: float
+    airspeed_range_mps: tuple[float, float]
+    turn_radius_m: Callable[[float], float]
+    climb_mps: Callable[[float], tuple[float, float]]
+    free_cut_m: float
+    ground: Ground | None = None
+    least_radius_m: Callable[[float], float] | None = None
+    heads_for_centres: bool = False
+    corner_m: float | None = None
+    wind_mps: complex = 0j
+
+    def corner_radius_m(self, vertex: Vertex, angle_rad: float) -> float:
+        """Radius of the arc at a corner: with bank in hand, or less where that would pass too far off."""
+        wide = self.turn_radius_m(vertex.airspeed_mps)
+        least = wide if self.least_radius_m is None else self.least_radius_m(vertex.airspeed_mps)
+        off = 1.0 / math.cos(0.5 * min(abs(angle_rad), 0.5 * math.pi)) - 1.0
+        most = LIMIT_SHARE * corner_limit_m(vertex.acceptance_m, self.corner_m) / max(off, FLATTEST)
+        return max(min(wide, most), least)
 
 
 class Vertex(NamedTuple):
@@ -29,6 +85,8 @@ class Vertex(NamedTuple):
         acceptance_m: how far off it may be passed; 0 where its item does not say.
         agl_m: height above ground that is held on the way to it; None: the altitude is linear.
         centre: of the circle that it lies on, for which the aircraft heads.
+        asked_mps: airspeed that the mission asks for on the way to it.
+        airspeed_mps: that is flown.
     """
 
     place: complex
@@ -37,34 +95,49 @@ class Vertex(NamedTuple):
     acceptance_m: float = 0.0
     agl_m: float | None = None
     centre: complex | None = None
+    asked_mps: float = 0.0
+    airspeed_mps: float = 0.0
 
 
-def rounded(run: Sequence[Vertex], speeds_mps: FloatArray, flying: Flying) -> FlyBy:
-    """Lines and arcs through some waypoints, not all in one place.
+@dataclass(frozen=True, eq=False)
+class MissionRoute:
+    """A mission as it is flown.
 
-    Args:
-        run: the waypoints.
-        speeds_mps: airspeed on the way to each.
-        flying: what they are flown with.
+    Attributes:
+        way: lines and arcs; its corners have the numbers of their items.
+        profile: altitude and airspeed along it.
+        asked_mps: the airspeeds that the mission asks for, as those of the profile; the aircraft may not hold them.
+        marks: item and arc length where each is reached.
+        notes: what was assumed, a line each.
+        legs: the mission leg by leg, for a law that flies to its waypoints.
     """
+
+    way: FlyBy
+    profile: VerticalProfile
+    asked_mps: FloatArray
+    marks: tuple[tuple[int, float], ...]
+    notes: tuple[str, ...]
+    legs: tuple[MissionLeg, ...]
+
+
+def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:
+    """Lines and arcs through some waypoints, not all in one place."""
     points = np.array([(vertex.place.real, vertex.place.imag) for vertex in run])
-    speeds = speeds_mps.tolist()
+    speeds = [vertex.airspeed_mps for vertex in run]
     radii = np.array([flying.turn_radius_m(speed) for speed in speeds])
     free = np.array([min(flying.free_cut_m, vertex.acceptance_m or math.inf) for vertex in run])
     tightest = None
     if flying.least_radius_m is not None:
         least = np.array([flying.least_radius_m(speed) for speed in speeds])
         limits = np.array([corner_limit_m(vertex.acceptance_m, flying.corner_m) for vertex in run])
-        tightest = Tightest(least, limits, np.asarray(flying.wind_mps / speeds_mps, dtype=np.complex128))
+        tightest = Tightest(least, limits, flying.wind_mps / np.array(speeds, dtype=np.complex128))
     return fly_by(points, radii, free, overshoot=True, tightest=tightest, every=True)
 
 
 def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:
-    """The legs between waypoints; places that only mark where a circle is joined or left are passed.
+    """The legs between waypoints, with the arc length of the route at each.
 
-    Args:
-        run: the waypoints.
-        stations_m: arc length of the route at each.
+    Places that only mark where a circle is joined or left are passed.
     """
     legs = []
     for (begin, end), along in zip(pairwise(run), pairwise(stations_m.tolist()), strict=True):
@@ -85,8 +158,7 @@ def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, befor
     """
     if step.height_m is None:
         return before_m if math.isfinite(before_m) else home_altitude_m
-    base = {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
-    return step.height_m + base
+    return step.height_m + {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
 
 
 def without_steps(
