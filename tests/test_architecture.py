@@ -65,7 +65,7 @@ ONLY_IN = {
     "scipy": (
         "harness/campaign/sampling.py",
         "harness/campaign/paired.py",
-        "harness/campaign/summary.py",
+        "harness/campaign/cell.py",
         "harness/certification/bounds.py",
         "harness/certification/rare.py",
         "harness/world_files/free_room.py",

@@ -122,6 +122,13 @@ def shown_figures(rows: Sequence[Row]) -> list[Metric]:
     ]
 
 
+def rows_for_paper(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of the table for a paper: a line a flight, the figures of `ON_TERMINAL`."""
+    shown = [next(each for each in METRICS if each.short == short) for short in ON_TERMINAL]
+    heads = ["scenario", "planner", *(each.short for each in shown)]
+    return heads, [[row.scenario, row.label, *(row.text(each) or DASH for each in shown)] for row in rows]
+
+
 def to_csv(rows: Sequence[Row]) -> str:
     """All figures at full precision; a figure that does not exist is an empty cell."""
     text = io.StringIO()

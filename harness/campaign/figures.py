@@ -1,4 +1,4 @@
-"""Figures of a campaign: success against a varied key, how long the ways were, where runs failed.
+"""Figures of a campaign: success against a varied key, how long the ways were, every run against what was varied.
 
 Drawn without a screen.
 """
@@ -7,45 +7,35 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from harness.campaign.points import RunPoints
-from harness.campaign.summary import CURVE_POINTS, Summary, Table
-from harness.files.errors import RunFolderError
-from harness.files.input_file import InputError
+from harness.campaign.groups import is_direction
+from harness.campaign.summary import CURVE_POINTS, Table
+from harness.campaign.table import Runs
 from harness.flight.record import FloatArray
-from harness.report.figure_style import DASHES, WIDTH_IN, colour, styled
-from harness.report.figures import FigureScene, draw_map, thinned
+from harness.report.figure_style import DASHES, colour, styled
 
-HEIGHT_IN = 2.9
+HEIGHT_IN: Final = 2.9
 LEGEND_LETTERS, KEY_LETTERS = 66, 6
 """Letters that a row of the legend has room for, and as many as the key before each name takes."""
 LEGEND_ROWS, ROW_IN = 3, 0.17
-"""Rows of the legend that a figure has room for, and how much higher each other one makes it."""
-ROTATED_FROM = 5
-"""From so many groups on, their labels stand slanted."""
-PANEL_IN = 1.5
+"""A figure has room for this many rows of the legend; each further one makes it so much higher."""
+PANEL_IN: Final = 1.5
 """Height of a panel of small multiples."""
-MAP_TITLE_PT: Final = 7
-"""Letters above maps of failures, so that three titles have room beside one another."""
-MAPS_A_ROW, MAP_TITLE_IN = 3, 0.45
-"""Maps of failures beside one another, and what each has above and below it."""
-MOST_OUTLINES: Final = 1500
-"""More points than these in a figure are drawn as dots of a picture."""
-MOST_FAILURES: Final = 9
-"""Failures beyond these are not drawn."""
-MAP_TICKS_IN = 0.3
-"""What each has beside it."""
-ROW_LETTERS = 56
+MAX_OUTLINES: Final = 1500
+"""A figure with more points than this is drawn as a picture of dots: a browser takes seconds for so many outlines."""
+ROW_LETTERS: Final = 56
 """Number of letters, in names below panels, that are as wide as the figure."""
-LABEL_LETTERS = 32
+LABEL_LETTERS: Final = 32
 """A longer label of a group loses its middle, for it takes room from what is drawn."""
+MAX_KEYS: Final = 4
+"""Only the first this many varied numbers have a column of panels."""
+ENOUGH: Final = 20
+"""With at least this many runs the axis ends at percentiles of the figure, and what lies beyond is marked there."""
 
 
 def success(table: Table) -> Figure:
@@ -55,14 +45,12 @@ def success(table: Table) -> Figure:
     with styled(_height_in(planners)) as figure:
         axes = figure.add_subplot()
         for index, planner in enumerate(planners):
-            own = [(place, cells[index]) for place, cells in enumerate(table.cells) if cells[index].runs]
-            shift = 0.12 * (index - (len(planners) - 1) / 2)
-            shares = [
-                (cell.success or 0.0, cell.success_low or 0.0, cell.success_high or 0.0) for _, cell in own
-            ]
+            own = [(place, cells[index].success) for place, cells in enumerate(table.cells)]
+            places = np.array([place for place, share in own if share], dtype=np.float64)
+            shares = [(share.value, share.low, share.high) for _, share in own if share]
             value, low, high = 100.0 * np.array(shares).reshape(-1, 3).T
             axes.errorbar(
-                [place + shift for place, _ in own],
+                places + 0.12 * (index - (len(planners) - 1) / 2),
                 value,
                 yerr=np.maximum([value - low, high - value], 0.0),
                 color=colour(index),
@@ -73,7 +61,7 @@ def success(table: Table) -> Figure:
                 capsize=2.5,
                 label=planner,
             )
-        slanted = len(labels) > ROTATED_FROM or max(map(len, labels), default=0) > 16
+        slanted = len(labels) > 5 or max(map(len, labels), default=0) > 16
         axes.set_xticks(
             range(len(labels)), labels, rotation=30 if slanted else 0, ha="right" if slanted else "center"
         )
@@ -98,62 +86,73 @@ def lengths(curves: Mapping[str, Sequence[float]]) -> Figure:
     return figure
 
 
-def scatter(points: RunPoints) -> Figure | None:
-    """Every figure against every number that was varied, a point a run; None where no number was varied.
+def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
+    """Figures against every varied number, a point a run; None where no number was varied.
 
-    Runs that did not reach the goal are crosses. Many points are drawn as a picture of dots: a browser takes seconds to
-    draw ten thousand outlines.
+    Runs that did not reach the goal are crosses. A figure's axis ends at its 1st and 99th percentile where others lie
+    far beyond them; those are triangles at its edge.
+
+    Args:
+        runs: of the campaign.
+        keys: that were varied.
     """
-    if not points.varied or not points.figures:
+    varied = [key for key in keys if _is_number(runs.values(key))][:MAX_KEYS]
+    figures = {
+        "clearance / wanted": runs.clearance_ratio,
+        "cross-track max, m": runs.numbers("cross_track_m.max"),
+        "length / optimum": runs.numbers("length_ratio"),
+    }
+    figures = {label: values for label, values in figures.items() if len({*values[np.isfinite(values)]}) > 1}
+    if not varied or not figures:
         return None
-    rows, columns = len(points.figures), len(points.varied)
-    names = [_wrapped(key, ROW_LETTERS // columns) for key in points.varied]
-    as_dots = rows * columns * len(points.reached) > MOST_OUTLINES
+    rows, columns = len(figures), len(varied)
+    names = [_wrapped(key, ROW_LETTERS // columns) for key in varied]
+    dots = rows * columns * len(runs) > MAX_OUTLINES
     with styled(0.5 + PANEL_IN * rows + ROW_IN * max(name.count("\n") for name in names)) as figure:
         grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
-        for row, (label, values) in enumerate(points.figures.items()):
-            for column, numbers in enumerate(points.varied.values()):
-                axes = grid[row][column]
-                for among, marker, shade in (
-                    (points.reached, ".", colour(0)),
-                    (~points.reached, "x", colour(1)),
-                ):
-                    axes.plot(
-                        numbers[among],
-                        values[among],
-                        marker,
-                        ms=3.5,
-                        color=shade,
-                        alpha=0.7,
-                        rasterized=as_dots,
-                    )
-                axes.grid(color="0.9", lw=0.6)
-                if column == 0:
-                    axes.set_ylabel(label)
-                if row == rows - 1:
-                    axes.set_xlabel(names[column])
+        for (label, values), panels in zip(figures.items(), grid, strict=True):
+            panels[0].set_ylabel(label)
+            for key, axes in zip(varied, panels, strict=True):
+                _panel(axes, runs.numbers(key), values, runs.reached, dots)
+                if is_direction(key):
+                    axes.set(xlim=(-10, 370), xticks=range(0, 361, 90))
+        for name, axes in zip(names, grid[-1], strict=True):
+            axes.set_xlabel(name)
     return figure
 
 
-def where_failed(failed: Sequence[Failure]) -> Figure:
-    """A map of each failure: its world, the track, and a cross where it ended."""
-    columns = min(MAPS_A_ROW, len(failed))
-    rows = math.ceil(len(failed) / columns)
-    bounds = [each.scene.bounds_m for each in failed]
-    shape = max((ymax - ymin) / (xmax - xmin) for xmin, ymin, xmax, ymax in bounds)
-    with styled(rows * (min(shape, 2.0) * (WIDTH_IN / columns - MAP_TICKS_IN) + MAP_TITLE_IN)) as figure:
-        grid = figure.subplots(rows, columns, squeeze=False).flat
-        for each, axes in zip(failed, grid, strict=False):  # in this order: the other takes one axes too many
-            draw_map(axes, each.scene)
-            track_km = thinned(each.track_m, each.scene) / 1e3
-            axes.plot(*track_km.T, color=colour(0), lw=1.2, zorder=5)
-            axes.plot(*track_km[-1], "X", color=colour(1), ms=7, mec="white", mew=0.6, zorder=8)
-            axes.set_title(f"run {each.run}: {each.outcome.replace('_', ' ')}", fontsize=MAP_TITLE_PT)
-            axes.set(xlabel="", ylabel="")
-            axes.tick_params(labelsize=6, length=2)
-        for axes in grid:
-            axes.set_visible(False)
-    return figure
+def _panel(axes: Any, numbers: FloatArray, values: FloatArray, reached: Any, dots: bool) -> None:
+    low, high = _limits(values)
+    if is_outlying := bool(np.any((values < low) | (values > high))):
+        axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+    within = (values >= low) & (values <= high)
+    for among, marker, shade in (
+        (reached & within, ".", colour(0)),
+        (~reached & within, "x", colour(1)),
+        (values > high, "^", colour(3)),
+        (values < low, "v", colour(3)),
+    ):
+        shown = np.clip(values[among], low, high) if is_outlying else values[among]
+        axes.plot(numbers[among], shown, marker, ms=3.5, color=shade, alpha=0.7, rasterized=dots)
+    axes.grid(color="0.9", lw=0.6)
+
+
+def _limits(values: FloatArray) -> tuple[float, float]:
+    """Where an axis ends: at percentiles, on a side where values lie beyond by more than what is between them."""
+    known = values[np.isfinite(values)]
+    low, high = np.percentile(known, (1, 99))
+    beyond = high - low
+    least, most = float(known.min()), float(known.max())
+    if len(known) < ENOUGH or not beyond:
+        return least, most
+    return float(low) if low - least > beyond else least, float(high) if most - high > beyond else most
+
+
+def _is_number(values: Sequence[Any]) -> bool:
+    given = {value for value in map(str, values) if value != "None"}
+    return len(given) > 1 and all(
+        value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values
+    )
 
 
 def _short(label: str, letters: int = LABEL_LETTERS) -> str:
@@ -184,60 +183,3 @@ def _columns(planners: Sequence[str]) -> int:
 def _legend(figure: Figure, planners: Sequence[str]) -> None:
     if len(planners) > 1:
         figure.legend(loc="outside lower center", ncols=_columns(planners), frameon=False)
-
-
-@dataclass(frozen=True, eq=False)
-class Failure:
-    """A run that did not reach the goal.
-
-    Attributes:
-        run: its number.
-        outcome: how it ended.
-        scene: its world.
-        track_m: (n, 2) what was flown, east and north.
-    """
-
-    run: int
-    outcome: str
-    scene: FigureScene
-    track_m: FloatArray
-
-
-def failures(summary: Summary, folder: Path) -> list[Failure]:
-    """The worst of the runs that failed, as far as their run folders were kept.
-
-    Args:
-        summary: of the campaign.
-        folder: of the campaign.
-    """
-    kept = (each for each in summary.worst if each.outcome != "reached" and each.folder)
-    return list(_failures([(each.run, each.outcome, folder / each.folder) for each in kept]))[:MOST_FAILURES]
-
-
-def _failures(runs: list[tuple[int, str, Path]]) -> Iterator[Failure]:
-    from harness.run_files.run_folder import load_run
-    from harness.scenario.performance import mission_of
-    from harness.scenario.scenario import parse_scenario
-    from harness.scenario.validation import KeyFault
-    from harness.world.world import World
-
-    for number, outcome, folder in runs:
-        try:
-            run = load_run(folder)
-            scenario = parse_scenario(run.scenario_yaml, str(folder), as_flown=True)
-            mission = mission_of(scenario)
-        except (RunFolderError, InputError, KeyFault):
-            # It broke off, is of other versions, or of a guidance law that is not here: there is nothing to draw.
-            continue
-        scene = FigureScene(
-            name=scenario.name,
-            bounds_m=mission.bounds_m,
-            obstacles=World.from_scenario(scenario).obstacles,
-            start_m=scenario.mission.start_m,
-            goal_m=mission.goal_m,
-            goal_radius_m=mission.goal_radius_m,
-            clearance_m=mission.clearance_m,
-            turn_radius_m=mission.turn_radius_m,
-            optimum_m=np.zeros((0, 2)),
-        )
-        yield Failure(number, outcome, scene, np.column_stack((run.track.east_m, run.track.north_m)))

@@ -1,4 +1,4 @@
-"""Groups of runs by a varied key: its values, or quantiles of them where a number was drawn at random."""
+"""Groups of runs by a varied key: its values, quantiles of drawn numbers, or quarters of the compass for directions."""
 
 from __future__ import annotations
 
@@ -13,14 +13,23 @@ import numpy as np
 
 from harness.campaign.table import IntArray
 
-MOST_NUMBERS: Final = 8
-"""A key with more different numbers is taken as drawn at random."""
+MAX_NUMBERS: Final = 8
+"""A key with more different numbers than this is taken as drawn at random."""
 
 BINS: Final = 4
-MOST_NAMES: Final = 12
-"""Most names with a group of their own; the rarest of more share one."""
+"""Numbers drawn at random are grouped into this many quantiles, directions into as many sectors."""
+
+MAX_NAMES: Final = 12
+"""At most this many names have a group of their own; the rarest of more share one."""
 
 NONE: Final = "not set"
+
+DIRECTIONS: Final = ("from_deg", "course_deg", "heading_deg")
+"""Ends of the paths of keys that are directions: 359 degrees is beside 0."""
+
+SECTORS: Final = tuple(
+    f"{name}, {low:g} to {low + 90:g}" for name, low in zip("NESW", (-45, 45, 135, 225), strict=True)
+)
 
 
 @dataclass(frozen=True)
@@ -32,13 +41,18 @@ class Axis:
         labels: of the groups, in order.
         edges: where the groups are quantiles, their limits from the least value to the largest; the limit
             between two belongs to the upper one. Else empty.
-        numeric: whether the labels are numbers in order.
+        numeric: whether the labels are numbers in order, which directions are not.
     """
 
     key: str
     labels: tuple[str, ...]
     edges: tuple[float, ...] = ()
     numeric: bool = False
+
+
+def is_direction(key: str) -> bool:
+    """Whether a key is a direction."""
+    return key.endswith(DIRECTIONS)
 
 
 def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis, IntArray]:
@@ -49,21 +63,21 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
     Args:
         key: its path.
         values: one a run; None where there is none.
-        drawn: they were drawn at random: numbers are grouped by quantiles where there are more than of these.
+        drawn: they were drawn at random: numbers are grouped where there are more than `BINS`.
     """
     given = [value for value in values if value is not None]
     numeric = bool(given) and all(
         isinstance(value, int | float) and not isinstance(value, bool) for value in given
     )
-    if numeric:
-        if len(set(given)) > (BINS if drawn else MOST_NUMBERS):
-            return _binned(key, values)
-        labels = dict(zip(sorted(set(given)), _numbers(sorted(set(given))), strict=True))
-    else:
-        labels = _names(given)
+    if numeric and len(set(given)) > (BINS if drawn else MAX_NUMBERS):
+        return _sectors(key, values) if is_direction(key) else _quantiles(key, values)
+    different = sorted(set(given)) if numeric else ()
+    labels = dict(zip(different, _numbers(different), strict=True)) if numeric else _names(given)
     texts = [NONE if value is None else labels[_hashable(value)] for value in values]
     order = tuple(dict.fromkeys([*labels.values(), *(text for text in texts if text == NONE)]))
-    return Axis(key, order, numeric=numeric), _indices(order, texts)
+    places = {text: place for place, text in enumerate(order)}
+    index = np.array([places[text] for text in texts], dtype=np.int64)
+    return Axis(key, order, numeric=numeric and not is_direction(key)), index
 
 
 def _numbers(values: Sequence[float], digits: int = 6) -> list[str]:
@@ -71,37 +85,45 @@ def _numbers(values: Sequence[float], digits: int = 6) -> list[str]:
     for count in range(digits, 18):
         texts = [f"{value:.{count}g}" for value in values]
         if len(set(texts)) == len(texts):
-            return texts
-    raise ValueError(f"not all different: {values}")
+            break
+    return texts
 
 
 def _names(given: Sequence[Any]) -> dict[Any, str]:
     """A label for each value that is not a number."""
     counts = Counter(map(_hashable, given))
-    every = list(counts)
-    if len(every) <= MOST_NAMES:
-        return {value: _text(value) for value in every}
-    kept = {value for value, _ in counts.most_common(MOST_NAMES - 1)}
-    others = f"{len(every) - len(kept)} others"
-    first = [value for value in every if value in kept]
-    return {value: _text(value) for value in first} | {value: others for value in every if value not in kept}
+    common = counts if len(counts) <= MAX_NAMES else dict(counts.most_common(MAX_NAMES - 1))
+    others = f"{len(counts) - len(common)} others"
+    first = {value: _text(value) for value in counts if value in common}
+    return first | {value: others for value in counts if value not in common}
 
 
-def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
-    numbers = np.array([np.nan if value is None else value for value in values], dtype=np.float64)
-    missing = np.isnan(numbers)
-    edges = np.unique(np.quantile(numbers[~missing], np.linspace(0.0, 1.0, BINS + 1)))
+def _quantiles(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
+    numbers = _floats(values)
+    edges = np.unique(np.quantile(numbers[~np.isnan(numbers)], np.linspace(0.0, 1.0, BINS + 1)))
     labels = tuple(f"{low} to {high}" for low, high in itertools.pairwise(_numbers(edges.tolist(), 4)))
     index = np.searchsorted(edges[1:-1], numbers, side="right")
-    if missing.any():
-        index[missing] = len(labels)
-        labels = (*labels, NONE)
-    return Axis(key, labels, tuple(edges.tolist()), numeric=True), index.astype(np.int64)
+    labels, index = _with_missing(labels, index, numbers)
+    return Axis(key, labels, tuple(edges.tolist()), numeric=True), index
 
 
-def _indices(order: Sequence[str], texts: Sequence[str]) -> IntArray:
-    places = {text: place for place, text in enumerate(order)}
-    return np.array([places[text] for text in texts], dtype=np.int64)
+def _sectors(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
+    """Quarters of the compass, each about one of its points."""
+    numbers = _floats(values)
+    index = np.floor(np.nan_to_num((numbers + 45.0) % 360.0) / 90.0)
+    labels, index = _with_missing(SECTORS, index, numbers)
+    return Axis(key, labels), index
+
+
+def _floats(values: Sequence[Any]) -> Any:
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def _with_missing(labels: tuple[str, ...], index: Any, numbers: Any) -> tuple[tuple[str, ...], IntArray]:
+    """The groups with one more for values that are missing, where any is."""
+    missing = np.isnan(numbers)
+    found: IntArray = np.where(missing, len(labels), index).astype(np.int64)
+    return (*labels, NONE) if missing.any() else labels, found
 
 
 def _hashable(value: Any) -> Any:

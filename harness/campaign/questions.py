@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from harness.analysis.metric import number
 from harness.analysis.rows import DASH
-from harness.campaign.paired import Estimate
-from harness.campaign.summary import Cell
+from harness.campaign.cell import Cell, Share
 
 
 @dataclass(frozen=True)
@@ -18,9 +17,8 @@ class Question:
     Attributes:
         title: of its heat map.
         note: what the figures are.
-        short: heading of its column on a terminal.
+        short: heading of its column on a terminal, and in a table for a paper.
         text: the answer.
-        brief: the answer on a terminal.
         shade: how bad it is, from 0 to 1; None where there is no answer.
     """
 
@@ -28,134 +26,80 @@ class Question:
     note: str
     short: str
     text: Callable[[Cell], str]
-    brief: Callable[[Cell], str]
     shade: Callable[[Cell], float | None]
 
 
-def percent(share: float | None) -> str:
-    """A share in per cent; only all is 100 and only none is 0."""
+def share_text(share: Share | None) -> str:
+    """A share in per cent with its interval, which says how far from none or all it may still be."""
     if share is None:
         return DASH
-    return f"{100 * share:.0f} %" if share in (0.0, 1.0) else f"{_partly(share):.1f} %"
+    # One failure in thousands of runs is what a campaign is flown for: only all is 100 and only none is 0.
+    percent = 100.0 * share.value if share.value in (0.0, 1.0) else min(max(100.0 * share.value, 0.1), 99.9)
+    return f"{percent:.3g} ({_end(share.low)}{DASH}{_end(share.high)})"
 
 
-def _partly(share: float) -> float:
-    """Per cent of what is neither all nor none, that a digit after the point does not round to either."""
-    return min(max(100 * share, 0.1), 99.9)
-
-
-def interval(low: float | None, high: float | None) -> str:
-    """Both ends of an interval of a share, in per cent."""
-    return "" if low is None or high is None else f"{100 * low:.1f}{DASH}{100 * high:.1f}"
-
-
-def difference(estimate: Estimate) -> str:
-    """A difference of shares in percentage points, with its interval."""
-    if estimate.value is None:
-        return DASH
-    if estimate.low is None or estimate.high is None:
-        return f"{100 * estimate.value:+.1f}"
-    return f"{100 * estimate.value:+.1f} ({100 * estimate.low:+.1f} to {100 * estimate.high:+.1f})"
-
-
-def ratio(estimate: Estimate) -> str:
-    """A ratio with its interval."""
-    if estimate.value is None:
-        return DASH
-    if estimate.low is None or estimate.high is None:
-        return f"{estimate.value:.4f}"
-    return f"{estimate.value:.4f} ({estimate.low:.4f} to {estimate.high:.4f})"
-
-
-def of_runs(cell: Cell) -> str:
-    """How many of the runs reached their goal."""
-    return f"{cell.reached} of {cell.runs}"
+def _end(share: float) -> str:
+    """An end of an interval, in per cent; near none or all with a digit more."""
+    percent = 100.0 * share
+    return f"{percent:.0f}" if 1.0 <= percent <= 99.0 or share in (0.0, 1.0) else f"{percent:.1f}"
 
 
 def _pair(first: float | None, second: float | None, text: Callable[[float], str]) -> str:
     parts = [DASH if each is None else text(each) for each in (first, second)]
-    return DASH if first is None and second is None else " / ".join(parts)
+    return DASH if first is None and second is None else "/".join(parts)
 
 
-def _success(cell: Cell) -> str:
-    spread = interval(cell.success_low, cell.success_high)
-    return f"{percent(cell.success)} ({spread}), {of_runs(cell)}" if cell.runs else DASH
+def _digits(value: float) -> str:
+    return f"{value:.{0 if value >= 10 else 1 if value >= 1 else 2}f}"
 
 
-def _success_briefly(cell: Cell) -> str:
-    if cell.success is None or cell.success_low is None or cell.success_high is None:
-        return DASH
-    share = 100 * cell.success if cell.success in (0.0, 1.0) else _partly(cell.success)
-    return f"{share:.3g} ({100 * cell.success_low:.0f}{DASH}{100 * cell.success_high:.0f})"
+def _bad(share: Share | None) -> float | None:
+    return None if share is None else 1.0 - share.value
 
 
-def _two_digits(value: float | None) -> str:
-    return DASH if value is None else f"{value:.{0 if value >= 10 else 1 if value >= 1 else 2}f}"
-
-
-def _length(cell: Cell) -> str:
-    return _pair(cell.length_median, cell.length_p95, "{:.3f}".format)
-
-
-def _clearance(cell: Cell) -> str:
-    return _pair(cell.least_clearance_m, None, number).removesuffix(f" / {DASH}")
-
-
-def _compact(text: str) -> str:
-    return text.replace(" / ", "/").replace(" %", "%")
-
+INTERVAL = "per cent of the runs, with Wilson's 95 % interval"
 
 QUESTIONS = (
     Question(
         "Goal reached",
-        "Share of the runs with Wilson's 95 % interval in per cent, and their number",
+        INTERVAL,
         "reached %",
-        _success,
-        _success_briefly,
-        lambda cell: None if cell.success is None else 1.0 - cell.success,
+        lambda cell: share_text(cell.success),
+        lambda cell: _bad(cell.success),
     ),
     Question(
         "Length over the clairvoyant optimum",
-        "Median / 95th percentile where the goal was reached; full shade at twice the optimum",
+        "Median/95th percentile where the goal was reached; full shade at twice the optimum",
         "length",
-        _length,
-        lambda cell: _compact(_pair(cell.length_median, cell.length_p95, "{:.2f}".format)),
+        lambda cell: _pair(cell.length_median, cell.length_p95, "{:.2f}".format),
         lambda cell: None if cell.length_median is None else cell.length_median - 1.0,
     ),
     Question(
-        "Clearance",
-        "Least distance to an obstacle edge in m; share of the runs that were ever below the wanted one",
+        "Least clearance",
+        "Least distance to an obstacle edge in any run, in m",
         "clear m",
-        lambda cell: (
-            f"{_clearance(cell)} m, {percent(cell.below_wanted)} below"
-            if cell.below_wanted is not None
-            else DASH
-        ),
-        lambda cell: _compact(f"{_clearance(cell)} {percent(cell.below_wanted)}"),
-        lambda cell: cell.below_wanted,
+        lambda cell: number(cell.least_clearance_m) or DASH,
+        lambda cell: None if cell.below_wanted is None else cell.below_wanted.value,
+    ),
+    Question(
+        "Below the wanted clearance",
+        f"At any time; {INTERVAL}",
+        "below %",
+        lambda cell: share_text(cell.below_wanted),
+        lambda cell: None if cell.below_wanted is None else cell.below_wanted.value,
     ),
     Question(
         "Trackable",
-        "Share of the runs in which the aircraft tracked every leg",
-        "tracks",
-        lambda cell: percent(cell.trackable),
-        lambda cell: _compact(percent(cell.trackable)),
-        lambda cell: None if cell.trackable is None else 1.0 - cell.trackable,
+        f"The aircraft tracked every leg; {INTERVAL}",
+        "tracks %",
+        lambda cell: share_text(cell.trackable),
+        lambda cell: _bad(cell.trackable),
     ),
     Question(
         "Planner time",
-        "Milliseconds: median of the runs' p50 / largest p99 of a run / longest search; full shade at 20 ms of p99",
-        "planner ms",
-        lambda cell: (
-            f"{_pair(cell.planner_p50_ms, cell.planner_p99_ms, number)} / {number(cell.planner_max_ms)}"
-            if cell.planner_p50_ms is not None
-            else DASH
-        ),
-        lambda cell: (
-            "/".join(map(_two_digits, (cell.planner_p50_ms, cell.planner_p99_ms, cell.planner_max_ms)))
-            if cell.planner_p50_ms is not None
-            else DASH
-        ),
+        "Milliseconds: largest p99 of a run/longest search; full shade at 20 ms of p99",
+        "plan ms",
+        lambda cell: _pair(cell.planner_p99_ms, cell.planner_max_ms, _digits),
         lambda cell: None if cell.planner_p99_ms is None else cell.planner_p99_ms / 20.0,
     ),
 )

@@ -1,4 +1,4 @@
-"""The page and the file of a campaign's answers: `summary.html`, which needs nothing but itself, and `summary.json`."""
+"""The page of a campaign's answers, `summary.html`, which needs nothing but itself, and `summary.json`."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from harness.analysis.causes import FINDINGS
 from harness.analysis.metric import number
-from harness.campaign.points import run_points
-from harness.campaign.questions import QUESTIONS, difference, ratio, shade
-from harness.campaign.summary import Summary
+from harness.campaign.questions import QUESTIONS, shade
+from harness.campaign.summary import Summary, Table
+from harness.campaign.table import Runs, load_tables
 from harness.files.errors import WriteError
 from harness.files.whole_file import replace_text
 from harness.report.page import Picture, rendered
 
 PAGE = "summary.html"
 PLAIN = "summary.json"
-SCHEMA = "wayproof/campaign-summary/3"
+SCHEMA = "wayproof/campaign-summary/4"
 
 
 def write_summary(summary: Summary, folder: Path) -> Path:
@@ -30,81 +29,67 @@ def write_summary(summary: Summary, folder: Path) -> Path:
         WriteError: they could not be written.
     """
     page = folder / PAGE
+    again = shlex.join(["wayproof", "report", str(folder)])
     try:
-        replace_text(folder / PLAIN, json.dumps(plain(summary), indent=2, allow_nan=False) + "\n")
-        replace_text(page, summary_html(summary, folder))
+        plain = {"schema": SCHEMA, **asdict(summary)}
+        replace_text(folder / PLAIN, json.dumps(plain, indent=2, allow_nan=False) + "\n")
+        text = rendered(
+            "campaign.html",
+            summary=summary,
+            questions=QUESTIONS,
+            pictures=list(_pictures(summary, folder)) if summary.total.runs else [],
+            findings=FINDINGS,
+            command=shlex.join(["wayproof", "report", "--run-reports", str(folder)]),
+            number=number,
+            shade=shade,
+        )
+        replace_text(page, text)
     except OSError as error:
         raise WriteError(
             f"cannot write the summary in {folder}: {error.strerror or error}; the results are whole, and "
-            f"`{shlex.join(['wayproof', 'report', str(folder)])}` makes it from them"
+            f"`{again}` makes it from them"
         ) from error
     return page
 
 
-def plain(summary: Summary) -> dict[str, Any]:
-    """The content of `summary.json`."""
-    return {"schema": SCHEMA, **asdict(summary)}
-
-
-def summary_html(summary: Summary, folder: Path) -> str:
-    """The text of `summary.html`.
-
-    Args:
-        summary: the answers.
-        folder: the campaign's, for what is drawn run by run.
-    """
-    return rendered(
-        "campaign.html",
-        summary=summary,
-        questions=QUESTIONS,
-        pictures=list(_pictures(summary, folder)) if summary.total.runs else [],
-        failures=_failure_maps(summary, folder),
-        findings=FINDINGS,
-        command=shlex.join(["wayproof", "report", "--run-reports", str(folder)]),
-        difference=difference,
-        ratio=ratio,
-        number=number,
-        shade=shade,
-    )
-
-
 def _pictures(summary: Summary, folder: Path) -> Iterator[Picture]:
-    from harness.campaign import figures as campaign_figures
+    from harness.campaign import figures
     from harness.report.figure_style import svg
 
     for table in summary.curves:
+        if len(table.rows.labels) > 1:  # one value is no plot
+            yield Picture(
+                svg(figures.success(table)),
+                f"Share of goals reached against {table.rows.key}",
+                f"Goals reached against {table.rows.key}, with Wilson's 95 % intervals.",
+            )
+    if any(len({*ratios}) > 1 for ratios in summary.lengths.values()):
         yield Picture(
-            svg(campaign_figures.success(table)),
-            f"Share of goals reached against {table.rows.key}",
-            f"Goals reached against {table.rows.key}, with Wilson's 95 % intervals.",
-        )
-    if summary.lengths:
-        yield Picture(
-            svg(campaign_figures.lengths(summary.lengths)),
+            svg(figures.lengths(summary.lengths)),
             "Distribution of the flown length over the clairvoyant optimum",
             "Flown lengths: the share of the goals reached with at most this length over the clairvoyant optimum.",
         )
-    scattered = campaign_figures.scatter(run_points(folder))
+    scattered = figures.scatter(Runs(*load_tables(folder)), summary.varied)
     if scattered is not None:
         yield Picture(
             svg(scattered),
             "Figures of every run against each number that was varied",
             "Every run: clearance over the wanted one, largest cross-track error and length over the optimum, against "
-            "each number that was varied. Crosses: the goal was not reached.",
+            "each number that was varied. Crosses: the goal was not reached. Triangles at an edge: beyond it.",
         )
 
 
-def _failure_maps(summary: Summary, folder: Path) -> Picture | None:
-    """Where runs failed; None where none did, or no run folder was kept of any that did."""
-    from harness.campaign.figures import failures, where_failed
-    from harness.report.figure_style import svg
-
-    failed = failures(summary, folder)
-    if not failed:
-        return None
-
-    return Picture(
-        svg(where_failed(failed)),
-        "Maps of the runs that failed",
-        "Where the worst of them ended (cross): track from S to G, obstacles with the wanted clearance; axes in km.",
-    )
+def rows_for_paper(summary: Summary) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of the table for a paper: the groups of the first table, and all runs."""
+    found: list[list[str]] = []
+    tables: tuple[Table, ...] = summary.tables[:1]
+    keys = [axis.key for table in tables for axis in (table.rows, table.columns) if axis]
+    for table in tables:
+        for label, cells in zip(table.rows.labels, table.cells, strict=True):
+            names = table.columns.labels if table.columns else (None,)
+            for name, cell in zip(names, cells, strict=True):
+                answers = [each.text(cell) if cell.runs else "" for each in QUESTIONS]
+                found.append([*filter(None, (label, name)), str(cell.runs), *answers])
+    total = [str(summary.total.runs), *(each.text(summary.total) for each in QUESTIONS)]
+    found.append(["all runs", *("" for _ in keys[1:]), *total])
+    return [*(keys or [""]), "runs", *(each.short for each in QUESTIONS)], found

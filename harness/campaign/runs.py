@@ -20,9 +20,8 @@ import numpy as np
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.cells import PlannedRun, cell_of, entry_columns, kind_of
 from harness.campaign.flight import Job
-from harness.campaign.key_types import takes_whole_numbers
-from harness.campaign.results import RESULTS, RUNS, fly_again
-from harness.campaign.sampling import FloatArray, design
+from harness.campaign.results import RESULTS, RUNS, campaign_of, fly_again, row_of
+from harness.campaign.sampling import FloatArray, design, takes_whole_numbers
 from harness.files.strict_yaml import (
     InputError,
     Loc,
@@ -218,12 +217,7 @@ class CampaignRuns:
         return self._made.get(number) or packed(self.scenario(number))
 
     def job(self, number: int, folder: Path) -> Job:
-        """Run `number` as it is handed to who flies it.
-
-        Args:
-            number: from 0.
-            folder: of the campaign.
-        """
+        """Run `number`, from 0, as it is handed to who flies it; `folder` is the campaign's."""
         return Job(
             number,
             self.packed(number),
@@ -242,7 +236,7 @@ class CampaignRuns:
         return fly_again(folder / RESULTS, number)
 
     def plain(self) -> dict[str, Any]:
-        """All that says what is flown, as JSON has it."""
+        """All that says what is flown, as JSON."""
         return self.file.plain()
 
     def check(self, progress: Callable[[int], None] | None = None) -> None:
@@ -384,3 +378,23 @@ def _without_course(root: Node) -> Node:
         return root
     kept = {name: node for name, node in mission.value.items() if name != "course_deg"}
     return replaced(root, ("mission",), Node(kept, mission.line))
+
+
+def flown_run(
+    results: Path, run: int, overrides: Sequence[tuple[str, str]] = ()
+) -> tuple[Scenario, str | None]:
+    """What a run of a campaign flew, and the digest of its row.
+
+    Args:
+        results: a campaign's `results.parquet`; it holds the campaign, no other file is needed.
+        run: number of the run; it may still be missing in the table.
+        overrides: keys to replace besides, as `load_scenario` takes them.
+
+    Raises:
+        InputError: the file is something else, or the campaign has no such run.
+    """
+    runs = CampaignRuns(CampaignFile.from_plain(campaign_of(results), str(results)))
+    if not 0 <= run < len(runs):
+        raise InputError(f"{results}: has no run {run}; must be 0 to {len(runs) - 1}")
+    row = row_of(results, run)
+    return runs.scenario(run, overrides), row["digest"] if row else None

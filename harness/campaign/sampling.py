@@ -6,6 +6,8 @@ unit cube serves every distribution.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from functools import cache
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, Strict, field_validator, model_validator
 
 from harness.files.strict_yaml import Loc
+from harness.scenario.scenario import scenario_schema
 from harness.scenario.sections import Section, key
 
 if TYPE_CHECKING:
@@ -139,3 +142,37 @@ def design(sampler: Sampler, draws: int, keys: int, seed: int) -> FloatArray:
 def _points(engine: qmc.QMCEngine, number: int) -> FloatArray:
     points: FloatArray = np.asarray(engine.random(number), dtype=np.float64)
     return points
+
+
+def takes_whole_numbers(loc: Loc) -> bool:
+    """Whether a key takes whole numbers and no others; of planners' own keys, of any planner's that has it."""
+    schema = _schema()
+    found = [schema]
+    for step in loc:
+        found = [inner for each in found for inner in _inside(each, step, schema["$defs"])]
+    return any(each.get("type") == "integer" for each in found)
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    return scenario_schema()
+
+
+def _inside(schema: Mapping[str, Any], step: str | int, definitions: Mapping[str, Any]) -> Iterator[Any]:
+    """What stands at a step in any variant of a schema, variants of it one by one."""
+    for variant in _variants(schema, definitions):
+        inner = variant.get("properties", {}).get(step) if isinstance(step, str) else variant.get("items")
+        if isinstance(inner, Mapping):
+            yield from _variants(inner, definitions)
+
+
+def _variants(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """A schema, or those that it refers to or chooses from."""
+    if "$ref" in schema:
+        yield from _variants(definitions[schema["$ref"].rsplit("/", 1)[-1]], definitions)
+        return
+    chosen = [*schema.get("anyOf", ()), *schema.get("oneOf", ())]
+    for each in chosen:
+        yield from _variants(each, definitions)
+    if not chosen:
+        yield schema

@@ -137,7 +137,7 @@ def _asked(
         if scenario is None or run is not None:
             raise typer.BadParameter("--from and --run go together")
         return load(scenario, given), None
-    from harness.campaign.replay import flown_run
+    from harness.campaign.runs import flown_run
 
     return flown_run(results, run, given)
 

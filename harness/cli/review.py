@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -25,6 +25,7 @@ from harness.cli.options import (
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
+    from harness.analysis.paper_table import Format
     from harness.campaign.summary import Summary
 
 
@@ -87,12 +88,26 @@ def report(
             "Of a campaign: also write the reports of the runs that its page describes (seconds each), and link them.",
         ),
     ] = False,
+    table: Annotated[
+        Literal["latex", "csv", "markdown"] | None,
+        typer.Option(
+            "--format",
+            metavar="FORMAT",
+            help="Of a campaign or comparison: only its table: latex, csv, markdown.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Of --format: a file in place of standard output.")
+    ] = None,
 ) -> int:
     """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
 
     Beside report.html lie its figures as SVG and PNG, and its table as CSV and Markdown.
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
+
+    With --format latex, csv or markdown the table of a campaign or a comparison, for a paper: wayproof report
+    runs/comparison --format latex
     """
     from harness.campaign.folder import LOCK
     from harness.campaign.results import INDEX, RESULTS
@@ -101,6 +116,13 @@ def report(
     from harness.files.input_file import InputError
     from harness.report.run_report import write_report
 
+    if out is not None and table is None:
+        raise typer.BadParameter("goes with --format", param_hint="--out")
+    if table is not None and (run_reports or (by and not (run / RESULTS).is_file())):
+        raise typer.BadParameter("prints the table alone", param_hint="--format")
+    if table is not None:
+        _print_table(run, by, table, out)
+        return 0
     if (run / RESULTS).is_file():
         return _summary(run, by, run_reports)
     if (run / INDEX).is_file() and is_held(run / LOCK):
@@ -132,7 +154,7 @@ def _summary(folder: Path, by: Sequence[str] | None, run_reports: bool) -> int:
     from harness.campaign.summary import summarise
     from harness.cli.summary_table import print_summary
 
-    chosen = [[_column(key.strip()) for key in each.split(",")] for each in by] if by else None
+    chosen = _keys(by)
     summary = summarise(folder, by=chosen)
     failed = False
     if run_reports:
@@ -144,13 +166,42 @@ def _summary(folder: Path, by: Sequence[str] | None, run_reports: bool) -> int:
     return FAILED if failed else 0
 
 
+def _keys(by: Sequence[str] | None) -> list[list[str]] | None:
+    return [[_column(key.strip()) for key in each.split(",")] for each in by] if by else None
+
+
+def _print_table(folder: Path, by: Sequence[str] | None, table: Format, out: Path | None) -> None:
+    """The table of a campaign or a comparison for a paper."""
+    from harness.analysis.paper_table import paper_table
+    from harness.analysis.rows import rows_for_paper as compared
+    from harness.campaign.report import rows_for_paper
+    from harness.campaign.results import RESULTS
+    from harness.campaign.summary import summarise
+    from harness.comparison.comparison import read_rows
+    from harness.files.errors import WriteError
+    from harness.files.whole_file import replace_text
+
+    if (folder / RESULTS).is_file():
+        text = paper_table(*rows_for_paper(summarise(folder, by=_keys(by))), table)
+    else:
+        text = paper_table(*compared(read_rows(folder)), table)
+    if out is None:
+        say(text.removesuffix("\n"))
+        return
+    try:
+        replace_text(out, text)
+    except OSError as error:
+        raise WriteError.of("the table", out, error) from error
+    say(f"table: {out}")
+
+
 def _run_reports(folder: Path, summary: Summary) -> bool:
     """Writes the reports of the runs that a campaign's page describes; says which it could not, and whether all."""
     from harness.files.errors import RunFolderError
     from harness.files.input_file import InputError
     from harness.report.run_report import write_report
 
-    described = [each for each in (*summary.worst, *summary.named) if each.folder]
+    described = [each for each in summary.worst if each.folder]
     if not described:
         say(
             "no run folder was kept of the runs on the page; `recordings: thin` in the campaign's file keeps all"

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from typing import Final
 
 from harness.analysis.metric import number
-from harness.campaign.questions import QUESTIONS, difference, ratio
+from harness.campaign.cell import Cell
+from harness.campaign.paired import Tested
+from harness.campaign.questions import QUESTIONS
 from harness.campaign.runs import CampaignRuns
-from harness.campaign.summary import Cell, Summary, Table
+from harness.campaign.summary import Summary, Table
 from harness.cli.standard_output import folded, say
 from harness.cli.terminal import coloured, plain, print_line, print_table
 from harness.files.strict_yaml import Scalar
@@ -21,7 +23,9 @@ CELL: Final = 28
 """A longer value is cut short."""
 
 SHOWN_WORST: Final = 5
-LEGEND: Final = "length: median/p95; clear: least, runs below the wanted; planner: p50/p99/max"
+LEGEND: Final = (
+    "reached, below the wanted clearance, tracks: 95 % interval; length: median/p95; plan: p99/max"
+)
 
 
 def print_runs(runs: CampaignRuns) -> None:
@@ -80,10 +84,12 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     print_line(LEGEND, style="dim")
     for duel in summary.duels:
         first, second = plain(duel.first), plain(duel.second)
+        told = "; ".join(
+            f"{plain(each.figure)} {each.difference.text()}" for each in duel.figures if _differs(each)
+        )
         print_line(
-            f"{first} against {second} in {counted(duel.pairs, 'pair')} of flights: goals reached "
-            f"{difference(duel.success)} points ({duel.only_first} by {first} alone, {duel.only_second} by {second} "
-            f"alone); length {ratio(duel.length)} times, where both reached ({duel.both_reached})"
+            f"{first} against {second} in {counted(duel.pairs, 'pair')} of flights ({duel.only_first} reached by "
+            f"{first} alone, {duel.only_second} by {second} alone): {told or 'no figure differs at 5 %'}",
         )
     failed = [run for run in summary.worst if run.outcome != "reached"]
     for run in failed[:SHOWN_WORST]:
@@ -97,7 +103,7 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
 
 
 def _cells(cell: Cell) -> list[str]:
-    return [str(cell.runs), *(question.brief(cell) if cell.runs else "" for question in QUESTIONS)]
+    return [str(cell.runs), *(question.text(cell) if cell.runs else "" for question in QUESTIONS)]
 
 
 def _lines(table: Table) -> list[Sequence[str]]:
@@ -111,3 +117,8 @@ def _lines(table: Table) -> list[Sequence[str]]:
         for name, cell in zip(table.columns.labels, cells, strict=True):
             lines.append((f" {plain(name)}", *_cells(cell)))
     return lines
+
+
+def _differs(tested: Tested) -> bool:
+    """Whether two planners differ in a figure beyond chance, at 5 %."""
+    return tested.p is not None and tested.p < 0.05

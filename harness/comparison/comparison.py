@@ -16,9 +16,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from harness.analysis.metric import ERROR
-from harness.analysis.rows import Row, to_csv, to_markdown
+from harness.analysis.rows import COMPARED, Row, to_csv, to_markdown
 from harness.campaign.flight import Answer, Job
+from harness.campaign.paired import TESTED, Duel, duels
 from harness.campaign.sweep import fly_jobs
 from harness.campaign.workers import local_workers
 from harness.files.errors import RunFolderError
@@ -227,6 +230,20 @@ def _check(scenarios: Sequence[Scenario], names: Sequence[str]) -> None:
         seen.add((each.name, called))
 
 
+def read_rows(folder: Path) -> list[Row]:
+    """The rows of a comparison that is complete.
+
+    Raises:
+        InputError: the folder holds none.
+    """
+    index = read_index(folder / INDEX, SCHEMA)
+    if index is None or not index.get("complete"):
+        raise InputError(f"{folder}: is not the folder of a campaign or of a complete comparison")
+    own = ("scenario", "planner", "outcome", "reason", "guidance")
+    known = [{key: row[key] for key in (*own, *COMPARED) if key in row} for row in index["rows"]]
+    return [Row(**row) for row in known]
+
+
 def _claim(out: Path, begun: Comparison) -> FolderLock:
     """Makes `out` the folder of this comparison alone, or raises RunFolderError."""
     if out.exists() and not out.is_dir():
@@ -291,7 +308,19 @@ def _report(comparison: Comparison, chapters: Sequence[Chapter]) -> str:
         comparison.versions,
         comparison.started_utc,
         comparison.kinematic,
+        _duels(comparison.rows),
     )
+
+
+def _duels(rows: Sequence[Row]) -> tuple[Duel, ...]:
+    """Planners in pairs over the scenarios; none with a single scenario, of which the table says it all."""
+    if len({row.scenario for row in rows}) < 2:
+        return ()
+    figures = {
+        each.name: np.array([row.figures[each.name] for row in rows], dtype=np.float64) for each in TESTED
+    }
+    reached = [row.outcome == "reached" for row in rows]
+    return duels([row.label for row in rows], [(row.scenario,) for row in rows], reached, figures)
 
 
 def _now() -> str:

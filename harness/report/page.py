@@ -55,11 +55,18 @@ class Chapter:
 
 
 def report_html(
-    chapters: Sequence[Chapter], command: str, versions: Mapping[str, str], written: str, kinematic: bool
+    chapters: Sequence[Chapter],
+    command: str,
+    versions: Mapping[str, str],
+    written: str,
+    kinematic: bool,
+    duels: Sequence[Any] = (),
 ) -> str:
-    """The text of `report.html`."""
+    """The text of `report.html`; `duels` are planners in pairs, as `harness.campaign.paired` has them."""
     return rendered(
         "comparison.html",
+        duels=duels,
+        number=number,
         chapters=chapters,
         command=command,
         versions=versions,

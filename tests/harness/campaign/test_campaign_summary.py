@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import itertools
 import json
 import math
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +19,13 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from harness.analysis.causes import FINDINGS
+from harness.campaign.cell import Cell, Share, wilson
 from harness.campaign.figures import lengths
-from harness.campaign.groups import BINS, MOST_NAMES, NONE, grouped
-from harness.campaign.paired import mean_estimate
-from harness.campaign.questions import QUESTIONS, percent
+from harness.campaign.groups import BINS, MAX_NAMES, NONE, grouped
+from harness.campaign.paired import duels, mean_estimate
+from harness.campaign.questions import share_text
 from harness.campaign.report import PAGE, PLAIN, write_summary
-from harness.campaign.summary import CURVE_POINTS, Cell, Summary, summarise, wilson
+from harness.campaign.summary import CURVE_POINTS, Summary, summarise
 from harness.cli.app import main
 from harness.cli.summary_table import print_summary
 from harness.files.strict_yaml import InputError
@@ -116,7 +117,10 @@ def test_a_share_has_wilsons_interval(digits: tuple[int, int]) -> None:
     z, share = 1.959963984540054, successes / trials
     middle = (share + z * z / (2 * trials)) / (1 + z * z / trials)
     half = z / (1 + z * z / trials) * math.sqrt(share * (1 - share) / trials + z * z / (4 * trials**2))
-    assert wilson(successes, trials) == pytest.approx((middle - half, middle + half), abs=1e-12)
+    found = wilson(successes, trials)
+    assert (found.value, found.low, found.high) == pytest.approx(
+        (share, middle - half, middle + half), abs=1e-12
+    )
 
 
 def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
@@ -128,32 +132,24 @@ def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
     assert total == Cell(
         runs=5,
         reached=3,
-        success=0.6,
-        success_low=wilson(3, 5)[0],
-        success_high=wilson(3, 5)[1],
+        success=wilson(3, 5),
         length_median=1.1,
         length_p95=float(np.percentile(ratios, 95)),
         least_clearance_m=-1.0,
-        below_wanted=0.25,
-        trackable=0.75,
-        planner_p50_ms=3.0,
+        below_wanted=wilson(1, 4),
+        trackable=wilson(3, 4),
         planner_p99_ms=9.0,
         planner_max_ms=9.0,
     )
 
 
-def test_nearly_all_is_not_all_and_a_few_are_not_none(tmp_path: Path) -> None:
-    """One failure in thousands of runs is what a campaign is flown for."""
+def test_nearly_all_is_not_all_and_none_of_a_few_is_not_never() -> None:
+    """One failure in thousands of runs is what a campaign is flown for; none of 24 may still be one in seven."""
     shares = (1.0, 4999 / 5000, 0.5, 1 / 5000, 0.0)
-    assert [percent(share) for share in shares] == ["100 %", "99.9 %", "50.0 %", "0.1 %", "0 %"]
-    cell = summarise(campaign(tmp_path, [row(0)])).total
-    brief = [QUESTIONS[0].brief(replace(cell, success=share)).split()[0] for share in shares]
-    assert brief == ["100", "99.9", "50", "0.1", "0"]
-
-
-def test_a_ratio_of_a_run_that_did_not_arrive_does_not_count(tmp_path: Path) -> None:
-    rows = [row(0), row(1, "timeout", length_ratio=7.0)]
-    assert summarise(campaign(tmp_path, rows)).total.length_p95 == 1.1
+    told = [share_text(Share(share, share, share)).split()[0] for share in shares]
+    assert told == ["100", "99.9", "50", "0.1", "0"]
+    z2 = 1.959963984540054**2
+    assert share_text(wilson(0, 24)) == f"0 (0\N{EN DASH}{100 * z2 / (24 + z2):.0f})"
 
 
 def test_tables_by_two_keys_split_the_runs(tmp_path: Path) -> None:
@@ -181,18 +177,41 @@ def test_planners_are_compared_in_pairs(tmp_path: Path) -> None:
     (duel,) = summarise(by_two(tmp_path / "c")).duels
     assert (duel.first, duel.second, duel.pairs) == ("rolling_window", "bug2", 12)
     assert (duel.only_first, duel.only_second, duel.both_reached) == (2, 0, 10)
-    assert duel.success.value == pytest.approx(2 / 12)
-    assert duel.success.low is not None
-    assert duel.success.high is not None
-    assert 0.0 <= duel.success.low < 2 / 12 < duel.success.high <= 0.5
-    assert duel.length.value == pytest.approx(1 / 1.1)
-    assert duel.length.low is None, "every pair has the same ratio: there is nothing to resample"
+    figures = {each.figure: each for each in duel.figures}
+    success = figures["goals reached, %"]
+    assert (success.pairs, success.first) == (12, 100.0)
+    assert success.second == pytest.approx(100 * 10 / 12)
+    assert success.difference.value == pytest.approx(100 * 2 / 12)
+    assert success.difference.low is not None
+    assert success.difference.high is not None
+    assert 0.0 <= success.difference.low < 100 * 2 / 12 < success.difference.high <= 50.0
+    length = figures["ratio to the clairvoyant optimum"]
+    assert length.pairs == 10
+    assert length.difference.value == pytest.approx(1.1 - 1.21)
+    assert length.difference.low is None, "every pair has the same difference: there is nothing to resample"
+    assert "planner time p99, ms" in figures
+
+
+def test_each_figure_has_wilcoxons_test_corrected_by_holm() -> None:
+    rng = np.random.default_rng(2)
+    ours, theirs = {}, {}
+    for name, shift in (("ratio", 0.3), ("min_clearance_m", 0.2), ("bank_reversals_per_min", 0.0)):
+        ours[name], theirs[name] = rng.normal(shift, 0.3, 20), rng.normal(0.0, 0.3, 20)
+    figures = {name: np.concatenate((ours[name], theirs[name])) for name in ours}
+    planners, cases = ["a"] * 20 + ["b"] * 20, [(case, "") for case in range(20)] * 2
+    (duel,) = duels(planners, cases, [True] * 40, figures)
+    raw = sorted((float(stats.wilcoxon(ours[name] - theirs[name]).pvalue), name) for name in figures)
+    expected = list(itertools.accumulate((min(1.0, (3 - rank) * p) for rank, (p, _) in enumerate(raw)), max))
+    found = sorted(each.p for each in duel.figures if each.p is not None)
+    assert found == pytest.approx(expected)
+    assert 0.0 < expected[0] < 0.06 < expected[2]
+    assert duel.figures[0].p is None, "all reached: there is nothing to test"
 
 
 def test_rows_that_share_no_case_make_no_pair(tmp_path: Path) -> None:
     rows = [row(0), row(1, planner="bug2"), row(2, case=0, planner="bug2", aircraft="c172p")]
     (duel,) = summarise(campaign(tmp_path, rows)).duels
-    assert (duel.pairs, duel.success.value, duel.length.value) == (0, None, None)
+    assert (duel.pairs, duel.figures) == (0, ())
 
 
 def test_scenarios_are_told_apart_where_each_is_flown_in_every_world(tmp_path: Path) -> None:
@@ -223,8 +242,8 @@ def test_the_bootstrap_interval_is_that_of_the_binomial_where_it_is_known() -> N
     assert estimate.low is not None
     assert estimate.high is not None
     assert estimate.value == pytest.approx(0.3)
-    assert estimate.low == pytest.approx(low, abs=0.003)
-    assert estimate.high == pytest.approx(high, abs=0.003)
+    assert estimate.low == pytest.approx(low, abs=0.004)
+    assert estimate.high == pytest.approx(high, abs=0.004)
     assert mean_estimate(differences, np.arange(1000)) == estimate, "the same every time"
 
 
@@ -411,7 +430,7 @@ def test_results_without_a_metric_are_read(tmp_path: Path) -> None:
     kept = {"run", "case", "seed", "scenario", "world", "planner", "aircraft", "outcome", "error"}
     rows = [{name: value for name, value in row(run, "error").items() if name in kept} for run in range(3)]
     total = summarise(campaign(tmp_path, rows)).total
-    assert (total.runs, total.success, total.least_clearance_m, total.trackable) == (3, 0.0, None, None)
+    assert (total.runs, total.reached, total.least_clearance_m, total.trackable) == (3, 0, None, None)
 
 
 @given(st.lists(st.none() | st.floats(-1e6, 1e6, allow_nan=False), max_size=60))
@@ -432,8 +451,8 @@ def test_every_number_has_one_group_between_its_edges(values: list[float | None]
 def test_the_rarest_of_many_names_share_a_group() -> None:
     values = [f"world {number}" for number in range(30) for _ in range(30 - number)]
     axis, index = grouped("world", values)
-    assert axis.labels == (*(f"world {number}" for number in range(MOST_NAMES - 1)), "19 others")
-    assert (index == MOST_NAMES - 1).sum() == sum(30 - number for number in range(11, 30))
+    assert axis.labels == (*(f"world {number}" for number in range(MAX_NAMES - 1)), "19 others")
+    assert (index == MAX_NAMES - 1).sum() == sum(30 - number for number in range(11, 30))
     assert grouped("sensor", [[1, 2], [1, 2], [3]])[0].labels == ("[1, 2]", "[3]")
     assert grouped("flag", [True, False])[0].labels == ("true", "false")
 
@@ -454,7 +473,7 @@ def test_a_terminal_of_80_columns_shows_it(tmp_path: Path, capsys: pytest.Captur
     lines = printed.splitlines()
     assert max(map(len, lines[:-1])) <= 80
     assert "reached 22, collision 2" in printed
-    assert any(line.split()[:4] == ["all", "runs", "24", "91.7"] for line in lines)
+    assert any(line.split()[:5] == ["all", "runs", "24", "91.7", "(74\N{EN DASH}98)"] for line in lines)
     assert "collision run 21 (forest, bug2, aerosonde), least clearance -2.5 m" in printed
     assert lines[-1] == f"again: wayproof fly --from {tmp_path}/c/results.parquet --run 21"
 
@@ -514,102 +533,6 @@ def test_where_nothing_failed_the_three_closest_are_shown(tmp_path: Path) -> Non
     assert "No run failed" in write_summary(summary, folder).read_text()
 
 
-def test_runs_that_stand_out_are_named(tmp_path: Path) -> None:
-    rows = [
-        row(run, min_clearance_m=60.0, **{"max_load_factor": 1.0, "trackability.causes": ""})
-        for run in range(5)
-    ]
-    rows[2] |= {"max_load_factor": 1.6}
-    rows[3] |= {"trackable": False, "trackability.causes": "bank limit", "min_clearance_m": 49.9}
-    folder = campaign(tmp_path / "c", rows)
-    summary = summarise(folder)
-    near, load = summary.extremes
-    assert (near.apart, load.apart) == (True, True), "none else came nearer to an obstacle than was wanted"
-    assert (load.figure, load.run, load.value, load.following, load.median) == (
-        "load factor",
-        2,
-        1.6,
-        1.0,
-        1.0,
-    )
-    assert near.run == 3
-    assert (near.value, near.following) == pytest.approx((49.9 / 50.0, 1.2))
-    assert [(each.causes, each.count, each.runs) for each in summary.untracked] == [("bank limit", 1, (3,))]
-    assert [(run.run, run.command) for run in summary.named] == [
-        (2, f"wayproof fly --from {folder}/results.parquet --run 2")
-    ]
-    page = write_summary(summary, folder).read_text()
-    assert "Runs that stand out" in page
-    assert_links_lead_somewhere(page)
-    assert page.count('<a href="#run-2">2</a>') == 1
-    assert page.count('<a href="#run-3">3</a>') == 2
-    assert "49.9 m; <strong class='bad'>below</strong> the wanted 50 m" in page
-    assert "60 m; wanted 50 m" in page
-
-
-def assert_links_lead_somewhere(page: str) -> None:
-    """Each run that is linked to has one place on the page, with the command that flies it again."""
-    for number in set(re.findall(r'<a href="#run-(\d+)">', page)):
-        assert page.count(f'<li id="run-{number}">') == 1
-        (place,) = re.findall(rf'<li id="run-{number}">(.*?)\n</li>', page, re.DOTALL)
-        assert f"--run {number}</span></code>" in place
-
-
-ODD = {
-    1: ("clearance over the wanted one, goal reached", {"min_clearance_m": 21.0}),
-    2: ("time at the bank limit, %", {"bank_saturation_fraction": 0.06}),
-    3: ("plan delay, s", {"plan_delay_s.max": 4.2}),
-    4: ("jump of the believed position, m", {"navigation_jump_m": 31.0}),
-    5: ("returns lost in the worst scan, %", {"lost_returns.max": 0.9}),
-}
-"""Run, the figure by which it stands out, and what is odd about it."""
-
-
-def test_each_oddity_of_a_campaign_stands_out_on_its_page_though_runs_failed(tmp_path: Path) -> None:
-    usual = {
-        "bank_saturation_fraction": 0.0,
-        "plan_delay_s.max": 0.2,
-        "navigation_jump_m": 0.4,
-        "lost_returns.max": 0.05,
-    }
-    rows = [row(run, **usual) | ODD.get(run, ("", {}))[1] for run in range(20)]
-    rows[7] |= {"outcome": "collision", "min_clearance_m": -1.0}  # it is among the failures, and no near miss
-    folder = campaign(tmp_path / "odd", rows)
-    summary = summarise(folder)
-    assert {each.run: each.figure for each in summary.extremes} == {run: ODD[run][0] for run in ODD}
-    assert all(each.apart for each in summary.extremes)
-    page = write_summary(summary, folder).read_text()
-    for run, (figure, _) in ODD.items():
-        assert (
-            f'<tr class="apart"><th scope="row">{figure}</th><td class="run"><a href="#run-{run}">{run}</a></td>'
-            in page
-        )
-    assert_links_lead_somewhere(page)
-
-
-def said_of(page: str, run: int) -> list[str]:
-    """By what a run stands out, as its description on a page says."""
-    (place,) = re.findall(rf'<li id="run-{run}">(.*?)\n</li>', page, re.DOTALL)
-    return [re.sub(r"<[^>]+>", "", each) for each in re.findall("<li>(.*?)</li>", place)]
-
-
-def test_a_navigation_error_stands_out_where_the_other_runs_navigate_perfectly(tmp_path: Path) -> None:
-    """They have none: that is an error of 0."""
-    rows = [row(run, **{"navigation_error_m.max": None, "navigation_jump_m": None}) for run in range(20)]
-    rows[7] |= {"navigation_error_m.max": 44.2, "navigation_jump_m": 44.0}
-    folder = campaign(tmp_path / "one", rows)
-    summary = summarise(folder)
-    assert [(each.figure, each.run, each.following) for each in summary.extremes if each.apart] == [
-        ("navigation error, m", 7, 0.0),
-        ("jump of the believed position, m", 7, 0.0),
-    ]
-    page = write_summary(summary, folder).read_text()
-    assert said_of(page, 7) == [
-        "Run 7 stands out by navigation error: 44.2 m; next run 0 m, median 0 m.",
-        "Run 7 stands out by jump of the believed position: 44 m; next run 0 m, median 0 m.",
-    ]
-
-
 def test_reports_of_runs_are_linked_where_there_are_and_asked_for_where_not(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -623,8 +546,6 @@ def test_reports_of_runs_are_linked_where_there_are_and_asked_for_where_not(
     page = (folder / PAGE).read_text()
     assert "2 runs described on this page have no report yet." in page
     assert f"<code>wayproof report --run-reports {folder}</code>" in page
-    assert f"<code>wayproof report {folder}/runs/0</code>" in page
-    assert f"<code>wayproof report {folder}/runs/2</code>" not in page
     assert "report.html" not in page
     capsys.readouterr()
     assert main(["report", "--run-reports", str(folder)]) == 1
@@ -635,7 +556,6 @@ def test_reports_of_runs_are_linked_where_there_are_and_asked_for_where_not(
     page = (folder / PAGE).read_text()
     assert page.count('<a href="runs/0/report.html">Report</a>') == 1
     assert page.count("report.html") == 1
-    assert f"<code>wayproof report {folder}/runs/0</code>" not in page
     assert "1 run described on this page has no report yet." in page
 
 
@@ -645,67 +565,63 @@ def test_only_a_campaign_has_reports_of_its_runs(tmp_path: Path, capsys: pytest.
     assert "--run-reports" in capsys.readouterr().err
 
 
-def test_what_is_odd_about_a_case_stands_out_though_several_planners_flew_it(tmp_path: Path) -> None:
-    rows = [
-        row(run, case=run // 2, planner=("rolling_window", "bug2")[run % 2], **{"lost_returns.max": 0.02})
-        for run in range(20)
-    ]
-    for run, lost in ((6, 0.72), (7, 0.67)):  # both of case 3
-        rows[run] |= {"lost_returns.max": lost}
-    (lost_returns,) = summarise(campaign(tmp_path / "c", rows)).extremes
-    assert (lost_returns.run, lost_returns.apart) == (6, True)
-    assert lost_returns.following == pytest.approx(2.0)
-    alone = [row(run, case=0, **{"lost_returns.max": 0.1 * run}) for run in range(4)]
-    (lost_returns,) = summarise(campaign(tmp_path / "alone", alone)).extremes
-    assert lost_returns.run == 3
-    assert lost_returns.following == pytest.approx(20.0), "there is one case only"
-
-
 def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
-    """Where navigation errs they are nearly all: their first ten would say nothing of the others."""
-    untracked = {"trackable": False, "trackability.causes": "navigation error"}
-    rows = [row(run, **untracked, **{"cross_track_m.max": 0.5}) for run in range(20)]
-    rows[0] |= {"trackable": True, "trackability.causes": ""}
-    rows[13] |= {"trackability.causes": "navigation error; bank limit", "cross_track_m.max": 7.0}
-    folder = campaign(tmp_path / "c", rows)
-    summary = summarise(folder)
-    assert [(each.causes, each.count, each.runs) for each in summary.untracked] == [
-        ("navigation error", 18, (1, 2, 3, 4, 5)),
-        ("navigation error; bank limit", 1, (13,)),
-    ]
-    assert not any(each.allowed_for for each in summary.untracked), "it is not known what was planned for it"
-    page = write_summary(summary, folder).read_text()
-    assert "In 19 of 20 runs not every leg was tracked, for these causes:" in page
-    said = re.sub(r'<a href="#run-(\d+)">\1</a>', r"\1", page)
-    off = "Largest cross-track error {} m; median of all runs 0.5 m."
-    assert (
-        f"<li>18 runs, 1, 2, 3, 4, 5, \N{HORIZONTAL ELLIPSIS}: navigation error. {off.format(0.5)}</li>"
-        in said
-    )
-    assert f"<li>Run 13: navigation error, bank limit. {off.format(7)}</li>" in said
-    for cause in ("navigation error", "bank limit"):
-        assert f"<strong>{cause}</strong>: {FINDINGS[cause]}.</p>" in page
-    assert "<strong>planner too late</strong>" not in page, "no run has that cause"
-    assert_links_lead_somewhere(page)
-    assert len(re.findall('<a href="#run-', page)) == 6 + len(summary.extremes)
-
-
-def test_navigation_errors_that_were_planned_for_come_last_and_say_so(tmp_path: Path) -> None:
     """A receiver errs as the scenario says that it does: what is odd is another cause, or a larger error."""
     untracked = {"trackable": False, "trackability.causes": "navigation error", "navigation_margin_m": 17.2}
     rows = [row(run, **untracked, **{"navigation_error_m.max": 9.0 + 0.1 * run}) for run in range(20)]
+    rows[0] |= {"trackable": True, "trackability.causes": ""}
     rows[4] |= {"navigation_error_m.max": 42.5}
     rows[13] |= {"trackability.causes": "navigation error; planner too late"}
     folder = campaign(tmp_path / "c", rows)
     summary = summarise(folder)
-    assert [(each.allowed_for, each.count, each.runs[:2]) for each in summary.untracked] == [
-        (False, 1, (4,)),
-        (False, 1, (13,)),
-        (True, 18, (0, 1)),
+    assert [(each.allowed_for, each.causes, each.count) for each in summary.untracked] == [
+        (False, "navigation error", 1),
+        (False, "navigation error; planner too late", 1),
+        (True, "navigation error", 17),
     ]
     page = write_summary(summary, folder).read_text()
-    usual = page.index("navigation error, of position no more than <abbr")
-    assert page.index(": navigation error.") < page.index("planner too late.") < usual
+    assert "In 19 of 20 runs not every leg was tracked, for these causes:" in page
+    usual = page.index("<li>17 runs: navigation error, of position no more than <abbr")
+    assert page.index("<li>1 run: navigation error.</li>") < page.index("planner too late.</li>") < usual
+    for cause in ("navigation error", "planner too late"):
+        assert f"<strong>{cause}</strong>: {FINDINGS[cause]}.</p>" in page
+    assert "<strong>bank limit</strong>" not in page, "no run has that cause"
+
+
+def test_directions_are_grouped_by_quarters_of_the_compass() -> None:
+    """350 and 10 degrees are one group, and no line leads from the last group to a first that is beside it."""
+    values = [350.0, 10.0, 44.9, 45.1, 90.0, 180.0, 225.1, 314.9, 360.0, None]
+    axis, index = grouped("environment.wind.from_deg", values, drawn=True)
+    assert index.tolist() == [0, 0, 0, 1, 1, 2, 3, 3, 0, 4]
+    assert (axis.labels[0], axis.labels[-1], axis.numeric) == ("N, -45 to 45", NONE, False)
+    numbers = [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert grouped("environment.wind.speed_mps", numbers, drawn=True)[0].numeric
+
+
+@pytest.mark.parametrize("form", ["latex", "csv", "markdown"])
+def test_a_table_for_a_paper_has_the_groups_and_all_runs(
+    form: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = by_two(tmp_path / "c")
+    words = ["report", str(folder), "--by", "planner", "--format", form]
+    assert main(words) == 0
+    text = capsys.readouterr().out
+    heads = ("planner", "runs", "reached %")
+    cells = ("bug2", "12", "83.3 (55\N{EN DASH}95)")
+    if form == "csv":
+        rows = list(csv.reader(text.splitlines()))
+        assert (tuple(rows[0][:3]), tuple(rows[2][:3]), rows[3][:2]) == (heads, cells, ["all runs", "24"])
+    elif form == "latex":
+        assert r"planner & runs & reached \%" in text
+        assert "bug2 & 12 & 83.3 (55--95) & 1.21/1.21" in text
+        assert text.startswith(r"\begin{tabular}{lrrrrrrr}")
+        assert text.count(r"\\") == 4
+    else:
+        assert f"| {' | '.join(heads)} |" in text
+        assert f"| {' | '.join(cells)} |" in text
+    assert not (folder / PAGE).exists(), "the table alone"
+    assert main([*words, "--out", str(tmp_path / "table.txt")]) == 0
+    assert (tmp_path / "table.txt").read_text() == text
 
 
 def test_a_key_drawn_at_random_is_always_grouped() -> None:
@@ -725,7 +641,9 @@ def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: 
     for width_px in (400, 1280):
         seen = shown(chromium, page, width_px)
         assert (seen.said, seen.asked_for, seen.overflow_px) == ((), (), 0)
-        assert (seen.figures, seen.missing) == (len(summary.curves) + 2, 0)
+        assert (seen.figures, seen.missing) == (2, 0), (
+            "success by wind, and lengths; one number of rays is no plot"
+        )
 
 
 def test_an_inner_edge_belongs_to_the_group_above() -> None:

@@ -276,21 +276,31 @@ def test_a_point_flies_every_plan_exactly_with_any_number_of_workers(
     answers = []
     for workers in ("1", "2"):
         out = place / f"workers-{workers}"
-        options = ["--planners", "corner", "--kinematic", "--no-recording", "--json", "--workers", workers]
+        options = [
+            "--planners",
+            "corner,bug2",
+            "--kinematic",
+            "--no-recording",
+            "--json",
+            "--workers",
+            workers,
+        ]
         assert main(["compare", *scenarios, *options, "--out", str(out)]) == 0
         answer = json.loads(capfd.readouterr().out)
         assert answer == json.loads((out / "comparison.json").read_text())
         assert not (out / "ring" / "overlay.rrd").exists()
         answers.append([{name: row[name] for name in row if name not in TIMES} for row in answer["rows"]])
     assert answers[0] == answers[1]
-    ring, drift = answers[0]
+    ring, _, drift, _ = answers[0]
     assert (ring["scenario"], drift["scenario"]) == ("ring", "drift")
     assert ring["total_system_error_max_m"] == 0.0
     assert ring["trackable"] is None
     # The flight ends at the edge of the goal circle, at the first look inside it.
     assert ring["flown_length_m"] == pytest.approx(2400.0 + 2400.0 - 60.0, abs=3.0)
     assert drift["ratio"] is None
-    assert "an obstacle moves" in (place / "workers-1" / "report.html").read_text()
+    page = (place / "workers-1" / "report.html").read_text()
+    assert "an obstacle moves" in page
+    assert "<h3>corner against bug2</h3>\n<p>2 pairs: both reached the goal in 2" in page
 
 
 @pytest.mark.flights
@@ -626,3 +636,17 @@ def test_a_curve_of_many_rows_keeps_its_peaks(
     curve = max((np.asarray(line.get_xydata()) for line in cross.get_lines()), key=len)
     assert len(curve) < 2000
     assert (curve[:, 1].max(), curve[:, 1].min()) == (7.0, -3.0)
+
+
+@pytest.mark.flights
+def test_the_table_of_a_comparison_for_a_paper(flown: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", str(flown), "--format", "csv"]) == 0
+    heads, *rows = csv.reader(capsys.readouterr().out.splitlines())
+    assert heads[:4] == ["scenario", "planner", "outcome", "km"]
+    km = [
+        f"{row['flown_length_m'] / 1e3:.3g}" if row["flown_length_m"] else "\N{EN DASH}"
+        for row in rows_of(flown)
+    ]
+    assert [row[3] for row in rows] == km
+    assert main(["report", str(flown / "ring"), "--format", "csv"]) == 2
+    assert "is not the folder of a campaign or of a complete comparison" in capsys.readouterr().err
