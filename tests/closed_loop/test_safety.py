@@ -258,7 +258,7 @@ def test_a_sensor_that_cannot_see_a_turn_is_refused_with_the_numbers(
     said = capsys.readouterr().err
     assert ("too short for a turn radius of 110 m with a clearance of 40 m" in said) is (status == 2)
     assert ("sensor.range_m: is 300, too short" in said) is (status == 2)
-    assert ("must be at least 311" in said) is (status == 2)
+    assert ("must be at least 303" in said) is (status == 2)
     if status == 2:
         assert main(["fly", str(at), "--out", str(tmp_path / "run")]) == 2
         assert not (tmp_path / "run").exists()
