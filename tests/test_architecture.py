@@ -86,7 +86,6 @@ ONLY_IN = {
         "planner/compiled.py",
         "planner/kernel_cache.py",
         "aircraft/kernels.py",
-        "aircraft/guidance/machine_code.py",
     ),
     "ompl": ("planner/baselines/dubins_tree.py",),
     "harness.cli.app": ("harness/__main__.py", "harness/front_door/wayproof/__main__.py"),
@@ -95,9 +94,8 @@ ONLY_IN = {
 # Slow to import: inside the function that needs them, but for files that are imported late themselves.
 LATE = {
     "jsbsim": ("aircraft/jsbsim_loading.py",),
-    "numba": ("aircraft/kernels.py", "aircraft/guidance/machine_code.py"),
-    "aircraft.kernels": ("aircraft/guidance/machine_code.py",),
-    "aircraft.guidance.machine_code": (),
+    "numba": ("aircraft/kernels.py",),
+    "aircraft.kernels": (),
     "rerun": ("harness/recording/*.py",),
     "pyarrow": (),
     "scipy": (),

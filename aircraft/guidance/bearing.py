@@ -16,11 +16,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLimits, GuidanceOutput
+from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
-from aircraft.guidance.progress import RouteProgress
+from aircraft.guidance.progress import PathPoint
+from aircraft.guidance.route_law import RouteLaw
 from aircraft.interface import GRAVITY_MPS2, AircraftState, Route
-from aircraft.route import route_point
 
 SLOW_MPS = 1.0
 """Ground speeds below this count as this for the look-ahead, so that the point stays ahead."""
@@ -52,43 +52,26 @@ def bank_to_point(to_east_m: float, to_north_m: float, course_rad: float, gain: 
     return gain * math.remainder(math.atan2(to_east_m, to_north_m) - course_rad, math.tau)
 
 
-class BearingLaw:
-    """Heads for points. Implements `GuidanceLaw` and `aircraft.guidance.waypoints.PointLaw`.
-
-    Args:
-        config: its keys.
-        limits: what may be asked of the aircraft.
-    """
+class BearingLaw(RouteLaw):
+    """Heads for points. Implements `GuidanceLaw` and `aircraft.guidance.waypoints.PointLaw`."""
 
     def __init__(self, config: BearingConfig, limits: GuidanceLimits) -> None:
-        self._gain, self._bank_limit_rad = config.gain, limits.bank_limit_rad
-        self._roll_step_rad = limits.roll_rate_radps / UPDATE_RATE_HZ
-        self._roll_rad = 0.0
-        self._route: Route | None = None
-        self._progress: RouteProgress | None = None
+        super().__init__(limits)
+        self._gain = config.gain
         self._point: tuple[float, float] | None = None
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         """Takes a new route; the roll command goes on from where it is."""
-        self._route, self._progress = route, RouteProgress(route, arc_length_m)
+        super().follow(route, arc_length_m)
         self._point = None
 
     def fly_to(self, east_m: float, north_m: float) -> None:
         """Heads for one point until the next call."""
         self._point = east_m, north_m
 
-    def update(self, state: AircraftState) -> GuidanceOutput:
-        """Decides the roll command for the next update interval."""
-        if self._route is None or self._progress is None:
-            raise RuntimeError("follow() a route before update()")
-        place = self._progress.along(state.east_m, state.north_m)
+    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+        """What the law asks for."""
         speed = max(state.groundspeed_mps, SLOW_MPS)
-        ahead_m = 2.0 * speed * speed / (self._gain * GRAVITY_MPS2)
-        east, north = self._point or route_point(self._route, place.arc_length_m + ahead_m)[:2]
-        wanted = bank_to_point(east - state.east_m, north - state.north_m, state.course_rad, self._gain)
-        allowed = min(max(wanted, -self._bank_limit_rad), self._bank_limit_rad)
-        step = self._roll_step_rad
-        self._roll_rad += min(max(allowed - self._roll_rad, -step), step)
-        return GuidanceOutput(
-            self._roll_rad, place.cross_track_m, place.arc_length_m, allowed != wanted, place.past_end
-        )
+        east, north = self._point or self.progress.ahead(2.0 * speed * speed / (self._gain * GRAVITY_MPS2))
+        to_east, to_north = east - state.east_m, north - state.north_m
+        return bank_to_point(to_east, to_north, state.course_rad, self._gain), math.nan

@@ -17,7 +17,9 @@ from typing import NamedTuple
 
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
-from aircraft.interface import GRAVITY_MPS2
+from aircraft.guidance.progress import PathPoint
+from aircraft.guidance.route_law import RouteLaw, centre_of
+from aircraft.interface import GRAVITY_MPS2, AircraftState
 
 ONE_OVER_PI = 0.3183099
 """1/pi to the digits that the autopilot uses."""
@@ -42,6 +44,8 @@ INTEGRATOR_RANGE_RAD = math.radians(5.0)
 INTEGRATOR_LIMIT_RAD = 0.1
 MAX_UPDATE_S = 0.1
 """The integrator takes a longer time since the last call for this one."""
+FAR_M = 1e4
+"""A leg without an end goes on this far beyond the aircraft."""
 STALE_S = 1.0
 """After a longer time since the last call on a leg the integrator begins at 0."""
 INDECISION_RAD = 0.9 * math.pi
@@ -72,21 +76,6 @@ class L1Config:
         """The config with every default filled in; no key of it depends on the aircraft."""
         return self
 
-    def parameters(self) -> L1Parameters:
-        """What the law needs: these keys. Circles do not grow with altitude, so no bank limit bounds their growth."""
-        return L1Parameters(self.period_s, self.damping, self.integrator_gain, 0.0, 0.0)
-
-
-class L1Parameters(NamedTuple):
-    """Constants of one flight: the keys of `L1Config`, and what they do not say."""
-
-    period_s: float
-    damping: float
-    integrator_gain: float
-    loiter_bank_limit_rad: float
-    target_airspeed_mps: float
-    """The airspeed that is held; 0 where nobody says it."""
-
 
 class L1Motion(NamedTuple):
     """How the aircraft moves."""
@@ -98,8 +87,6 @@ class L1Motion(NamedTuple):
     yaw_rad: float
     yaw_cd: int
     """The same in hundredths of a degree, as the autopilot keeps it."""
-    eas2tas: float
-    """True over equivalent airspeed, 1 at sea level."""
 
 
 class L1Memory(NamedTuple):
@@ -109,15 +96,6 @@ class L1Memory(NamedTuple):
     integrator_rad: float = 0.0
     last_gain: float = 0.0
     """The integrator begins at 0 when its gain has changed."""
-
-
-class L1FlightMemory(NamedTuple):
-    """`L1Memory`, and when a leg was flown last."""
-
-    last_nu_rad: float = 0.0
-    integrator_rad: float = 0.0
-    last_gain: float = 0.0
-    leg_time_s: float = -math.inf
 
 
 class L1Leg(NamedTuple):
@@ -142,44 +120,19 @@ class L1Circle(NamedTuple):
 
 
 class L1Output(NamedTuple):
-    """The lateral acceleration, and what it comes from."""
+    """What to fly until the next call."""
 
     lateral_acceleration_mps2: float
-    roll_cd: int
-    """Roll angle of a coordinated turn, hundredths of a degree."""
-    bearing_rad: float
-    """Direction to the point that is aimed at; on a circle, to its centre."""
-    bearing_error_rad: float
-    """Nu as it enters the law; 0 where the circle is held."""
     crosstrack_m: float
     """On a leg positive to its LEFT; on a circle positive outside."""
-    distance_m: float
-    """The L1 distance."""
-    target_bearing_cd: int
-    """Direction to B, or to the centre, hundredths of a degree."""
     circling: bool
     """The circle is held; before, it is approached."""
-    radius_m: float
-    """Radius of the circle that is flown, grown with altitude; 0 on a leg."""
-    turn_distance_m: float
-    """Distance before a waypoint at which a turn by 90 degrees begins; 0 on a circle."""
 
 
 def follow_leg(
-    at: L1Motion, leg: L1Leg, since_s: float, memory: L1Memory, has: L1Parameters
+    at: L1Motion, leg: L1Leg, since_s: float, memory: L1Memory, has: L1Config
 ) -> tuple[L1Output, L1Memory]:
-    """The law on a leg.
-
-    Args:
-        at: the aircraft now.
-        leg: where from and where to.
-        since_s: time since the last call on a leg.
-        memory: as the last call left it.
-        has: parameters of the flight.
-
-    Returns:
-        What to fly until the next call, and the memory for it.
-    """
+    """The law on a leg, so long since the last call on one, and the memory for the next call."""
     fresh, since = since_s > STALE_S, min(since_s, MAX_UPDATE_S)
     east, north, speed = leg_velocity(at)
     distance = max(ONE_OVER_PI * has.damping * has.period_s * speed, leg.min_distance_m)
@@ -192,9 +145,9 @@ def follow_leg(
 
     integrator, gain = 0.0 if fresh else memory.integrator_rad, memory.last_gain
     if away > distance and along / max(away, 1.0) < -HALF_RIGHT_SINE:
-        nu, bearing = aim_at(-from_east, -from_north, east, north)
+        nu = aim_at(-from_east, -from_north, east, north)
     elif along > length + PAST_LEG_S * speed:
-        nu, bearing = aim_at(to_east, to_north, east, north)
+        nu = aim_at(to_east, to_north, east, north)
     else:
         sine = left / max(distance, 0.1)
         intercept = math.asin(min(max(sine, -HALF_RIGHT_SINE), HALF_RIGHT_SINE))
@@ -206,42 +159,18 @@ def follow_leg(
         intercept += integrator
         across, ahead = north * leg_east - east * leg_north, east * leg_east + north * leg_north
         nu = intercept + math.atan2(across, ahead)
-        bearing = wrapped(math.atan2(leg_east, leg_north) + intercept)
     target_cd = bearing_cd(to_east, to_north)
     nu = decided(nu, memory.last_nu_rad, target_cd, at.yaw_cd)
     used = min(max(nu, -QUARTER_TURN), QUARTER_TURN)
     acceleration = 4.0 * has.damping * has.damping * speed * speed / distance * math.sin(used)
-    output = L1Output(
-        acceleration,
-        roll_of(acceleration),
-        bearing,
-        used,
-        left,
-        distance,
-        target_cd,
-        False,
-        0.0,
-        min(90.0 * at.eas2tas * at.eas2tas, distance),
-    )
-    return output, L1Memory(nu, integrator, gain)
+    return L1Output(acceleration, left, False), L1Memory(nu, integrator, gain)
 
 
 def follow_circle(
-    at: L1Motion, circle: L1Circle, memory: L1Memory, has: L1Parameters
+    at: L1Motion, circle: L1Circle, memory: L1Memory, has: L1Config
 ) -> tuple[L1Output, L1Memory]:
-    """The law on a circle.
-
-    Args:
-        at: the aircraft now.
-        circle: where, how large, which way round.
-        memory: as the last call left it.
-        has: parameters of the flight.
-
-    Returns:
-        What to fly until the next call, and the memory for it.
-    """
-    radius = flown_radius(circle.radius_m, at.eas2tas, has)
-    omega = TWO_PI / has.period_s
+    """The law on a circle, and the memory for the next call."""
+    radius, omega = circle.radius_m, TWO_PI / has.period_s
     east, north = at.velocity_east_mps, at.velocity_north_mps
     over_ground = math.sqrt(east * east + north * north)
     speed = max(over_ground, MIN_CIRCLE_SPEED_MPS)
@@ -274,19 +203,7 @@ def follow_circle(
     hold = circle.direction * (correction + centripetal)
     circling = not (error > 0.0 and circle.direction * capture < circle.direction * hold)
     acceleration = hold if circling else capture
-    output = L1Output(
-        acceleration,
-        roll_of(acceleration),
-        math.atan2(-out_east, -out_north),
-        0.0 if circling else used,
-        error,
-        distance,
-        target_cd,
-        circling,
-        radius,
-        0.0,
-    )
-    return output, L1Memory(nu, memory.integrator_rad, memory.last_gain)
+    return L1Output(acceleration, error, circling), L1Memory(nu, memory.integrator_rad, memory.last_gain)
 
 
 def leg_velocity(at: L1Motion) -> tuple[float, float, float]:
@@ -311,10 +228,9 @@ def leg_direction(at: L1Motion, leg: L1Leg) -> tuple[float, float, float]:
     return math.sin(at.yaw_rad), math.cos(at.yaw_rad), length
 
 
-def aim_at(to_east: float, to_north: float, east_mps: float, north_mps: float) -> tuple[float, float]:
-    """Nu towards a point, and the direction to it, rad."""
-    across = north_mps * to_east - east_mps * to_north
-    return math.atan2(across, east_mps * to_east + north_mps * to_north), math.atan2(to_east, to_north)
+def aim_at(to_east: float, to_north: float, east_mps: float, north_mps: float) -> float:
+    """Nu towards a point, rad."""
+    return math.atan2(north_mps * to_east - east_mps * to_north, east_mps * to_east + north_mps * to_north)
 
 
 def decided(nu_rad: float, last_nu_rad: float, target_cd: int, yaw_cd: int) -> float:
@@ -326,15 +242,6 @@ def decided(nu_rad: float, last_nu_rad: float, target_cd: int, yaw_cd: int) -> f
     return last_nu_rad if behind and abs(off) > INDECISION_CD and nu_rad * last_nu_rad < 0.0 else nu_rad
 
 
-def flown_radius(radius_m: float, eas2tas: float, has: L1Parameters) -> float:
-    """The radius of a circle at altitude, m: it grows as the air thins, beyond what the bank limit leaves."""
-    grown = radius_m * eas2tas * eas2tas
-    if has.loiter_bank_limit_rad <= 0.0 or has.target_airspeed_mps <= 0.0:
-        return grown
-    at_sea_level = has.target_airspeed_mps**2 / (GRAVITY_MPS2 * math.tan(has.loiter_bank_limit_rad))
-    return grown if at_sea_level > radius_m else max(at_sea_level * eas2tas * eas2tas, radius_m)
-
-
 def bearing_cd(to_east: float, to_north: float) -> int:
     """Direction to a point in whole hundredths of a degree, in (-18000, 18000]."""
     angle = 0.5 * math.pi + math.atan2(-to_north, to_east)
@@ -342,11 +249,6 @@ def bearing_cd(to_east: float, to_north: float) -> int:
         angle += 2.0 * math.pi
     whole = int(angle * 18000.0 / math.pi + 0.5) % 36000
     return whole - 36000 if whole > 18000 else whole
-
-
-def roll_of(acceleration_mps2: float) -> int:
-    """Roll angle of a coordinated turn in whole hundredths of a degree, cut towards 0."""
-    return int(100.0 * math.degrees(math.atan(acceleration_mps2 / GRAVITY_MPS2)))
 
 
 def wrapped(angle_rad: float) -> float:
@@ -357,3 +259,28 @@ def wrapped(angle_rad: float) -> float:
     if inside < -math.pi:
         return inside + 2.0 * math.pi
     return inside
+
+
+class L1Law(RouteLaw):
+    """Flies a route by L1: its lines as legs, its arcs as circles, which do not grow with altitude."""
+
+    def __init__(self, config: L1Config, limits: GuidanceLimits) -> None:
+        super().__init__(limits)
+        self._has, self._memory, self._leg_time_s = config, L1Memory(), -math.inf
+
+    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+        """What the law asks for."""
+        yaw = (state.heading_rad + math.pi) % math.tau - math.pi
+        moves = state.east_m, state.north_m, state.velocity_east_mps, state.velocity_north_mps
+        at = L1Motion(*moves, yaw, int(100.0 * math.degrees(yaw)) % 36000)
+        if place.curvature_1pm == 0.0:
+            east, north, ahead_east, ahead_north, _, length, start, *_ = self.progress.segment
+            length = min(length, place.arc_length_m - start + FAR_M)
+            leg = L1Leg(east, north, east + length * ahead_east, north + length * ahead_north, 0.0)
+            since_s, self._leg_time_s = state.time_s - self._leg_time_s, state.time_s
+            output, self._memory = follow_leg(at, leg, since_s, self._memory, self._has)
+        else:
+            bend = place.curvature_1pm
+            circle = L1Circle(*centre_of(place), abs(1.0 / bend), -math.copysign(1.0, bend))
+            output, self._memory = follow_circle(at, circle, self._memory, self._has)
+        return math.atan(output.lateral_acceleration_mps2 / GRAVITY_MPS2), math.nan

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from aircraft.guidance.interface import GuidanceOutput
-from aircraft.guidance.progress import Along, RouteProgress
+from aircraft.guidance.progress import RouteProgress
 from aircraft.guidance.waypoints import PointLaw, WaypointLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import arc_point
@@ -27,6 +27,14 @@ HEADING_FOR_CENTRES: Final = ("l1", "npfg")
 
 L1_CAPTURE_RADII: Final = 3.0
 """ArduPlane follows the line to the centre of a loiter down to so many radii from it."""
+
+
+class Along(NamedTuple):
+    """Where the aircraft is along and beside a route; as in `PathPoint`."""
+
+    cross_track_m: float
+    arc_length_m: float
+    past_end: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,12 +137,12 @@ class MissionLaw:
             share = self._round_rad / leg.swept_rad if self._bearing_rad is not None else 0.0
             past_end = share >= 1.0
         else:
-            place = self._on_leg.along(state.east_m, state.north_m)
+            place = self._on_leg.nearest(state.east_m, state.north_m)
             share = place.arc_length_m / (float(leg.route.segments[:, 5].sum()) - leg.captured_radius_m)
             past_end = place.past_end
         station_m = first + min(max(share, 0.0), 1.0) * (last - first)
         self._progress.restart(station_m)
-        beside = self._progress.along(state.east_m, state.north_m)
+        beside = self._progress.nearest(state.east_m, state.north_m)
         return Along(beside.cross_track_m, station_m, past_end and self._leg == len(self._legs) - 1)
 
     def _begin_next(self) -> None:
@@ -152,7 +160,7 @@ class MissionLaw:
         if leg.centre_m is not None:
             return self._gone_round_rad(leg, state) >= leg.swept_rad
         if leg.end_m is None:
-            return self._on_leg.along(state.east_m, state.north_m).past_end
+            return self._on_leg.nearest(state.east_m, state.north_m).past_end
         east, north = leg.end_m[0] - state.east_m, leg.end_m[1] - state.north_m
         away_m = math.hypot(east, north)
         if leg.captured_radius_m > 0.0:

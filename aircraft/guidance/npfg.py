@@ -17,7 +17,9 @@ from typing import NamedTuple
 
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
-from aircraft.interface import GRAVITY_MPS2
+from aircraft.guidance.progress import PathPoint
+from aircraft.guidance.route_law import RouteLaw
+from aircraft.interface import GRAVITY_MPS2, AircraftState
 
 FEASIBILITY_BUFFER_MPS = 1.5
 """A bearing is feasible in full if the airspeed exceeds the wind that must be beaten by this much."""
@@ -25,8 +27,6 @@ SLOW_MPS = 1.0
 """Below this ground speed the track error bound no longer shrinks in proportion to speed."""
 TRACK_KEEPING_SHARE = 0.5
 """Share of the track error bound from which on track keeping asks for its full ground speed."""
-MAX_SWITCH_DISTANCE_M = 500.0
-"""Largest distance before a waypoint at which the next leg may begin."""
 SMALL = 1e-6
 """Time constants, speeds (m/s) and rates (rad/s) below this count as zero."""
 LEAST_DAMPING = 0.5
@@ -82,39 +82,6 @@ class NpfgConfig:
         given_s = self.roll_time_constant_s
         return replace(self, roll_time_constant_s=limits.slowest_roll_s if given_s is None else given_s)
 
-    def parameters(
-        self, nominal_airspeed_mps: float, max_airspeed_mps: float, roll_limit_rad: float
-    ) -> NpfgParameters:
-        """What the law needs: these keys, resolved, and the aircraft's speeds and roll limit."""
-        assert self.roll_time_constant_s is not None
-        keys = {name: value for name, value in vars(self).items() if name in NpfgParameters._fields}
-        return NpfgParameters(
-            **keys,
-            roll_limit_rad=roll_limit_rad,
-            nominal_airspeed_mps=nominal_airspeed_mps,
-            max_airspeed_mps=max_airspeed_mps,
-        )
-
-
-class NpfgParameters(NamedTuple):
-    """Constants of one flight: the keys of `NpfgConfig`, and what they do not say."""
-
-    period_s: float
-    damping: float
-    lower_period_bound: bool
-    upper_period_bound: bool
-    min_ground_speed_on: bool
-    track_keeping: bool
-    wind_regulation: bool
-    min_ground_speed_mps: float
-    max_track_keeping_speed_mps: float
-    roll_time_constant_s: float
-    switch_distance_multiplier: float
-    period_safety_factor: float
-    roll_limit_rad: float
-    nominal_airspeed_mps: float
-    max_airspeed_mps: float
-
 
 class NpfgInput(NamedTuple):
     """Where the aircraft is, how it moves over the ground, the wind, and the nearest point of the path."""
@@ -136,12 +103,9 @@ class NpfgInput(NamedTuple):
 
 
 class NpfgOutput(NamedTuple):
-    """The roll command and the air velocity wanted, with every quantity they come from."""
+    """What to fly until the next call, and some of what it comes from."""
 
     lateral_acceleration_mps2: float
-    feedforward_mps2: float
-    """The part of a path's curvature, before it is scaled by feasibility and proximity."""
-    roll_rad: float
     airspeed_mps: float
     heading_rad: float
     """Direction of the wanted air velocity."""
@@ -149,37 +113,16 @@ class NpfgOutput(NamedTuple):
     """Direction of the wanted ground velocity."""
     track_error_m: float
     """Distance from the path, positive to its right."""
-    track_error_bound_m: float
-    """From this distance on the law aims straight at the path."""
-    look_ahead_rad: float
-    """0 straight at the path, pi/2 along it."""
     track_proximity: float
-    """1 on the path, 0 at the bound and beyond."""
+    """1 on the path, 0 at the track error bound and beyond."""
     feasibility: float
     """Of the bearing: 1 if it can be made good in this wind, 0 if not."""
-    feasibility_on_track: float
-    """Likewise of the path's tangent."""
-    min_ground_speed_mps: float
     period_s: float
     """The period within its bounds."""
-    gain_1ps: float
-    time_constant_s: float
-    switch_distance_m: float
-    air_velocity_east_mps: float
-    """The wanted air velocity."""
-    air_velocity_north_mps: float
 
 
-def npfg(at: NpfgInput, has: NpfgParameters) -> NpfgOutput:
-    """The law; it has no memory.
-
-    Args:
-        at: aircraft, wind and path now.
-        has: parameters of the flight.
-
-    Returns:
-        What to fly until the next call.
-    """
+def npfg(at: NpfgInput, has: NpfgConfig, nominal_mps: float, largest_mps: float) -> NpfgOutput:
+    """The law, with the nominal and the largest true airspeed; it has no memory."""
     wind_east, wind_north = at.wind_east_mps, at.wind_north_mps
     tangent_east, tangent_north = at.tangent_east, at.tangent_north
     air_east, air_north = at.velocity_east_mps - wind_east, at.velocity_north_mps - wind_north
@@ -206,33 +149,21 @@ def npfg(at: NpfgInput, has: NpfgParameters) -> NpfgOutput:
     combined = bearing * on_track
     least = min_ground_speed(has, share, combined)
     wanted_east, wanted_north = air_velocity(
-        has, least, wind, wind_east, wind_north, bearing_east, bearing_north
+        has, nominal_mps, largest_mps, least, wind_east, wind_north, bearing_east, bearing_north
     )
 
     forward = curvature_feedforward(at, airspeed, error)
     acceleration = turning(gain, airspeed, air_east, air_north, wanted_east, wanted_north)
     acceleration += combined * proximity * forward
-    roll = math.atan(acceleration / GRAVITY_MPS2)
     return NpfgOutput(
         acceleration,
-        forward,
-        min(max(roll, -has.roll_limit_rad), has.roll_limit_rad),
-        math.sqrt(wanted_east * wanted_east + wanted_north * wanted_north),
+        math.hypot(wanted_east, wanted_north),
         math.atan2(wanted_east, wanted_north),
         math.atan2(bearing_east, bearing_north),
         error,
-        bound,
-        look_ahead,
         proximity,
         bearing,
-        on_track,
-        least,
         period,
-        gain,
-        time_constant,
-        min(MAX_SWITCH_DISTANCE_M, has.switch_distance_multiplier * bound),
-        wanted_east,
-        wanted_north,
     )
 
 
@@ -260,7 +191,7 @@ def look_ahead_angle(share: float) -> float:
 
 
 def adapted_period(
-    has: NpfgParameters,
+    has: NpfgConfig,
     distance_m: float,
     ground_speed_mps: float,
     airspeed_mps: float,
@@ -269,17 +200,18 @@ def adapted_period(
     on_track: float,
 ) -> float:
     """The period between what roll can follow and what a curved path in wind needs, s."""
-    if not has.lower_period_bound or has.roll_time_constant_s <= SMALL:
+    roll_s = has.roll_time_constant_s or 0.0
+    if not has.lower_period_bound or roll_s <= SMALL:
         return has.period_s
     rate = abs(curvature_1pm) * airspeed_mps
     if wind_mps > airspeed_mps or airspeed_mps < SMALL:
         rate *= 2.0
     else:
         rate *= 2.0 * (1.0 - math.sqrt(1.0 - wind_mps / airspeed_mps))
-    straight = math.pi * has.roll_time_constant_s / has.damping
+    straight = math.pi * roll_s / has.damping
     curved = straight
     if rate >= SMALL and has.damping >= LEAST_DAMPING:
-        curved = on_track * 4.0 * math.pi * has.roll_time_constant_s * has.damping
+        curved = on_track * 4.0 * math.pi * roll_s * has.damping
         curved += (1.0 - on_track) * straight
     safety = has.period_safety_factor
     bound = track_error_bound(ground_speed_mps, safety * straight * has.damping)
@@ -293,7 +225,7 @@ def adapted_period(
     return period
 
 
-def min_ground_speed(has: NpfgParameters, share: float, feasible: float) -> float:
+def min_ground_speed(has: NpfgConfig, share: float, feasible: float) -> float:
     """The least ground speed along the bearing, m/s: the one of the aircraft, or what track keeping asks for."""
     least = 0.0
     if has.wind_regulation and has.min_ground_speed_on:
@@ -305,9 +237,10 @@ def min_ground_speed(has: NpfgParameters, share: float, feasible: float) -> floa
 
 
 def air_velocity(
-    has: NpfgParameters,
+    has: NpfgConfig,
+    nominal: float,
+    largest: float,
     least_mps: float,
-    wind_mps: float,
     wind_east: float,
     wind_north: float,
     east: float,
@@ -316,7 +249,7 @@ def air_velocity(
     """East and north of the air velocity that makes a bearing good, or comes nearest to it, m/s."""
     along = wind_east * east + wind_north * north
     across = wind_north * east - wind_east * north
-    nominal, largest = has.nominal_airspeed_mps, has.max_airspeed_mps
+    wind_mps = math.hypot(wind_east, wind_north)
     asks = has.wind_regulation and (has.min_ground_speed_on or has.track_keeping)
     speed = 0.0  # of the wind triangle; 0: none
     if asks and least_mps > along:
@@ -383,3 +316,30 @@ def turning(
         return gain_1ps * airspeed_mps * (-1.0 if across < 0.0 else 1.0)
     length = math.sqrt(wanted_east * wanted_east + wanted_north * wanted_north)
     return gain_1ps * across / length if length > 0.0 else 0.0
+
+
+class NpfgLaw(RouteLaw):
+    """Flies a route by `npfg`."""
+
+    def __init__(self, config: NpfgConfig, limits: GuidanceLimits) -> None:
+        super().__init__(limits)
+        self._has, self._speeds_mps = config, (limits.airspeed_mps, limits.max_airspeed_mps)
+
+    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+        """What the law asks for."""
+        east_mps, north_mps = state.velocity_east_mps, state.velocity_north_mps
+        at = NpfgInput(
+            state.east_m,
+            state.north_m,
+            east_mps,
+            north_mps,
+            east_mps - state.airspeed_mps * math.sin(state.heading_rad),
+            north_mps - state.airspeed_mps * math.cos(state.heading_rad),
+            place.east_m,
+            place.north_m,
+            place.tangent_east,
+            place.tangent_north,
+            -place.curvature_1pm,
+        )
+        output = npfg(at, self._has, *self._speeds_mps)
+        return math.atan(output.lateral_acceleration_mps2 / GRAVITY_MPS2), output.airspeed_mps

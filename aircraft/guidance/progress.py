@@ -29,14 +29,6 @@ class PathPoint(NamedTuple):
     """The route is flown out: the point lies on its last tangent, beyond the end."""
 
 
-class Along(NamedTuple):
-    """Where the aircraft is along and beside a route; as in `PathPoint`."""
-
-    cross_track_m: float
-    arc_length_m: float
-    past_end: bool
-
-
 class RouteProgress:
     """Keeps the place on one route. It only moves on, so a route may cross itself.
 
@@ -51,35 +43,31 @@ class RouteProgress:
         self._nearest = kernels.nearest_on_route
         self.rows = route_rows(route)
         self._row, self._along_m = place_on_rows(self.rows, arc_length_m)
-        self._starts_m, self._endless = self.rows[:, 6].tolist(), np.isinf(self.rows[:, 5]).tolist()
+        self._segments: list[tuple[float, ...]] = [tuple(row) for row in self.rows.tolist()]
 
     def restart(self, arc_length_m: float) -> None:
         """Looks for the nearest point from there on (m from the route's start), as if the route was new."""
         self._row, self._along_m = place_on_rows(self.rows, arc_length_m)
 
-    def along(self, east_m: float, north_m: float) -> Along:
-        """How far along the nearest point is, from the last one onwards: `nearest` in a third of the time.
+    @property
+    def segment(self) -> tuple[float, ...]:
+        """The row of `rows` that the last nearest point is on."""
+        return self._segments[self._row]
 
-        Args:
-            east_m: position of the aircraft.
-            north_m: likewise.
-        """
-        row, along_m, cross_m, _, _ = self._nearest(self.rows, self._row, self._along_m, east_m, north_m)
-        self._row, self._along_m = row, along_m
-        return Along(cross_m, self._starts_m[row] + along_m, self._endless[row] and along_m > 0.0)
+    def ahead(self, along_m: float) -> tuple[float, float]:
+        """East and north (m) of the point of the route so far beyond the last nearest one."""
+        row, along_m = self._row, self._along_m + along_m
+        while along_m > self._segments[row][5] and row < len(self._segments) - 1:
+            along_m, row = along_m - self._segments[row][5], row + 1
+        return arc_point(self._segments[row][:6], along_m)[:2]  # type: ignore[arg-type]
 
     def nearest(self, east_m: float, north_m: float) -> PathPoint:
-        """The nearest point from the last one onwards.
-
-        Args:
-            east_m: position of the aircraft.
-            north_m: likewise.
-        """
+        """The point nearest to an aircraft, from the last one onwards."""
         row, along_m, cross_m, tangent_east, tangent_north = self._nearest(
             self.rows, self._row, self._along_m, east_m, north_m
         )
         self._row, self._along_m = row, along_m
-        _, _, _, _, curvature_1pm, length_m, start_m, _, _ = self.rows[row].tolist()
+        _, _, _, _, curvature_1pm, length_m, start_m, _, _ = self._segments[row]
         return PathPoint(
             east_m=east_m - cross_m * tangent_north,
             north_m=north_m + cross_m * tangent_east,

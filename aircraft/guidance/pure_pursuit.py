@@ -14,11 +14,15 @@ from typing import NamedTuple
 
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
-from aircraft.interface import GRAVITY_MPS2
+from aircraft.guidance.progress import PathPoint
+from aircraft.guidance.route_law import RouteLaw
+from aircraft.interface import GRAVITY_MPS2, AircraftState
 
 LOOK_AHEAD = 2.0 * math.sqrt(2.0)
 """Look-ahead time times the aircraft's guidance bandwidth. On a line the law is an oscillator of the natural frequency
 sqrt(2) / time and the damping 0.7: with this it is half as fast as the bandwidth."""
+GOAL_STEPS, GOAL_REACH = 16, 2.0
+"""Most steps towards the goal point; it is at most so many look-ahead distances along the route away."""
 LEAST_CRAB_COSINE = 0.2
 """Least cosine of the angle between course and heading with which bank is worked out."""
 SLOW_MPS = 1.0
@@ -42,18 +46,6 @@ class PurePursuitConfig:
         ahead = LOOK_AHEAD / limits.bandwidth_radps if self.look_ahead_s is None else self.look_ahead_s
         return replace(self, look_ahead_s=ahead)
 
-    def parameters(self) -> PurePursuitParameters:
-        """What the law needs: the keys, resolved."""
-        assert self.look_ahead_s is not None
-        return PurePursuitParameters(self.look_ahead_s, self.min_look_ahead_m)
-
-
-class PurePursuitParameters(NamedTuple):
-    """Constants of one flight."""
-
-    look_ahead_s: float
-    min_look_ahead_m: float
-
 
 class PurePursuitOutput(NamedTuple):
     """The turn towards the goal point."""
@@ -66,12 +58,10 @@ class PurePursuitOutput(NamedTuple):
     """Bank of a coordinated turn with this acceleration at the crab angle of now, not limited."""
 
 
-def look_ahead_distance(
-    velocity_east_mps: float, velocity_north_mps: float, has: PurePursuitParameters
-) -> float:
+def look_ahead_distance(velocity_east_mps: float, velocity_north_mps: float, has: PurePursuitConfig) -> float:
     """How far ahead the goal point is sought, m."""
     speed = math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps)
-    return max(speed * has.look_ahead_s, has.min_look_ahead_m)
+    return max(speed * (has.look_ahead_s or 0.0), has.min_look_ahead_m)
 
 
 def pure_pursuit(
@@ -82,19 +72,10 @@ def pure_pursuit(
     heading_rad: float,
     look_ahead_m: float,
 ) -> PurePursuitOutput:
-    """The law; it has no memory.
+    """The law, by the way to the goal point, the ground velocity, the nose and the look-ahead distance; no memory.
 
-    Args:
-        to_goal_east_m: the way from the aircraft to the goal point.
-        to_goal_north_m: likewise.
-        velocity_east_mps: ground velocity.
-        velocity_north_mps: likewise.
-        heading_rad: of the nose.
-        look_ahead_m: the look-ahead distance; of the goal only the direction counts beside it. To one more than a
-            right angle off the course the turn is as hard as to one at a right angle.
-
-    Returns:
-        Acceleration, curvature and roll.
+    Of the goal only the direction counts beside the distance. To one more than a right angle off the course the turn is
+    as hard as to one at a right angle.
     """
     east, north = velocity_east_mps, velocity_north_mps
     speed = max(math.sqrt(east * east + north * north), SLOW_MPS)
@@ -109,3 +90,29 @@ def pure_pursuit(
     ahead = (east * math.sin(heading_rad) + north * math.cos(heading_rad)) / speed
     roll = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead, LEAST_CRAB_COSINE)))
     return PurePursuitOutput(acceleration, curvature, roll)
+
+
+class PurePursuitLaw(RouteLaw):
+    """Flies a route by pure pursuit of the first point ahead that is the look-ahead distance away."""
+
+    def __init__(self, config: PurePursuitConfig, limits: GuidanceLimits) -> None:
+        super().__init__(limits)
+        self._has = config
+
+    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+        """What the law asks for."""
+        velocity = state.velocity_east_mps, state.velocity_north_mps
+        ahead_m = look_ahead_distance(*velocity, self._has)
+        goal = self._goal(state.east_m, state.north_m, ahead_m)
+        return pure_pursuit(*goal, *velocity, state.heading_rad, ahead_m).roll_rad, math.nan
+
+    def _goal(self, east_m: float, north_m: float, ahead_m: float) -> tuple[float, float]:
+        """The way to the goal point (m). To go on by what is missing of the distance never oversteps it."""
+        gone, east, north = 0.0, *self.progress.ahead(0.0)
+        for _ in range(GOAL_STEPS):
+            missing = ahead_m - math.hypot(east - east_m, north - north_m)
+            if missing <= 1e-3 * ahead_m or gone > GOAL_REACH * ahead_m:
+                break
+            gone += missing
+            east, north = self.progress.ahead(gone)
+        return east - east_m, north - north_m

@@ -13,13 +13,12 @@ from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
 from aircraft.guidance.bearing import BearingConfig, BearingLaw
-from aircraft.guidance.compiled_law import CompiledLaw
 from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
-from aircraft.guidance.l1 import L1Config, L1FlightMemory
-from aircraft.guidance.npfg import NpfgConfig
+from aircraft.guidance.l1 import L1Config, L1Law
+from aircraft.guidance.npfg import NpfgConfig, NpfgLaw
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
-from aircraft.guidance.pure_pursuit import PurePursuitConfig
-from aircraft.guidance.vector_field import VectorFieldConfig, VectorFieldMemory, parameters
+from aircraft.guidance.pure_pursuit import PurePursuitConfig, PurePursuitLaw
+from aircraft.guidance.vector_field import VectorFieldConfig, VectorFieldLaw
 
 GROUP = "wayproof.guidance"
 DEFAULT_KIND = "preview"
@@ -57,59 +56,42 @@ class GuidanceKind:
         return self.make(self.config(**keys).resolved(limits), limits)
 
 
-def _npfg(config: NpfgConfig, limits: GuidanceLimits) -> CompiledLaw:
-    speeds = limits.airspeed_mps, limits.max_airspeed_mps
-    return CompiledLaw("npfg", config.parameters(*speeds, limits.bank_limit_rad), limits)
-
-
-def _l1(config: L1Config, limits: GuidanceLimits) -> CompiledLaw:
-    return CompiledLaw("l1", config.parameters(), limits, L1FlightMemory())
-
-
-def _vector_field(config: VectorFieldConfig, limits: GuidanceLimits) -> CompiledLaw:
-    return CompiledLaw("vector_field", parameters(config, limits), limits, VectorFieldMemory())
-
-
-def _pure_pursuit(config: PurePursuitConfig, limits: GuidanceLimits) -> CompiledLaw:
-    return CompiledLaw("pure_pursuit", config.parameters(), limits)
-
-
 BUILT_IN = (
     GuidanceKind(
-        kind="preview",
-        summary="path curvature ahead of the roll lag, and a second-order correction of the cross-track error",
-        config=PreviewConfig,
-        make=PreviewLaw,
+        "preview",
+        "path curvature ahead of the roll lag, and a second-order correction of the cross-track error",
+        PreviewConfig,
+        PreviewLaw,
     ),
     GuidanceKind(
-        kind="npfg",
-        summary="PX4's (Stastny, Siegwart): a look-ahead angle to the path, the wind triangle, curvature fed forward",
-        config=NpfgConfig,
-        make=_npfg,
+        "npfg",
+        "PX4's (Stastny, Siegwart): a look-ahead angle to the path, the wind triangle, curvature fed forward",
+        NpfgConfig,
+        NpfgLaw,
     ),
     GuidanceKind(
-        kind="l1",
-        summary="ArduPilot's (Park, Deyst, How): a point on the leg ahead; lines as legs, arcs as loiter circles",
-        config=L1Config,
-        make=_l1,
+        "l1",
+        "ArduPilot's (Park, Deyst, How): a point on the leg ahead; lines as legs, arcs as loiter circles",
+        L1Config,
+        L1Law,
     ),
     GuidanceKind(
-        kind="vector_field",
-        summary="Beard and McLain: a field of courses about lines and orbits, and course hold",
-        config=VectorFieldConfig,
-        make=_vector_field,
+        "vector_field",
+        "Beard and McLain: a field of courses about lines and orbits, and course hold",
+        VectorFieldConfig,
+        VectorFieldLaw,
     ),
     GuidanceKind(
-        kind="pure_pursuit",
-        summary="Coulter: the arc to the point of the path at a look-ahead distance",
-        config=PurePursuitConfig,
-        make=_pure_pursuit,
+        "pure_pursuit",
+        "Coulter: the arc to the point of the path at a look-ahead distance",
+        PurePursuitConfig,
+        PurePursuitLaw,
     ),
     GuidanceKind(
-        kind="bearing",
-        summary="simple autopilots': bank in proportion to the angle between course and the bearing to a point",
-        config=BearingConfig,
-        make=BearingLaw,
+        "bearing",
+        "simple autopilots': bank in proportion to the angle between course and the bearing to a point",
+        BearingConfig,
+        BearingLaw,
     ),
 )
 

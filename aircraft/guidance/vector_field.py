@@ -17,7 +17,9 @@ from typing import NamedTuple
 
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLimits
 from aircraft.guidance.key import key
-from aircraft.interface import GRAVITY_MPS2
+from aircraft.guidance.progress import PathPoint
+from aircraft.guidance.route_law import RouteLaw, centre_of
+from aircraft.interface import GRAVITY_MPS2, AircraftState
 
 CONVERGENCE_S = 7.2
 """Time constant of the approach to a line, s: that of the authors' k_path 0.01 1/m and 50 degrees at 25 m/s."""
@@ -90,12 +92,6 @@ def parameters(config: VectorFieldConfig, limits: GuidanceLimits) -> VectorField
     )
 
 
-class VectorFieldMemory(NamedTuple):
-    """What the law keeps from one call to the next."""
-
-    integral_rad: float = 0.0
-
-
 class VectorFieldParameters(NamedTuple):
     """Constants of one flight."""
 
@@ -146,15 +142,7 @@ def line_course(
 def orbit_course(
     out_east_m: float, out_north_m: float, radius_m: float, direction: float, has: VectorFieldParameters
 ) -> float:
-    """Course of the field of an orbit (eq. 10.13), rad.
-
-    Args:
-        out_east_m: the way from the centre to the aircraft.
-        out_north_m: likewise.
-        radius_m: of the orbit.
-        direction: +1 clockwise, -1 counter-clockwise.
-        has: parameters of the flight.
-    """
+    """Course of the field of an orbit (eq. 10.13), rad, by the way out from its centre; direction +1 clockwise."""
     gain = has.orbit_gain
     if gain == 0.0:
         # The slope, at the orbit, of the field of a line.
@@ -173,17 +161,7 @@ def follow_line(
     integral_rad: float,
     has: VectorFieldParameters,
 ) -> VectorFieldOutput:
-    """The law on a line through a point.
-
-    Args:
-        at: the aircraft now.
-        point_east_m: any point of the line.
-        point_north_m: likewise.
-        tangent_east: the line's unit direction.
-        tangent_north: likewise.
-        integral_rad: the integrator as the last call left it, 0 at first.
-        has: parameters of the flight.
-    """
+    """The law on a line through a point; the integrator is as the last call left it, 0 at first."""
     east, north = at.east_m - point_east_m, at.north_m - point_north_m
     error = east * tangent_north - north * tangent_east
     course = line_course(error, tangent_east, tangent_north, has)
@@ -199,17 +177,7 @@ def follow_orbit(
     integral_rad: float,
     has: VectorFieldParameters,
 ) -> VectorFieldOutput:
-    """The law on an orbit.
-
-    Args:
-        at: the aircraft now.
-        centre_east_m: of the orbit.
-        centre_north_m: likewise.
-        radius_m: of the orbit.
-        direction: +1 clockwise, -1 counter-clockwise.
-        integral_rad: the integrator as the last call left it, 0 at first.
-        has: parameters of the flight.
-    """
+    """The law on an orbit, direction +1 clockwise; the integrator is as the last call left it, 0 at first."""
     east, north = at.east_m - centre_east_m, at.north_m - centre_north_m
     course = orbit_course(east, north, radius_m, direction, has)
     # The bank that holds the orbit at this ground speed and crab angle (chapter 9).
@@ -251,3 +219,24 @@ def crab_cosine(at: Motion) -> float:
         return 1.0
     ahead = east * math.sin(at.heading_rad) + north * math.cos(at.heading_rad)
     return max(ahead / speed, LEAST_CRAB_COSINE)
+
+
+class VectorFieldLaw(RouteLaw):
+    """Flies a route by the field of each of its lines and arcs."""
+
+    def __init__(self, config: VectorFieldConfig, limits: GuidanceLimits) -> None:
+        super().__init__(limits)
+        self._has, self._integral_rad = parameters(config, limits), 0.0
+
+    def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
+        """What the law asks for."""
+        moves = state.east_m, state.north_m, state.velocity_east_mps, state.velocity_north_mps
+        at, bend = Motion(*moves, state.heading_rad), place.curvature_1pm
+        if bend == 0.0:
+            line = place.east_m, place.north_m, place.tangent_east, place.tangent_north
+            output = follow_line(at, *line, self._integral_rad, self._has)
+        else:
+            orbit = *centre_of(place), abs(1.0 / bend), -math.copysign(1.0, bend)
+            output = follow_orbit(at, *orbit, self._integral_rad, self._has)
+        self._integral_rad = output.integral_rad
+        return output.roll_rad, math.nan

@@ -122,7 +122,7 @@ class WaypointLaw:
         while self._leg < len(self._points) - 1 and self._reached(state):
             self._next_leg()
         roll_rad, _, _, saturated, _, airspeed_mps = self.law.update(state)
-        place = self._progress.along(state.east_m, state.north_m)
+        place = self._progress.nearest(state.east_m, state.north_m)
         return GuidanceOutput(
             roll_rad, place.cross_track_m, place.arc_length_m, saturated, place.past_end, airspeed_mps
         )

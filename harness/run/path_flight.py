@@ -14,8 +14,8 @@ import numpy as np
 from aircraft.airframe import Airframe
 from aircraft.climb import climb_rates
 from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat
-from aircraft.guidance.mission_legs import HEADING_FOR_CENTRES, MissionLaw, MissionLeg, straight
-from aircraft.guidance.progress import Along, RouteProgress
+from aircraft.guidance.mission_legs import HEADING_FOR_CENTRES, Along, MissionLaw, MissionLeg, straight
+from aircraft.guidance.progress import PathPoint, RouteProgress
 from aircraft.guidance.waypoints import WaypointLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
@@ -268,8 +268,8 @@ def fly_along(
     guidance, route = loop.guidance, Route(path.segments)
     progress_of = RouteProgress(route)
 
-    def where(state: AircraftState) -> Along:
-        return progress_of.along(state.east_m, state.north_m)
+    def where(state: AircraftState) -> Along | PathPoint:
+        return progress_of.nearest(state.east_m, state.north_m)
 
     if isinstance(guidance, WaypointLaw):
         guidance = MissionLaw(guidance, kind, plan.legs)
@@ -303,7 +303,11 @@ class PathEnd:
     contact_m = math.inf
 
     def __init__(
-        self, where: Callable[[AircraftState], Along], length_m: float, near_m: float, limit_s: float
+        self,
+        where: Callable[[AircraftState], Along | PathPoint],
+        length_m: float,
+        near_m: float,
+        limit_s: float,
     ) -> None:
         self._where, self._length_m = where, length_m
         self._near_m, self._limit_s = near_m, limit_s

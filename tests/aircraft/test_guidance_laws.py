@@ -58,8 +58,8 @@ def test_the_integrator_waits_while_the_roll_is_cut() -> None:
 
 @pytest.mark.parametrize("speed_mps", [25.0, 0.05])
 def test_l1_flies_straight_on_at_the_centre_of_a_circle_without_a_radius(speed_mps: float) -> None:
-    has = L1Config().parameters()
-    at = L1Motion(7.0, -3.0, speed_mps, 0.0, 0.0, 0, 1.0)
+    has = L1Config()
+    at = L1Motion(7.0, -3.0, speed_mps, 0.0, 0.0, 0)
     output, memory = follow_circle(at, L1Circle(7.0, -3.0, 0.0, 1.0), L1Memory(), has)
     assert all(map(math.isfinite, (*output, *memory)))
     assert output.crosstrack_m == 0.0
@@ -78,13 +78,13 @@ def test_pure_pursuit_turns_on_the_arc_through_the_goal() -> None:
 
 
 def test_pure_pursuit_looks_ahead_by_time() -> None:
-    has = PurePursuitConfig().resolved(LIMITS).parameters()
+    has = PurePursuitConfig().resolved(LIMITS)
     assert look_ahead_distance(12.0, 16.0, has) == pytest.approx(20.0 * 2.0 * math.sqrt(2.0) / 1.44)
 
 
 def test_npfg_on_its_path_in_calm_air_asks_for_the_curvature() -> None:
     at = NpfgInput(0.0, 0.0, 0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0 / 150.0)
-    output = npfg(at, NpfgConfig(roll_time_constant_s=0.5).parameters(25.0, 30.0, math.radians(50.0)))
+    output = npfg(at, NpfgConfig(roll_time_constant_s=0.5), 25.0, 30.0)
     assert output.lateral_acceleration_mps2 == pytest.approx(625.0 / 150.0)
     assert output.track_proximity == 1.0
 
@@ -92,7 +92,7 @@ def test_npfg_on_its_path_in_calm_air_asks_for_the_curvature() -> None:
 def test_npfg_flies_nowhere_slower_than_the_wind_allows() -> None:
     # A wind of twice the airspeed, against the path: the nose stays in the wind.
     at = NpfgInput(0.0, 0.0, 0.0, -25.0, 0.0, -50.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-    output = npfg(at, NpfgConfig(roll_time_constant_s=0.5).parameters(25.0, 25.0, math.radians(50.0)))
+    output = npfg(at, NpfgConfig(roll_time_constant_s=0.5), 25.0, 25.0)
     assert output.feasibility == 0.0
     assert output.heading_rad == pytest.approx(0.0, abs=1e-9)
     assert output.airspeed_mps == pytest.approx(25.0)

@@ -20,7 +20,7 @@ from harness.scenario.shipped import scenario_path
 HELD = {
     "aerosonde_forest": "ddfa6a222d840d1ed9d6f96fb1885b2bd691240167ddbf0b71abdc8822129d72",
     "polygon_town": "6c0fd27e7de66e8b479bf0492505b8fbf5ee06f874b5613246b8211f89d79648",
-    "one_of_everything": "de123b6bccd09e3c4491473f698550dcd2fc99e08974fa8c222148a66f25e35a",
+    "one_of_everything": "7498f60b9eef980fe43ab8f7ad6ff6848ec32467c4b0389f1d21588912c2c088",
 }
 """SHA-256 of the first minute of each."""
 
