@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -98,18 +98,7 @@ def read_flown(path: Path, plane: LocalPlane) -> FlownFlight:
 def _of_table(path: Path, plane: LocalPlane) -> dict[str, FloatArray]:
     """Columns of a table, without the rows that have no place."""
     table = _table(path)
-    names = table.column_names
-    place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
-    if "time_s" not in names or place is None:
-        east, north = LOCAL[1]
-        missing = next((name for name in ("time_s", east, north) if name not in names), "")
-        raise InputError(
-            f"{path}: has no column {missing}; must have time_s, and east_m, north_m or latitude_deg, longitude_deg"
-        )
-    height = next((name for name in ("up_m", *ALTITUDES) if name in names), None)
-    wanted = {"time_s": "time_s", place[0]: "east_m", place[1]: "north_m"}
-    wanted |= {height: "up_m"} if height else {}
-    wanted |= {name: name for name in OPTIONAL if name in names}
+    place, wanted = _wanted(table.column_names, path)
     columns = {new: _numbers(table, name, path) for name, new in wanted.items()}
     known = np.isfinite([columns[name] for name in ("time_s", "east_m", "north_m")]).all(axis=0)
     columns = {name: each[known] for name, each in columns.items()}
@@ -118,6 +107,19 @@ def _of_table(path: Path, plane: LocalPlane) -> dict[str, FloatArray]:
         placed = np.array([plane.plane(*pair) for pair in pairs]).reshape(-1, 2)
         columns["east_m"], columns["north_m"] = placed.T
     return columns
+
+
+def _wanted(names: Sequence[str], path: Path) -> tuple[tuple[str, str], dict[str, str]]:
+    """The pair of columns of a place, and the columns that are read with what they are called here."""
+    place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
+    if "time_s" not in names or place is None:
+        missing = next((name for name in ("time_s", *LOCAL[1]) if name not in names), "")
+        raise InputError(
+            f"{path}: has no column {missing}; must have time_s, and east_m, north_m or latitude_deg, longitude_deg"
+        )
+    wanted = {"time_s": "time_s", place[0]: "east_m", place[1]: "north_m"}
+    wanted |= dict.fromkeys([name for name in ("up_m", *ALTITUDES) if name in names][:1], "up_m")
+    return place, wanted | {name: name for name in OPTIONAL if name in names}
 
 
 def _table(path: Path) -> pa.Table:

@@ -5,27 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 
-FIRST_SETTLED = 2
+FIRST_SETTLED: Final = 2
 """Laps before this one are not settled: the autopilot has just been switched on."""
-
-FAR_M = 5.0
+FAR_M: Final = 5.0
 """A corner counts as reached, where no radius is known, once the aircraft is so much farther away than it was."""
-
-
-def outside_m(columns: Mapping[str, FloatArray], corners_m: FloatArray) -> FloatArray:
-    """(n,) distance beyond the polygon of the corners, 0 inside; of two corners the distance from their line."""
-    import shapely
-
-    shape = shapely.Polygon(corners_m) if len(corners_m) > 2 else shapely.LineString(corners_m)
-    found: FloatArray = shapely.distance(shape, shapely.points(columns["east_m"], columns["north_m"]))
-    return found
 
 
 def legs_of(
@@ -75,8 +66,14 @@ class Side:
 
     @cached_property
     def outside(self) -> FloatArray:
-        """(n,) of `outside_m`."""
-        return outside_m(self.columns, self.corners_m)
+        """(n,) distance beyond the polygon of the corners, 0 inside; of two corners the distance from their line."""
+        import shapely
+
+        corners = self.corners_m
+        shape = shapely.Polygon(corners) if len(corners) > 2 else shapely.LineString(corners)
+        points = shapely.points(self.columns["east_m"], self.columns["north_m"])
+        found: FloatArray = shapely.distance(shape, points)
+        return found
 
     @cached_property
     def whole(self) -> list[int]:
@@ -91,15 +88,18 @@ class Side:
 
     def figures(self, chosen: NDArray[np.bool_]) -> dict[str, float]:
         """What is told of some rows."""
-        columns, told = self.columns, _spread(self.outside[chosen])
-        told["height_error_p95_m"] = _p95(np.abs(columns["up_m"][chosen] - self.height_m))
+        columns = {name: each[chosen] for name, each in self.columns.items()}
+        told = {
+            **_spread(self.outside[chosen]),
+            "height_error_p95_m": _p95(np.abs(columns["up_m"] - self.height_m)),
+        }
         if "roll_deg" in columns:
-            rate = np.gradient(columns["roll_deg"], columns["time_s"])
-            told["bank_p95_deg"] = _p95(np.abs(columns["roll_deg"][chosen]))
-            told["roll_rate_p95_degps"] = _p95(np.abs(rate[chosen]))
+            rate = np.gradient(self.columns["roll_deg"], self.columns["time_s"])[chosen]
+            told["bank_p95_deg"] = _p95(np.abs(columns["roll_deg"]))
+            told["roll_rate_p95_degps"] = _p95(np.abs(rate))
         if "airspeed_mps" in columns:
-            told["airspeed_mean_mps"] = float(np.nanmean(columns["airspeed_mps"][chosen]))
-            told["airspeed_p95_mps"] = _p95(columns["airspeed_mps"][chosen])
+            told["airspeed_mean_mps"] = float(np.nanmean(columns["airspeed_mps"]))
+            told["airspeed_p95_mps"] = _p95(columns["airspeed_mps"])
         return told
 
     def lap(self, lap: int) -> dict[str, Any]:
@@ -119,6 +119,29 @@ class Side:
         track = shapely.LineString(there[other.laps == lap])
         found: FloatArray = shapely.distance(track, shapely.points(here[self.laps == lap]))
         return found
+
+
+def compared(flown: Side, simulated: Side) -> dict[str, Any]:
+    """Laps and figures of both.
+
+    Raises:
+        InputError: they have no settled lap in common.
+    """
+    settled = [lap for lap in flown.whole if lap in simulated.whole]
+    if not settled:
+        missing = "the log" if not flown.whole else "the simulated flight"
+        raise InputError(f"{missing} has no whole lap after lap 1; there is nothing to compare")
+    rows: list[dict[str, Any]] = [
+        {"lap": lap, "flown": flown.lap(lap), "simulated": simulated.lap(lap)} for lap in settled
+    ]
+    told: dict[str, Any] = {"settled_laps": settled, "laps": rows}
+    for name, side in (("flown", flown), ("simulated", simulated)):
+        told[name] = side.figures(np.isin(side.laps, settled))
+        told[name]["outside_max_mean_m"] = float(np.mean([row[name]["outside_max_m"] for row in rows]))
+        told[name]["lap_mean_s"] = float(np.mean([row[name]["time_s"] for row in rows]))
+    apart = np.concatenate([flown.to_m(simulated, lap) for lap in settled])
+    told["distance_between_m"] = {"p50": float(np.median(apart)), "p95": float(np.percentile(apart, 95))}
+    return told
 
 
 def _spread(outside: FloatArray) -> dict[str, float]:

@@ -2,26 +2,51 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Final
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
-from harness.files.input_file import InputError
+from harness.files.input_file import MAX_JSON_BYTES, InputError, read_text
 from harness.flight.record import FloatArray
 from harness.run_files.path_files import read_path
 
-MISSION_KEYS = ("acceptance_radius_m", "airspeed_command_ias_mps", "baro_height_command_m", "bank_limit_deg")
+CORNERS: Final = "two or more pairs [east, north] of numbers in m"
 
 
-class Origin(NamedTuple):
+class Origin(BaseModel):
     """Where east = north = up = 0 of a log lies."""
 
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float = 0.0
+    model_config = ConfigDict(strict=True)
+    latitude_deg: FiniteFloat
+    longitude_deg: FiniteFloat
+    altitude_m: FiniteFloat = 0.0
+
+
+class Keys(BaseModel):
+    """Keys of the mapping `mission` of a JSON."""
+
+    model_config = ConfigDict(strict=True)
+    corners_east_north_m: Annotated[list[tuple[FiniteFloat, FiniteFloat]], Field(min_length=2)]
+    acceptance_radius_m: FiniteFloat | None = None
+    airspeed_command_ias_mps: FiniteFloat | None = None
+    baro_height_command_m: FiniteFloat | None = None
+    bank_limit_deg: FiniteFloat | None = None
+
+
+class Frame(BaseModel):
+    """The mapping `frame` of a JSON."""
+
+    origin: Origin | None = None
+
+
+class MissionFile(BaseModel):
+    """A JSON with a mission; other keys are not read."""
+
+    mission: Keys
+    frame: Frame | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,69 +71,43 @@ class FlownMission:
 
 
 def read_mission(path: Path) -> FlownMission:
-    """Reads a mission.
-
-    Args:
-        path: a JSON with `mission.corners_east_north_m` and others of `MISSION_KEYS`, or a file that `wayproof check`
-            takes.
+    """Reads a mission: a JSON with `mission.corners_east_north_m`, or a file that `wayproof check` takes.
 
     Raises:
         InputError: it is neither, or a value is not of its kind.
     """
-    content: Any = None
     if path.suffix.lower() == ".json":
-        try:
-            content = json.loads(path.read_text("utf-8"))
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-        except ValueError as error:
-            raise InputError(f"{path}: is no JSON ({error})") from error
-    if isinstance(content, dict) and "mission" in content:
-        return _of_json(content, str(path))
+        text = read_text(path, MAX_JSON_BYTES, "a mission, in JSON")
+        if '"mission"' in text and '"Plan"' not in text:
+            return _of_json(text, str(path))
     given = read_path(path)
     points = given.points_m
     if len(points) > 2 and np.hypot(*(points[-1] - points[0])) < 1.0:
         points = points[:-1]
-    accepted = [step.acceptance_m for step in given.mission.steps] if given.mission else []
-    radius = next((each for each in accepted if each > 0.0), None)
-    origin = None if given.origin_deg is None else Origin(*given.origin_deg)
+    steps = given.mission.steps if given.mission else ()
+    radius = next((step.acceptance_m for step in steps if step.acceptance_m > 0.0), None)
     height_m = float(given.altitudes_m[0]) if len(given.altitudes_m) else None
+    place = given.origin_deg
+    origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
     return FlownMission(points, radius, height_m=height_m, origin=origin)
 
 
-def _of_json(content: dict[str, Any], source: str) -> FlownMission:
-    mission = content["mission"]
-    if not isinstance(mission, dict) or "corners_east_north_m" not in mission:
-        raise InputError(
-            f"{source}: mission.corners_east_north_m: is missing; must be [[east, north], ...] in m"
-        )
+def _of_json(text: str, source: str) -> FlownMission:
     try:
-        corners = np.array(mission["corners_east_north_m"], dtype=np.float64)
-    except (TypeError, ValueError):
-        corners = np.zeros(0)
-    if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 2 or not np.isfinite(corners).all():
-        raise InputError(f"{source}: mission.corners_east_north_m: must be two or more pairs of numbers in m")
-    values = {name: _number(mission, name, f"{source}: mission.") for name in MISSION_KEYS}
-    frame = content.get("frame", {})
-    place = frame.get("origin") if isinstance(frame, dict) else None
-    origin = None
-    if isinstance(place, dict) and {"latitude_deg", "longitude_deg"} <= place.keys():
-        numbers = [_number(place, name, f"{source}: frame.origin.") for name in Origin._fields]
-        origin = Origin(numbers[0] or 0.0, numbers[1] or 0.0, numbers[2] or 0.0)
+        found = MissionFile.model_validate_json(text)
+    except ValidationError as error:
+        first: Any = error.errors()[0]
+        if first["type"] == "json_invalid":
+            raise InputError(f"{source}: is no JSON ({first['msg']})") from error
+        value = "is missing" if first["type"] == "missing" else f"is {str(first['input'])[:80]!r}"
+        right = CORNERS if "corners_east_north_m" in first["loc"] else "a number"
+        raise InputError(f"{source}: {'.'.join(map(str, first['loc']))}: {value}; must be {right}") from error
+    keys = found.mission
     return FlownMission(
-        corners,
-        values["acceptance_radius_m"],
-        values["airspeed_command_ias_mps"],
-        values["baro_height_command_m"],
-        values["bank_limit_deg"],
-        origin,
+        np.array(keys.corners_east_north_m),
+        keys.acceptance_radius_m,
+        keys.airspeed_command_ias_mps,
+        keys.baro_height_command_m,
+        keys.bank_limit_deg,
+        found.frame.origin if found.frame else None,
     )
-
-
-def _number(mapping: dict[str, Any], name: str, where: str) -> float | None:
-    value = mapping.get(name)
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise InputError(f"{where}{name}: is {value!r}; must be a number")
-    return float(value)

@@ -16,8 +16,8 @@ from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight, read_flown
-from harness.replays.measures import Side, legs_of
-from harness.replays.mission import FlownMission, Origin, read_mission
+from harness.replays.measures import Side, compared, legs_of
+from harness.replays.mission import FlownMission, read_mission
 from harness.replays.simulated import Asked, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows
 
@@ -66,7 +66,7 @@ def replay(
         log: as `harness.replays.flown.read_flown` takes it.
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
         out: folder to write.
-        mission: as `harness.replays.mission.read_mission` takes it; None: corners are told from the log.
+        mission: as `harness.replays.mission.read_mission` takes it.
         overrides: keys of the simulated flight's scenario to replace, `guidance.kind` for one, as
             `harness.scenario.scenario.load_scenario` takes them.
         windows: the wind changes as the log shows it; else it is steady.
@@ -82,34 +82,21 @@ def replay(
     if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / INDEX).exists())):
         raise RunFolderError(f"{out} holds other things; give a new folder")
     flown_mission = read_mission(mission)
-    origin = flown_mission.origin or Origin(0.0, 0.0)
-    flight = read_flown(log, LocalPlane(origin.latitude_deg, origin.longitude_deg))
+    origin = flown_mission.origin
+    plane = LocalPlane(origin.latitude_deg, origin.longitude_deg) if origin else LocalPlane(0.0, 0.0)
+    flight = read_flown(log, plane)
     wind = fit_wind(flight)
     winds = (fit_windows(flight, wind) if windows else []) or [wind]
     asked = _asked(flight, flown_mission, winds, wind)
     scenario = scenario_for(asked, aircraft, overrides)
-
-    corners_m, columns = flown_mission.corners_m, dict(flight.columns)
-    legs = legs_of(columns, corners_m, asked.first, flown_mission.acceptance_m)
-    laps = columns["lap"] if "lap" in columns else 1.0 + _laps(legs, asked)
-    count = int(laps[-1] - laps[0]) + 1
+    flown, laps = _flown(asked)
     out.mkdir(parents=True, exist_ok=True)
     replace_text(out / INDEX, json.dumps({"schema": SCHEMA, "complete": False}) + "\n")
-    simulated = fly_anew(scenario, asked, count, out / SIMULATED)
-    columns["time_s"] = columns["time_s"] - columns["time_s"][0]
-    if flight.airspeed_mps is not None:
-        columns["airspeed_mps"] = flight.airspeed_mps
-    sides = {
-        "flown": Side(columns, corners_m, legs, laps, asked.height_m, _ended(flight, flown_mission)),
-        "simulated": Side(
-            simulated,
-            corners_m,
-            simulated["leg"],
-            laps[0] + _laps(simulated["leg"], asked),
-            scenario.mission.altitude_m,
-            bool(simulated["leg"][-1] >= count * len(corners_m)),
-        ),
-    }
+    columns = fly_anew(scenario, asked, laps, out / SIMULATED)
+    corners_m, legs = flown_mission.corners_m, columns["leg"]
+    ended = bool(legs[-1] >= laps * len(corners_m))
+    numbers = flown.laps[0] + _laps(legs, asked)
+    simulated = Side(columns, corners_m, legs, numbers, scenario.mission.altitude_m, ended)
     told = {
         "schema": SCHEMA,
         "complete": True,
@@ -120,24 +107,17 @@ def replay(
         "wind_windows": [{"time_s": each.time_s, **each.told()} for each in winds] if windows else [],
         "airspeed_mps": asked.airspeed_mps,
         "latency_s": scenario.navigation.latency_s,
-        **_compared(sides),
+        **compared(flown, simulated),
         "notes": list(flight.notes),
     }
-    found = Replay(told, columns, simulated, corners_m, out)
-    _write(found, sides, recording)
+    found = Replay(told, flown.columns, columns, corners_m, out)
+    _write(found, {"flown": flown, "simulated": simulated}, recording)
     return found
-
-
-def _laps(legs: FloatArray, asked: Asked) -> FloatArray:
-    """(n,) laps begun after the first: each begins when corner 0 is reached."""
-    corners = len(asked.mission.corners_m)
-    laps: FloatArray = np.floor((legs + (asked.first - 1) % corners) / corners)
-    return laps
 
 
 def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Asked:
     """Where it begins, and with which airspeed and height."""
-    airspeed, commanded = flight.airspeed_mps, mission.airspeed_mps
+    airspeed, commanded, corners = flight.airspeed_mps, mission.airspeed_mps, mission.corners_m
     if airspeed is None:
         commanded = wind.airspeed_mps
     elif commanded is None:
@@ -148,45 +128,36 @@ def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], 
         height_m = mission.height_m + float(np.nanmedian(flight["up_m"] - flight["baro_height_m"]))
     else:
         height_m = float(np.nanmedian(flight["up_m"]))
-    return Asked(flight, mission, _first(flight, mission), winds, commanded, height_m)
-
-
-def _first(flight: FlownFlight, mission: FlownMission) -> int:
-    """The corner that the flight heads for first: the log's, else the one after the nearest."""
-    corners = mission.corners_m
     if "target_index" in flight and flight["target_index"][0] >= 0:
-        return int(flight["target_index"][0]) % len(corners)
-    away = np.hypot(*(corners - (flight["east_m"][0], flight["north_m"][0])).T)
-    return (int(away.argmin()) + 1) % len(corners)
+        first = int(flight["target_index"][0]) % len(corners)
+    else:  # the corner after the nearest
+        away = np.hypot(*(corners - (flight["east_m"][0], flight["north_m"][0])).T)
+        first = (int(away.argmin()) + 1) % len(corners)
+    return Asked(flight, mission, first, winds, commanded, height_m)
 
 
-def _ended(flight: FlownFlight, mission: FlownMission) -> bool:
-    """Whether the log ends where a lap does: at corner 0, as near as it comes in two rows."""
-    step_m = float(np.hypot(flight["ve_mps"][-1], flight["vn_mps"][-1])) * float(
-        np.diff(flight["time_s"])[-1]
-    )
-    away = np.hypot(*(mission.corners_m[0] - (flight["east_m"][-1], flight["north_m"][-1])))
-    return bool(away <= (mission.acceptance_m or 0.0) + 2.0 * step_m)
+def _flown(asked: Asked) -> tuple[Side, int]:
+    """The flown flight as it is measured, and its number of laps."""
+    flight, mission = asked.flight, asked.mission
+    columns = dict(flight.columns)
+    legs = legs_of(columns, mission.corners_m, asked.first, mission.acceptance_m)
+    laps = columns["lap"] if "lap" in columns else 1.0 + _laps(legs, asked)
+    # The log ends where a lap does: at corner 0, as near as it comes in two rows.
+    step_s = float(np.diff(flight["time_s"])[-1])
+    step_m = float(np.hypot(flight["ve_mps"][-1], flight["vn_mps"][-1])) * step_s
+    away_m = np.hypot(*(mission.corners_m[0] - (flight["east_m"][-1], flight["north_m"][-1])))
+    ended = bool(away_m <= (mission.acceptance_m or 0.0) + 2.0 * step_m)
+    columns["time_s"] = columns["time_s"] - columns["time_s"][0]
+    if flight.airspeed_mps is not None:
+        columns["airspeed_mps"] = flight.airspeed_mps
+    return Side(columns, mission.corners_m, legs, laps, asked.height_m, ended), int(laps[-1] - laps[0]) + 1
 
 
-def _compared(sides: Mapping[str, Side]) -> dict[str, Any]:
-    """Laps and figures of both."""
-    flown, simulated = sides["flown"], sides["simulated"]
-    settled = [lap for lap in flown.whole if lap in simulated.whole]
-    if not settled:
-        missing = "the log" if not flown.whole else "the simulated flight"
-        raise InputError(f"{missing} has no whole lap after lap 1; there is nothing to compare")
-    rows: list[dict[str, Any]] = [
-        {"lap": lap, **{name: side.lap(lap) for name, side in sides.items()}} for lap in settled
-    ]
-    told: dict[str, Any] = {"settled_laps": settled, "laps": rows}
-    for name, side in sides.items():
-        told[name] = side.figures(np.isin(side.laps, settled))
-        told[name]["outside_max_mean_m"] = float(np.mean([row[name]["outside_max_m"] for row in rows]))
-        told[name]["lap_mean_s"] = float(np.mean([row[name]["time_s"] for row in rows]))
-    apart = np.concatenate([flown.to_m(simulated, lap) for lap in settled])
-    told["distance_between_m"] = {"p50": float(np.median(apart)), "p95": float(np.percentile(apart, 95))}
-    return told
+def _laps(legs: FloatArray, asked: Asked) -> FloatArray:
+    """(n,) laps begun after the first: each begins when corner 0 is reached."""
+    corners = len(asked.mission.corners_m)
+    laps: FloatArray = np.floor((legs + (asked.first - 1) % corners) / corners)
+    return laps
 
 
 def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:

@@ -27,15 +27,15 @@ from planner.interface import Path as PlannedPath
 
 DEFAULT_LAW: Final = "bearing"
 """Gain 1.5, and no switch by passing."""
-LATENCY_S: Final = 0.2
-"""Age of the state that the law works with: what ArduPilot takes of a satellite receiver that it does not know
-(AP_GPS_Backend::get_lag), as a log does not tell which it was."""
+LATENCY_S: Final = 0.12
+"""Age of the state that the law works with: the delay that autopilots take for a satellite receiver."""
 ABOUT_M: Final = 1000.0
 LOW_M: Final = 50.0
 UNKNOWN_ALTITUDE_M: Final = 300.0
 """A log whose heights are not above the sea is flown here."""
 LONGER: Final = 1.25
 """The simulated aircraft has this share of the flown time."""
+COLUMNS: Final = ("time_s", "east_m", "north_m", "up_m", "roll_deg", "airspeed_mps")
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +70,8 @@ class Asked:
 class LapsEnd:
     """Over once all legs are flown, or the time is up. Implements `Termination`.
 
-    Args:
-        law: that flies the legs.
-        legs: number of them.
-        limit_s: time limit.
+    Attributes:
+        switches_s: times of the updates in which a corner was reached.
     """
 
     contact_m = math.inf
@@ -82,7 +80,6 @@ class LapsEnd:
         self._law, self._legs, self._limit_s = law, legs, limit_s
         self._before_s = 0.0
         self.switches_s: list[float] = []
-        """Times of the updates in which a corner was reached."""
 
     def to_go_m(self, state: AircraftState) -> float:
         """Nothing is known of it."""
@@ -112,18 +109,25 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
     Raises:
         InputError: the aircraft cannot fly it.
     """
-    flight, mission = asked.flight, asked.mission
+    flight, mission, origin = asked.flight, asked.mission, asked.mission.origin
     places = np.vstack((np.column_stack((flight["east_m"], flight["north_m"])), mission.corners_m))
-    low, high = places.min(axis=0) - ABOUT_M, places.max(axis=0) + ABOUT_M
+    bounds = (*(places.min(axis=0) - ABOUT_M).tolist(), *(places.max(axis=0) + ABOUT_M).tolist())
     start, goal = places[0], mission.corners_m[asked.first]
     far = max(float(np.hypot(*(goal - start))), 2.0)
-    origin = mission.origin
     altitude_m = asked.height_m + (origin.altitude_m if origin else 0.0)
-    winds = [(wind.time_s, wind.speed_mps, wind.from_deg) for wind in asked.winds]
+    changes = [[wind.time_s, wind.speed_mps, wind.from_deg] for wind in asked.winds if wind.time_s > 0.0]
+    wind = {"speed_mps": asked.winds[0].speed_mps, "from_deg": asked.winds[0].from_deg, "changes": changes}
+    exact = (
+        "position_sigma_m",
+        "velocity_sigma_mps",
+        "heading_sigma_deg",
+        "airspeed_sigma_mps",
+        "altitude_sigma_m",
+    )
     keys: dict[str, Any] = {
         "schema": "wayproof/scenario/1",
         "name": "replay",
-        "area": {"bounds_m": [*low.tolist(), *high.tolist()]},
+        "area": {"bounds_m": bounds},
         "mission": {
             "start_m": start.tolist(),
             "course_deg": math.degrees(math.atan2(flight["ve_mps"][0], flight["vn_mps"][0])) % 360.0,
@@ -135,32 +139,18 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
         "aircraft": {
             "model": aircraft,
             "airspeed_mps": asked.airspeed_mps,
-            "autopilot": {
-                "state_latency_s": 0.0,
-                **({} if mission.bank_limit_deg is None else {"bank_limit_deg": mission.bank_limit_deg}),
-            },
+            "autopilot": {"state_latency_s": 0.0},
         },
-        "guidance": {
-            "kind": DEFAULT_LAW,
-            "follow": "waypoints",
-            **({} if mission.acceptance_m is None else {"acceptance_radius_m": mission.acceptance_m}),
-        },
-        "navigation": {
-            "kind": "gnss",
-            **dict.fromkeys(("position_sigma_m", "velocity_sigma_mps", "heading_sigma_deg"), 0.0),
-            **dict.fromkeys(("airspeed_sigma_mps", "altitude_sigma_m"), 0.0),
-            "latency_s": LATENCY_S,
-        },
-        "environment": {
-            "wind": {
-                "speed_mps": winds[0][1],
-                "from_deg": winds[0][2],
-                "changes": [list(row) for row in winds if row[0] > 0.0],
-            }
-        },
+        "guidance": {"kind": DEFAULT_LAW, "follow": "waypoints"},
+        "navigation": {"kind": "gnss", **dict.fromkeys(exact, 0.0), "latency_s": LATENCY_S},
+        "environment": {"wind": wind},
     }
+    if mission.bank_limit_deg is not None:
+        keys["aircraft"]["autopilot"]["bank_limit_deg"] = mission.bank_limit_deg
+    if mission.acceptance_m is not None:
+        keys["guidance"]["acceptance_radius_m"] = mission.acceptance_m
     if origin:
-        keys["area"]["origin"] = {"latitude_deg": origin.latitude_deg, "longitude_deg": origin.longitude_deg}
+        keys["area"]["origin"] = origin.model_dump(exclude={"altitude_m"})
     scenario = scenario_of(keys, overrides)
     if scenario.guidance.follow != "waypoints":
         raise InputError(
@@ -170,16 +160,10 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
 
 
 def fly_anew(scenario: Scenario, asked: Asked, laps: int, folder: Path) -> dict[str, FloatArray]:
-    """Flies it into a run folder.
-
-    Args:
-        scenario: of `scenario_for`.
-        asked: what is flown anew.
-        laps: so many times round.
-        folder: the run folder.
+    """Flies it into a run folder, so many times round.
 
     Returns:
-        Columns of the track, with the number of the leg in `leg`.
+        `COLUMNS` of the track, with the number of the leg in `leg`.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
@@ -203,9 +187,6 @@ def fly_anew(scenario: Scenario, asked: Asked, laps: int, folder: Path) -> dict[
 
     fly_to_folder(scenario, folder, recording=False, make=make, pilot="replay")
     track = load_run(folder).track
-    columns = {
-        name: np.asarray(getattr(track, name), dtype=np.float64)
-        for name in ("time_s", "east_m", "north_m", "up_m", "roll_deg", "airspeed_mps")
-    }
+    columns = {name: np.asarray(getattr(track, name), dtype=np.float64) for name in COLUMNS}
     columns["leg"] = np.searchsorted(ends[0].switches_s, columns["time_s"] + 1e-6).astype(np.float64)
     return columns

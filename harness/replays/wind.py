@@ -93,9 +93,7 @@ def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | No
 def fit_windows(flight: FlownFlight, whole: FittedWind) -> list[FittedWind]:
     """The winds of windows one after the other; none of those in which the aircraft does not turn enough.
 
-    Args:
-        flight: the flight.
-        whole: the wind of all of it; its airspeed stands for one that was not measured.
+    The airspeed of the whole flight's wind stands for one that was not measured.
     """
     times: FloatArray = flight["time_s"] - flight["time_s"][0]
     measured = flight.airspeed_mps
