@@ -20,6 +20,10 @@ HOLD_RESERVE_DEG = {None: 5.0, "light": 5.0, "moderate": 10.0, "severe": 15.0}
 12 m/s kept within 0.3 m in light turbulence with 5 degrees, within 0.5 m in moderate turbulence with 10. With 5
 and 7 degrees in moderate turbulence the aircraft was up to 7 m and 3 m off."""
 
+CALM_HOLD_RESERVE_DEG = 10.0
+"""The same in calm air, where all of the turn takes as much bank: with 5 a J3Cub that came into it out of a weave was
+off it by 22 m."""
+
 TRACKING_FACTOR = {None: 1.0, "light": 1.5, "moderate": 3.0, "severe": 6.0}
 """Cross-track error that is hardly ever exceeded, in units of (turn acceleration) * (roll lag)^2. That is the
 scale of the bump at an arc-line joint; what was flown stays below half of it in calm air, and the factors for
@@ -91,7 +95,7 @@ def performance(
     The radius follows from the coordinated turn at the fastest groundspeed, downwind, with bank in reserve:
     R = (Va + W)^2 / (g tan(bank)), the bank being the limit less the reserve and no steeper than what the aircraft
     was seen to keep its speed and altitude at. Below it the bank saturates and tracking fails abruptly. A hold is flown
-    with less in reserve (`HOLD_RESERVE_DEG`), but no tighter than turns in calm air.
+    with less in reserve (`HOLD_RESERVE_DEG`, in calm air `CALM_HOLD_RESERVE_DEG`).
 
     Args:
         airframe: the aircraft.
@@ -126,7 +130,7 @@ def performance(
     most_deg, bank_limit_deg = min(level_deg, rolled_deg), airframe.bank_limit_deg
     acceleration = _turn_acceleration(min(bank_limit_deg - BANK_RESERVE_DEG[turbulence], most_deg))
     holding = _turn_acceleration(min(bank_limit_deg - HOLD_RESERVE_DEG[turbulence], most_deg))
-    calm = _turn_acceleration(min(bank_limit_deg - BANK_RESERVE_DEG[None], most_deg))
+    calm = _turn_acceleration(min(bank_limit_deg - CALM_HOLD_RESERVE_DEG, most_deg))
     fastest = airspeed_mps + wind_mps + gust_mps
     radius_m = fastest * fastest / acceleration
     hold_radius_m = min(max(fastest * fastest / holding, airspeed_mps * airspeed_mps / calm), radius_m)

@@ -104,7 +104,7 @@ class Performance:
         turn_radius_m: smallest radius a plan may ask for, margins for wind and turbulence included.
         roll_in_s: time from wings level to 90 % of 30 degrees, or of the bank limit if that is less, at cruise.
         tracking_error_m: cross-track error that the guidance stays within on such a plan.
-        hold_radius_m: smallest radius of a full turn that is held. In wind it is less than `turn_radius_m`: a hold
+        hold_radius_m: smallest radius of a full turn that is held. It is less than `turn_radius_m`: a hold
             needs no bank in reserve for changes of curvature, only for gusts.
     """
 

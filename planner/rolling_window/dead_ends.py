@@ -22,9 +22,9 @@ RETRY_S = 60.0
 MOST_EFFORT = 4
 """A search that found nothing is repeated with twice the effort, this many times; from then on once a turn."""
 
-MOST_RETRIES = 3
-"""Everything is tried again this many times before a goal is called unreachable for want of room to turn: a narrower
-way may be seen to be safe from elsewhere on the turn, or at another look."""
+MOST_RETRIES = 8
+"""Everything is tried again this many times before a flight ends for want of room to turn: a narrower way may be seen
+to be safe from elsewhere on the turn, or at another look."""
 
 
 class DeadEnds:

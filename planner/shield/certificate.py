@@ -15,6 +15,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,9 +23,11 @@ from planner.geometry.clearance import inside_bounds
 from planner.geometry.curves import (
     Limits,
     Point,
+    Pose,
     Segment,
     along,
     between,
+    end_of,
     full_turn,
     place_on,
 )
@@ -41,6 +44,9 @@ MOST_ARC_LENGTHS = 32
 
 ARC_LENGTHS_AT_ONCE = 4
 """So many arc lengths are looked at together: mostly one of the first serves."""
+
+AHEAD_STEP, ASIDE = 0.25, (0.0, 0.5)
+"""Turns about places ahead are looked for at every such share of the turn radius along a path, this share aside."""
 
 SIDES = (1.0, -1.0)
 """Left, right: the sign of the curvature."""
@@ -73,6 +79,37 @@ class Certified:
     loiter_entry_m: float
 
 
+class _Swerve(NamedTuple):
+    """An arc to one side that leads into a full turn to the other, about a place ahead.
+
+    Attributes:
+        side: of the full turn, 1: left.
+        angle_rad: of the arc.
+        ahead_m, aside_m: where the centre lies, seen from where the arc begins.
+    """
+
+    side: float
+    angle_rad: float
+    ahead_m: float
+    aside_m: float
+
+    @classmethod
+    def to(cls, side: float, share: float, limits: Limits) -> _Swerve:
+        """The one whose centre lies aside by a share of the radius: 2 R cos(a) - roll sin(a) = (1 + share) R."""
+        radius, roll = limits.radius_m, 2.0 * limits.roll_m
+        angle = math.acos((1.0 + share) * radius / math.hypot(2.0 * radius, roll)) - math.atan2(
+            roll, 2.0 * radius
+        )
+        return cls(
+            side, angle, 2.0 * radius * math.sin(angle) + roll * math.cos(angle), side * share * radius
+        )
+
+    def lead(self, pose: Pose, limits: Limits) -> list[Segment]:
+        """The arc, and the straight to roll after it."""
+        arc: Segment = (*pose, -self.side / limits.radius_m, self.angle_rad * limits.radius_m)
+        return [arc, (*along(arc, arc[5]), 0.0, 2.0 * limits.roll_m)] if limits.roll_m else [arc]
+
+
 class Certifier:
     """Looks for the last safe turn off a path.
 
@@ -86,6 +123,7 @@ class Certifier:
     def __init__(self, limits: Limits, clearance_m: float, horizon_m: float, spacing_m: float) -> None:
         self._limits, self._horizon, self._spacing = limits, horizon_m, spacing_m
         self._beside = BEYOND * clearance_m
+        self._swerves = [_Swerve.to(side, share, limits) for share in ASIDE for side in SIDES]
         self._disc = _disc(disc_radius_m(limits.radius_m, clearance_m), spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: MapView) -> float:
@@ -130,31 +168,28 @@ class Certifier:
         Through a gap narrower than a turn beside the path, this is the first turn that is seen. An arc to one side
         leads into a full turn to the other, about a place ahead. Arguments are those of `certify`.
         """
-        radius, roll = self._limits
-        # With the arc of angle a: 2 R cos(a) - roll sin(a) = R, so that the centre is not beside the path.
-        angle = math.acos(radius / math.hypot(2.0 * radius, roll)) - math.atan2(roll, 2.0 * radius)
-        ahead_m = 2.0 * radius * math.sin(angle) + roll * math.cos(angle)
         free_to = min(self.seen_free_to_m(path, seen), to_m)
-        step = 0.125 * radius
+        step = AHEAD_STEP * self._limits.radius_m
         arc_lengths_m: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
         poses = poses_at(path, arc_lengths_m)
-        centres = poses[:, :2] + ahead_m * poses[:, 2:]
-        places = (centres[:, None] + self._disc).reshape(-1, 2)
-        free = seen.seen_free(places).reshape(len(centres), -1).all(axis=1)
-        for arc_length_m in arc_lengths_m[free].tolist():
+        ahead = poses[:, None, 2:]
+        aside = np.stack((-ahead[..., 1], ahead[..., 0]), axis=-1)
+        offsets = np.array([(each.ahead_m, each.aside_m) for each in self._swerves])[:, :, None]
+        centres = poses[:, None, :2] + offsets[:, 0] * ahead + offsets[:, 1] * aside
+        places = (centres[:, :, None] + self._disc).reshape(-1, 2)
+        free = seen.seen_free(places).reshape(*centres.shape[:2], -1).all(axis=2)
+        for i, which in np.argwhere(free).tolist():
+            arc_length_m = float(arc_lengths_m[i])
             pose, curvature = place_on(path, arc_length_m)
-            for side in SIDES:
-                if side * curvature > 0.0:
-                    continue  # that would take a straight to roll
-                arc: Segment = (*pose, -side / radius, angle * radius)
-                line: Segment = (*along(arc, arc[5]), 0.0, roll)
-                turn = [arc, line, full_turn(along(line, roll), radius, side)]
-                lead = Path(np.array([row for row in turn[:2] if row[5] > 0.0]))
-                if self.seen_free_to_m(lead, seen) >= lead.length_m and terrain.admits(Path(np.array(turn))):
-                    way = between(path, 0.0, arc_length_m)
-                    return Certified(
-                        Path(np.array([*way, *lead.segments.tolist(), turn[2]]), loiter=True), arc_length_m
-                    )
+            swerve = self._swerves[which]
+            if swerve.side * curvature > 0.0:
+                continue  # that would take a straight to roll
+            lead = Path(np.array(swerve.lead(pose, self._limits)))
+            turn = full_turn(end_of(lead), self._limits.radius_m, swerve.side)
+            whole = Path(np.array([*lead.segments.tolist(), turn]), loiter=True)
+            if self.seen_free_to_m(lead, seen) >= lead.length_m and terrain.admits(whole):
+                way = between(path, 0.0, arc_length_m)
+                return Certified(Path(np.array([*way, *whole.segments.tolist()]), loiter=True), arc_length_m)
         return None
 
     def certify_up_to(

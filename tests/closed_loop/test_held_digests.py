@@ -18,7 +18,7 @@ from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
 
 HELD = {
-    "aerosonde_forest": "ddfa6a222d840d1ed9d6f96fb1885b2bd691240167ddbf0b71abdc8822129d72",
+    "aerosonde_forest": "0ca7df4598c874b63c63a47fe7b8b7b381107b7092acc205e886d632502b5ffc",
     "polygon_town": "6c0fd27e7de66e8b479bf0492505b8fbf5ee06f874b5613246b8211f89d79648",
     "one_of_everything": "7498f60b9eef980fe43ab8f7ad6ff6848ec32467c4b0389f1d21588912c2c088",
 }

@@ -112,7 +112,7 @@ class Events(Invariant):
 def watched(scenario: Scenario) -> tuple[Flight, Invariant]:
     """A point-mass flight, every plan of which keeps the invariant."""
     loop = make_loop(scenario, lambda start, air: PointMass(start, air, step_rate_hz=20))
-    invariant = Invariant(loop.world, loop.mission.turn_radius_m, loop.mission.tracking_error_m)
+    invariant = Invariant(loop.world, loop.mission.hold_radius_m, loop.mission.tracking_error_m)
     return fly(loop, [invariant]), invariant
 
 
@@ -198,7 +198,7 @@ def test_the_invariant_sees_a_plan_that_is_not_safe(small_world: SmallWorld) -> 
     hidden = {"circle": {"center_m": [2000.0, 2250.0], "radius_m": 100.0}}
     blind = make_loop(scenario_with(small_world, []), PointMass)
     truth = make_loop(scenario_with(small_world, [hidden]), PointMass).world
-    invariant = Invariant(truth, blind.mission.turn_radius_m, blind.mission.tracking_error_m)
+    invariant = Invariant(truth, blind.mission.hold_radius_m, blind.mission.tracking_error_m)
     with pytest.raises(AssertionError, match="plan"):
         fly(replace(blind, termination=MissionEnd(blind.world, blind.mission, 120.0)), [invariant])
 
@@ -242,7 +242,7 @@ def test_a_world_that_lies_ends_the_flight_as_a_fault_of_the_planner(
     assert at_s <= flight.sim_s < at_s + 3.0
 
 
-@pytest.mark.parametrize(("range_m", "status"), [(300.0, 2), (315.0, 0)])
+@pytest.mark.parametrize(("range_m", "status"), [(255.0, 2), (270.0, 0)])
 def test_a_sensor_that_cannot_see_a_turn_is_refused_with_the_numbers(
     small_world: SmallWorld,
     tmp_path: FilePath,
@@ -256,9 +256,9 @@ def test_a_sensor_that_cannot_see_a_turn_is_refused_with_the_numbers(
     at.write_text(text.replace("range_m: 1000.0", f"range_m: {range_m:g}"))
     assert main(["validate", str(at)]) == status
     said = capsys.readouterr().err
-    assert ("too short for a turn radius of 110 m with a clearance of 40 m" in said) is (status == 2)
-    assert ("sensor.range_m: is 300, too short" in said) is (status == 2)
-    assert ("must be at least 303" in said) is (status == 2)
+    assert ("too short for a turn radius of 91 m with a clearance of 40 m" in said) is (status == 2)
+    assert ("sensor.range_m: is 255, too short" in said) is (status == 2)
+    assert ("must be at least 263" in said) is (status == 2)
     if status == 2:
         assert main(["fly", str(at), "--out", str(tmp_path / "run")]) == 2
         assert not (tmp_path / "run").exists()
