@@ -24,7 +24,7 @@ from harness.cli.falsify import falsify
 from harness.cli.fly import fly
 from harness.cli.formats import schema, validate
 from harness.cli.names import list_names
-from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag
+from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag, with_remedy
 from harness.cli.review import replay, report, view
 from harness.cli.standard_output import kept_up, results_alone, results_over, say, to_nowhere
 from harness.cli.sweep import sweep
@@ -34,6 +34,8 @@ from harness.flight.signals import taken_as_interrupt
 from planner.compiled import own_this_process
 
 INTERRUPTED: Final = 130
+MEMORY_BYTES: Final = 1_200_000_000
+"""Address space with which a flight gets through: with half of it libraries abort."""
 COMPLETION: Final = "_WAYPROOF_COMPLETE"
 """The variable by which a shell asks for completions, which typer ends with sys.exit."""
 
@@ -85,11 +87,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         open_standard_files()
         own_this_process()
         results_alone()
+        _warn_of_little_memory()
     with taken_as_interrupt() as came:
         status = _run(words, debug)
     if arguments is None:
         results_over()
     return 128 + came[0] if came and status == INTERRUPTED else status
+
+
+def _warn_of_little_memory() -> None:
+    """Tells of a limit under which libraries abort without a word."""
+    import resource
+
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if 0 <= most < MEMORY_BYTES:
+        say(
+            f"wayproof: a process may use {most / 1e6:.0f} MB here and a flight takes some {MEMORY_BYTES / 1e6:.0f}: "
+            "lift the limit with `ulimit -v unlimited`",
+            err=True,
+        )
 
 
 def _run(words: Sequence[str], debug: bool) -> int:
@@ -146,7 +162,7 @@ def _report(error: Exception) -> int:
         say(f"wayproof: {error}", err=True)
         return FAILED
     if isinstance(error, OSError):
-        say(f"wayproof: {error}", err=True)
+        say(f"wayproof: {with_remedy(error)}", err=True)
         return FAILED if error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
     say(f"wayproof: internal error, {sentence(error)}; --debug shows where", err=True)
     return FAILED

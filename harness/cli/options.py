@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -306,6 +307,17 @@ def bad_input(error: ValueError) -> Exception:
     return InputError(f"wayproof: {error}")
 
 
+def with_remedy(error: OSError) -> str:
+    """What an error of the system says, and what would help where that is known."""
+    if error.errno in (errno.EMFILE, errno.ENFILE):
+        return f"{error}: raise the limit with `ulimit -n 1024`"
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return "the working directory has been deleted: change to another"
+    return str(error)
+
+
 @contextmanager
 def faults_told(left: Callable[[], str]) -> Iterator[None]:
     """Ends with BAD_INPUT for a folder or an aircraft that cannot be used, and says after Ctrl-C what is left.
@@ -359,7 +371,7 @@ def resumable(folder: Path, index: str) -> Iterator[None]:
         with faults_told(lambda: done if (folder / index).exists() else "nothing was written"):
             yield
     except OSError as error:
-        say(f"wayproof: {error}; {done}", err=True)
+        say(f"wayproof: {with_remedy(error)}; {done}", err=True)
         raise typer.Exit(FAILED) from error
 
 

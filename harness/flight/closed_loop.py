@@ -70,18 +70,23 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
         progress: told of the flight every few simulated seconds.
 
     Raises:
+        KeyboardInterrupt: after Ctrl-C; the observers have all rows up to it.
         ValueError: the scan rate does not divide the simulation rate.
         RuntimeError: the loop has been flown before.
     """
     next_report_s = 0.0
     with held_back() as interrupt:
         flying = ClosedLoop(loop, observers)
-        while flying.ending is None:
-            interrupt()
-            if progress is not None and flying.true.time_s >= next_report_s:
-                progress(flying.true.time_s, flying.to_go_m, flying.status_label)
-                next_report_s = flying.true.time_s + PROGRESS_EVERY_S
-            flying.step()
+        try:
+            while flying.ending is None:
+                interrupt()
+                if progress is not None and flying.true.time_s >= next_report_s:
+                    progress(flying.true.time_s, flying.to_go_m, flying.status_label)
+                    next_report_s = flying.true.time_s + PROGRESS_EVERY_S
+                flying.step()
+        except KeyboardInterrupt:
+            flying.hand_on()
+            raise
         if progress is not None:
             progress(flying.true.time_s, flying.to_go_m, flying.status_label)
         return flying.flight()
@@ -264,6 +269,10 @@ class ClosedLoop:
         for observer in self._observers:
             observer.on_event(self.true.time_s, text if ending.outcome is Outcome.REACHED else Caution(text))
         return True
+
+    def hand_on(self) -> None:
+        """Hands the rows since the last block on to the observers."""
+        self._log.hand_on()
 
     @property
     def to_go_m(self) -> float:

@@ -34,23 +34,23 @@ class ShieldState(str):
 
 
 class Observer(Protocol):
-    """What may look on while the loop runs. Nothing that it does reaches the loop."""
+    """What may look on while the loop runs; its own methods do nothing. Nothing that it does reaches the loop."""
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """A scan was taken."""
-        ...
+        return
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
         """A plan takes effect."""
-        ...
+        return
 
     def on_block(self, block: Track) -> None:
         """Some hundred more rows of the track."""
-        ...
+        return
 
     def on_event(self, time_s: float, text: str) -> None:
         """Something worth a line in the log; a `Caution` is of what should not happen."""
-        ...
+        return
 
 
 @runtime_checkable

@@ -5,7 +5,6 @@ In flight they are held back to where no machine code is at work.
 
 from __future__ import annotations
 
-import _thread
 import math
 import signal
 import threading
@@ -71,7 +70,8 @@ def held_back() -> Iterator[Callable[[], None]]:
         if time.monotonic() - first_s >= AGAIN_S:
             let_through()
         elif not timers:
-            timers.append(threading.Timer(AGAIN_S, _thread.interrupt_main, (number,)))
+            # A signal itself, not `interrupt_main`: it wakes a planner that sleeps or waits.
+            timers.append(threading.Timer(AGAIN_S, signal.pthread_kill, (main_thread, number)))
             timers[0].daemon = True
             timers[0].start()
 
@@ -85,6 +85,7 @@ def held_back() -> Iterator[Callable[[], None]]:
             handlers[signal.Signals(number)](number, None)
 
     main = threading.current_thread() is threading.main_thread()
+    main_thread = threading.get_ident()
     found = {each: signal.getsignal(each) for each in INTERRUPTING if main}
     handlers = {each: handler for each, handler in found.items() if callable(handler)}
     for each in handlers:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.interface import AircraftState
-from harness.flight.record import AcceptedPlan, Track
+from harness.flight.observer import Observer
 from harness.mapping.scan import RangeScan
 from planner.interface import Mission
 
@@ -32,7 +32,7 @@ LEAST: Final = np.array([0, -1, -1, 0, 0, -1, -1, -1, 0], dtype=np.float32)
 MOST: Final = np.ones(len(STATE), dtype=np.float32)
 
 
-class ScanKeeper:
+class ScanKeeper(Observer):
     """An observer of the loop that keeps the last scan which has become available."""
 
     def __init__(self) -> None:
@@ -42,15 +42,6 @@ class ScanKeeper:
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Keeps a scan."""
         self._coming.append(scan)
-
-    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        """Nothing."""
-
-    def on_block(self, block: Track) -> None:
-        """Nothing."""
-
-    def on_event(self, time_s: float, text: str) -> None:
-        """Nothing."""
 
     def forget(self) -> None:
         """Begins anew, for the next flight."""

@@ -17,7 +17,7 @@ import numpy as np
 from aircraft.frames import LocalPlane
 from aircraft.guidance.altitude import LevelFlight
 from aircraft.guidance.interface import GuidanceLaw
-from aircraft.interface import FlightModel
+from aircraft.interface import AircraftState, FlightModel
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, StartConditions
 from harness.analysis.flight_limits import FlightLimits
@@ -27,7 +27,7 @@ from harness.files.versions import versions
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.navigation import Navigator, pose_error_m
 from harness.flight.observer import Observer, Progress
-from harness.flight.record import Flight
+from harness.flight.record import AcceptedPlan, Flight, Track
 from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import SensedMap
 from harness.recording.properties import run_properties
@@ -200,13 +200,17 @@ def fly_to_folder(
             told = [command or shlex.join(sys.argv)]
             radius_m = loop.mission.turn_radius_m
             folder = stack.enter_context(RunFolder.create(out, text, told, _sources(scenario), radius_m))
-            observers = [*watching]
+            so_far, observers = _SoFar(), [*watching]
             scene = replace(scene_of(scenario, loop, text, pilot), profile=profile) if recording else None
             log = None if scene is None else _recording(scene, loop, folder, identity, thin)
             if log is not None:
                 stack.callback(log.end)
                 observers.append(log)
-            flight = flown_by(loop, observers, progress)
+            try:
+                flight = flown_by(loop, [so_far, *observers], progress)
+            except KeyboardInterrupt:
+                so_far.leave_in(folder)
+                raise
             figures = measured_by(flight, flight_limits(scenario, planned=pilot is None))
             if log is not None:
                 log.close(figures, run_properties(scenario, figures), varied)
@@ -214,6 +218,27 @@ def fly_to_folder(
     except OSError as error:
         raise WriteError.of("the run", out, error) from error
     return figures
+
+
+class _SoFar(Observer):
+    """An observer that keeps what has been flown, for a flight that is broken off."""
+
+    def __init__(self) -> None:
+        self._blocks: list[Track] = []
+        self._plans: list[AcceptedPlan] = []
+
+    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
+        """Keeps a plan."""
+        self._plans.append(accepted)
+
+    def on_block(self, block: Track) -> None:
+        """Keeps rows of the track."""
+        self._blocks.append(block)
+
+    def leave_in(self, folder: RunFolder) -> None:
+        """Writes what there is into a folder that stays marked incomplete."""
+        if self._blocks:
+            folder.leave(Track.joined(self._blocks), self._plans)
 
 
 def _sources(scenario: Scenario) -> list[dict[str, str]]:

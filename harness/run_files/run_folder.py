@@ -158,9 +158,16 @@ class RunFolder:
         """
         if not len(track):
             raise RunFolderError(f"the run in {self.path} has no track: nothing was flown")
+        text = _json(metrics)
+        self.leave(track, plans)
+        replace_text(self.path / METRICS, text)
+        sums = {name: _sha256(self.path / name) for name in HASHED if (self.path / name).exists()}
+        replace_text(self.path / MANIFEST, _json({**self._manifest, "complete": True, "sha256": sums}))
+
+    def leave(self, track: Track, plans: Sequence[AcceptedPlan]) -> None:
+        """Writes track and plans, of a flight that was broken off perhaps: the run stays marked incomplete."""
         import pyarrow.parquet as pq
 
-        text = _json(metrics)
         # At once: whatever is written while flying costs the flight its place in the caches.
         rows = track_table(track)
         split = {
@@ -170,9 +177,6 @@ class RunFolder:
         for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):
             with replacing(self.path / name) as file:
                 pq.write_table(table, file, compression=COMPRESSION, **how)
-        replace_text(self.path / METRICS, text)
-        sums = {name: _sha256(self.path / name) for name in HASHED if (self.path / name).exists()}
-        replace_text(self.path / MANIFEST, _json({**self._manifest, "complete": True, "sha256": sums}))
 
     def __enter__(self) -> RunFolder:
         return self
@@ -202,7 +206,10 @@ def load_run(path: Path) -> Run:
         _there(path)
         raise RunFolderError(f"{path} is not a run folder: it has no {MANIFEST} of a run")
     if manifest.get("complete") is not True:
-        raise RunFolderError(f"the run in {path} is incomplete: it was stopped before its end; fly it again")
+        left = f"; {TRACK} and {PLANS} have what was flown" if (path / TRACK).exists() else ""
+        raise RunFolderError(
+            f"the run in {path} is incomplete: it was stopped before its end; fly it again{left}"
+        )
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
+from harness.flight.observer import Observer
 from harness.flight.record import AcceptedPlan, Track
 from harness.flight.track_log import TrackLog
 from harness.mapping.scan import RangeScan
-from harness.watching.onlooker import Onlooker
 from harness.watching.relay import Call, Opening
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class Relay(Protocol):
         ...
 
 
-class LiveLog(Onlooker):
+class LiveLog(Observer):
     """Sends a flight to a viewer that is running. Nothing that becomes of the viewer reaches the flight.
 
     What is flown is handed over at least five times a second of wall time, if the flight itself goes on that often.

@@ -7,14 +7,14 @@ from typing import Final
 
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
-from harness.watching.onlooker import Onlooker
+from harness.flight.observer import Observer
 
 _CAUGHT_UP_S: Final = 1.0
 _NAP_S: Final = 0.05
 """Waits are cut into pieces of this length, between which Python takes signals."""
 
 
-class Pace(Onlooker):
+class Pace(Observer):
     """Holds a flight back to a speed. One that has fallen behind catches up by a second, and is late for the rest.
 
     Args:
@@ -35,9 +35,3 @@ class Pace(Onlooker):
         self._flown_s = state.time_s
         while (left_s := self._due_s - time.monotonic()) > 0.0:
             time.sleep(min(left_s, _NAP_S))
-
-
-def next_due(due_s: float, every_s: float, now_s: float) -> float:
-    """When something is due again: a period after it was due, for what comes late must not make all else late."""
-    following_s = due_s + every_s
-    return following_s if following_s > now_s else now_s + every_s

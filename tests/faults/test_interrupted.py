@@ -10,6 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from harness.cli.app import main
@@ -47,6 +49,82 @@ def test_a_signal_in_flight_is_said_in_a_line(
         load_run(tmp_path / "run")
     assert run_here(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1
     assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
+
+
+SLEEPER = """
+import time
+from planner.registry import planner_kinds
+
+
+class Sleeper:
+    # Plans forty times, and then waits for something that never comes.
+
+    def __init__(self, mission):
+        kind, self.calls = planner_kinds()["rolling_window"], 0
+        self.inner = kind.make(kind.config().resolved(mission), mission)
+
+    def plan(self, request):
+        self.calls += 1
+        if self.calls > 40:
+            open("asleep", "w").close()
+            time.sleep(3600)
+        return self.inner.plan(request)
+"""
+
+
+@pytest.mark.flights
+def test_a_flight_whose_planner_hangs_can_be_broken_off_and_leaves_what_was_flown(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(SLEEPER)
+    words = ("fly", str(FOREST), "--planner", "own.py:Sleeper", "--out", "run", "--quiet", "--no-recording")
+    process = start(tmp_path, *words)
+    wait_until((tmp_path / "asleep").exists, process)
+    process.send_signal(signal.SIGTERM)
+    assert process.communicate(timeout=60) == (
+        "",
+        "wayproof: interrupted; the run in run is marked incomplete\n",
+    )
+    assert process.returncode == 143
+    track = pq.read_table(tmp_path / "run" / "track.parquet")
+    times, flown_m = (
+        track["time_s"].to_numpy(),
+        np.hypot(*(np.ptp(track[name]) for name in ("east_m", "north_m"))),
+    )
+    assert times[-1] > 1.0
+    assert flown_m == pytest.approx(25.0 * times[-1], rel=0.2)
+    assert pq.read_table(tmp_path / "run" / "plans.parquet").num_rows >= 1
+    with pytest.raises(RunFolderError, match=r"track\.parquet and plans\.parquet have what was flown"):
+        load_run(tmp_path / "run")
+
+
+@pytest.mark.flights
+@pytest.mark.parametrize(
+    ("shell", "told"),
+    [
+        (
+            "ulimit -n 24; exec {} sweep {campaign} --workers 2 --out out",
+            "raise the limit with `ulimit -n 1024`",
+        ),
+        (
+            "cd gone; rmdir ../gone; exec {} fly {forest}",
+            "the working directory has been deleted: change to another",
+        ),
+        ("ulimit -v 1100000; exec {} list campaigns", "lift the limit with `ulimit -v unlimited`"),
+    ],
+)
+def test_what_the_process_may_not_have_is_told_with_its_remedy(shell: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "gone").mkdir()
+    names = {"campaign": "forest_planners", "forest": str(FOREST)}
+    done = subprocess.run(
+        ["bash", "-c", shell.format(f"{sys.executable} -m harness", **names)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert told in done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 @pytest.mark.flights
