@@ -16,7 +16,7 @@ from aircraft.interface import AircraftState, Route
 from harness.analysis.metrics import metrics
 from harness.cli.flight_rows import flight_rows
 from harness.flight.closed_loop import Loop, fly
-from harness.flight.observer import Caution
+from harness.flight.observer import Caution, Observer
 from harness.flight.record import BELIEVED_FIELDS, TRACK_FIELDS, Flight, Outcome, digest
 from harness.flight.state_estimator import PerfectEstimator
 from harness.mapping.sensed_map import SensedMap
@@ -24,7 +24,6 @@ from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run, tables
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, parse_scenario
-from harness.watching.onlooker import Onlooker
 from planner.interface import Plan, PlanRequest
 from tests.closed_loop.conftest import SmallWorld
 from tests.point_mass import PointMass
@@ -140,7 +139,7 @@ class Jumping:
         return state._replace(east_m=state.east_m + 80.0)
 
 
-class Told(Onlooker):
+class Told(Observer):
     """Notes the events that tell of fixes."""
 
     def __init__(self) -> None:

@@ -19,12 +19,12 @@ from aircraft.interface import AircraftState
 from harness.analysis.metrics import metrics
 from harness.cli.app import main
 from harness.flight.closed_loop import fly
+from harness.flight.observer import Observer
 from harness.recording.log import RerunLog
 from harness.recording.viewer import free_port
 from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop, scene_of
 from harness.watching import live
 from harness.watching.live import LiveLog
-from harness.watching.onlooker import Onlooker
 from harness.watching.pace import Pace
 from harness.watching.relay import Call, Opening
 from harness.watching.watched_flight import Onlookers, fly_watched
@@ -59,7 +59,7 @@ def server() -> Iterator[tuple[subprocess.Popen[str], str]]:
         process.kill()
 
 
-class KillsAt(Onlooker):
+class KillsAt(Observer):
     """Ends the viewer in mid-flight, and gives the news the time to arrive."""
 
     def __init__(self, process: subprocess.Popen[str], at_s: float) -> None:
