@@ -27,11 +27,8 @@ def nearly_towards(east: float, north: float, start_rad: float, spacing_rad: flo
 
     The arc tangent is Hastings' polynomial (Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.4.49).
 
-    Args:
-        east: of the place, from the sensor.
-        north: of the place, from the sensor.
-        start_rad: bearing of the first ray, in [0, 2 pi).
-        spacing_rad: of the rays, more than twice `NEARLY_RAD`.
+    East and north are from the sensor; the first ray is at `start_rad`, in [0, 2 pi), and the spacing is more than
+    twice `NEARLY_RAD`.
     """
     beside, ahead = abs(east), abs(north)
     ratio = min(beside, ahead) / max(beside, ahead, TINY)
@@ -54,32 +51,12 @@ def nearly_towards(east: float, north: float, start_rad: float, spacing_rad: flo
 def first_over(bearing_rad: float, spacing_rad: float, beam_rad: float, aside: int) -> int:
     """The last beam that begins before a bearing, counted from the first; where beams do not touch it may end before.
 
-    Args:
-        bearing_rad: clockwise from the axis of the first beam.
-        spacing_rad: of the axes.
-        beam_rad: width of the beams.
-        aside: so many beams before it are told instead.
+    The bearing is clockwise from the axis of the first beam. The beam `aside` before it is told.
     """
     return math.floor((bearing_rad + 0.5 * min(beam_rad, spacing_rad)) / spacing_rad) - aside
 
 
-@compiled(
-    CELLS_OUT,
-    LOOKS_OUT,
-    CELLS,
-    FLOATS,
-    FLOAT,
-    FLOAT,
-    FLOAT,
-    FLOAT,
-    FLOAT,
-    FLOAT,
-    BOOL,
-    FLOAT,
-    FLOAT,
-    COUNT,
-    COUNT,
-)
+@compiled(CELLS_OUT, LOOKS_OUT, CELLS, FLOATS, *[FLOAT] * 6, BOOL, FLOAT, FLOAT, COUNT, COUNT)
 def through_cells(
     seen: BoolArray,
     looks: NDArray[np.uint8],
@@ -102,22 +79,9 @@ def through_cells(
     Beams that touch cover all of a cell. Where they do not, one more to either side has to go beyond it, and what is
     too narrow to be missed between them is up to who chooses `reach`.
 
-    Args:
-        seen: cells seen to be free.
-        looks: how often each was looked through; not read where once is enough.
-        disc: of these, those to be asked.
-        ranges: of all beams.
-        x_first: corner of the first cell, from the sensor.
-        y_first: corner of the first cell, from the sensor.
-        cell: width of a cell.
-        start_rad: bearing of the axis of the first beam.
-        spacing_rad: of the axes.
-        beam_rad: width of the beams.
-        closed: the last beam is the neighbour of the first.
-        reach: ranges count up to this one.
-        noise: so much further than a cell the beams have to go.
-        aside: so many beams more to either side have to go beyond it.
-        needed: looks through that make a cell free; one that returns something begins anew.
+    Of the cells of a `disc` those not `seen` to be free are asked; `looks` tells how often each was looked through, and
+    is not read where once is enough (`needed`). The first cell's corner lies at `x_first`, `y_first` from the sensor.
+    Ranges count up to `reach`; beams have to go beyond a cell by `noise`, and so have `aside` more to either side.
     """
     rays, half, coarse = len(ranges), 0.75 * cell, spacing_rad > 2.0 * NEARLY_RAD
     for column in range(seen.shape[0]):
@@ -161,9 +125,7 @@ def through_cells(
                 looks[column, row] = 0
 
 
-@compiled(
-    BOOLS_OUT, PLACES, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT, COUNT, FLOAT, COUNT
-)
+@compiled(BOOLS_OUT, PLACES, FLOATS, *[FLOAT] * 5, BOOL, FLOAT, FLOAT, COUNT, FLOAT, COUNT)
 def through_places(
     through: BoolArray,
     places: ComplexArray,
@@ -182,21 +144,9 @@ def through_places(
 ) -> int:
     """How many places all beams to either side went beyond; `through` becomes true for these.
 
-    Args:
-        through: (k,) all false.
-        places: (k,) east + i north.
-        ranges: of all beams.
-        east: of the sensor.
-        north: of the sensor.
-        start_rad: bearing of the axis of the first beam.
-        spacing_rad: of the axes.
-        beam_rad: width of the beams.
-        closed: the last beam is the neighbour of the first.
-        within_m: only nearer places are asked.
-        sure_m: so much further than a place the beams have to go.
-        abreast: so many beams to either side of the one towards it, one at least.
-        aimed_m: how near that one passes by, but for half its width.
-        every: only so many places on is one asked.
+    `through` (k,) is all false, `places` (k,) are east + i north. Only places nearer than `within_m` are asked, and of
+    these one in `every`. The beams, the one towards a place and `abreast` to either side, have to go further by
+    `sure_m`, and the middle of that one to pass by no further than `aimed_m`.
     """
     many, rays, coarse = 0, len(ranges), spacing_rad > 2.0 * NEARLY_RAD
     for i in range(0, len(places), every):

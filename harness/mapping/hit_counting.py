@@ -40,17 +40,9 @@ def new_edges(
 ) -> tuple[IntArray, ComplexArray]:
     """Cells and places to be counted: hits that are not certain, and what lies between two that are joined.
 
-    Args:
-        hits: (n,) rays that met something,
-        places: (n,) and where.
-        score: of each cell.
-        slot: of each cell; negative where it has no point.
-        cell_m: width of a cell.
-        rows: of the grid.
-        rays: of the scan.
-        closed: the last hit is the neighbour of the first.
-        join_m: hits nearer to each other are joined.
-        first_score: a cell that was hit has at least this score, unless it was looked through.
+    (n,) `hits` are the rays that met something, `places` where they did. `score` and `slot` are by cell, the latter
+    negative where it has no point. `closed`: the last hit is the neighbour of the first. Hits nearer to each other than
+    `join_m` are joined. A cell that was hit has at least `first_score`, unless it was looked through.
     """
     n, per_m = len(hits), 1.0 / cell_m
     cells, uncertain = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_)
@@ -87,28 +79,6 @@ def new_edges(
     return counted[:k], found[:k]
 
 
-@compiled(COUNTS_OUT, SCORES, COUNTS, COUNTS, COUNT, COUNT)
-def edges_after(
-    slots: IntArray, score: NDArray[np.int8], cell_of: IntArray, since: IntArray, known: int, revision: int
-) -> int:
-    """How many edges became so after a revision; the first of `slots` become theirs.
-
-    Args:
-        slots: room for all that are known.
-        score: of each cell.
-        cell_of: by slot: its cell,
-        since: and the revision at which it became an edge.
-        known: how many slots are in use.
-        revision: of the map.
-    """
-    many = 0
-    for slot in range(known):
-        if since[slot] > revision and score[cell_of[slot]] >= CONFIRMED:
-            slots[many] = slot
-            many += 1
-    return many
-
-
 @compiled(COUNTS, PLACES, FLOATS, FLOAT, BOOL, FLOAT, BOOL)
 def ends(
     hits: IntArray,
@@ -121,14 +91,8 @@ def ends(
 ) -> IntArray:
     """(k,) which hits lie at an end of an outline, as the sensor sees it; one may be told several times.
 
-    Args:
-        hits: (n,) rays that met something,
-        places: (n,) and where.
-        ranges: of all rays.
-        cell_m: width of a cell.
-        closed: the last hit is the neighbour of the first.
-        join_m: hits nearer to each other are joined.
-        corners: a wall that turns away from the sensor ends there, too, though both of its sides are in sight.
+    Hits and places are those of `new_edges`, `ranges` of all rays. With `corners` a wall that turns away from the
+    sensor ends there, too, though both of its sides are in sight.
     """
     n, rays = len(hits), len(ranges)
     pairs = n if closed else n - 1
@@ -182,18 +146,10 @@ def count_hits(
 ) -> tuple[int, int, bool]:
     """Counts hits: a cell gets a point with the first, and is an edge as soon as it is believed.
 
-    Args:
-        cells: (k,) cells that were hit; each counts once,
-        places: (k,) and where; the first in a cell counts.
-        score: of each cell.
-        slot: of each cell; negative where it has no point.
-        points: by slot, east + i north; there is room for k more,
-        cell_of: by slot: its cell,
-        since: and the revision at which it became an edge.
-        known: how many slots are in use.
-        revision: of the map.
-        first_score: what the first hit of a cell raises its score to, at least.
-        corner: of the grid, east + i north.
+    Each of (k,) cells counts once, and the first of the places in it. By cell: `score`, and `slot`, negative where it
+    has no point. By slot, with room for k more: `points`, east + i north, the cell that it is of, and `since`, the
+    revision at which it became an edge. `known` slots are in use; the first hit raises a score to `first_score` at
+    least.
 
     Returns:
         How many slots are in use now; the revision now; whether a cell was hit that has yet to be believed.
@@ -216,44 +172,3 @@ def count_hits(
             raised = 1
             since[slot[cell]] = revision + 1
     return known, revision + raised, unconfirmed
-
-
-@compiled(
-    FLOAT,
-    COUNT,
-    COUNT,
-    BOOL,
-    FLOAT,
-    COUNTS,
-    PLACES,
-    SCORES_OUT,
-    SLOTS_OUT,
-    PLACES_OUT,
-    COUNTS_OUT,
-    COUNTS_OUT,
-    COUNT,
-    COUNT,
-    COUNT,
-    PLACE,
-)
-def count_new_edges(
-    cell_m: float,
-    rows: int,
-    rays: int,
-    closed: bool,
-    join_m: float,
-    hits: IntArray,
-    places: ComplexArray,
-    score: NDArray[np.int8],
-    slot: NDArray[np.int32],
-    points: ComplexArray,
-    cell_of: IntArray,
-    since: IntArray,
-    known: int,
-    revision: int,
-    first_score: int,
-    corner: complex,
-) -> tuple[int, int, bool]:
-    """`count_hits` of the `new_edges`; there is room for `PARTS` times as many points as hits."""
-    cells, found = new_edges(hits, places, score, slot, cell_m, rows, rays, closed, join_m, first_score)
-    return count_hits(cells, found, score, slot, points, cell_of, since, known, revision, first_score, corner)

@@ -11,21 +11,12 @@ the map cannot outgrow them.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from harness.mapping.edge_grid import EdgeGrid
-from harness.mapping.hit_counting import (
-    CONFIRMED,
-    PARTS,
-    count_hits,
-    count_new_edges,
-    edges_after,
-    ends,
-    new_edges,
-)
+from harness.mapping.hit_counting import CONFIRMED, count_hits, ends, new_edges
 from harness.mapping.scan import RangeScan, all_round, supported
 from harness.mapping.scan_comparison import count_looked_through, near_any
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
@@ -132,9 +123,8 @@ class ObstacleMap:
         """(k, 2) edge points that came in after `revision`, in the order in which they did."""
         if revision >= self.revision:
             return np.zeros((0, 2))
-        slots = np.empty(self._count, dtype=np.intp)
-        many = edges_after(slots, self._score, self._key, self._since, self._count, revision)
-        slots = slots[:many]
+        slots = (self._since[: self._count] > revision).nonzero()[0]
+        slots = slots[self._score[self._key[slots]] >= CONFIRMED]
         if revision < self.revision - 1:  # else all came in at once
             slots = slots[np.argsort(self._since[slots], kind="stable")]
         return _pairs(self._points[slots])
@@ -169,15 +159,12 @@ class ObstacleMap:
                 return
         rays, cell, join, first = len(scan.ranges_m), self._cell, self._join, self._first_score
         closed = all_round(scan) and bool(hits[0] + rays - hits[-1] <= 2)
-        if nearest_m >= self._near_by:
-            self._grow(PARTS * len(hits))
-            self._take_over(
-                count_new_edges(cell, self._ny, rays, closed, join, hits, places, *self._counted())
-            )
-            return
         cells, found = new_edges(
             hits, places, self._score, self._slot, cell, self._ny, rays, closed, join, first
         )
+        if nearest_m >= self._near_by:
+            self._count_hits(cells, found)
+            return
         corners = nearest_m < DETAIL[-1][0] * self._clearance
         near = ends(hits, places, scan.ranges_m, cell, closed, join, corners)
         ranges, places = scan.ranges_m[hits[near]], places[near]
@@ -199,10 +186,7 @@ class ObstacleMap:
     def _place_anew(self, scan: RangeScan, ranges_m: FloatArray, places: ComplexArray) -> None:
         """Moves edges to where they are seen now, within their cells, if that is from much nearer by than before.
 
-        Args:
-            scan: the scan.
-            ranges_m: (n,) of its hits,
-            places: (n,) and where they are, from the corner of the grid.
+        Ranges and places, from the corner of the grid, are those of its hits.
         """
         new = self._points[len(self._seen_from_m) : self._count]  # came in with the scan before
         self._seen_from_m = np.concatenate((self._seen_from_m, np.abs(new - self._scanned_at)))
@@ -244,25 +228,13 @@ class ObstacleMap:
         return reach < x < width - reach and reach < y < height - reach
 
     def _count_hits(self, cells: IntArray, places: ComplexArray) -> None:
+        if not len(cells):
+            return
         self._grow(len(cells))
-        self._take_over(count_hits(cells, places, *self._counted()))
-
-    def _counted(self) -> tuple[Any, ...]:
-        """What hits are counted in, as `harness.mapping.hit_counting` takes it."""
-        return (
-            self._score,
-            self._slot,
-            self._points,
-            self._key,
-            self._since,
-            self._count,
-            self.revision,
-            self._first_score,
-            self._origin,
+        by_slot = self._points, self._key, self._since, self._count
+        self._count, self.revision, unconfirmed = count_hits(
+            cells, places, self._score, self._slot, *by_slot, self.revision, self._first_score, self._origin
         )
-
-    def _take_over(self, counted: tuple[int, int, bool]) -> None:
-        self._count, self.revision, unconfirmed = counted
         self._unconfirmed |= unconfirmed
 
     def _fine_keys(self, places: ComplexArray, finer: int) -> NDArray[np.int64]:

@@ -35,20 +35,10 @@ def count_rays(
 ) -> int:
     """Counts what the rays towards cells did. Near by, where several rays meet a cell, two more of them are asked.
 
-    Args:
-        counted: the slots of the cells that a ray was aimed at; written.
-        slots: of the cells that are asked.
-        distances: of each,
-        positions: and its bearing, in rays from the first on.
-        ranges: of all rays.
-        ignored: of all rays, those not to be counted; none of them where it is empty.
-        counts: (n, 3) of all cells, by slot; written.
-        half: half the width of a cell.
-        spacing_rad: of the rays.
-        within: cells further away are not asked.
-        noise: standard deviation of ranges.
-        forget_at: counts are halved from so many on.
-        closed: the last ray is the neighbour of the first.
+    Of the cells that are asked, `slots`, those that a ray was aimed at are written to `counted`. `distances` (m) and
+    `positions`, bearings in rays from the first on, are by cell; `counts` (n, 3), which is written, by slot. `ignored`
+    rays are not counted; it may be empty. `half` is half the width of a cell; cells beyond `within` are not asked;
+    counts are halved from `forget_at` on.
 
     Returns:
         How many are counted.
@@ -84,37 +74,6 @@ def count_rays(
     return many
 
 
-@compiled(FLAGS_OUT, CELLS, "Array(float32, 2, 'C', readonly=True)", FLAGS, FLOAT, FLOAT, FLOAT, FLOAT)
-def decide(
-    edges: BoolArray,
-    slots: NDArray[np.int32],
-    counts: NDArray[np.float32],
-    was: BoolArray,
-    least_stopped: float,
-    least_share: float,
-    short: float,
-    doubt: float,
-) -> None:
-    """Tells which cells are edges now.
-
-    Args:
-        edges: (k,) whether each cell is; written.
-        slots: (k,) of the cells.
-        counts: (n, 3) of all cells, by slot.
-        was: (n,) whether each was an edge.
-        least_stopped: an edge stopped so many rays at least,
-        least_share: and this share of those that reached it.
-        short: a ray that ended before it counts for so much of one that it stopped.
-        doubt: what is an edge remains one down to this part of both.
-    """
-    for i in range(len(slots)):
-        slot = slots[i]
-        stopped = np.float32(counts[slot, 0] + np.float32(short) * counts[slot, 2])
-        reached = np.float32(stopped + counts[slot, 1])
-        share = doubt if was[slot] else 1.0
-        edges[i] = stopped >= share * least_stopped and stopped >= share * least_share * reached
-
-
 @compiled(FLAGS_OUT, "Array(int64, 2, 'C', readonly=True)", CELLS, FLAGS, FLOATS, COUNT, COUNT, FLOAT)
 def find_long(
     found: BoolArray,
@@ -128,15 +87,9 @@ def find_long(
 ) -> None:
     """Tells which cells lie near one that has been an edge for long.
 
-    Args:
-        found: (k,) whether each is; written.
-        cells: (k, 2) their columns and rows; what lies off the grid counts as lying at its border.
-        slots: of all cells, column after column; negative where there is none.
-        edges: by slot, whether each is an edge,
-        since_s: and since when.
-        columns: of the grid.
-        reach: so many columns and rows further is near.
-        until_s: an edge for long has been one since then.
+    (k, 2) `cells` are columns and rows, of which `reach` more to each side are near; what lies off the grid counts as
+    lying at its border. `slots` are those of all cells, column after column, negative where there is none; by slot is
+    told whether it is an edge, and since when. An edge for long has been one since `until_s`.
     """
     rows = len(slots) // columns
     for i in range(len(cells)):

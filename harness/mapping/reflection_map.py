@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.mapping.edge_grid import EdgeGrid
-from harness.mapping.reflection_counting import count_rays, decide, find_long
+from harness.mapping.reflection_counting import count_rays, find_long
 from harness.mapping.scan import RangeScan, all_round, clockwise_from
 from harness.mapping.scan_comparison import near_any
 from planner.interface import BoolArray, FloatArray
@@ -186,14 +186,15 @@ class ReflectionMap:
         return slots
 
     def _decide(self, slots: NDArray[np.int32]) -> None:
-        was, now = self._edge[slots], np.empty(len(slots), dtype=np.bool_)
-        limits = LEAST_STOPPED, self._least_share, STOPPED_SHORT, DOUBT
-        decide(now, slots, self._counts, self._edge, *limits)
+        """Tells which cells are edges now."""
+        counts, was = self._counts[slots], self._edge[slots]
+        stopped = counts[:, 0] + np.float32(STOPPED_SHORT) * counts[:, 2]
+        reached, share = stopped + counts[:, 1], np.where(was, DOUBT, 1.0)
+        now = (stopped >= share * LEAST_STOPPED) & (stopped >= share * self._least_share * reached)
         changed = (now != was).nonzero()[0]
         if len(changed):
             self.revision += 1
-            gone = was[changed].any()
             self._edge[slots[changed]] = now[changed]
             self._since[slots[changed]], self._since_s[slots[changed]] = self.revision, self._time_s
-            if gone:
+            if was[changed].any():
                 self.last_removal_revision = self.revision

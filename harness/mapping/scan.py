@@ -156,13 +156,7 @@ def _beside(ranges: FloatArray, ray: int, step: int, closed: bool, lossy: bool) 
 def _side(ranges: FloatArray, ray: int, beam_rad: float, noise_m: float, closed: bool, lossy: bool) -> float:
     """Where within a beam its return comes from: 1 its right side, -1 its left side, 0 the axis.
 
-    Args:
-        ranges: of all beams.
-        ray: one that returned something.
-        beam_rad: its width.
-        noise_m: standard deviation of ranges.
-        closed: the last beam is the neighbour of the first.
-        lossy: returns get lost.
+    `closed`: the last beam is the neighbour of the first. `lossy`: returns get lost.
     """
     own = ranges[ray]
     before, after = _beside(ranges, ray, -1, closed, lossy), _beside(ranges, ray, 1, closed, lossy)

@@ -86,15 +86,7 @@ def count_looked_through(
 ) -> int:
     """How many places a scan looked through, surely: with the ray towards each and some to either side.
 
-    Args:
-        through: (k,) all false; those that it looked through become true.
-        scan: the scan.
-        places: (k,) places.
-        sure_m: how much further than a place the rays went.
-        abreast: so many rays to either side.
-        aimed_m: how near the ray passes by a place, if it is to say anything about it.
-        within_m: how far away it says anything.
-        every: only so many places on is one asked: one is among as many in a row.
+    Arguments are those of `through_places`: those of (k,) places that were looked through become true in `through`.
     """
     return through_places(
         through,

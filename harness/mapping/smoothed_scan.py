@@ -55,12 +55,8 @@ def _medians(ring: FloatArray, rays: IntArray, half: int) -> FloatArray:
 def find_medians(medians: FloatArray, ring: FloatArray, rays: IntArray, offset: int, width: int) -> None:
     """Medians of stretches of a list of ranges; of an even number the lower of the two in the middle.
 
-    Args:
-        medians: (k,) of what was returned, infinite where no more than half was; written.
-        ring: ranges, infinite where nothing was returned.
-        rays: (k,) each stretch begins so far behind `offset`.
-        offset: into the list.
-        width: of the stretches.
+    (k,) `medians` are written, infinite where no more than half of a stretch returned anything. Each stretch of `width`
+    begins `offset` behind one of the `rays` in `ring`.
     """
     ordered = np.empty(width)
     for i in range(len(rays)):

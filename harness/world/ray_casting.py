@@ -88,12 +88,8 @@ def _tried(
 ) -> tuple[int, int, int]:
     """Beams whose axes lie between two bearings: of one span the first and after the last, and of one from 0 on.
 
-    Args:
-        bearing_rad: from the nose, the one to the left.
-        width_rad: how far clockwise from there the other is.
-        first_rad: bearing of the axis of beam 0 from the nose.
-        spacing_rad: of the axes.
-        rays: how many beams.
+    The left one is at `bearing_rad` from the nose, the other `width_rad` clockwise from there, the axis of beam 0 at
+    `first_rad`.
     """
     first = (bearing_rad - first_rad) % math.tau / spacing_rad
     last = first + width_rad / spacing_rad
@@ -124,12 +120,7 @@ def _between(left: complex, right: complex, to_right: float, ahead: float) -> bo
 def _along_to_circle(ray: complex, right: float, ahead: float, radius: float, outside: bool) -> float:
     """Distance along a ray to a circle, from inside to the way out; +inf where it does not meet it.
 
-    Args:
-        ray: unit vector.
-        right: of the centre, from the sensor.
-        ahead: of the centre, from the sensor.
-        radius: of the circle.
-        outside: the sensor is.
+    Its centre lies to the right and ahead of the sensor, which may be `outside`.
     """
     beside = abs(_side(ray, right, ahead))
     if beside > radius:
@@ -139,7 +130,7 @@ def _along_to_circle(ray: complex, right: float, ahead: float, radius: float, ou
     return distance if distance >= 0.0 else math.inf
 
 
-@compiled(FLOATS_OUT, PLACES, PLACES, FACES, BOOL, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(FLOATS_OUT, PLACES, PLACES, FACES, BOOL, *[FLOAT] * 8)
 def _lower_to_circles(
     ranges: FloatArray,
     left: ComplexArray,
@@ -157,20 +148,10 @@ def _lower_to_circles(
 ) -> None:
     """Lowers ranges to circles.
 
-    Args:
-        ranges: of all beams, m.
-        left: unit vectors of their sides as the nose sees them, to its right + i ahead,
-        right: and of their other sides.
-        circles: (3, c) as `Faces` has them.
-        touching: the right side of each beam is the left side of the next.
-        east: of the sensor.
-        north: of the sensor.
-        cos: of its heading,
-        sin: and the sine.
-        range_m: nothing is met beyond it.
-        first_rad: bearing of the axis of beam 0 from the nose.
-        spacing_rad: of the axes.
-        beam_rad: width of the beams.
+    `left` and `right` are unit vectors of the sides of the beams as the nose sees them, to its right + i ahead; of
+    beams that are `touching` the right side of each is the left side of the next. (3, c) `circles` are those of
+    `Faces`. The sensor is at east and north, its heading has `cos` and `sin`; `first_rad` is the bearing of the axis of
+    beam 0.
     """
     rays = len(ranges)
     for circle in range(circles.shape[1]):
@@ -232,7 +213,7 @@ def _along_to_edge(
     return distance if distance >= 0.0 else math.inf
 
 
-@compiled(FLOATS_OUT, PLACES, PLACES, FACES, BOOL, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(FLOATS_OUT, PLACES, PLACES, FACES, BOOL, *[FLOAT] * 8)
 def _lower_to_edges(
     ranges: FloatArray,
     left: ComplexArray,
@@ -291,14 +272,7 @@ def _lower_to_edges(
 
 @compiled(FACES, FACES, FLOAT, FLOAT, unchecked=True)  # every scan begins with it
 def nearest_face_m(circles: FloatArray, edges: FloatArray, east: float, north: float) -> float:
-    """Distance from a place to the nearest face, ahead or not; +inf where there is none.
-
-    Args:
-        circles: (3, c) as `Faces` has them,
-        edges: (4, e) and these.
-        east: of the place, m.
-        north: of the place, m.
-    """
+    """Distance from a place to the nearest face, ahead or not; +inf where there is none."""
     nearest = math.inf
     for i in range(circles.shape[1]):
         away = math.hypot(circles[0, i] - east, circles[1, i] - north) - circles[2, i]

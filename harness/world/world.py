@@ -295,11 +295,7 @@ class World:
     def _reach(self, some: int, east: float, north: float, slack: float) -> float:
         """So near to a place are all standing obstacles that may be the nearest to a point within a slack of it.
 
-        Args:
-            some: any of the standing obstacles; the nearer, the less.
-            east: of the place, m.
-            north: of the place, m.
-            slack: m.
+        `some` is any of the standing obstacles; the nearer, the less.
         """
         probe = self.obstacles[self._standing[some]]
         nearest = float(probe.distance(np.array([[east, north]]), np.zeros(1))[0])
