@@ -1,11 +1,18 @@
-"""The square grid that edge points lie on, one a cell."""
+"""Edge points on a square grid of cells, which both maps of what stands still keep."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.mapping.scan_comparison import near_any
+from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
+
 MOST_CELLS = 16_000_000
+"""Cells are wider than a quarter of the clearance where more of them would be needed."""
 
 
 @dataclass(frozen=True)
@@ -35,3 +42,79 @@ class EdgeGrid:
             math.ceil((high - low + 2.0 * border) / cell) for low, high in ((xmin, xmax), (ymin, ymax))
         )
         return EdgeGrid(cell, complex(xmin - border, ymin - border), columns, rows)
+
+
+class EdgePoints:
+    """Points by slot, in the order in which they came, and the revision of the set of those that are edges.
+
+    Args:
+        grid: that they lie on.
+        range_m: sensing range.
+        revision: to count from, where the map follows another one.
+    """
+
+    def __init__(self, grid: EdgeGrid, range_m: float, revision: int) -> None:
+        self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
+        self._range = range_m
+        self._count = 0
+        self._points = np.zeros(1024, dtype=np.complex128)
+        self._since = np.zeros(1024, dtype=np.int64)  # revision at which each last became an edge
+        self.revision = revision
+        """Grows with every change of the set of edge points."""
+        self.last_removal_revision = revision
+        """The last revision at which edge points were taken away again."""
+        self._near = np.zeros(0, dtype=np.int32)
+        self._near_at, self._near_count = complex(math.inf, math.inf), 0
+
+    @property
+    def spacing_m(self) -> float:
+        """Edge points of one wall are about this far apart."""
+        return self._cell
+
+    def _are_edges(self, slots: IntArray) -> BoolArray:
+        """(k,) which slots hold an edge."""
+        raise NotImplementedError
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """(k, 2) edge points that came in after `revision`, in the order in which they did."""
+        if revision >= self.revision:
+            return np.zeros((0, 2))
+        slots = (self._since[: self._count] > revision).nonzero()[0]
+        slots = slots[self._are_edges(slots)]
+        if revision < self.revision - 1:  # else all came in at once
+            slots = slots[np.argsort(self._since[slots], kind="stable")]
+        return self._points[slots].view(np.float64).reshape(-1, 2)
+
+    def _slots_within(self, points_m: FloatArray, within_m: float) -> IntArray:
+        """Slots of all that is no further from some points, (k, 2)."""
+        places = points_m[:, 0] + 1j * points_m[:, 1]
+        return near_any(self._points[: self._count], places, within_m).nonzero()[0]
+
+    def _make_room(self, slots: int, *names: str) -> None:
+        """Arrays by slot get room for as many slots, and as much again; what is new is 0."""
+        for name in names:
+            array = getattr(self, name)
+            if slots > len(array):
+                size = max(2 * len(array), slots) - len(array)
+                setattr(self, name, np.concatenate((array, np.zeros((size, *array.shape[1:]), array.dtype))))
+
+    def _note_removal(self) -> None:
+        """Counts that edges were taken away."""
+        self.revision += 1
+        self.last_removal_revision = self.revision
+
+    def _column_and_row(self, places: ComplexArray) -> tuple[IntArray, IntArray, BoolArray]:
+        """Cells of places seen from the corner of the grid, and which of them lie on it."""
+        column, row = (places.view(np.float64).reshape(-1, 2).T * (1.0 / self._cell)).astype(np.int64)
+        return column, row, (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
+
+    def _in_reach(self, sensor: complex, renewed_m: float) -> NDArray[np.int32]:
+        """Slots of points that are no further than the range, and some more; looked up anew after a way."""
+        if not abs(sensor - self._near_at) < renewed_m:
+            near = np.abs(self._points[: self._count] - sensor) < self._range + renewed_m
+            self._near = near.nonzero()[0].astype(np.int32)
+            self._near_at, self._near_count = sensor, self._count
+        if self._near_count < self._count:
+            more = np.arange(self._near_count, self._count, dtype=np.int32)
+            self._near, self._near_count = np.concatenate((self._near, more)), self._count
+        return self._near

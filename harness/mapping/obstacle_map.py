@@ -15,10 +15,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.mapping.edge_grid import EdgeGrid
+from harness.mapping.edge_grid import EdgeGrid, EdgePoints
 from harness.mapping.hit_counting import CONFIRMED, count_hits, ends, new_edges
 from harness.mapping.scan import RangeScan, all_round, supported
-from harness.mapping.scan_comparison import count_looked_through, near_any
+from harness.mapping.scan_comparison import count_looked_through
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 SUPPORT = 0.5
@@ -42,7 +42,7 @@ LOOK_THROUGH_EVERY = 6
 other time only where none was the last time."""
 
 
-class ObstacleMap:
+class ObstacleMap(EdgePoints):
     """What stands still, as a sensor with exact ranges shows it (`harness.mapping.sensed_map.Edges`).
 
     Args:
@@ -65,40 +65,23 @@ class ObstacleMap:
         revision: int = 0,
         shifted: bool = False,
     ) -> None:
-        grid = EdgeGrid.over(bounds_m, clearance_m)
-        self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
+        super().__init__(EdgeGrid.over(bounds_m, clearance_m), range_m, revision)
         self._coarse = self._nx * self._ny
         # Fine cells that were hit, numbered after the coarse ones.
         self._fine: dict[tuple[int, int, int], int] = {}
         self._score = np.zeros(self._coarse + 1024, dtype=np.int8)  # by cell
         self._slot = np.full(self._coarse + 1024, -1, dtype=np.int32)  # by cell, -1 where there is no point
-        self._points = np.zeros(1024, dtype=np.complex128)  # by slot
         self._key = np.zeros(1024, dtype=np.int64)  # by slot: its cell
-        self._since = np.zeros(1024, dtype=np.int64)  # by slot: revision at which it last became an edge
-        self._count = 0
         self._join = 2.0 * clearance_m
         self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
-        self._range = range_m
         self._doubtful, self._first_score = doubtful, 1 if doubtful else CONFIRMED
         self._shifted, self._scanned_at = shifted, 0j  # the latter: from where the scan before was taken
         self._seen_from_m = np.zeros(0)  # by slot: least range at which it was seen, where poses err
-        self.revision = revision
-        """Grows with every change of the set of edge points."""
-        self.last_removal_revision = revision
-        """The last revision at which edge points were taken away again."""
         self._scans = 0
         self._all_stands = True  # no point was looked through the last time
         self._unconfirmed = False  # a cell was hit in the last scan taken in, and has yet to be believed
         self._same_view = max(SAME_VIEW * range_m, self._cell)
         self._taken_at, self._taken_nearest = complex(math.inf, math.inf), math.inf
-        self._near = np.zeros(0, dtype=np.int32)
-        self._near_at = complex(math.inf, math.inf)
-        self._near_count = 0
-
-    @property
-    def spacing_m(self) -> float:
-        """Edge points of one wall are about this far apart."""
-        return self._cell
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
         """Takes in one scan, but for some of its rays."""
@@ -119,26 +102,17 @@ class ObstacleMap:
             self._all_stands = not self._look_through(scan)
         self._scans += 1
 
-    def edges_since(self, revision: int) -> FloatArray:
-        """(k, 2) edge points that came in after `revision`, in the order in which they did."""
-        if revision >= self.revision:
-            return np.zeros((0, 2))
-        slots = (self._since[: self._count] > revision).nonzero()[0]
-        slots = slots[self._score[self._key[slots]] >= CONFIRMED]
-        if revision < self.revision - 1:  # else all came in at once
-            slots = slots[np.argsort(self._since[slots], kind="stable")]
-        return _pairs(self._points[slots])
+    def _are_edges(self, slots: IntArray) -> BoolArray:
+        confirmed: BoolArray = self._score[self._key[slots]] >= CONFIRMED
+        return confirmed
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Forgets all that is no further from some points, (k, 2)."""
-        slots = near_any(
-            self._points[: self._count], points_m[:, 0] + 1j * points_m[:, 1], within_m
-        ).nonzero()[0]
+        slots = self._slots_within(points_m, within_m)
         slots = slots[self._score[self._key[slots]] > 0]
         if len(slots):
             self._score[self._key[slots]] = 0
-            self.revision += 1
-            self.last_removal_revision = self.revision
+            self._note_removal()
 
     def _take_in(self, scan: RangeScan, nearest_m: float, ignored: BoolArray | None) -> None:
         """Counts hits; where they are new, also what lies between them; and near outlines in detail.
@@ -152,8 +126,7 @@ class ObstacleMap:
         if self._shifted:
             self._place_anew(scan, scan.ranges_m[hits], places)
         if not self._holds(scan):
-            column, row = self._column_and_row(places)
-            on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
+            _, _, on_grid = self._column_and_row(places)
             hits, places = hits[on_grid], places[on_grid]
             if not len(hits):
                 return
@@ -177,7 +150,7 @@ class ObstacleMap:
                 cells, found = np.concatenate((cells, fine)), np.concatenate((found, at))
                 if first < CONFIRMED:
                     # Where the wall is known, this only tells where it ends: once is enough.
-                    column, row = self._column_and_row(at)
+                    column, row, _ = self._column_and_row(at)
                     sure = self._score[column * self._ny + row] >= CONFIRMED
                     again.append((fine[sure], at[sure]))
         for each in ((cells, found), *again):
@@ -191,9 +164,8 @@ class ObstacleMap:
         new = self._points[len(self._seen_from_m) : self._count]  # came in with the scan before
         self._seen_from_m = np.concatenate((self._seen_from_m, np.abs(new - self._scanned_at)))
         self._scanned_at = complex(scan.east_m, scan.north_m)
-        column, row = self._column_and_row(places)
-        near = (ranges_m < PLACED_ANEW * self._clearance) & (column >= 0) & (column < self._nx)
-        among = (near & (row >= 0) & (row < self._ny)).nonzero()[0]
+        column, row, on_grid = self._column_and_row(places)
+        among = (on_grid & (ranges_m < PLACED_ANEW * self._clearance)).nonzero()[0]
         cells, first = np.unique(column[among] * self._ny + row[among], return_index=True)
         held = self._slot[cells] >= 0
         hits, slots = among[first[held]], self._slot[cells[held]]
@@ -216,11 +188,6 @@ class ObstacleMap:
         hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
         return hits, scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
 
-    def _column_and_row(self, places: ComplexArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Cells of places seen from the corner of the grid."""
-        cells = (places.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
-        return cells[::2], cells[1::2]
-
     def _holds(self, scan: RangeScan) -> bool:
         """Whether all that a scan can reach lies on the grid."""
         reach, x, y = scan.max_range_m, scan.east_m - self._origin.real, scan.north_m - self._origin.imag
@@ -230,7 +197,7 @@ class ObstacleMap:
     def _count_hits(self, cells: IntArray, places: ComplexArray) -> None:
         if not len(cells):
             return
-        self._grow(len(cells))
+        self._make_room(self._count + len(cells), "_points", "_key", "_since")
         by_slot = self._points, self._key, self._since, self._count
         self._count, self.revision, unconfirmed = count_hits(
             cells, places, self._score, self._slot, *by_slot, self.revision, self._first_score, self._origin
@@ -248,25 +215,10 @@ class ObstacleMap:
             self._slot = np.concatenate((self._slot, np.full(more, -1, dtype=np.int32)))
         return np.array(keys, dtype=np.int64)
 
-    def _grow(self, more: int) -> None:
-        if self._count + more <= len(self._key):
-            return
-        size = max(2 * len(self._key), self._count + more)
-        self._points = np.resize(self._points, size)
-        self._key = np.resize(self._key, size)
-        self._since = np.resize(self._since, size)
-
     def _look_through(self, scan: RangeScan) -> bool:
         """Takes a point off every known point that three neighbouring rays looked past; whether any was."""
         sensor = complex(scan.east_m, scan.north_m)
-        if not abs(sensor - self._near_at) < self._range / 8.0:
-            near = np.abs(self._points[: self._count] - sensor) < 1.125 * self._range
-            self._near = near.nonzero()[0].astype(np.int32)
-            self._near_at, self._near_count = sensor, self._count
-        if self._near_count < self._count:
-            more = np.arange(self._near_count, self._count, dtype=np.int32)
-            self._near, self._near_count = np.concatenate((self._near, more)), self._count
-        slots = self._near
+        slots = self._in_reach(sensor, self._range / 8.0)
         through = np.zeros(len(slots), dtype=np.bool_)
         # Only a ray that passes close by says anything about a point.
         if not count_looked_through(
@@ -284,8 +236,7 @@ class ObstacleMap:
         if len(weaker):
             self._score[weaker] -= 1
             if (self._score[weaker] == CONFIRMED - 1).any():
-                self.revision += 1
-                self.last_removal_revision = self.revision
+                self._note_removal()
                 # What was seen from afar to be somewhere in a beam is elsewhere: the next scan tells where.
                 self._taken_at = complex(math.inf, math.inf)
         return len(weaker) > 0

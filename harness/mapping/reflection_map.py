@@ -15,11 +15,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.mapping.edge_grid import EdgeGrid
+from harness.mapping.edge_grid import EdgeGrid, EdgePoints
 from harness.mapping.reflection_counting import count_rays, find_long
 from harness.mapping.scan import RangeScan, all_round, clockwise_from
-from harness.mapping.scan_comparison import near_any
-from planner.interface import BoolArray, FloatArray
+from planner.interface import BoolArray, FloatArray, IntArray
 
 LEAST_STOPPED = 5.0
 """An edge stopped so many rays at least."""
@@ -38,7 +37,7 @@ STOOD_S = 20.0
 NO_RAYS = np.zeros(0, dtype=np.bool_)
 
 
-class ReflectionMap:
+class ReflectionMap(EdgePoints):
     """What stands still, as a sensor with noisy ranges shows it (`harness.mapping.sensed_map.Edges`).
 
     Args:
@@ -57,38 +56,18 @@ class ReflectionMap:
         noise_m: float,
         revision: int = 0,
     ) -> None:
-        grid = EdgeGrid.over(bounds_m, clearance_m)
-        self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
-        self._noise, self._range = noise_m, range_m
+        super().__init__(EdgeGrid.over(bounds_m, clearance_m), range_m, revision)
+        self._noise = noise_m
         self._least_share = min(REFLECTIVITY, HAZARD * self._cell / noise_m)
-        self._slot = np.full(self._nx * self._ny, -1, dtype=np.int32)  # by cell
-        self._count = 0
-        self._points = np.zeros(1024, dtype=np.complex128)  # by slot, as all that follows: middle of the cell
-        self._counts = np.zeros(
-            (1024, 3), dtype=np.float32
-        )  # rays it stopped, let through, that ended before
+        self._slot = np.full(self._nx * self._ny, -1, dtype=np.int32)  # by cell; points are middles of cells
+        # By slot: rays that it stopped, that it let through, that ended before it; whether it is an edge, since when.
+        self._counts = np.zeros((1024, 3), dtype=np.float32)
         self._edge = np.zeros(1024, dtype=np.bool_)
-        self._since = np.zeros(1024, dtype=np.int64)  # revision at which it last became an edge
-        self._since_s = np.zeros(1024)  # and when
+        self._since_s = np.zeros(1024)
         self._time_s = 0.0
-        self.revision = self.last_removal_revision = (
-            revision  # as `harness.mapping.sensed_map.Edges` has them
-        )
-        self._near = np.zeros(0, dtype=np.int32)
-        self._near_at = complex(math.inf, math.inf)
-        self._near_count = 0
 
-    @property
-    def spacing_m(self) -> float:
-        """Edge points of one wall are about this far apart."""
-        return self._cell
-
-    def edges_since(self, revision: int) -> FloatArray:
-        """(k, 2) edge points that came in after `revision`, in the order in which they did."""
-        since = self._since[: self._count]
-        slots = ((since > revision) & self._edge[: self._count]).nonzero()[0]
-        points = self._points[slots[np.argsort(since[slots], kind="stable")]]
-        return points.view(np.float64).reshape(-1, 2)
+    def _are_edges(self, slots: IntArray) -> BoolArray:
+        return self._edge[slots]
 
     def stands(self, points_m: FloatArray, since_s: float = STOOD_S) -> BoolArray:
         """(k,) which of (k, 2) places lie no further than ranges err from a cell that has been an edge so long."""
@@ -108,31 +87,20 @@ class ReflectionMap:
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Forgets all that is no further from some points, (k, 2)."""
-        slots = near_any(
-            self._points[: self._count], points_m[:, 0] + 1j * points_m[:, 1], within_m
-        ).nonzero()[0]
+        slots = self._slots_within(points_m, within_m)
         if len(slots):
             self._counts[slots] = 0.0
             self._edge[slots] = False
-            self.revision += 1
-            self.last_removal_revision = self.revision
+            self._note_removal()
 
-    def _add_cells(self, scan: RangeScan, hits: NDArray[np.intp]) -> None:
+    def _add_cells(self, scan: RangeScan, hits: IntArray) -> None:
         """Cells that returned a ray for the first time get a slot."""
         places = scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
-        column, row = (places.view(np.float64).reshape(-1, 2).T / self._cell).astype(np.int64)
-        on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
+        column, row, on_grid = self._column_and_row(places)
         keys = np.unique(column[on_grid] * self._ny + row[on_grid])
         fresh = keys[self._slot.take(keys) < 0]
         end = self._count + len(fresh)
-        if end > len(self._points):
-            size = max(2 * len(self._points), end)
-            more = size - len(self._points)
-            self._points = np.concatenate((self._points, np.zeros(more, dtype=np.complex128)))
-            self._counts = np.concatenate((self._counts, np.zeros((more, 3), dtype=np.float32)))
-            self._edge = np.concatenate((self._edge, np.zeros(more, dtype=np.bool_)))
-            self._since = np.concatenate((self._since, np.zeros(more, dtype=np.int64)))
-            self._since_s = np.concatenate((self._since_s, np.zeros(more)))
+        self._make_room(end, "_points", "_since", "_counts", "_edge", "_since_s")
         new = np.arange(self._count, end, dtype=np.int32)
         self._slot[fresh] = new
         column, row = np.divmod(fresh, self._ny)
@@ -141,28 +109,15 @@ class ReflectionMap:
 
     def _ask_cells(self, scan: RangeScan, ignored: BoolArray | None) -> None:
         """Counts what the rays towards known cells did, and decides anew which cells are edges."""
-        slots = self._in_range(complex(scan.east_m, scan.north_m))
+        slots = self._in_reach(complex(scan.east_m, scan.north_m), self._range / 16.0)
         offsets = self._points.take(slots) - complex(scan.east_m, scan.north_m)
-        distance = np.abs(offsets)
-        position = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy()) / scan.spacing_rad
-        slots = self._counted(scan, ignored, slots, distance, position)
-        self._decide(slots)
-
-    def _counted(
-        self,
-        scan: RangeScan,
-        ignored: BoolArray | None,
-        slots: NDArray[np.int32],
-        distances: FloatArray,
-        positions: FloatArray,
-    ) -> NDArray[np.int32]:
-        """Slots of the cells that a ray was aimed at, which are counted."""
+        bearings = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
         counted = np.empty(len(slots), dtype=np.int32)
         many = count_rays(
             counted,
             slots,
-            distances,
-            positions,
+            np.abs(offsets),
+            bearings / scan.spacing_rad,
             scan.ranges_m,
             NO_RAYS if ignored is None else ignored,
             self._counts,
@@ -174,16 +129,7 @@ class ReflectionMap:
             FORGET_AT,
             all_round(scan),
         )
-        return counted[:many]
-
-    def _in_range(self, sensor: complex) -> NDArray[np.int32]:
-        """Slots of cells that a scan from here may tell something of."""
-        if not abs(sensor - self._near_at) < self._range / 16.0:
-            near = np.abs(self._points[: self._count] - sensor) < 1.07 * self._range
-            self._near = near.nonzero()[0].astype(np.int32)
-            self._near_at, self._near_count = sensor, self._count
-        slots = np.concatenate((self._near, np.arange(self._near_count, self._count, dtype=np.int32)))
-        return slots
+        self._decide(counted[:many])
 
     def _decide(self, slots: NDArray[np.int32]) -> None:
         """Tells which cells are edges now."""
