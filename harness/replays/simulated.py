@@ -27,8 +27,9 @@ from planner.interface import Path as PlannedPath
 
 DEFAULT_LAW: Final = "bearing"
 """Gain 1.5, and no switch by passing."""
-LATENCY_S: Final = 0.12
-"""Age of the state that the law works with: the delay that autopilots take for a satellite receiver."""
+LATENCY_S: Final = 0.2
+"""Age of the state that the law works with: what ArduPilot takes of a satellite receiver that it does not know
+(AP_GPS_Backend::get_lag), as a log does not tell which it was."""
 ABOUT_M: Final = 1000.0
 LOW_M: Final = 50.0
 UNKNOWN_ALTITUDE_M: Final = 300.0
