@@ -10,14 +10,23 @@ from __future__ import annotations
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 
 from harness.cli.app import main as wayproof
-from harness.recording.viewer import NO_DRIVER, ViewerError, screenshot
+from harness.recording.blueprint import TIMELINE
+from harness.recording.local_page import LOCALHOST
+from harness.recording.viewer import NO_DRIVER, ViewerError, free_port, viewer_process
 from tests.page import NoBrowserError, browser, shown
+
+SETTLE_S = 1.5
+"""The viewer draws a new time within a few frames; a software renderer needs about a second for them."""
+MOST_PICTURES = 20
+"""What goes on changing is drawn no more often than this."""
 
 ROOT = Path(__file__).parents[1]
 SIZE = (1800, 1040)
@@ -76,6 +85,43 @@ def make(out: Path, work: Path) -> Iterator[str]:
                 _keep(png, out)
     except NoBrowserError as error:
         print(f"skipped the pages: {error}")
+
+
+def screenshot(
+    rrd: Path, png: Path, time_s: float | None = None, size: tuple[int, int] = (1920, 1080)
+) -> list[str]:
+    """Draws a recording at a simulated time, without a screen; returns what its views complain of."""
+    from rerun.experimental import ViewerClient
+
+    port = free_port()
+    arguments = ["--headless", "--bind", LOCALHOST, "--port", str(port), "--hide-welcome-screen"]
+    with (
+        tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch,
+        viewer_process([*arguments, "--window-size", f"{size[0]}x{size[1]}"], Path(scratch), port),
+    ):
+        try:
+            client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
+            client.open(str(rrd.resolve()))
+            if time_s is not None:
+                client.set_time(TIMELINE, duration=time_s, play_state="paused")
+            time.sleep(SETTLE_S)
+            client.save_screenshot(str(png.resolve()))
+            return [str(report) for view in client.get_state().views for report in view.reports]
+        except ConnectionError as error:
+            # Without a driver it listens for a moment before it gives up.
+            raise ViewerError(NO_DRIVER) from error
+
+
+def draw_settled(client: Any, png: Path) -> None:
+    """Draws what a viewer shows once two pictures in a row are alike: until then rows may be on their way."""
+    time.sleep(SETTLE_S)
+    before = b""
+    for _ in range(MOST_PICTURES):
+        time.sleep(SETTLE_S)
+        client.save_screenshot(str(png))
+        if png.read_bytes() == before:
+            return
+        before = png.read_bytes()
 
 
 def _keep(png: Path, out: Path) -> None:

@@ -40,8 +40,8 @@ BELIEVED = "believed"
 """Below WORLD and PLAN: where the aircraft believed to be, as the trail; only where navigation is not perfect."""
 NAVIGATION = "navigation_error"
 """Below SERIES: likewise."""
-THROTTLE, RETURNS, PLAN_DELAY = "throttle", "returns", "plan_delay"
-"""Below SERIES: throttle in per cent, beams that returned something, how late plans took effect."""
+THROTTLE, PLAN_DELAY = "throttle", "plan_delay"
+"""Below SERIES: throttle in per cent, how late plans took effect."""
 SENSED = "sensed"
 """Below WORLD and PLAN: places on edges, each when it was sensed first; shown up to the cursor as well."""
 TRUE = "true_obstacles"
@@ -107,7 +107,6 @@ SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     "altitude_error/flown": ("altitude error", TRACK, 1.5),
     f"{NAVIGATION}/flown": ("navigation error", TRACK, 1.5),
     f"{THROTTLE}/flown": ("throttle", TRACK, 1.5),
-    f"{RETURNS}/flown": ("beams that returned something", TRACK, 1.0),
     BELIEVED_OFF: ("as believed", CHOSEN, 1.0),
 }
 """Name, colour and width of every line of the time series, by its entity below SERIES; of overlaid runs, only
@@ -218,7 +217,7 @@ class Scene:
     def empty_series(self) -> tuple[str, ...]:
         """Time series that have nothing to show: clearance where there is no obstacle, search where nothing is."""
         shown = {"clearance": bool(self.obstacles), NAVIGATION: self.believes}
-        shown |= dict.fromkeys(("search", PLAN_DELAY, RETURNS), self.searches)
+        shown |= dict.fromkeys(("search", PLAN_DELAY), self.searches)
         return tuple(name for name, has in shown.items() if not has)
 
     @cached_property

@@ -18,7 +18,6 @@ from harness.recording.blueprint import (
     NAVIGATION,
     PLAN,
     PLAN_DELAY,
-    RETURNS,
     SENSED,
     SERIES,
     STATES,
@@ -117,7 +116,7 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
 
 PLOTS: Final = (
     (4, ("cross_track", "altitude_error", NAVIGATION, "speed", THROTTLE)),
-    (4, ("clearance", "search", PLAN_DELAY, RETURNS)),
+    (4, ("clearance", "search", PLAN_DELAY)),
     (5, ("bank",)),
 )
 """Rows of the time series: share of the height, and names."""
@@ -220,7 +219,6 @@ def series_views(
         (THROTTLE, "Throttle, %", (-5.0, 105.0)),
         ("search", "Search, ms", None),
         (PLAN_DELAY, "Plan delay, s", None),
-        (RETURNS, "Returns per scan", None),
         ("bank", _bank_title(frame, whole) if one else "Bank, deg (right +)", _bank_range_deg(frame)),
     ]
     return [

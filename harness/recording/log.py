@@ -38,7 +38,7 @@ from harness.recording.scene import (
     send_believed,
 )
 from harness.recording.sensed import NewEdges, Sensed, returns_m
-from harness.recording.series import Returns, curves, send_curves, send_levels, thin_curves, thin_rows
+from harness.recording.series import curves, send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_2d, strips_3d
 from harness.recording.states import (
     AT_LIMIT,
@@ -123,7 +123,7 @@ class RerunLog:
         self._whole: list[FloatArray] = []
         self._last: Track | None = None
         self._known_to_move, self._tracked = moving, Tracked()
-        self._changing, self._returns = Changing(scene), Returns()
+        self._changing = Changing(scene)
         self._nearness = Nearness(scene.limits.clearance_m)
         log_scene(self._rec, scene, thin)
         log_plan_style(self._rec, thin)
@@ -145,7 +145,6 @@ class RerunLog:
         if self._thin:
             return
         self._scan = scan
-        self._returns.take(scan)
         self._tracked.take(scan.time_s, self._known_to_move())
         if scan.time_s - self._scan_drawn_s >= self._scan_period_s:
             self._draw(scan)
@@ -293,7 +292,6 @@ class RerunLog:
         scans, plans = self._scans, self._plans
         self._scans, self._plans = [], []
         self._tracked.send(self._rec)
-        self._returns.send(self._rec)
         send_plans(self._rec, plans, self._scene.held_m, self._chord_error_m, self._thin)
         if scans:
             points = [returns_m(scan) for scan in scans]

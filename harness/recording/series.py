@@ -1,19 +1,15 @@
-"""The time series of a recording: curves of the track, the levels they are held against, returns scan by scan."""
+"""The time series of a recording: curves of the track, the levels they are held against."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
 
 from harness.flight.record import FloatArray, IntArray, Track
 from harness.recording import blueprint as look
-
-if TYPE_CHECKING:
-    from harness.mapping.scan import RangeScan
 
 
 def thin_curves(block: Track) -> dict[str, FloatArray]:
@@ -64,30 +60,3 @@ def send_levels(rec: rr.RecordingStream, scene: look.Scene, time_s: FloatArray) 
     levels = {"clearance/wanted": wanted} if "clearance" not in scene.empty_series else {}
     levels |= {"bank/limit": np.tile((-limit_deg, limit_deg), (2, 1))}
     send_curves(rec, levels, time_s[[0, -1]])
-
-
-class Returns:
-    """Counts the beams that returned something, scan by scan.
-
-    Of a perfect sensor only scans that somebody has read are counted, and those without any return: to follow the rays
-    of the others would cost more than all else that is recorded.
-    """
-
-    def __init__(self) -> None:
-        self._scans: list[RangeScan] = []
-
-    def take(self, scan: RangeScan) -> None:
-        """Takes a scan."""
-        self._scans.append(scan)
-
-    def send(self, rec: rr.RecordingStream) -> None:
-        """Sends the counts of the scans since the last time."""
-        scans, self._scans = self._scans, []
-        counts = {
-            scan.time_s: np.count_nonzero(scan.ranges_m < math.inf) if scan.nearest_m < math.inf else 0
-            for scan in scans
-            if scan.followed or scan.nearest_m == math.inf
-        }
-        if counts:
-            values = np.array([*counts.values()], dtype=np.float64)
-            send_curves(rec, {f"{look.RETURNS}/flown": values}, np.array([*counts]))

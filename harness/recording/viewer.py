@@ -25,18 +25,11 @@ from urllib.parse import quote
 
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
-from harness.recording.blueprint import TIMELINE
 from harness.recording.local_page import LOCALHOST, local_page
 from harness.recording.overlay import send_recording, write_overlay
 from harness.run_files.run_folder import OVERLAY, RECORDING, recording_of
 
 START_TIMEOUT_S = 30.0
-SETTLE_S = 1.5
-"""The viewer draws a new time within a few frames; a software renderer needs about a second for them."""
-MOST_PICTURES = 20
-"""What goes on changing is drawn no more often than this."""
-
-
 ALONE = ".rrd"
 LOG = "viewer.log"
 NO_SCREEN = (
@@ -198,48 +191,6 @@ def run_names(run_dirs: Sequence[Path]) -> list[str]:
     ]
 
 
-def screenshot(
-    rrd: Path, png: Path, time_s: float | None = None, size: tuple[int, int] = (1920, 1080)
-) -> list[str]:
-    """Draws a recording as its viewer would show it, without a screen.
-
-    Needs a Vulkan driver; Debian's package `mesa-vulkan-drivers` has one that does without graphics hardware.
-
-    Args:
-        rrd: the recording.
-        png: picture to write.
-        time_s: simulated time of the cursor; None: where the recording opens.
-        size: width and height in pixels.
-
-    Returns:
-        What the views complained about; empty for a sound recording.
-
-    Raises:
-        ViewerError: no such recording, or no driver.
-    """
-    if not rrd.is_file():
-        raise ViewerError(f"no recording {rrd}")
-    from rerun.experimental import ViewerClient
-
-    port = free_port()
-    arguments = ["--headless", "--bind", LOCALHOST, "--port", str(port), "--hide-welcome-screen"]
-    with (
-        tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch,
-        viewer_process([*arguments, "--window-size", f"{size[0]}x{size[1]}"], Path(scratch), port),
-    ):
-        try:
-            client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
-            client.open(str(rrd.resolve()))
-            if time_s is not None:
-                client.set_time(TIMELINE, duration=time_s, play_state="paused")
-            time.sleep(SETTLE_S)
-            client.save_screenshot(str(png.resolve()))
-            return [str(report) for view in client.get_state().views for report in view.reports]
-        except ConnectionError as error:
-            # Without a driver it listens for a moment before it gives up.
-            raise ViewerError(NO_DRIVER) from error
-
-
 def _executable() -> str:
     """The viewer's own program; the wheel's `rerun` command only wraps it and would leave it behind."""
     spec = find_spec("rerun_cli")
@@ -353,15 +304,3 @@ def answers(port: int, viewer: subprocess.Popen[str]) -> bool:
             return True
         time.sleep(0.05)
     return False
-
-
-def draw_settled(client: Any, png: Path) -> None:
-    """Draws what a viewer shows once two pictures in a row are alike: until then rows may be on their way."""
-    time.sleep(SETTLE_S)
-    before = b""
-    for _ in range(MOST_PICTURES):
-        time.sleep(SETTLE_S)
-        client.save_screenshot(str(png))
-        if png.read_bytes() == before:
-            return
-        before = png.read_bytes()

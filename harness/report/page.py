@@ -9,10 +9,8 @@ from typing import Any
 
 import jinja2
 
-from harness.analysis.causes import FINDINGS
-from harness.analysis.metric import Metric, number
+from harness.analysis.metric import Metric
 from harness.analysis.rows import DASH, Row, shown_figures
-from harness.report.remarks import Remark
 
 
 @dataclass(frozen=True)
@@ -72,76 +70,6 @@ def report_html(
         versions=versions,
         written=written,
         kinematic=kinematic,
-    )
-
-
-@dataclass(frozen=True)
-class JudgedBy:
-    """A figure of a leg that has a limit.
-
-    Attributes:
-        figure: its name in `trackability` of `metrics.json`.
-        label: what people are shown, with its unit.
-        most: the limit.
-    """
-
-    figure: str
-    label: str
-    most: float
-
-    def exceeded(self, leg: Mapping[str, Any]) -> bool:
-        """Whether a leg is over the limit; not where it has no such figure."""
-        value = leg.get(self.figure)
-        return value is not None and value > self.most
-
-
-def run_html(
-    chapter: Chapter,
-    legs: Sequence[Mapping[str, Any]],
-    checked: Mapping[str, Any] | None,
-    *,
-    judged: Sequence[JudgedBy],
-    remarks: Sequence[Remark],
-    aircraft: str,
-    scenario_yaml: str,
-    command: str,
-    versions: Mapping[str, str],
-    platform: str,
-    written: str,
-) -> str:
-    """The text of a single run's `report.html`.
-
-    Args:
-        chapter: with one row, and the figures of the path and of its profiles.
-        legs: `trackability` of `metrics.json`.
-        checked: `metrics.json` of a path that was given; None where a planner made the path.
-        judged: what else than the distance from the path legs were judged by.
-        remarks: what is said before the figures.
-        aircraft: its name.
-        scenario_yaml: the scenario as flown.
-        command: the command line that flew it.
-        versions: what flew, by name.
-        platform: what it flew on.
-        written: date and time of the flight.
-    """
-    lost = [leg for leg in legs if not leg["trackable"]]
-    return rendered(
-        "run.html",
-        chapter=chapter,
-        row=chapter.rows[0],
-        number=number,
-        legs=legs,
-        lost=lost,
-        findings={cause: FINDINGS[cause] for cause in FINDINGS if cause in {leg["cause"] for leg in lost}},
-        exceeded=[each for each in judged if any(map(each.exceeded, lost))],
-        checked=checked,
-        remarks=remarks,
-        aircraft=aircraft,
-        scenario_yaml=scenario_yaml,
-        command=command,
-        versions=versions,
-        platform=platform,
-        written=written,
     )
 
 

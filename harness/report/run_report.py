@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from harness.analysis.causes import FINDINGS
 from harness.analysis.findings import CONTRADICTED
+from harness.analysis.metric import number
 from harness.analysis.rows import escaped, to_csv, to_markdown
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.errors import RunFolderError
@@ -13,7 +17,7 @@ from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.files.wording import printable
 from harness.report.chapters import entry, optimum_of, run_chapter
-from harness.report.page import JudgedBy, run_html
+from harness.report.page import rendered
 from harness.report.remarks import Remark, remarks
 from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
 from harness.scenario.scenario import Scenario, parse_scenario
@@ -48,26 +52,28 @@ def _written(run: Run, folder: Path) -> Path:
         raise TypeError(f"command: must be text; got {type(line).__name__}")
     _, *arguments = shlex.split(line)
     command = shlex.join(["wayproof", *_found_again(arguments, folder)])
-    versions = {name: version for name, version in manifest["versions"].items() if version}
-    text = run_html(
-        run_chapter(scenario, flight, optimum),
-        run.metrics["trackability"],
-        run.metrics if "check" in run.metrics else None,
-        judged=_judged_by(scenario),
-        remarks=[
-            Remark(each["kind"], each["text"] + _beside(optimum, each["kind"]))
-            for each in run.metrics.get("findings", ())
-        ]
-        + remarks(
-            flight.row,
-            scenario.planner.clearance_m or 0.0,
-            scenario.aircraft.airspeed_mps or 0.0,
-            given="check" in run.metrics,
-        ),
+    legs, given = run.metrics["trackability"], "check" in run.metrics
+    lost = [leg for leg in legs if not leg["trackable"]]
+    told = [
+        Remark(each["kind"], each["text"] + _beside(optimum, each["kind"]))
+        for each in run.metrics.get("findings", ())
+    ]
+    speed_mps, clearance_m = scenario.aircraft.airspeed_mps or 0.0, scenario.planner.clearance_m or 0.0
+    text = rendered(
+        "run.html",
+        chapter=run_chapter(scenario, flight, optimum),
+        row=flight.row,
+        number=number,
+        legs=legs,
+        lost=lost,
+        findings={cause: text for cause, text in FINDINGS.items() if cause in {leg["cause"] for leg in lost}},
+        exceeded=_exceeded(scenario, lost),
+        checked=run.metrics if given else None,
+        remarks=[*told, *remarks(flight.row, clearance_m, speed_mps, given=given)],
         aircraft=Path(scenario.aircraft.model).name,
         scenario_yaml=run.scenario_yaml,
         command=command,
-        versions=versions,
+        versions={name: version for name, version in manifest["versions"].items() if version},
         platform=manifest["platform"]["system"],
         written=manifest["started_utc"],
     )
@@ -88,15 +94,19 @@ def _beside(optimum: Optimum, kind: str) -> str:
     return f", the clairvoyant optimum {turned:.0f} deg"
 
 
-def _judged_by(scenario: Scenario) -> list[JudgedBy]:
-    """What legs were judged by, beside their distance from the path."""
+def _exceeded(scenario: Scenario, lost: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The limits that legs exceeded, beside the distance from the path: figure of `trackability`, label, limit."""
     limits = scenario.trackability
     given = (
         ("max_altitude_error_m", "altitude error, m", limits.altitude_m),
         ("max_airspeed_error_mps", "airspeed error, m/s", limits.airspeed_mps),
         ("max_load_factor", "load factor", limits.load_factor),
     )
-    return [JudgedBy(figure, label, most) for figure, label, most in given if most is not None]
+    return [
+        {"figure": figure, "label": label, "most": most}
+        for figure, label, most in given
+        if most is not None and any((leg.get(figure) or 0.0) > most for leg in lost)
+    ]
 
 
 def _found_again(arguments: list[str], folder: Path) -> list[str]:

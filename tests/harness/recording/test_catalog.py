@@ -22,9 +22,10 @@ from harness.recording.blueprint import Frame
 from harness.recording.catalog import catalog
 from harness.recording.log import RerunLog
 from harness.recording.properties import properties_of, run_properties, severity
-from harness.recording.viewer import NO_DRIVER, ViewerError, draw_settled
+from harness.recording.viewer import NO_DRIVER, ViewerError
 from harness.scenario.scenario import parse_scenario
 from tests.harness.recording.test_rerun_log import LIMITS, SCENE
+from tests.pictures import draw_settled
 
 SCENARIO = """\
 schema: wayproof/scenario/1
