@@ -8,19 +8,23 @@ figure or scrolls sideways.
 from __future__ import annotations
 
 import shutil
+import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 from PIL import Image
 
 from harness.cli.app import main as wayproof
 from harness.recording.blueprint import TIMELINE
 from harness.recording.local_page import LOCALHOST
-from harness.recording.viewer import NO_DRIVER, ViewerError, free_port, viewer_process
+from harness.recording.overlay import send_recording
+from harness.recording.viewer import NO_DRIVER, ViewerError, empty_viewer, free_port, viewer_process
 from tests.page import NoBrowserError, browser, shown
 
 SETTLE_S = 1.5
@@ -110,6 +114,18 @@ def screenshot(
         except ConnectionError as error:
             # Without a driver it listens for a moment before it gives up.
             raise ViewerError(NO_DRIVER) from error
+
+
+@contextmanager
+def served(rrd: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Serves a recording to browsers, without opening one; gives the server and the address."""
+    told: list[str] = []
+    with (
+        patch("webbrowser.open", lambda address: True),
+        empty_viewer(web=True, tell=told.append) as (viewer, source),
+    ):
+        send_recording(rrd, source)
+        yield viewer, told[0].split()[0]
 
 
 def draw_settled(client: Any, png: Path) -> None:

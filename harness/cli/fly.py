@@ -194,14 +194,12 @@ def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Onlookers, Callabl
     from contextlib import ExitStack
 
     from harness.files.input_file import InputError
-    from harness.recording.viewer import ViewerError, following_viewer
+    from harness.recording.viewer import ViewerError, empty_viewer
     from harness.watching.watched_flight import Onlookers
 
     with ExitStack() as stack:
         try:
-            process, url = stack.enter_context(
-                following_viewer(web, lambda address: say(f"{address} (Ctrl-C ends it)", err=True))
-            )
+            process, url = stack.enter_context(empty_viewer(web, lambda address: say(address, err=True)))
         except ViewerError as error:
             raise InputError(f"wayproof: {error}") from error
 

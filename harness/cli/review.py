@@ -246,7 +246,7 @@ def open_campaign(folder: Path, web: bool = False) -> bool:
     from harness.campaign.table import recordings_of
     from harness.files.errors import RunFolderError
     from harness.recording.catalog import open_table
-    from harness.recording.properties import NO_RECORDINGS, severity_told
+    from harness.recording.properties import NO_RECORDINGS
     from harness.recording.viewer import ViewerError
 
     try:
@@ -254,12 +254,11 @@ def open_campaign(folder: Path, web: bool = False) -> bool:
         if not recordings:
             raise RunFolderError(NO_RECORDINGS.format(folder))
         say(f"{len(recordings)} recordings", err=True)
-        say(f"sorted by {severity_told()}", err=True)
         open_table(
             folder.resolve().name,
             recordings,
             web,
-            lambda address: say(f"{address} (Ctrl-C ends it)", err=True),
+            lambda address: say(address, err=True),
         )
     except RunFolderError as error:
         raise bad_input(error) from error

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import tempfile
 import threading
-import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,20 +16,9 @@ from harness.recording.blueprint import FRAME, Frame
 from harness.recording.layout import layout_of
 from harness.recording.local_page import LOCALHOST
 from harness.recording.properties import NO_RECORDINGS, RUN, VARIED
-from harness.recording.viewer import (
-    NO_DRIVER,
-    ViewerError,
-    address_of,
-    answers,
-    free_port,
-    need_screen,
-    viewer_process,
-    web_viewer,
-)
+from harness.recording.viewer import ViewerError, empty_viewer, wait_for
 
 if TYPE_CHECKING:
-    import subprocess
-
     import pyarrow as pa
 
 NEEDS_CATALOG: Final = (
@@ -182,51 +170,9 @@ def open_table(
         RunFolderError: the campaign has no recordings.
         ViewerError: there is no screen, or the viewer or the server does not start.
     """
-    if not web:
-        need_screen()
-    with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
-        if web:
-            with (
-                catalog(name, recordings) as served,
-                contextlib.suppress(KeyboardInterrupt),
-                web_viewer(Path(scratch)) as (viewer, address, _),
-            ):
-                page = address_of(address, served.url)
-                tell(page)
-                webbrowser.open(page)
-                viewer.wait()
-            return
-        with window(name, recordings, Path(scratch)) as (viewer, _):
-            if viewer.wait() != 0:
-                raise ViewerError(f"the viewer ended with status {viewer.returncode}")
+    with catalog(name, recordings) as served, empty_viewer(web, tell, served.url) as (viewer, source):
+        if not web:
+            from rerun.experimental import ViewerClient
 
-
-@contextlib.contextmanager
-def window(
-    name: str, recordings: Sequence[Path], scratch: Path, arguments: Sequence[str] = ()
-) -> Iterator[tuple[subprocess.Popen[str], Any]]:
-    """Opens the table of a campaign in a viewer; gives that, and rerun's handle of it.
-
-    The viewer starts while the recordings are read.
-
-    Raises:
-        RunFolderError: the campaign has no recordings.
-        ViewerError: the viewer or the server does not start.
-    """
-    port = free_port()
-    command = ["--bind", LOCALHOST, "--port", str(port), "--hide-welcome-screen", *arguments]
-    with viewer_process(command, scratch) as viewer, catalog(name, recordings) as served:
-        from rerun.experimental import ViewerClient
-
-        if not answers(port, viewer):
-            raise ViewerError(NO_DRIVER if "--headless" in arguments else "the viewer does not start")
-        try:
-            client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
-            client.open(served.url)
-        except ConnectionError as error:
-            raise ViewerError(NO_DRIVER) from error
-        try:
-            yield viewer, client
-        finally:
-            viewer.kill()  # the server waits for who is still connected
-            viewer.wait()
+            ViewerClient.connect(source).open(served.url)
+        wait_for(viewer)

@@ -49,7 +49,6 @@ from harness.recording.states import (
     States,
     log_colours,
     mode_of,
-    over,
     plan_text,
     send_changes,
     send_events,
@@ -259,9 +258,7 @@ class RerunLog:
         changes = tracking_changes(metrics["trackability"])
         send_changes(self._rec, look.TRACKING_LANE, changes)
         causes = dict.fromkeys((state for _, state in changes), look.HIT) | {NAVIGATION_ERROR: look.WARNED}
-        ended = {over(metrics): look.CALM}
-        log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM} | ended)
-        log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours() | ended)
+        log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM})
         self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
 
     def _draw(self, scan: RangeScan) -> None:

@@ -18,7 +18,6 @@ from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import layout_of
 from harness.recording.properties import RUN
-from harness.recording.states import over, send_changes
 
 SHARED = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
 """Below PLAN and WORLD: what all runs of a scenario have in common."""
@@ -64,9 +63,6 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
         figures = [_metrics(own) for own in chunks]
-        lane = f"/{look.STATES}/{look.PLANNER_LANE}"
-        laned = [p for p, own in enumerate(chunks) if any(chunk.entity_path == lane for chunk in own)]
-        _end_lanes(rec, names, figures, laned)
         logs = ["/" + look.SUMMARY not in {chunk.entity_path for chunk in own} for own in chunks]
         without = [
             "log" if log else "none" if each else "unfinished"
@@ -208,19 +204,6 @@ def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
     points = rr.SeriesPoints(names=[name], colors=[colour], marker_sizes=[2.0])
     for line in (look.SEARCH, look.DELAYS):
         rec.log(f"{look.SERIES}/{line}/{place}", points, static=True)
-
-
-def _end_lanes(
-    rec: rr.RecordingStream,
-    names: Sequence[str],
-    figures: Sequence[Mapping[str, Any]],
-    laned: Collection[int],
-) -> None:
-    """Says in the lanes of each run from when on its flight is over, for the others go on."""
-    for place, (name, each) in enumerate(zip(names, figures, strict=True)):
-        for lane in (look.PLANNER_LANE, look.TRACKING_LANE) if each and place in laned else ():
-            own = f"{place + 1}-{rr.escape_entity_path_part(name)}/{lane}"
-            send_changes(rec, own, [(each["flight_time_s"], over(each))])
 
 
 def _metrics(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, Any]:

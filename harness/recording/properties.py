@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.analysis.causes import is_allowed_for
-from harness.analysis.metric import ERROR, SEVERITY
+from harness.analysis.metric import SEVERITY
 from harness.analysis.registry import METRICS
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ NO_RECORDINGS: Final = (
     "one, `failures` a whole one of those that failed"
 )
 """Said of a campaign of which there is no table."""
-NOT_FAIR: Final = {"reached, but not tracked or too near": 1.0}
+NOT_FAIR: Final = 1.0
 """Severity of a run that reached its goal and was not tracked, or came nearer to an obstacle than was wanted."""
 
 Value = str | float | int | bool
@@ -72,18 +72,10 @@ def _rounded(value: Value) -> Value:
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
-def severity_told() -> str:
-    """What the figure `severity` says, for people who see it in a table."""
-    told = sorted({**SEVERITY, **NOT_FAIR}.items(), key=lambda each: -each[1])
-    outcomes = ", ".join(f"{value:.0f} {name.replace('_', ' ')}" for name, value in told if name != ERROR)
-    return f"severity: the outcome before the point ({outcomes}), behind it more the less clearance there was"
-
-
 def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> float:
     """How badly a run went: its outcome before the point, and behind it more the less clearance there was."""
     fair = trackable and (clearance_ratio is None or clearance_ratio >= 1.0)
-    (not_fair,) = NOT_FAIR.values()
-    whole = not_fair if outcome == "reached" and not fair else SEVERITY.get(outcome, 0.0)
+    whole = NOT_FAIR if outcome == "reached" and not fair else SEVERITY.get(outcome, 0.0)
     near = 0.0 if clearance_ratio is None else 1.0 / (1.0 + math.exp(min(clearance_ratio, 50.0)))
     return round(whole + near, 6)
 

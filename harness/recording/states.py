@@ -29,11 +29,6 @@ TOLD_DELAY_S: Final = 0.05
 """A plan that took effect so long after its scan says so."""
 
 
-def over(metrics: Mapping[str, Any]) -> str:
-    """The state of a flight that has ended; an overlay shows it while other flights go on."""
-    return f"over: {metrics['outcome']}"
-
-
 class States:
     """Finds the changes of state, block by block."""
 

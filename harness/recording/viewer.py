@@ -72,8 +72,6 @@ def open_viewer(
             raise InputError(f"{each}: no such file")
         elif len(run_dirs) > 1:
             raise InputError(f"{each}: a recording is opened alone; run folders are overlaid")
-    if not web:
-        need_screen()
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
         recordings = [each if each.suffix.lower() == ALONE else recording_of(each) for each in run_dirs]
         shown = recordings[0]
@@ -82,16 +80,10 @@ def open_viewer(
             told = write_overlay(recordings, run_names(run_dirs), shown)
             if told:
                 tell(told)
-        if web:
-            with contextlib.suppress(KeyboardInterrupt), served(shown, Path(scratch)) as (viewer, address):
-                tell(f"{address} (Ctrl-C ends it)")
-                webbrowser.open(address)
-                viewer.wait()
-            return
-        command = [_executable(), str(shown), "--bind", LOCALHOST, "--port", str(free_port())]
-        with _viewer(command, Path(scratch)) as viewer:
-            if viewer.wait() != 0:
-                raise ViewerError(f"the viewer ended with status {viewer.returncode}: {_last_line(scratch)}")
+        with empty_viewer(web, tell) as (viewer, source):
+            # A viewer that serves a file to a browser keeps a processor busy; one that is sent it does not.
+            send_recording(shown, source)
+            wait_for(viewer)
 
 
 def _overlay_of(folder: Path) -> Path:
@@ -110,19 +102,6 @@ def need_screen() -> None:
     """Raises ViewerError where there is no screen to open a window on."""
     if sys.platform == "linux" and not (os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}):
         raise ViewerError(NO_SCREEN)
-
-
-@contextlib.contextmanager
-def served(rrd: Path, scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Serves a recording to browsers of this machine; gives the server and the address to open.
-
-    Raises:
-        ViewerError: the server does not start.
-    """
-    with web_viewer(scratch) as (viewer, address, source):
-        # A viewer that serves a file keeps a processor busy; one that is sent it does not.
-        send_recording(rrd, source)
-        yield viewer, address_of(address, source)
 
 
 @contextlib.contextmanager
@@ -147,10 +126,15 @@ def web_viewer(scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str, str]
 
 
 @contextlib.contextmanager
-def following_viewer(
-    web: bool = False, tell: Callable[[str], None] = lambda address: None
+def empty_viewer(
+    web: bool = False, tell: Callable[[str], None] = lambda address: None, url: str | None = None
 ) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Opens an empty viewer for a flight that goes on; gives it, and the address that takes recordings.
+    """Opens a viewer; gives it, and the address that takes recordings.
+
+    Args:
+        web: in a browser instead of a window.
+        tell: is told the address for the browser.
+        url: what a browser opens in place of what the viewer is sent.
 
     Raises:
         ViewerError: there is no screen, or the viewer does not start.
@@ -160,8 +144,9 @@ def following_viewer(
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
         if web:
             with web_viewer(Path(scratch)) as (viewer, page, source):
-                tell(address_of(page, source))
-                webbrowser.open(address_of(page, source))
+                address = f"{page}?url={quote(url or source, safe='')}"
+                tell(f"{address} (Ctrl-C ends it)")
+                webbrowser.open(address)
                 yield viewer, source
             return
         port = free_port()
@@ -170,9 +155,16 @@ def following_viewer(
             yield viewer, f"rerun+http://{LOCALHOST}:{port}/proxy"
 
 
-def address_of(page: str, source: str) -> str:
-    """The address at which a browser opens the viewer's page on a source of data."""
-    return f"{page}?url={quote(source, safe='')}"
+def wait_for(viewer: subprocess.Popen[str]) -> None:
+    """Waits until a viewer is closed, or Ctrl-C is pressed.
+
+    Raises:
+        ViewerError: it broke off.
+    """
+    with contextlib.suppress(KeyboardInterrupt):
+        if viewer.wait() == 0:
+            return
+        raise ViewerError(f"the viewer ended with status {viewer.returncode}")
 
 
 def _last_line(scratch: str) -> str:

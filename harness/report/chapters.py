@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from harness.analysis.metric import number
 from harness.analysis.rows import Row, row_of
 from harness.files.errors import RunFolderError
 from harness.files.whole_file import replace_bytes
-from harness.files.wording import counted
 from harness.run_files.given_path import GIVEN
 from harness.run_files.run_folder import Run
 from harness.scenario.conditions import told
@@ -24,9 +23,6 @@ from harness.world.world import World
 if TYPE_CHECKING:
     from harness.report.figures import DrawnRun, FigureScene
     from harness.report.page import Chapter, Picture
-
-MOST_OUTAGES: Final = 4
-"""Outages of navigation that are named in a report."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,11 +92,7 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
             )
         pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
     rows = [each.row for each in entries]
-    facts = (
-        {"conditions": told(scenario)}
-        | _facts(scene, optimum)
-        | without_fix(scenario, scenario.mission.time_limit_s)
-    )
+    facts = {"conditions": told(scenario)} | _facts(scene, optimum)
     return Chapter(scene.name, facts, rows, pictures, optimum.reason)
 
 
@@ -126,11 +118,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
         caption = f"The track from S to G in {scene.name}{_enlarged(scene, drawn)}."
     strips = figures.profiles(scene, [(0, drawn)])
     pictures = [_picture(folder / "path", path, caption), _picture(folder / "profiles", strips, PROFILES)]
-    facts = (
-        {"conditions": told(scenario)}
-        | _facts(scene, optimum)
-        | without_fix(scenario, metrics["flight_time_s"])
-    )
+    facts = {"conditions": told(scenario)} | _facts(scene, optimum)
     if "check" in metrics:  # a path that was given is compared with no other
         del facts["clairvoyant optimum"]
     if "check" in metrics and not scene.obstacles:
@@ -146,20 +134,6 @@ def _enlarged(scene: FigureScene, drawn: DrawnRun) -> str:
 
 
 PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
-
-
-def without_fix(scenario: Scenario, until_s: float) -> dict[str, str]:
-    """When there was no fix of the position, as a fact; nothing where there always was one."""
-    met = [
-        (begin_s, min(end_s, until_s))
-        for begin_s, end_s in scenario.navigation.outages_s
-        if begin_s < until_s
-    ]
-    if not met:
-        return {}
-    told = [f"{begin_s:.0f} to {end_s:.0f} s" for begin_s, end_s in met[:MOST_OUTAGES]]
-    more = f" and {counted(len(met) - MOST_OUTAGES, 'time')} more" if len(met) > MOST_OUTAGES else ""
-    return {"without a fix": ", ".join(told) + more}
 
 
 def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:

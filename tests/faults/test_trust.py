@@ -17,8 +17,8 @@ from aircraft.jsbsim_loading import load, trim
 from aircraft.model_files import AircraftError, model_files
 from aircraft.start import StartConditions
 from harness.cli.app import main
-from harness.recording.viewer import served
 from tests.faults.command import FOREST, ROOT
+from tests.pictures import served
 
 MODEL = Path(aircraft.__path__[0], "aerosonde")
 SOURCES = [path for room in ("planner", "aircraft", "harness") for path in (ROOT / room).rglob("*.py")]
@@ -93,7 +93,7 @@ def sockets(pids: list[int]) -> list[tuple[str, int]]:
 
 
 def test_the_viewer_is_served_to_this_machine_alone(a_run: Path, tmp_path: Path) -> None:
-    with served(a_run / "flight.rrd", tmp_path) as (viewer, address):
+    with served(a_run / "flight.rrd") as (viewer, address):
         listening = sockets([viewer.pid, os.getpid()])
         assert len(listening) >= 2
         assert {host for host, _ in listening} == {"127.0.0.1"}

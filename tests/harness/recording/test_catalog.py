@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun as rr
+from rerun.experimental import ViewerClient
 
 from harness.analysis.metrics import metrics
 from harness.campaign.table import recordings_of
@@ -22,7 +23,7 @@ from harness.recording.blueprint import Frame
 from harness.recording.catalog import catalog
 from harness.recording.log import RerunLog
 from harness.recording.properties import properties_of, run_properties, severity
-from harness.recording.viewer import NO_DRIVER, ViewerError
+from harness.recording.viewer import NO_DRIVER, ViewerError, free_port, viewer_process
 from harness.scenario.scenario import parse_scenario
 from tests.harness.recording.test_rerun_log import LIMITS, SCENE
 from tests.pictures import draw_settled
@@ -177,19 +178,6 @@ def test_severity_orders_outcomes_then_clearance(make_track: MakeTrack, make_pla
     assert len(set(figures)) == len(figures)
 
 
-def test_severity_is_explained_where_the_table_is_opened(
-    campaign: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(catalogs, "open_table", lambda *given: None)
-    (campaign / "campaign.json").write_text("{}")
-    assert main(["view", str(campaign)]) == 0
-    said = capsys.readouterr().err
-    assert "sorted by severity: the outcome before the point (8 collision, 7 lost control, " in said
-    assert (
-        "2 unreachable, 1 reached, but not tracked or too near, 0 reached), behind it more the less" in said
-    )
-
-
 def test_a_campaign_without_recordings_says_how_to_get_some(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -262,8 +250,15 @@ def driven() -> Iterator[None]:
 @pytest.mark.flights
 def test_the_table_is_drawn_and_a_run_opens_in_our_layout(campaign: Path, tmp_path: Path) -> None:
     pytest.importorskip("datafusion")
-    png, arguments = tmp_path / "table.png", ["--headless", "--window-size", "1600x900"]
-    with driven(), catalogs.window("small", recordings_of(campaign), tmp_path, arguments) as (_, client):
+    png, port = tmp_path / "table.png", free_port()
+    arguments = ["--headless", "--window-size", "1600x900", "--bind", "127.0.0.1", "--port", str(port)]
+    with (
+        driven(),
+        catalog("small", recordings_of(campaign)) as served,
+        viewer_process(arguments, tmp_path, port),
+    ):
+        client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+        client.open(served.url)
         draw_settled(client, png)
         table = seen(client, lambda state: "/dataset/" in state.location).location
         client.open(f"{table}?segment_id=run%201")

@@ -15,7 +15,6 @@ import pytest
 from harness.analysis.causes import FINDINGS
 from harness.cli.app import main
 from harness.run_files.run_folder import REPORT_FILES, load_run
-from harness.scenario.scenario import dump_scenario, parse_scenario
 from tests.page import shown
 
 SCENARIO = """
@@ -82,28 +81,6 @@ def test_a_leg_shows_the_limit_that_it_was_over(run: Path, tmp_path: Path) -> No
     assert "altitude error 10 m, airspeed error 2.5 m/s, load factor 3.8.</p>" in page
     assert '<td>0.8</td><td class="bad">12.5</td><td class="bad">4</td><td class="bad">4.5</td>' in page
     assert '<td class="bad">11.0</td><td>0.1</td><td>\N{EN DASH}</td><td>1.4</td>' in page
-
-
-@pytest.mark.flights
-def test_it_says_when_there_was_no_fix(run: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "run"
-    shutil.copytree(run, copy)
-    scenario, perfect = copy / "scenario.yaml", parse_scenario((run / "scenario.yaml").read_text())
-    assert "without a fix" not in (run / "report.html").read_text()
-    for outages, told in (
-        ([[20, 50], [100.4, 9e3]], f"20 to 50 s, 100 to {load_run(run).metrics['flight_time_s']:.0f} s"),
-        ([[9e3, 9.1e3]], None),
-        (
-            [[t, t + 1] for t in range(0, 60, 10)],
-            "0 to 1 s, 10 to 11 s, 20 to 21 s, 30 to 31 s and 2 times more",
-        ),
-    ):
-        rewrite(
-            scenario, dump_scenario(perfect.with_({"navigation": {"kind": "gnss", "outages_s": outages}}))
-        )
-        assert main(["report", str(copy)]) == 0
-        page = (copy / "report.html").read_text()
-        assert (f"<li>without a fix {told}</li>" in page) if told else "without a fix" not in page
 
 
 @pytest.mark.flights
