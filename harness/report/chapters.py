@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from harness.analysis.metric import number
 from harness.analysis.rows import Row, row_of
@@ -21,6 +24,7 @@ from harness.world.optimum import Optimum, shortest_path
 from harness.world.world import World
 
 if TYPE_CHECKING:
+    from harness.flight.record import FloatArray
     from harness.report.figures import DrawnRun, FigureScene
     from harness.report.page import Chapter, Picture
 
@@ -120,7 +124,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     pictures = [_picture(folder / "path", path, caption), _picture(folder / "profiles", strips, PROFILES)]
     facts = {"conditions": told(scenario)} | _facts(scene, optimum)
     if "check" in metrics:  # a path that was given is compared with no other
-        del facts["clairvoyant optimum"]
+        del facts["clairvoyant optimum"], facts["estimate with turn radius R"]
     if "check" in metrics and not scene.obstacles:
         del facts["obstacles"], facts["wanted clearance"]
     return Chapter(scene.name, facts, [flight.row], pictures, optimum.reason)
@@ -132,6 +136,9 @@ def _enlarged(scene: FigureScene, drawn: DrawnRun) -> str:
         "" if drawn.nearest(scene.clearance_m) is None else "; enlarged: where it came nearest to an obstacle"
     )
 
+
+JOINING_SHARES = np.linspace(0.05, 1.0, 20)
+"""Places along each line of the optimum at which a Dubins curve may join it."""
 
 PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
 
@@ -161,9 +168,40 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
         clearance_m=scenario.planner.clearance_m,
         turn_radius_m=_turn_radius_m(scenario, run),
         optimum_m=optimum.points_m,
+        turning_optimum_m=turning_optimum_m(
+            optimum.points_m, mission.course_deg, _turn_radius_m(scenario, run)
+        ),
         wind=(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0),
         navigation_margin_m=scenario.navigation.margin_m or 0.0,
     )
+
+
+def turning_optimum_m(points_m: FloatArray, course_deg: float | None, radius_m: float) -> float | None:
+    """Length of the optimum (k, 2) with the shortest Dubins curve from the start's course onto one of its lines.
+
+    An estimate: its bends are taken to be as wide as the turn radius. None where there is no optimum or course.
+    """
+    if len(points_m) < 2 or course_deg is None:
+        return None
+    from planner.baselines.dubins_tree import dubins
+    from planner.geometry.curves import Pose
+
+    steps = np.diff(points_m, axis=0)
+    lengths = np.hypot(*steps.T)
+    course = math.radians(course_deg)
+    east_m, north_m = points_m[0].tolist()
+    start = Pose(east_m, north_m, math.sin(course), math.cos(course))
+    left = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
+    places = [(line, share) for line in np.flatnonzero(lengths > 0.0).tolist() for share in JOINING_SHARES]
+    ways = []
+    for line, share in places:
+        tangent_east, tangent_north = (steps[line] / lengths[line]).tolist()
+        east_m, north_m = (points_m[line] + share * steps[line]).tolist()
+        curve = dubins(start, Pose(east_m, north_m, tangent_east, tangent_north), radius_m)
+        to_go_m = float(left[line] - share * lengths[line])
+        # A curve shorter than the optimum up to there leads through an obstacle.
+        ways.append(to_go_m + max(sum(row[5] for row in curve), float(left[0]) - to_go_m))
+    return min(ways, default=None)
 
 
 def _drawn(flight: ReportedFlight) -> DrawnRun | None:
@@ -200,6 +238,7 @@ def _facts(scene: FigureScene, optimum: Optimum) -> dict[str, str]:
     return {
         "straight line": km(((goal_east - east) ** 2 + (goal_north - north) ** 2) ** 0.5),
         "clairvoyant optimum": km(optimum.length_m),
+        "estimate with turn radius R": km(scene.turning_optimum_m),
         "obstacles": str(len(scene.obstacles)),
         "wanted clearance": _kept(scene),
         "turn radius R": f"{number(scene.turn_radius_m)} m",

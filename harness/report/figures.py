@@ -84,6 +84,7 @@ class FigureScene:
         clearance_m: wanted.
         turn_radius_m: smallest radius of the aircraft.
         optimum_m: (k, 2) the clairvoyant shortest path; empty where there is none.
+        turning_optimum_m: its estimated length for an aircraft that turns; None where there is none.
         wind: speed in m/s and where it blows from in degrees; speed 0 without wind.
         navigation_margin_m: kept beyond the clearance, for the navigation error.
     """
@@ -97,6 +98,7 @@ class FigureScene:
     clearance_m: float
     turn_radius_m: float
     optimum_m: FloatArray
+    turning_optimum_m: float | None = None
     wind: tuple[float, float] = (0.0, 0.0)
     navigation_margin_m: float = 0.0
 

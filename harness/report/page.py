@@ -9,7 +9,7 @@ from typing import Any
 
 import jinja2
 
-from harness.analysis.metric import Metric
+from harness.analysis.metric import Metric, number
 from harness.analysis.rows import DASH, Row, shown_figures
 
 
