@@ -62,12 +62,7 @@ SPACING_M = 50.0
 
 
 class InRange:
-    """A seen world in which everything within range of a place of the flight has been seen.
-
-    Args:
-        circles: the obstacles.
-        range_m: sensing range.
-    """
+    """A seen world in which everything within range of a place of the flight has been seen."""
 
     spacing_m = SPACING_M
     last_removal_revision = 0

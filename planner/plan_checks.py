@@ -61,15 +61,9 @@ def start_tolerance_m(mission: Mission) -> float:
 
 
 def checked_plan(answer: object, position_m: tuple[float, float], mission: Mission) -> Plan:
-    """A planner's answer as a plan that nobody can change any more.
+    """A planner's answer, whatever that is, as a plan that nobody can change any more.
 
-    Args:
-        answer: what `Planner.plan` returned, whatever that is.
-        position_m: (east, north) of the aircraft when the planner was asked.
-        mission: speed, tracking error and latency, which say how far off a path may begin.
-
-    Returns:
-        The answer itself where it is no new path; else a copy of it with its picture made.
+    Returns the answer itself where it is no new path; else a copy of it with its picture made.
 
     Raises:
         WrongAnswerError: it is no plan, or its path cannot be flown.
@@ -141,13 +135,7 @@ def _waypoints(waypoints_m: Any) -> FloatArray:
 
 
 def _path(path: Any, position_m: tuple[float, float], start_m: float) -> Path:
-    """A copy of a path, if it can be flown from where the aircraft is.
-
-    Args:
-        path: of the answer.
-        position_m: (east, north) of the aircraft.
-        start_m: the path begins no further from there.
-    """
+    """A copy of a path, if it can be flown and begins no further than `start_m` from the aircraft."""
     if path is None:
         raise _refused("it is none")
     if not issubclass(type(path), Path):

@@ -130,12 +130,7 @@ class BendyRuler:
         return steer(request, mission, (pose, prefix), target, points, picture)
 
     def bearing(self, here: Point, points_m: FloatArray) -> float:
-        """Steps 1 to 4: the bearing to be flown, rad counter-clockwise from east.
-
-        Args:
-            here: where the lines begin.
-            points_m: (m, 2) edge points near enough to matter.
-        """
+        """Steps 1 to 4: the bearing to be flown, rad counter-clockwise from east, among (m, 2) edge points."""
         goal = self._mission.goal_m
         to_goal = math.atan2(goal[1] - here[1], goal[0] - here[0])
         first_m = min(self._lookahead_m, math.dist(here, goal))

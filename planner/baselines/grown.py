@@ -33,15 +33,7 @@ CELL_SHARE = 0.35
 
 
 class GrownObstacles:
-    """The obstacles of one flight.
-
-    Args:
-        mission: the area, the goal and the clearance.
-        margin_m: distance kept beyond the clearance, and from the bounds of the area.
-
-    Attributes:
-        keep_m: distance from every edge point.
-    """
+    """The obstacles of one flight: discs of the radius `keep_m`, clearance and margin; the border keeps the margin."""
 
     def __init__(self, mission: Mission, margin_m: float) -> None:
         self.keep_m, self._margin_m, self._mission = mission.clearance_m + margin_m, margin_m, mission
@@ -55,8 +47,7 @@ class GrownObstacles:
     def take_in(self, seen: MapView) -> tuple[FloatArray, bool]:
         """Remembers what has come in.
 
-        Returns:
-            The (k, 2) new edge points, and whether some were taken back: then everything may be different.
+        Returns the (k, 2) new edge points, and whether some were taken back: then everything may be different.
         """
         self._memory.take_in(seen)
         # What moves comes last there: where it has moved, or new edges have come before it, all is united anew.
@@ -152,12 +143,9 @@ class GrownObstacles:
         return int(np.argmin(shapely.distance(self._rings, shapely.Point(place))))
 
     def boundary(self, place: Point, side: float, length_m: float) -> FloatArray:
-        """(n, 2) the boundary next to a place, from there on, at most once round.
+        """(n, 2) at most so much of the boundary next to a place, from there on and at most once round.
 
-        Args:
-            place: on the boundary or near it.
-            side: 1 for the obstacle on the left, -1 for on the right.
-            length_m: how much of it.
+        Side 1 has the obstacle on the left, -1 on the right.
         """
         import shapely
 
@@ -184,10 +172,9 @@ class GrownObstacles:
         return float(min((shape.distance(goal) for shape in mine), default=math.inf))
 
     def tangents(self, place: Point, parts: set[int], reach_m: float) -> list[tuple[Point, float, bool]]:
-        """The corners at which lines from a place touch some obstacles, those on the left of the line with side 1.
+        """The corners within reach at which lines from a place touch some obstacles, their sides, and which are in sight.
 
-        Returns:
-            Corner, side, and whether it is in sight.
+        Of side 1 are those that lie on the left of the line.
         """
         import shapely
 

@@ -24,13 +24,8 @@ def steer(
 ) -> Plan:
     """The path of a planner that answers with a direction: BendyRuler and VFH+ have none of their own.
 
-    Args:
-        request: the question to the planner.
-        mission: turn radius and area.
-        start: where the path leaves the one in effect, and the stretch up to there.
-        target: where the direction leads.
-        points_m: (m, 2) edge points, for a turn to hold in.
-        picture: of how the direction was found.
+    `start` is where the path leaves the one in effect, and the stretch up to there; the direction leads to `target`.
+    The (m, 2) edge points are for a turn to hold in.
     """
     pose, prefix = start
     turn = turn_onto(pose, target, mission.turn_radius_m)

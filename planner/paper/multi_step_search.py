@@ -81,12 +81,8 @@ class Track:
 def multi_step_search(window: Window, start_m: Point, course_rad: float) -> list[Track]:
     """Section 3.2: the process of one step, N times; n candidates of N sub-segments, best first.
 
-    Where no candidate gets on for N steps, the depth is halved until one does; the paper is silent on that.
-
-    Args:
-        window: the planning window.
-        start_m: the first track point.
-        course_rad: theta on arrival there.
+    They begin at `start_m` on a course. Where no candidate gets on for N steps, the depth is halved until one does; the
+    paper is silent on that.
     """
     left_m, _ = guide_vector(start_m, window.mission.goal_m)
     best = [[Track((start_m,), course_rad, 0.0, left_m)]]
@@ -128,15 +124,7 @@ def next_steps(window: Window, track: Track) -> Iterator[Track]:
 def directions(
     window: Window, track: Track, guide_m: float, guide_rad: float, most_rad: float
 ) -> Iterator[int]:
-    """The Delta of each step to be tried from the end of a track.
-
-    Args:
-        window: the planning window.
-        track: the track so far.
-        guide_m: length of the guide vector at its end.
-        guide_rad: direction of the guide vector.
-        most_rad: largest change of course.
-    """
+    """The Delta of each step to be tried from the end of a track, the change of course at most `most_rad`."""
     here, config, course = track.nodes[-1], window.config, track.course_rad
     unit_rad, step_m = config.unit_rad, config.resolved_step_m
     if not crosses(here, along_guide(window, here, guide_m, guide_rad), window.points_m, window.keep_m):

@@ -25,12 +25,7 @@ class Route:
 def cancel_nodes(nodes: tuple[Point, ...], before_m: Point, window: Window) -> tuple[Point, ...]:
     """From w_si on to the furthest w_sk with a free connection, what is between cancelled, until w_si is w_sn.
 
-    A connection counts where the turn onto it keeps the minimum turn radius.
-
-    Args:
-        nodes: w_s1 ... w_sn.
-        before_m: the place from which w_s1 is come to.
-        window: the planning window.
+    A connection counts where the turn onto it keeps the minimum turn radius; w_s1 is come to from `before_m`.
     """
     kept, i = [nodes[0]], 0
     while i < len(nodes) - 1:

@@ -41,12 +41,8 @@ def distance_left_m(guide_m: float, step_m: float, off_guide_rad: float) -> floa
 def fan_shaped_sectors(points_m: FloatArray, keep_m: float, node_m: Point) -> list[Sector]:
     """Section 3.2, (1): the free sectors into which obstacles break up the window, as seen from a track point.
 
-    M and N of an obstacle are the tangents to it on its left and on its right. Obstacles whose fans overlap are one.
-
-    Args:
-        points_m: (m, 2) edge points in the planning window.
-        keep_m: distance to be kept from each.
-        node_m: the track point.
+    M and N of an obstacle, (m, 2) edge points and the distance kept from each, are the tangents to it on its left and
+    on its right. Obstacles whose fans overlap are one.
     """
     if not len(points_m):
         return [ALL]

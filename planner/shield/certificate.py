@@ -53,11 +53,7 @@ SIDES = (1.0, -1.0)
 
 
 class CertificateBroken(RuntimeError):
-    """Something was seen where the plan in effect was certified to be free, and there is no way out.
-
-    Args:
-        time_s: when it was seen.
-    """
+    """Something was seen at `time_s` where the plan in effect was certified to be free, and there is no way out."""
 
     def __init__(self, time_s: float) -> None:
         super().__init__(
@@ -111,14 +107,7 @@ class _Swerve(NamedTuple):
 
 
 class Certifier:
-    """Looks for the last safe turn off a path.
-
-    Args:
-        limits: smallest radius and room to roll.
-        clearance_m: wanted distance from obstacles.
-        horizon_m: nothing further along a path than this is looked at.
-        spacing_m: distance between the places at which space is asked to be free.
-    """
+    """Looks for the last safe turn off a path up to `horizon_m`; space is asked to be free every `spacing_m`."""
 
     def __init__(self, limits: Limits, clearance_m: float, horizon_m: float, spacing_m: float) -> None:
         self._limits, self._horizon, self._spacing = limits, horizon_m, spacing_m
@@ -137,13 +126,9 @@ class Certifier:
     def certify(
         self, path: Path, seen: MapView, terrain: Terrain, to_m: float = math.inf
     ) -> Certified | None:
-        """The longest part of a path that ends in a turn which is seen to be free.
+        """The longest part of a path that ends in a turn which is seen to be free, begun before the arc length `to_m`.
 
-        Args:
-            path: a path that keeps its distance from all edges seen, up to `to_m`.
-            seen: what has been seen to be free.
-            terrain: the edges, and the distance that the turn has to keep from each.
-            to_m: arc length before which the turn begins.
+        Up to there the path keeps its distance from all edges seen; `terrain` has the distance that the turn keeps.
         """
         free_to = min(self.seen_free_to_m(path, seen), to_m)
         step = max(0.5 * self._limits.radius_m, free_to / MOST_ARC_LENGTHS)
@@ -195,15 +180,9 @@ class Certifier:
     def certify_up_to(
         self, over_m: float, path: Path, seen: MapView, bounds_m: tuple[float, float, float, float]
     ) -> Certified | None:
-        """All of a path, where it is seen to be free and stays within bounds until the flight is over.
+        """All of a path, where it is seen to be free and stays within bounds up to the arc length `over_m`: the goal.
 
         There is no turn to leave it for: what lies beside it has to be seen to be free as well, as beyond a turn.
-
-        Args:
-            over_m: arc length from which on nothing is flown.
-            path: a path that keeps its distance from all edges seen, up to there.
-            seen: what has been seen to be free.
-            bounds_m: xmin, ymin, xmax, ymax.
         """
         flown = between(path, 0.0, over_m)
         if not flown or over_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
@@ -250,25 +229,14 @@ def _disc(radius_m: float, spacing_m: float) -> FloatArray:
 
 
 def disc_radius_m(radius_m: float, clearance_m: float) -> float:
-    """Radius of the disc that has to be seen to be free for a turn to be certified.
-
-    Args:
-        radius_m: turn radius.
-        clearance_m: wanted distance from obstacles.
-    """
+    """Radius of the disc that has to be seen to be free for a turn of one radius to be certified, m."""
     return max(DISC * radius_m, radius_m + BEYOND * clearance_m)
 
 
 def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, reaction_s: float) -> float:
-    """Sensing range without which not even a turn can be certified.
+    """Sensing range without which not even a turn can be certified, m.
 
     A turn beside the course reaches two radii to the side; beyond it lie the clearance, more than what is certified
-    of it, and what is flown until a plan takes effect.
-
-    Args:
-        radius_m: turn radius.
-        clearance_m: wanted distance from obstacles.
-        speed_mps: speed over the ground.
-        reaction_s: latency of sensor and planner, and the time to roll.
+    of it, and what is flown within `reaction_s`: latency of sensor and planner, and the time to roll.
     """
     return 2.0 * DISC * radius_m + clearance_m + speed_mps * reaction_s

@@ -107,14 +107,10 @@ class MonitorLimits:
 class PlanMonitor:
     """Compares edge points as they come in with the plan in effect, and tells when to search for another.
 
-    Args:
-        limits: distances that it goes by.
-
     Attributes:
         plan: the committed plan in effect, None without one.
         proposed: the plan that was given to the loop last, until it is in effect.
-        cut_m: arc length at which the course comes too near to an edge point seen since it was found; infinite
-            where it does not.
+        cut_m: arc length at which the course comes too near to an edge point seen since; infinite where it does not.
         broken: the certified part of the plan, or its turn, comes too near to something.
         lengthened_m: so much longer than the course before it is the one that the last search found.
         searched_at_m: arc length at which the last search was made.
@@ -133,16 +129,7 @@ class PlanMonitor:
         self.searched_at_m = 0.0
 
     def take_effect(self, flown: Plan | None, points_m: FloatArray, gone: int = 0) -> bool:
-        """Begins to watch the plan that was proposed last, if it is the one that is flown now.
-
-        Args:
-            flown: the plan in effect in the loop.
-            points_m: as in `cut_at`.
-            gone: as in `cut_at`.
-
-        Returns:
-            Whether a new plan is in effect.
-        """
+        """Begins to watch the plan proposed last, if it is the one that is flown now; returns whether it is."""
         if self.proposed is None or flown is not self.proposed.plan:
             return False
         self.plan, self.proposed, self.searched_at_m = self.proposed, None, 0.0
@@ -152,26 +139,16 @@ class PlanMonitor:
         return True
 
     def cut_at(self, course: Course, points_m: FloatArray, gone: int = 0) -> float:
-        """Arc length at which a course comes too near to one of (m, 2) still edges that it was not found with.
+        """Arc length at which a course comes too near to an edge that it was not found with.
 
-        Args:
-            course: the course.
-            points_m: (m, 2) all that are remembered, in the order in which they came in.
-            gone: so many at most of those that it was found with have been let go of since.
+        `points_m`, (m, 2), are all still ones in the order in which they came in; at most `gone` have been let go of.
         """
         return first_breach(course.path, points_m[max(course.known - gone, 0) :], self._limits.keep_m)
 
     def look(self, plan: CommittedPlan, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
-        """Takes in new edge points: compares them at once where one is near, else those of a few requests together.
+        """Takes in (k, 2) new edges: compares them at once where one is near, else those of a few requests together.
 
-        Args:
-            plan: the plan in effect.
-            here_m: arc length of the aircraft on it.
-            position: of the aircraft.
-            fresh_m: (k, 2) the new points.
-
-        Returns:
-            Whether the course is cut anew, or nearer than before.
+        Returns whether the course is cut anew, or nearer than before; `here_m` is the arc length of the aircraft.
         """
         self._since += 1
         if len(fresh_m):
@@ -201,11 +178,7 @@ class PlanMonitor:
     def due(self, plan: CommittedPlan, here_m: float, since_m: float, newly_cut: bool) -> bool:
         """Whether to roll the window: the nearer ahead something is wrong with the plan in effect, the sooner.
 
-        Args:
-            plan: the plan in effect.
-            here_m: arc length of the aircraft on it.
-            since_m: flown since the last search.
-            newly_cut: as `look` has it.
+        `since_m` were flown since the last search; `newly_cut` is what `look` returned.
         """
         limits = self._limits
         wrong = min(self.cut_m, plan.loiter_entry_m) - here_m

@@ -35,17 +35,9 @@ def encounters(request: PlanRequest, mission: Mission) -> list[FloatArray]:
 def met_at(
     moving: MovingEdges, position: Point, time_s: float, speed_mps: float, spacing_m: float
 ) -> FloatArray:
-    """The outline of an obstacle, drawn out over the places where it can be met.
+    """(k, 2) the outline of an obstacle, drawn out over where it can be met, every `spacing_m` or more often; m.
 
-    Args:
-        moving: the obstacle.
-        position: (east, north) of the aircraft, m.
-        time_s: time now.
-        speed_mps: of the aircraft.
-        spacing_m: the outline is drawn again and again no further apart than this.
-
-    Returns:
-        (k, 2) points, m; no two in one cell of half the spacing.
+    The aircraft is at `position` at `time_s`. No two points lie in one cell of half the spacing.
     """
     velocity = np.array(moving.velocity_mps)
     now = moving.points_m + velocity * (time_s - moving.time_s)
@@ -63,10 +55,7 @@ def met_at(
 def meeting_s(offsets_m: FloatArray, velocity_mps: FloatArray, speed_mps: float) -> FloatArray:
     """(k,) how long an aircraft takes straight to points that move: |offset + velocity t| = speed t.
 
-    Args:
-        offsets_m: (k, 2) the points now, from the aircraft.
-        velocity_mps: (2,) their velocity; what is faster than `FASTEST` of the aircraft is taken to be that fast.
-        speed_mps: of the aircraft.
+    `offsets_m` are (k, 2) from the aircraft; what is faster than `FASTEST` of it is taken to be that fast.
     """
     pace = float(np.hypot(*velocity_mps))
     velocity = velocity_mps * min(1.0, FASTEST * speed_mps / max(pace, 1e-9))

@@ -86,13 +86,7 @@ class Escape:
 
 
 class Escapes:
-    """Looks for escapes.
-
-    Args:
-        mission: goal and limits.
-        memory: the edge points.
-        room: limits of curves, and the distances that paths keep.
-    """
+    """Looks for escapes, for one flight."""
 
     def __init__(self, mission: Mission, memory: ObstacleMemory, room: Room) -> None:
         self._mission, self._memory, self._room = mission, memory, room
@@ -165,9 +159,9 @@ class Escapes:
         Args:
             request: what was asked.
             threats: what is near, if that is to be feared.
-            committed: the plan in effect.
-            here: arc length of the aircraft on it.
-            until_m: arc length up to which it can be flown.
+            committed: the plan in effect, which can be flown from `here` to `until_m` (arc lengths).
+            here: where the aircraft is on it.
+            until_m: see above.
             prefix: what of it is flown in any case.
             certain: nothing has changed so far, nor been taken back by the sensor.
             nearer: a certified course that would come nearer than wanted to what moves or has appeared.
@@ -231,10 +225,8 @@ class Escapes:
         """The option that keeps furthest from what is near, of those that keep a share of what is wanted.
 
         More than what is wanted is no better; each must be clearer than those before it. What is met is met, be it far
-        ahead: with less to be kept, being far ahead counts for less.
-
-        Returns:
-            Of those in space that was `seen` to be free; of all. Without `seen` they are the same.
+        ahead: with less to be kept, being far ahead counts for less. Returns the best of those in space that was
+        `seen` to be free, and of all; without `seen` they are the same.
         """
         keeps_m = self._room.path_keeps_m
         best: list[_Option | None] = [None, None]

@@ -86,12 +86,9 @@ class Threats:
         return cls(near_m, np.concatenate(moving), mission.speed_mps, step_along_m(mission))
 
     def room_m(self, path: Path, least_m: float = -math.inf, later: float = LATER) -> float:
-        """How far a way keeps from all, what is far along it counted as further away; m.
+        """How far a way from the aircraft on keeps from all, what is far along it counted as further away (`LATER`); m.
 
-        Args:
-            path: the way, from where the aircraft is.
-            least_m: with less it is not looked at to its end.
-            later: see `LATER`.
+        With less than `least_m` it is not looked at to its end.
         """
         arc_lengths_m = np.arange(0.0, AHEAD_S * self.speed_mps, self.step_m)
         if path.loiter:
@@ -118,15 +115,7 @@ def step_along_m(mission: Mission) -> float:
 
 
 def far_side(face_m: FloatArray, position_m: Point) -> FloatArray:
-    """What of a body is taken to lie behind its face: half a circle from one end of that to the other.
-
-    Args:
-        face_m: (k, 2) edge points in order.
-        position_m: from where they are seen.
-
-    Returns:
-        (k, 2) points.
-    """
+    """(k, 2) what of a body is taken to lie behind its (k, 2) face, seen from a place: half a circle."""
     middle, half = 0.5 * (face_m[0] + face_m[-1]), 0.5 * (face_m[-1] - face_m[0])
     away = np.array((-half[1], half[0]))
     away *= np.copysign(1.0, away @ (middle - position_m))
@@ -136,12 +125,7 @@ def far_side(face_m: FloatArray, position_m: Point) -> FloatArray:
 
 
 def rolled_out(prefix: Sequence[Segment], limits: Limits) -> Iterator[Path]:
-    """Ways on: a turn, one back, straight on or not, and a full turn on to the same side; the gentlest first.
-
-    Args:
-        prefix: what is flown before.
-        limits: smallest radius and room to roll.
-    """
+    """Ways on: a turn, one back, straight on or not, a full turn on to the same side; the gentlest first."""
     last = prefix[-1]
     pose, curvature = along(last, last[5]), last[4]
     sides = (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0)

@@ -24,9 +24,7 @@ class InterventionLog:
     """Counts interventions as the planner is asked.
 
     Attributes:
-        refused_plans: as in `ShieldReport`.
-        backup: why the aircraft is on the backup; empty while it flies the planner's path.
-        since_s: when it came there.
+        backup: why the aircraft is on the backup since `since_s`; empty while it flies the planner's path.
     """
 
     def __init__(self) -> None:

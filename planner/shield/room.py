@@ -13,16 +13,10 @@ from planner.memory import ObstacleMemory
 class Room:
     """The space of one flight.
 
-    Args:
-        mission: limits and the area.
-        memory: the edge points.
-        path_keeps_m: what paths keep from every edge point where there is room.
-        tally: work is counted here.
-
     Attributes:
         limits: of turns.
         holds: of the full turns that plans end in.
-        path_keeps_m: as above.
+        path_keeps_m: what paths keep from every edge point where there is room.
     """
 
     def __init__(self, mission: Mission, memory: ObstacleMemory, path_keeps_m: float, tally: Tally) -> None:

@@ -74,12 +74,7 @@ class Adopted:
 
 
 class Shield:
-    """A planner with a certified backup, for one flight.
-
-    Args:
-        inner: the planner.
-        mission: goal and limits.
-    """
+    """A planner with a certified backup, for one flight."""
 
     def __init__(self, inner: Planner, mission: Mission) -> None:
         self._inner, self._mission = inner, mission

@@ -49,15 +49,9 @@ class Tracked:
 def tracked(
     pose: Pose, curvature: float, path: Path, from_m: float, limits: Limits, most_m: float
 ) -> Tracked | None:
-    """A track of a path from a pose on, at most so long; None where the path ends behind the pose.
+    """A track of a path from a pose and curvature (1/m) on, at most `most_m` long; None: the path ends behind it.
 
-    Args:
-        pose: where the track begins.
-        curvature: there, 1/m.
-        path: the planner's path.
-        from_m: arc length of the path before which the pose is not beside it.
-        limits: smallest radius and room to roll.
-        most_m: the track is no longer than this.
+    Before the arc length `from_m` the pose is not beside the path.
     """
     step_m, ahead_m = STEP_SHARE * limits.radius_m, AHEAD_SHARE * limits.radius_m
     places = sample(path, step_m)
