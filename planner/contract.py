@@ -61,13 +61,29 @@ SPACING_M = 50.0
 """Distance between neighbouring edge points."""
 
 
-class InRange:
-    """A seen world in which everything within range of a place of the flight has been seen."""
+class GivenMap:
+    """A seen world of points given beforehand; everything else is free."""
 
     spacing_m = SPACING_M
+    revision = 1
     last_removal_revision = 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+
+    def __init__(self, points_m: FloatArray) -> None:
+        self._points = points_m
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """All points at first, then none."""
+        return self._points if revision < self.revision else np.zeros((0, 2))
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        """(k,) true."""
+        return np.ones(len(points_m), dtype=np.bool_)
+
+
+class InRange(GivenMap):
+    """A seen world in which everything within range of a place of the flight has been seen."""
 
     def __init__(self, circles: Sequence[Disc], range_m: float) -> None:
         self.revision = 0
@@ -99,27 +115,6 @@ class InRange:
         for x, y, radius in self._circles:
             free &= np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) > radius
         return free
-
-
-class GivenMap:
-    """A seen world of points given beforehand; everything else is free."""
-
-    spacing_m = SPACING_M
-    revision = 1
-    last_removal_revision = 0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-
-    def __init__(self, points_m: FloatArray) -> None:
-        self._points = points_m
-
-    def edges_since(self, revision: int) -> FloatArray:
-        """All points at first, then none."""
-        return self._points if revision < self.revision else np.zeros((0, 2))
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        """(k,) true."""
-        return np.ones(len(points_m), dtype=np.bool_)
 
 
 class ContractFlight:

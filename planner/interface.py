@@ -56,7 +56,7 @@ class MovingEdges:
     Attributes:
         time_s: simulated time at which the obstacle was at these points.
         points_m: (k, 2) edge points, in order from one end of the seen edge to the other; at least one.
-        velocity_mps: east and north; (0, 0) if the obstacle has just appeared and its velocity is not known yet.
+        velocity_mps: east and north; (0, 0) if it has just appeared and its velocity is not known yet.
     """
 
     time_s: float
@@ -73,35 +73,28 @@ class MapView(Protocol):
     @property
     def spacing_m(self) -> float:
         """Edge points of one wall are about this far apart."""
-        ...
 
     @property
     def revision(self) -> int:
         """Grows by one with every change of the set of edge points."""
-        ...
 
     @property
     def last_removal_revision(self) -> int:
         """The last revision at which edge points were taken away again; 0 where none ever was."""
-        ...
 
     @property
     def moving(self) -> tuple[MovingEdges, ...]:
         """Obstacles known to move; their edge points are not among those of `edges_since`."""
-        ...
 
     @property
     def last_contradiction_s(self) -> float:
         """Simulated time of the latest edge in space that had been seen to be free; -inf: there was none."""
-        ...
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after `revision`, oldest first; all of them after -1."""
-        ...
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -174,10 +167,7 @@ class Path:
 
     @classmethod
     def through(cls, points_m: Sequence[tuple[float, float]] | FloatArray) -> Path:
-        """Straight lines from point to point. At corners the direction jumps: an aircraft cuts them.
-
-        Args:
-            points_m: (n, 2) east, north; at least two, none equal to the one before.
+        """Straight lines through (n, 2) points, n > 1. At corners the direction jumps: an aircraft cuts them.
 
         Raises:
             ValueError: there are fewer points, or two that follow one another are equal.
@@ -214,12 +204,7 @@ class Path:
 
 
 class Refused(NamedTuple):
-    """Why the shield does not fly the path that a planner gave last.
-
-    Attributes:
-        place_m: (east, north) up to where it was certified.
-        reason: a sentence.
-    """
+    """Why the shield does not fly the path that a planner gave last: a sentence, and (east, north) where that is."""
 
     place_m: tuple[float, float]
     reason: str
@@ -318,11 +303,9 @@ class Planner(Protocol):
     def plan(self, request: PlanRequest) -> Plan:
         """Answers one request. Must not use clocks or randomness of its own: same requests, same plans.
 
-        A path that is FOUND begins at `request.position_m`, and each segment at the end of the one before.
-        `planner.plan_checks` has every rule for an answer, with its figures. An answer that breaks one, or an
-        exception, ends the flight as `planner_failed` with a sentence that says why.
+        A path that is FOUND begins at `request.position_m`, and each segment at the end of the one before. An answer
+        that breaks a rule of `planner.plan_checks`, or an exception, ends the flight as `planner_failed`.
         """
-        ...
 
 
 class NoWayToBegin(RuntimeError):

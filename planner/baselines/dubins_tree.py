@@ -14,7 +14,7 @@ that keep the distance. OMPL is an optional dependency: `pip install wayproof[om
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
@@ -47,8 +47,6 @@ NEAR = 1.5
 
 LOOK_SHARE = 0.5
 """A branch of the tree is looked at every so many of the distances that it keeps."""
-
-WORDS = ("LSL", "RSR", "LSR", "RSL", "RLR", "LRL")
 
 
 @dataclass(frozen=True)
@@ -93,7 +91,7 @@ class DubinsTree:
         self._searched_at_m = 0.0
         self._breach_m = (
             math.inf
-        )  # where the plan in effect comes too near to something seen since it was made
+        )  # where something seen since it was made comes too near to the plan in effect
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while nothing seen blocks it; grows a tree where something does."""
@@ -120,20 +118,14 @@ class DubinsTree:
             return stuck("the tree found no way", request, self._mission, self._memory.points_m)
         segments = [segment for way in ways for segment in way]
         nodes = [way[-1] for way in ways]
+        told = f"tree {self._searches}, {len(ways)} Dubins curves to the goal"
+        guide, seen_m = np.array([request.position_m, self._mission.goal_m]), self._mission.sensor_range_m
         return Plan(
             PlanStatus.FOUND,
-            f"tree {self._searches}, {len(ways)} Dubins curves to the goal"
-            if len(ways) > 1
-            else "way to the goal in view",
+            told if len(ways) > 1 else "way to the goal in view",
             np.array([request.position_m, *(along(node, node[5])[:2] for node in nodes)]),
             Path(np.array([*prefix, *segments])),
-            partial(
-                PlanPicture,
-                np.array([request.position_m, self._mission.goal_m]),
-                self._mission.sensor_range_m,
-                np.zeros((0, 4)),
-                (np.array([each[:2] for each in poses]),),
-            ),
+            partial(PlanPicture, guide, seen_m, candidates=(np.array([each[:2] for each in poses]),)),
         )
 
     def _room(self, points: FloatArray, pose: Pose, keep: float) -> FloatArray:
@@ -274,53 +266,48 @@ def dubins_chain(poses: Sequence[Pose], radius_m: float, terrain: Terrain) -> li
 
 
 def dubins(start: Pose, end: Pose, radius_m: float) -> list[Segment]:
-    """The shortest curve from pose to pose whose radius is nowhere smaller than a given one."""
-    best: list[Segment] = []
-    shortest = math.inf
-    for word in WORDS:
-        lengths = _word(word, start, end, radius_m)
-        if lengths is None or sum(lengths) >= shortest:
-            continue
-        shortest = sum(lengths)
-        best, pose = [], start
-        for letter, length in zip(word, lengths, strict=True):
-            curvature = {"L": 1.0, "S": 0.0, "R": -1.0}[letter] / radius_m
-            if length > SHORTEST_M:
-                best.append((*pose, curvature, length))
-                pose = along(best[-1], length)
-    return best
+    """The shortest curve from pose to pose whose radius is nowhere smaller than a given one.
+
+    Words and formulas: A. M. Shkel and V. Lumelsky, "Classification of the Dubins set", Robotics and Autonomous Systems
+    34, 2001. A word that begins with a turn to the right is that of the mirrored poses.
+    """
+    words = [(side, word) for side in (1.0, -1.0) for word in _words(start, end, radius_m, side)]
+    side, (middle, last, *lengths) = min(words, key=lambda each: sum(each[1][2:]))
+    way: list[Segment] = []
+    pose = start
+    for turn, length in zip((1.0, middle, last), lengths, strict=True):
+        if length * radius_m > SHORTEST_M:
+            way.append((*pose, side * turn / radius_m, length * radius_m))
+            pose = along(way[-1], way[-1][5])
+    return way
 
 
-def _word(word: str, start: Pose, end: Pose, radius: float) -> tuple[float, float, float] | None:
-    """Lengths of the three parts of a Dubins word; None where it does not join the poses."""
-    first, last = (1.0 if letter == "L" else -1.0 for letter in (word[0], word[2]))
-    (x, y, tx, ty), (ex, ey, etx, ety) = start, end
-    cx, cy = x - first * radius * ty, y + first * radius * tx
-    dx, dy = ex - last * radius * ety - cx, ey + last * radius * etx - cy
-    distance, bearing = math.hypot(dx, dy), math.atan2(dy, dx)
-    leaving, arriving = math.atan2(ty, tx), math.atan2(ety, etx)
-    if word[1] == "S":
-        if first != last and distance < 2.0 * radius:
-            return None
-        course = bearing + (first * math.asin(2.0 * radius / distance) if first != last else 0.0)
-        straight = math.sqrt(max(distance**2 - (2.0 * radius) ** 2, 0.0)) if first != last else distance
-        return _turn(first, leaving, course) * radius, straight, _turn(last, course, arriving) * radius
-    if distance >= 4.0 * radius:
-        return None
-    # Three circles that touch: the middle one's centre lies off the line between the others'.
-    off = math.acos(distance / (4.0 * radius))
-    to_middle = bearing + first * off
-    at_first = to_middle + first * 0.5 * math.pi
-    at_last = bearing - first * off + first * 0.5 * math.pi
-    middle = _turn(-first, at_first, at_last + math.pi)
-    return (
-        _turn(first, leaving, at_first) * radius,
-        middle * radius,
-        _turn(last, at_last + math.pi, arriving) * radius,
-    )
+def _words(
+    start: Pose, end: Pose, radius_m: float, side: float
+) -> Iterator[tuple[float, float, float, float, float]]:
+    """LSL, LSR, LRL where they join the poses: turns of the second and third part, and three lengths in radii."""
+    dx, dy = (end.east_m - start.east_m) / radius_m, side * (end.north_m - start.north_m) / radius_m
+    d, bearing = math.hypot(dx, dy), math.atan2(dy, dx)
+    a = side * math.atan2(start.tangent_north, start.tangent_east) - bearing
+    b = side * math.atan2(end.tangent_north, end.tangent_east) - bearing
+    sines, cosines = math.sin(a) - math.sin(b), math.cos(a) - math.cos(b)
+    turn, same = 2.0 * math.cos(a - b), math.atan2(-cosines, d + sines)
+    straight = 2.0 + d * d - turn + 2.0 * d * sines
+    yield 0.0, 1.0, _angle(same - a), math.sqrt(max(straight, 0.0)), _angle(b - same)
+    both = math.sin(a) + math.sin(b)
+    straight = -2.0 + d * d + turn + 2.0 * d * both
+    if straight >= 0.0:
+        length = math.sqrt(straight)
+        course = math.atan2(-math.cos(a) - math.cos(b), d + both) - math.atan2(-2.0, length)
+        yield 0.0, -1.0, _angle(course - a), length, _angle(course - b)
+    cosine = (6.0 - d * d + turn - 2.0 * d * sines) / 8.0
+    if abs(cosine) <= 1.0:
+        middle = math.tau - math.acos(cosine)
+        first = _angle(same - a + 0.5 * middle)
+        yield -1.0, 1.0, first, middle, _angle(b - a - first + middle)
 
 
-def _turn(side: float, course: float, to_course: float) -> float:
-    """The angle by which a turn to one side leads from one course to another."""
-    turn = side * (to_course - course) % math.tau
-    return 0.0 if math.tau - turn < 1e-9 else turn
+def _angle(radians: float) -> float:
+    """An angle in [0, 2 pi); one that is a full turn but for rounding is 0."""
+    angle = radians % math.tau
+    return 0.0 if math.tau - angle < 1e-9 else angle

@@ -172,7 +172,7 @@ class GrownObstacles:
         return float(min((shape.distance(goal) for shape in mine), default=math.inf))
 
     def tangents(self, place: Point, parts: set[int], reach_m: float) -> list[tuple[Point, float, bool]]:
-        """The corners within reach at which lines from a place touch some obstacles, their sides, and which are in sight.
+        """The corners within reach at which lines from a place touch some obstacles, sides, and which are in sight.
 
         Of side 1 are those that lie on the left of the line.
         """

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from planner.geometry.clearance import admits, first_breach
+from planner.geometry.clearance import first_breach
 from planner.geometry.curves import (
     Limits,
     Pose,
@@ -19,6 +19,7 @@ from planner.geometry.curves import (
     pose_at,
     sample,
 )
+from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 
 LEAD_S = 1.0
@@ -54,52 +55,49 @@ def stuck(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray
     if path is None or path.loiter or path.length_m - arc_length_m < limits.roll_m:
         path = Path(np.array([(*request.position_m, *request.direction, 0.0, max(limits.roll_m, 1.0))]))
         arc_length_m = 0.0
+    to_m = min(path.length_m, arc_length_m + AHEAD_RADII * limits.radius_m)
     for seen, share in product((request.seen, None), SHARES):
-        hold = holding_turn(path, arc_length_m, mission, points_m, share * mission.clearance_m, seen)
+        terrain = Terrain(points_m, np.full(len(points_m), share * mission.clearance_m), mission.bounds_m)
+        hold = divert_to_loiter(path, arc_length_m, to_m, limits, terrain, seen)
         if hold is not None:
             waypoints = np.array([request.position_m, *hold.segments[1:, :2].tolist()])
             return Plan(PlanStatus.FOUND, f"{why}; holding", waypoints, hold)
     return Plan(PlanStatus.NO_PATH, f"{why} and there is no room to hold")
 
 
-def holding_turn(
-    path: Path,
-    from_m: float,
-    mission: Mission,
-    points_m: FloatArray,
-    keep_m: float,
-    seen: MapView | None = None,
+def divert_to_loiter(
+    path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrain, seen: MapView | None = None
 ) -> Path | None:
-    """The path in effect, left as late as may be for a full turn at the turn radius; None: there is no room.
+    """The path in effect from one arc length on, left before another, as late as may be, for a full turn.
 
     Args:
         path: the path in effect.
         from_m: arc length of the aircraft on it.
-        mission: turn radius and area.
-        points_m: (m, 2) edge points.
-        keep_m: distance to be kept from each.
+        to_m: arc length up to which it can still be flown.
+        limits: smallest radius and room to roll.
+        terrain: where the turn and the way there may lie.
         seen: the turn lies in space that was seen to be free; None: anywhere.
+
+    Returns:
+        A path that ends in a loiter circle; None where no place on it has room for one.
     """
-    limits = Limits.of(mission)
-    to_m = min(path.length_m, from_m + AHEAD_RADII * limits.radius_m)
+    # Where the way there comes too near to something, it is left before.
     way = between(path, from_m, to_m)
-    breach = first_breach(Path(np.array(way)), points_m, keep_m) if way else math.inf
+    breach = first_breach(Path(np.array(way)), terrain.points_m, terrain.keep_m) if way else math.inf
     if breach < math.inf:
-        to_m = max(from_m, from_m + breach - keep_m)
+        to_m = max(from_m, from_m + breach - float(terrain.keep_m.max()))
     step_m = APART_RADII * limits.radius_m
-    for i in range(int((to_m - from_m) / step_m), -1, -1):
+    for i in range(max(int((to_m - from_m) / step_m), 0), -1, -1):
         pose, curvature = place_on(path, from_m + i * step_m)
         for side in (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0):
             roll: list[Segment] = [(*pose, 0.0, limits.roll_m)] if side * curvature < 0.0 else []
             start = along(roll[0], limits.roll_m) if roll else pose
-            rows = Path(np.array([*roll, full_turn(start, limits.radius_m, side)]))
-            if seen is not None and not seen.seen_free(sample(rows, step_m)).all():
+            turn = Path(np.array([*roll, full_turn(start, limits.radius_m, side)]))
+            if seen is not None and not seen.seen_free(sample(turn, step_m)).all():
                 continue
-            if admits(rows, points_m, keep_m, mission.bounds_m):
-                return Path(
-                    np.array([*between(path, from_m, from_m + i * step_m), *rows.segments.tolist()]),
-                    loiter=True,
-                )
+            if terrain.admits(turn):
+                rows = [*between(path, from_m, from_m + i * step_m), *turn.segments.tolist()]
+                return Path(np.array(rows), loiter=True)
     return None
 
 

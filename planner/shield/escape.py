@@ -15,6 +15,7 @@ import numpy as np
 from planner.geometry.clearance import behind
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Segment, onward, place_on, sample
+from planner.geometry.joining import divert_to_loiter
 from planner.geometry.path_samples import places_along
 from planner.geometry.terrain import Terrain
 from planner.interface import MapView, Mission, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
@@ -23,7 +24,6 @@ from planner.plan_checks import start_tolerance_m
 from planner.shield.certificate import CertificateBroken, Certifier
 from planner.shield.committed_plan import CommittedPlan
 from planner.shield.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out, step_along_m
-from planner.shield.loiter import divert_to_loiter
 from planner.shield.room import Room
 
 BROKEN_SHARE = 0.99
