@@ -16,7 +16,7 @@ from planner.contract import MISSION
 from planner.geometry.curves import Pose, sample
 from planner.interface import FloatArray, Mission, Path
 from planner.paper.config import ImprovedBugConfig
-from planner.paper.definitions import crosses, guide_vector, track_cost_m, within
+from planner.paper.definitions import crosses, guide_vector, within
 from planner.paper.multi_step_search import Window, multi_step_search
 from planner.paper.route_optimisation import Route, cancel_nodes, flyable, shortest, turn_fits
 from planner.paper.sectors import (
@@ -83,10 +83,6 @@ def test_equations_1_to_3() -> None:
 def test_the_largest_change_of_course(step_m: float, radius_m: float, unit_deg: float, units: int) -> None:
     # 2 atan(1) = 90 deg, 2 atan(0.5) = 53.13 deg, 90 / 7 = 12.9, 2 atan(0.005) = 0.57 deg.
     assert most_units(step_m, radius_m, math.radians(unit_deg) * (1.0 - 1e-12)) == units
-
-
-def test_the_cost_of_a_track_is_its_length() -> None:
-    assert track_cost_m([(0.0, 0.0), (3.0, 4.0), (3.0, 10.0)]) == pytest.approx(11.0)
 
 
 def test_definition_1_and_2() -> None:

@@ -11,7 +11,7 @@ import pytest
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose, pose_at
 from planner.interface import FloatArray, Mission, Path, Plan, PlanStatus
-from planner.shield.committed_plan import CUT, UNHURRIED, CommittedPlan, MonitorLimits, PlanMonitor
+from planner.shield.committed_plan import CUT, CommittedPlan, MonitorLimits, PlanMonitor
 
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
 TURN = (2000.0, 0.0, 1.0, 0.0, 0.01, 2.0 * math.pi * 100.0)
@@ -146,23 +146,3 @@ def test_the_window_rolls_on_the_sooner_the_nearer_something_is_wrong() -> None:
     assert not monitor.due(committed(1), 0.0, 0.9 * 50.0, newly_cut=False)
     assert monitor.due(committed(1), 0.0, max(least_m, 50.0), newly_cut=False)
     assert monitor.due(committed(1), 1100.0, 0.0, newly_cut=True)
-
-
-def test_a_way_that_grazes_what_cuts_it_is_looked_at_again_later() -> None:
-    flown, monitor = committed(1), monitoring()
-    in_effect(monitor, flown, EDGES[:2])
-    since_m = 0.5 * (CUT + UNHURRIED) * flown.loiter_entry_m
-    assert monitor.due(flown, 0.0, since_m, newly_cut=False)
-    monitor.lengthened_m = 0.0
-    assert not monitor.due(flown, 0.0, since_m, newly_cut=False)
-    assert monitor.due(flown, 0.0, UNHURRIED * monitor.cut_m, newly_cut=False)
-
-
-def test_only_what_was_proposed_takes_effect() -> None:
-    monitor, proposed, other = monitoring(), committed(3), committed(3)
-    assert not monitor.take_effect(None, EDGES)
-    monitor.proposed = proposed
-    assert not monitor.take_effect(other.plan, EDGES)
-    assert (monitor.plan, monitor.proposed) == (None, proposed)
-    assert monitor.take_effect(proposed.plan, EDGES)
-    assert not monitor.take_effect(proposed.plan, EDGES)

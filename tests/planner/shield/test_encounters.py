@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from planner.interface import FloatArray, Mission, MovingEdges, PlanRequest
+from planner.interface import FloatArray, MovingEdges
 from planner.shield.encounters import (
     EARLIEST,
     FASTEST,
     LATER_S,
     LATEST,
-    encounters,
     meeting_s,
     met_at,
 )
@@ -91,25 +89,6 @@ def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
         assert off.min() < 1e-6
 
 
-@given(seed=SEEDS)
-def test_obstacles_at_rest_stay_where_they_are(seed: int) -> None:
-    each = obstacle(seed, 0.0, 0.0)
-    drawn = met_at(each, (0.0, 0.0), 1000.0, SPEED, SPACING)
-    assert {tuple(place) for place in drawn.tolist()} <= {tuple(place) for place in each.points_m.tolist()}
-    away = np.hypot(*(each.points_m[:, None] - drawn).transpose(2, 0, 1)).min(axis=1)
-    assert away.max() <= 0.5 * SPACING * math.sqrt(2.0)
-
-
-@given(seed=SEEDS, pace=st.floats(FASTEST * SPEED, 1e4), course=COURSES)
-def test_faster_ones_are_met_after_a_bounded_time(seed: int, pace: float, course: float) -> None:
-    each = obstacle(seed, pace, course)
-    away = np.hypot(*each.points_m.T)
-    told = meeting_s(each.points_m, np.array(each.velocity_mps), SPEED)
-    assert np.isfinite(told).all()
-    assert (told <= away / (SPEED * (1.0 - FASTEST)) + 1e-9).all()
-    assert (told >= away / (SPEED * (1.0 + FASTEST)) - 1e-9).all()
-
-
 @given(seed=SEEDS, pace=PACES, course=COURSES, age_s=st.floats(0.0, 30.0))
 def test_what_was_seen_a_while_ago_has_moved_on_since(
     seed: int, pace: float, course: float, age_s: float
@@ -134,18 +113,3 @@ def test_as_the_aircraft_comes_nearer_the_places_draw_together() -> None:
     ]
     assert 100.0 <= widths[0] < widths[1] < widths[2]
     assert widths[0] < 100.0 + 6.0 * (LATER_S + 5.0)
-
-
-def test_each_obstacle_has_its_outline() -> None:
-    class Seen:
-        moving = (obstacle(1, 5.0, 0.3), obstacle(2, 3.0, 2.0))
-
-    mission = Mission(
-        (0.0, 9000.0), 50.0, (-9e3, -9e3, 9e3, 9e3), 2.0 * SPACING, 100.0, SPEED, 0.5, 1.0, 1500.0
-    )
-    request = PlanRequest(7.0, (10.0, 20.0), (0.0, 1.0), Seen())  # type: ignore[arg-type]
-    outlines = encounters(request, mission)
-    assert len(outlines) == 2
-    for outline, each in zip(outlines, Seen.moving, strict=True):
-        np.testing.assert_array_equal(outline, met_at(each, (10.0, 20.0), 7.0, SPEED, SPACING))
-    assert len(encounters(request, replace(mission, clearance_m=8.0 * SPACING))[0]) < len(outlines[0])

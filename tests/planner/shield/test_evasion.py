@@ -17,7 +17,7 @@ from planner.geometry.path_samples import poses_at
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, PlanStatus
 from planner.rolling_window.planner import RollingWindow
 from planner.shield.encounters import EARLIEST, LATEST
-from planner.shield.escape import CLEARER, EVADING_S, LOITER_SHARES
+from planner.shield.escape import LOITER_SHARES
 from planner.shield.evasion import (
     AHEAD_S,
     LATER,
@@ -25,7 +25,6 @@ from planner.shield.evasion import (
     UNKNOWN_S,
     Threats,
     clearest,
-    far_side,
     rolled_out,
 )
 from tests.examples import examples
@@ -110,21 +109,6 @@ def test_from_what_has_just_appeared_it_keeps_further(place: tuple[float, float]
     away = np.hypot(*(poses_at(path, arc_lengths_m)[:, :2] - place).T)
     reach = UNKNOWN_MPS * np.minimum(LATEST * arc_lengths_m / SPEED, UNKNOWN_S)
     assert unknown.room_m(path) == pytest.approx((away - reach + LATER * arc_lengths_m).min())
-
-
-@pytest.mark.parametrize("bearing", [0.3, 2.0, 4.0])
-@pytest.mark.parametrize("clockwise", [1.0, -1.0])
-def test_the_far_side_of_a_circle_is_where_it_is(bearing: float, clockwise: float) -> None:
-    """Half of it is seen from far away."""
-    middle, position = (
-        np.array((100.0, -50.0)),
-        (100.0 + 1e5 * math.cos(bearing), -50.0 + 1e5 * math.sin(bearing)),
-    )
-    angle = bearing + clockwise * np.linspace(-0.5, 0.5, 19) * math.pi
-    face = middle + 80.0 * np.column_stack((np.cos(angle), np.sin(angle)))
-    behind = far_side(face, position)
-    np.testing.assert_allclose(np.hypot(*(behind - middle).T), 80.0)
-    assert np.hypot(*(behind - face[9]).T).max() == pytest.approx(160.0)
 
 
 def test_round_a_loiter_circle_room_is_that_of_the_place_it_will_be_at() -> None:
@@ -257,72 +241,6 @@ def test_a_plan_is_left_where_what_has_just_appeared_beside_it_may_come_to_it(
     assert near is not None
     assert answer.path is not None
     assert near.room_m(answer.path) >= MISSION_HERE.clearance_m
-
-
-class HalfOpen(Seen):
-    """Nothing is known of what lies further east than some place."""
-
-    to_m = 1200.0
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return points_m[:, 0] < self.to_m
-
-
-@pytest.mark.parametrize("appears", [False, True])
-def test_a_plan_is_not_prolonged_to_where_what_has_just_appeared_may_come(
-    appears: bool, ring: MakePoints
-) -> None:
-    seen = HalfOpen(nothing())
-    pilot, plan = flown_straight(seen)
-    seen.to_m = 4000.0
-    if appears:
-        seen.moving = (MovingEdges(24.0, ring(1200.0, -115.0, 30.0, 12.0), (0.0, 0.0)),)
-    answer = pilot.plan(request_on(plan, 600.0, seen))
-    assert answer.status is (PlanStatus.NO_BETTER if appears else PlanStatus.FOUND)
-
-
-@pytest.mark.parametrize("seed", [889, 902, 1087])
-def test_where_all_that_is_wanted_cannot_be_kept_the_clearest_way_is_flown(
-    seed: int, ring: MakePoints
-) -> None:
-    """But for so much less as another has to keep more. Of nothing it is certain that it is free."""
-    rng = np.random.default_rng(seed)
-    seen = Partly(nothing())
-    pilot, plan = flown_straight(seen)
-    for _ in range(rng.integers(1, 4)):
-        east, north, radius = rng.uniform(150, 800), rng.uniform(-500, 500), rng.uniform(40, 150)
-        course, speed = rng.uniform(0, 2 * math.pi), rng.uniform(3, 10)
-        velocity = (speed * math.cos(course), speed * math.sin(course))
-        seen.moving += (MovingEdges(1.0, ring(east, north, radius, 12.0), velocity),)
-    seen.hidden = lambda north: north < math.inf
-    request = request_on(plan, 25.0, seen)
-    answer, near = pilot.plan(request), pilot._escapes.threats(request)
-    assert near is not None
-    assert plan.path is not None
-    flown = answer.path or Path(np.array(onward(plan.path, 25.0, AHEAD_S * SPEED)))
-    ways = rolled_out(onward(plan.path, 25.0, pilot._lead_m), pilot._local.limits)
-    keeps_m = pilot._local.room.path_keeps_m
-    best_m = max(near.room_m(way, later=0.5 * LATER) for way in ways)
-    assert 0.5 * keeps_m < best_m < keeps_m
-    assert near.room_m(flown) > best_m - CLEARER * keeps_m
-
-
-@pytest.mark.parametrize("appeared", [False, True])
-def test_where_not_all_stood_still_a_broken_certificate_is_no_fault_of_the_planner(
-    appeared: bool, ring: MakePoints
-) -> None:
-    """Edges were taken back, or something appeared, long before: it keeps as clear as it can."""
-    seen = Seen(nothing())
-    pilot, plan = flown_straight(seen)
-    seen.show(np.array([(5000.0, 5000.0)]))
-    if appeared:
-        seen.last_contradiction_s = 1.0
-    else:
-        seen.last_removal_revision = seen.revision
-    pilot.plan(request_on(plan, 25.0, seen))
-    seen.show(ring(200.0, 0.0, 160.0, 12.0))
-    answer = pilot.plan(request_on(plan, 50.0, seen)._replace(time_s=2.0 + EVADING_S))
-    assert answer.reason.startswith("something is in the way; ")
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -11,7 +11,7 @@ import pytest
 from planner.geometry.curves import sample
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.shield import shield as shield_module
-from planner.shield.shield import Shield, first_exit_m
+from planner.shield.shield import Shield
 
 Known = Callable[[FloatArray], MapView]
 MISSION = Mission(
@@ -57,12 +57,6 @@ def test_a_way_that_leaves_the_area_is_flown_only_as_far_as_a_turn_inside(
     path = answer(Once(*OUT_AND_BACK), free).path
     assert path is not None
     assert sample(path, 5.0)[:, 1].max() > 800.0
-
-
-def test_first_exit() -> None:
-    path = Path.through([(0.0, 0.0), (1000.0, 0.0)])
-    assert first_exit_m(path, (-1.0, -1.0, 2000.0, 1.0)) == math.inf
-    assert first_exit_m(path, (-1.0, -1.0, 355.0, 1.0)) == pytest.approx(350.0)
 
 
 def test_a_refused_planner_is_told_where_and_why(known: Known) -> None:
