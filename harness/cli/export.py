@@ -37,7 +37,7 @@ def export(
     from harness.files.errors import RunFolderError
     from harness.files.input_file import InputError
     from harness.files.whole_file import replace_bytes
-    from harness.run_files.exports.export import exported
+    from harness.run_files.exports import exported
     from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
 
     try:

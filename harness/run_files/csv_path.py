@@ -6,8 +6,7 @@ import csv
 from typing import Final
 
 from harness.files.input_file import InputError
-from harness.run_files.path_as_read import PathAsRead
-from harness.run_files.read_values import finite, shown
+from harness.run_files.path_as_read import PathAsRead, finite, shown
 
 LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))
 """Columns of a place in the local plane."""

@@ -9,8 +9,7 @@ from typing import Any, Final, NamedTuple
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.run_files.fences import Fence, Fences
-from harness.run_files.path_as_read import PathAsRead, Point, of_points
-from harness.run_files.read_values import finite, parsed_json, shown
+from harness.run_files.path_as_read import PathAsRead, Point, finite, of_points, parsed_json, shown
 
 PARTS: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
 """What a geometry of several parts is made of."""

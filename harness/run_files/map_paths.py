@@ -15,8 +15,7 @@ from xml.etree import ElementTree
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.run_files.fences import Fence, Fences
-from harness.run_files.path_as_read import PathAsRead, Point, of_points
-from harness.run_files.read_values import finite, shown
+from harness.run_files.path_as_read import PathAsRead, Point, finite, of_points, shown
 
 LINES: Final = ("LineString", "Track")
 PASSED: Final = (

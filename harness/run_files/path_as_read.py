@@ -1,9 +1,12 @@
-"""What a file says of a path, before it is put into the local plane."""
+"""What a file says of a path, before it is put into the local plane, and values of such files: JSON, finite numbers."""
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any, NoReturn
 
 from harness.files.input_file import InputError
 from harness.run_files.fences import Fences
@@ -52,3 +55,59 @@ def of_points(
         )
     positions = tuple((latitude, longitude) for latitude, longitude, _ in points)
     return PathAsRead(False, positions, heights, above_ground and bool(heights), fences, tuple(notes))
+
+
+def parsed_json(text: str, source: str) -> Any:
+    """What a JSON text holds; a fault of it names the file.
+
+    Raises:
+        InputError: it is not JSON, has a key twice in one place, or a number that is not finite.
+    """
+
+    def refuse(name: str) -> NoReturn:
+        raise InputError(f"{source}: has the number {name}; must be finite")
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            names = [name for name, _ in pairs]
+            again = next(name for name in names if names.count(name) > 1)
+            raise InputError(f"{source}: has the key {shown(again)!r} twice in one place; must have it once")
+        return found
+
+    try:
+        return json.loads(text, parse_constant=refuse, object_pairs_hook=once)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{source}:{error.lineno}: is not JSON ({error.msg})") from error
+    except RecursionError as error:
+        raise InputError(f"{source}: is nested too deeply; must be a path") from error
+    except InputError:
+        raise
+    except ValueError as error:  # what Python says of a number of thousands of digits
+        raise InputError(f"{source}: has a number that is too long; must be a path") from error
+
+
+def finite(value: Any, where: str) -> float:
+    """A finite number, from JSON or from text."""
+    try:
+        number = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        told = "missing, or null" if value is None else repr(shown(str(value)))
+        raise InputError(f"{where}: is {told}; must be a finite number")
+    return number
+
+
+def whole(value: Any, where: str) -> int:
+    """A whole number, from JSON or from text."""
+    number = finite(value, where)
+    if number != int(number):
+        raise InputError(f"{where}: is {number:g}; must be a whole number")
+    return int(number)
+
+
+def shown(text: str) -> str:
+    """A text as a line can show it."""
+    short = text if len(text) <= 80 else f"{text[:77]}..."
+    return short if short.isprintable() else ascii(short)

@@ -14,7 +14,7 @@ from harness.run_files.fences import Fence, Fences
 from harness.run_files.mission import commands
 from harness.run_files.mission.fence_items import rally_note
 from harness.run_files.mission.items import MISSION, Item, MissionAsRead, filled, waiting_notes
-from harness.run_files.read_values import finite, parsed_json, shown, whole
+from harness.run_files.path_as_read import finite, parsed_json, shown, whole
 
 LANDING_PATTERNS: Final = {"fwLandingPattern": commands.LAND, "vtolLandingPattern": commands.VTOL_LAND}
 """Complex items that are written as a place to descend at and a place to land."""

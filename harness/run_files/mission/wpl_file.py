@@ -12,7 +12,7 @@ from harness.files.fence_commands import APART, RALLY_POINT
 from harness.files.input_file import InputError
 from harness.run_files.mission import commands, fence_items
 from harness.run_files.mission.items import FRAMES, SEA, Item, MissionAsRead, filled, waiting_notes
-from harness.run_files.read_values import finite, whole
+from harness.run_files.path_as_read import finite, whole
 
 WPL: Final = "QGC WPL"
 CELLS: Final = 12

@@ -23,9 +23,8 @@ from pyproj import CRS, Transformer
 from aircraft.frames import LocalPlane
 from harness.cli.app import main
 from harness.flight.record import FloatArray
-from harness.run_files.exports.export import FORMATS
-from harness.run_files.exports.exported_path import planned_points
-from harness.run_files.exports.missions import fences
+from harness.run_files.exported_path import planned_points
+from harness.run_files.exports import FORMATS, fences
 from harness.run_files.path_files import PathAsGiven, read_path
 from harness.run_files.run_folder import Run, load_run
 from harness.scenario.scenario import parse_scenario
