@@ -11,7 +11,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from aircraft.actuators.actuator import CONTROLS, Actuator, Actuators, NormActuator
+from aircraft.actuators.actuator import Actuator, Actuators, NormActuator
 from aircraft.airframe import DERIVED, FIGURES, Airframe, AirframeEntry, AutopilotKeys
 from aircraft.autopilot import Gains
 from aircraft.card_cache import cached, figure, is_kept
@@ -67,9 +67,6 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
 
 def is_surveyed(name: str) -> bool:
     """Whether an aircraft's figures are kept, so that `airframe` need not fly it for them.
-
-    Args:
-        name: as `airframe` takes it.
 
     Raises:
         AircraftError: there is none.
@@ -138,89 +135,25 @@ _MEASURED = ("mass_kg", "cruise_mps", "roll_in_s", "weave_error_m", *FIGURES)
 
 @cache
 def _table() -> Mapping[str, AirframeEntry]:
-    return MappingProxyType(parse_airframes(files("aircraft").joinpath("airframes.yaml").read_text("utf-8")))
-
-
-def parse_airframes(text: str) -> dict[str, AirframeEntry]:
-    """Reads an airframe table.
-
-    Args:
-        text: YAML in the form of airframes.yaml.
-
-    Raises:
-        ValueError: if a key is unknown, missing, repeated or not of its type, or a figure is out of order;
-            the message names the airframe and the key.
-    """
+    """The entries of airframes.yaml, by name."""
     import yaml
 
-    class Loader(yaml.SafeLoader):
-        """Refuses a key that is given twice."""
-
-        def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-            seen: set[str] = set()
-            for key, _ in node.value:
-                if key.value in seen:
-                    raise ValueError(f"line {key.start_mark.line + 1}: {key.value!r} is given twice")
-                seen.add(key.value)
-            return super().construct_mapping(node, deep)
-
-    table = yaml.load(text, Loader)
-    if not isinstance(table, dict):
-        raise ValueError("the airframe table must map names to airframes")
-    return {str(name): _entry(str(name), keys) for name, keys in table.items()}
+    table = yaml.safe_load(files("aircraft").joinpath("airframes.yaml").read_text("utf-8"))
+    return MappingProxyType({name: _entry(name, **keys) for name, keys in table.items()})
 
 
-def _entry(name: str, keys: object) -> AirframeEntry:
-    if not isinstance(keys, dict):
-        raise ValueError(f"{name}: must be a mapping")
-    if unknown := sorted(set(keys) - {"summary", "cruise_mps", "verified", "gains", "actuators", *FIGURES}):
-        raise ValueError(f"{name}: unknown key {unknown[0]!r}")
-    if missing := sorted({"summary", "cruise_mps", "verified"} - set(keys)):
-        raise ValueError(f"{name}: missing key {missing[0]!r}")
-    if not isinstance(keys["verified"], bool):
-        raise ValueError(f"{name}.verified: must be true or false")
-    gains = keys.get("gains", {})
-    if not isinstance(gains, dict):
-        raise ValueError(f"{name}.gains: must be a mapping")
-    if unknown := sorted(set(gains) - {f.name for f in fields(Gains)}):
-        raise ValueError(f"{name}.gains: unknown gain {unknown[0]!r}")
-    for gain, value in gains.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise ValueError(f"{name}.gains.{gain}: must be a finite number; got {value!r}")
-    actuators = _actuators(name, keys.get("actuators", {}))
-    for key in ("cruise_mps", *FIGURES):
-        value = keys.get(key, 1.0)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
-            raise ValueError(f"{name}.{key}: must be a positive number; got {value!r}")
+def _entry(
+    name: str,
+    summary: str,
+    cruise_mps: float,
+    verified: bool,
+    gains: Mapping[str, float] = MappingProxyType({}),
+    actuators: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
+    **figures: float,
+) -> AirframeEntry:
+    assert {*gains} <= {each.name for each in fields(Gains)}, name
+    assert {*figures} <= {*FIGURES}, name
+    servos = Actuators(**{control: Actuator(**keys) for control, keys in actuators.items()})
     return AirframeEntry(
-        name=name,
-        summary=str(keys["summary"]),
-        cruise_mps=float(keys["cruise_mps"]),
-        verified=keys["verified"],
-        figures=MappingProxyType({key: float(keys[key]) for key in FIGURES if key in keys}),
-        gains=MappingProxyType({key: float(value) for key, value in gains.items()}),
-        actuators=actuators,
+        name, summary, cruise_mps, verified, MappingProxyType(figures), MappingProxyType(dict(gains)), servos
     )
-
-
-def _actuators(name: str, keys: object) -> Actuators:
-    """The servos of an entry: `{aileron: {lag_s, rate_limit_degps, deadband_deg}, ...}`."""
-    if not isinstance(keys, dict):
-        raise ValueError(f"{name}.actuators: must be a mapping")
-    if unknown := sorted(set(keys) - set(CONTROLS)):
-        raise ValueError(f"{name}.actuators: unknown control {unknown[0]!r}")
-    made = {}
-    for control, figures in keys.items():
-        where = f"{name}.actuators.{control}"
-        if not isinstance(figures, dict):
-            raise ValueError(f"{where}: must be a mapping")
-        if unknown := sorted(set(figures) - {each.name for each in fields(Actuator)}):
-            raise ValueError(f"{where}: unknown key {unknown[0]!r}")
-        for key, value in figures.items():
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ValueError(f"{where}.{key}: must be a number; got {value!r}")
-        try:
-            made[control] = Actuator(**figures)
-        except ValueError as error:
-            raise ValueError(f"{where}.{error}") from None
-    return Actuators(**made)

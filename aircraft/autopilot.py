@@ -284,14 +284,7 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
 
 
 def roll_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
-    """The lesser of the phase margins of the roll rate loop and of the roll loop around it.
-
-    Args:
-        at: the aircraft at trim.
-        gains: of the autopilot.
-        lag_s: time constant of the aileron's servo.
-        latency_s: age of the roll angle.
-    """
+    """The lesser of the phase margins of the roll rate loop and of the roll loop around it."""
     s = 1j * FREQUENCIES_RADPS
     plant = at.lda / (s - at.lp) / (1.0 + lag_s * s)
     return _margin_deg(
@@ -300,14 +293,7 @@ def roll_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: floa
 
 
 def pitch_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
-    """The lesser of the phase margins of the pitch rate loop and of the pitch loop around it.
-
-    Args:
-        at: the aircraft at trim.
-        gains: of the autopilot.
-        lag_s: time constant of the elevator's servo.
-        latency_s: age of the pitch angle.
-    """
+    """The lesser of the phase margins of the pitch rate loop and of the pitch loop around it."""
     s = 1j * FREQUENCIES_RADPS
     short_period = s * s - (at.mq + at.za) * s + at.mq * at.za - at.ma
     plant = -at.mde * (s - at.za) / short_period / (1.0 + lag_s * s)

@@ -57,12 +57,7 @@ def _sha256(result: dict[str, Any]) -> str:
 
 
 def is_kept(title: str, digest: str) -> bool:
-    """Whether the cache has something of a measurement, which `cached` then takes if it is sound.
-
-    Args:
-        title: as `cached` takes it.
-        digest: likewise.
-    """
+    """Whether the cache has something of a measurement, which `cached` then takes if it is sound."""
     return _file(title, digest).is_file()
 
 

@@ -61,10 +61,6 @@ AS_MODELLED: Final = Deviation()
 def deviate(root: ElementTree.Element, deviation: Deviation) -> None:
     """Changes a JSBSim model in place.
 
-    Args:
-        root: its root element.
-        deviation: what differs.
-
     Raises:
         ValueError: the model does not show what is to differ.
     """

@@ -27,10 +27,6 @@ class LocalPlane:
     def __init__(self, latitude_deg: float, longitude_deg: float) -> None:
         """Lays the plane about an origin.
 
-        Args:
-            latitude_deg: geodetic latitude of (0, 0), within 85 degrees of the equator.
-            longitude_deg: longitude of (0, 0), in [-180, 360].
-
         Raises:
             ValueError: if the origin is not finite or out of range.
         """
@@ -55,10 +51,6 @@ class LocalPlane:
 
         The point goes to the tangent plane through its ECEF coordinates. The distance is the arc over the
         chord, with the radius of the normal section after Euler: 1/R = cos^2/M + sin^2/N.
-
-        Args:
-            latitude_rad: geodetic latitude.
-            longitude_rad: longitude.
 
         Returns:
             East (m), north (m) and the meridian convergence (rad): a direction in the plane is the true
@@ -94,10 +86,6 @@ class LocalPlane:
 
         `project` to the second order, to a tenth of a millimetre: a polynomial through nine points of it, as
         `aircraft.kernels.place_in_patch` works it out.
-
-        Args:
-            latitude_rad: geodetic latitude.
-            longitude_rad: longitude.
 
         Returns:
             19 numbers: latitude and longitude (rad) of its middle; how far from there it holds, to the north and the
@@ -166,11 +154,6 @@ class PatchedPlane:
     """Projects as `LocalPlane.project` does, to a tenth of a millimetre, in a twentieth of the time.
 
     It keeps a patch of the plane about the last points, a polynomial, and lays a new one where a point is off it.
-
-    Args:
-        plane: the local plane.
-        latitude_rad: geodetic latitude of where the first patch is laid.
-        longitude_rad: longitude of it.
     """
 
     def __init__(self, plane: LocalPlane, latitude_rad: float, longitude_rad: float) -> None:

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import math
-import os
-import threading
 import xml.etree.ElementTree as ElementTree
 from collections import deque
-from concurrent.futures import Future, wait
-from contextlib import ExitStack
-from queue import SimpleQueue
 from typing import Any
 
 import jsbsim
@@ -93,72 +87,25 @@ def node(fdm: Any, path: str) -> Any:
 def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
     """A fresh jsbsim.FGFDMExec with the model and the autopilot; a second model in one would crash.
 
-    It is made in another thread, as the C library gives that a heap of its own: there all of a model lies close
-    together. Among what libraries and flights before it have left, its steps take up to a twentieth longer.
-
     Raises:
         AircraftError: the model cannot be loaded.
     """
-    jsbsim.set_logger(_SILENCE)  # of this thread, which takes the steps
-    made: Future[Any] = Future()
-    try:
-        with _STARTING:
-            orders = _orders()
-        orders.put((made, files, step_rate_hz))
-        return made.result()
-    finally:
-        if not made.cancel():  # Ctrl-C: Python must not end while the other thread is in JSBSim
-            wait((made,))
-
-
-@functools.cache
-def _orders() -> SimpleQueue[tuple[Future[Any], ModelFiles, int]]:
-    """What the thread that loads models is asked for. It never ends, as with it its heap would go to others."""
-    orders: SimpleQueue[tuple[Future[Any], ModelFiles, int]] = SimpleQueue()
-
-    def load_all() -> None:
-        jsbsim.set_logger(_SILENCE)
-        while True:
-            made, files, step_rate_hz = orders.get()
-            if made.set_running_or_notify_cancel():
-                try:
-                    made.set_result(_load(files, step_rate_hz))
-                except BaseException as error:
-                    made.set_exception(error)
-            del made  # the model is not this thread's
-
-    threading.Thread(target=load_all, name="load models", daemon=True).start()
-    return orders
-
-
-def _forked() -> None:
-    """In the new process there is no such thread."""
-    _orders.cache_clear()
-    _STARTING.release()
-
-
-_STARTING = threading.Lock()
-os.register_at_fork(before=_STARTING.acquire, after_in_parent=_STARTING.release, after_in_child=_forked)
-
-
-def _load(files: ModelFiles, step_rate_hz: int) -> Any:
+    jsbsim.set_logger(_SILENCE)
     _SILENCE.errors.clear()
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_debug_level(0)
-    fdm.set_dt(
-        1.0 / step_rate_hz
-    )  # before the model: its filters and integrators take their step when they are loaded
-    with ExitStack() as stack:
-        try:
-            late = files.latency_s, round(files.latency_s * step_rate_hz)
-            derived = stack.enter_context(with_autopilot(files.model, files.actuators, files.deviation, late))
+    # Before the model: its filters and integrators take their step when they are loaded.
+    fdm.set_dt(1.0 / step_rate_hz)
+    late = files.latency_s, round(files.latency_s * step_rate_hz)
+    try:
+        with with_autopilot(files.model, files.actuators, files.deviation, late) as derived:
             fdm.set_aircraft_path(str(derived))
             fdm.set_engine_path(str(files.engines))
             fdm.set_systems_path(str(files.systems))
             loaded = fdm.load_model(files.name)
-        except (OSError, ValueError, jsbsim.BaseError) as error:
-            reason = " ".join(str(error).split())
-            raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from error
+    except (OSError, ValueError, jsbsim.BaseError) as error:
+        reason = " ".join(str(error).split())
+        raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from error
     if not loaded:
         said = "; ".join(_SILENCE.errors)
         raise AircraftError(f"{files.name}: JSBSim refuses the model{said and f': {said}'}")

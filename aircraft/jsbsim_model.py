@@ -119,7 +119,7 @@ class JsbsimModel:
         self._settle()
         if atmosphere.turbulence is not None and atmosphere.intensity is not None:
             if ground is None:
-                self._stir(atmosphere.turbulence, atmosphere.intensity, atmosphere.seed)
+                self._start_turbulence(atmosphere.turbulence, atmosphere.intensity, atmosphere.seed)
             else:
                 self._turbulence = DrydenGusts(atmosphere.intensity, atmosphere.seed)
         self._gust, self._vertical_gusts = atmosphere.gust, atmosphere.vertical_gusts
@@ -185,16 +185,16 @@ class JsbsimModel:
         altitude(altitude_m / FOOT_M)
         airspeed(airspeed_mps / FOOT_M)
         if self._ground is not None:
-            self._lay_ground()
+            self._place_ground()
         if self._windy and self._turbulence is None:
-            self._blow()
+            self._apply_wind()
 
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
         run = self._fdm.run
         if self._gust or self._vertical_gusts or self._turbulence:
             for _ in range(steps):
-                self._blow()
+                self._apply_wind()
                 run()
                 self._step += 1
             return
@@ -266,7 +266,7 @@ class JsbsimModel:
         for path, value in values.items():
             fdm[path] = value
         fdm.run_ic()
-        self._blow()
+        self._apply_wind()
 
     def _settle(self) -> None:
         """Takes steps of next to no duration.
@@ -291,7 +291,7 @@ class JsbsimModel:
             east, north = east + share * self._gust.east_mps, north + share * self._gust.north_mps
         return east * self._cosine + north * self._sine, north * self._cosine - east * self._sine
 
-    def _blow(self) -> None:
+    def _apply_wind(self) -> None:
         """Writes the wind of now: towards true east and north, and down."""
         write_east, write_north = self._write_wind
         east_fps, north_fps = self._wind_true()
@@ -316,13 +316,13 @@ class JsbsimModel:
         height_m = math.nan if self._ground is None else self._ground(east_m, north_m)
         return self._terrain_ft * FOOT_M if math.isnan(height_m) else height_m
 
-    def _lay_ground(self) -> None:
+    def _place_ground(self) -> None:
         """Puts the flight model's ground below the aircraft where it was when its state was last read."""
         east_m, north_m, up_ft = self._place
         self._terrain_ft = self._ground_m(east_m, north_m) / FOOT_M
         self._write_terrain(min(self._terrain_ft, up_ft - TERRAIN_BELOW_FT))
 
-    def _stir(self, model: str, intensity: str, seed: int) -> None:
+    def _start_turbulence(self, model: str, intensity: str, seed: int) -> None:
         """Starts turbulence after MIL-F-8785C."""
         values = {
             "atmosphere/randomseed": float(seed),

@@ -53,13 +53,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 def place_in_patch(
     patch: FloatArray, latitude_rad: float, longitude_rad: float
 ) -> tuple[float, float, float]:
-    """East and north (m) and meridian convergence (rad) of a point; NaN where the patch does not reach.
-
-    Args:
-        patch: (19,) see `aircraft.frames.LocalPlane.patch`.
-        latitude_rad: geodetic latitude.
-        longitude_rad: longitude.
-    """
+    """East and north (m) and meridian convergence (rad) of a point; NaN where the patch does not reach."""
     up, right = latitude_rad - patch[0], longitude_rad - patch[1]
     if not (abs(up) <= patch[2] and abs(right) <= patch[3]):
         return math.nan, math.nan, math.nan
@@ -88,17 +82,6 @@ def preview_update(
     airspeed_mps: float,
 ) -> tuple[float, float, float, bool, bool]:
     """The law of `aircraft.guidance.preview`, from one update to the next.
-
-    Args:
-        rows: (n, 9) the route.
-        gains: record of `PREVIEW_GAINS`.
-        memory: record of `PREVIEW_MEMORY`; goes on.
-        east_m: position of the aircraft.
-        north_m: likewise.
-        velocity_east_mps: ground velocity.
-        velocity_north_mps: likewise.
-        heading_rad: of the nose.
-        airspeed_mps: true airspeed.
 
     Returns:
         What `GuidanceOutput` consists of.
@@ -169,13 +152,6 @@ def nearest_on_route(
 ) -> tuple[int, float, float, float, float]:
     """The nearest point of a route from the last one onwards.
 
-    Args:
-        rows: (n, 9) the route.
-        row: of the last nearest point.
-        along_m: distance of that point from the row's start.
-        east_m: position of the aircraft.
-        north_m: likewise.
-
     Returns:
         Row and distance along it, cross-track error (m, positive to the right), unit tangent east and north.
     """
@@ -243,13 +219,6 @@ def air_direction(
     If the bearing can be made good, the wind triangle. If not, along sqrt(W^2 - V^2) b - w, as PX4's npfg has it
     (`CourseToAirspeedRefMapper::infeasibleAirVelRef`): this is the wind triangle where feasibility ends, and
     straight into the wind where the bearing is against it.
-
-    Args:
-        wind_east_mps: the wind, the direction it blows towards.
-        wind_north_mps: its other component.
-        airspeed_mps: true airspeed, not above the wind's.
-        bearing_east: wanted direction over the ground, a unit vector.
-        bearing_north: its other component.
 
     Returns:
         East and north of the heading, a unit vector.

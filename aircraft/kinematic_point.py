@@ -33,13 +33,7 @@ class KinematicPoint:
         atmosphere: Atmosphere | None = None,
         step_rate_hz: int = STEP_RATE_HZ,
     ) -> None:
-        """Starts along the course.
-
-        Args:
-            start: position, altitude, course and airspeed.
-            atmosphere: ignored; taken so that a point is made as other flight models are.
-            step_rate_hz: steps per second that `advance` counts in.
-        """
+        """Starts along the course."""
         del atmosphere
         self.command(0.0, start.altitude_m, start.airspeed_mps)
         self._step, self._step_rate_hz = 0, step_rate_hz
@@ -88,12 +82,7 @@ class KinematicPoint:
         return None
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
-        """Takes a new route.
-
-        Args:
-            route: what to fly.
-            arc_length_m: where on it to begin looking for the nearest point, m from its start.
-        """
+        """Takes a new route."""
         east, north, *_ = route_point(self._way, self._along_m)
         arc_length_m = _nearest_station(route, arc_length_m, east, north)
         joint_east, joint_north, *_ = route_point(route, arc_length_m)
@@ -107,11 +96,7 @@ class KinematicPoint:
         self._joins_at_m, self._along_m = arc_length_m, 0.0
 
     def update(self, state: AircraftState) -> GuidanceOutput:
-        """Says where on its route the point is; it has nothing to decide.
-
-        Args:
-            state: the point now.
-        """
+        """Says where on its route the point is; it has nothing to decide."""
         on_route_m = self._along_m - self._gap_m
         return GuidanceOutput(
             roll_command_rad=0.0,

@@ -85,10 +85,6 @@ class DrydenGusts:
     JSBSim's own takes the height above the sea for that over ground. u is a process of first order; v and w are
     sqrt(1/2) (sqrt(3) y1 + (1 - sqrt(3)) y2), y1 one of first order and y2 that once more through its lag, which has
     Dryden's transverse spectrum. No gusts of rotation.
-
-    Args:
-        intensity: light, moderate or severe.
-        seed: of the noise.
     """
 
     def __init__(self, intensity: str, seed: int) -> None:

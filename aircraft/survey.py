@@ -93,10 +93,6 @@ UPDATE_STEPS = STEP_RATE_HZ // UPDATE_RATE_HZ
 def survey(entry: AirframeEntry, files: ModelFiles) -> dict[str, Any]:
     """Everything measured of `Airframe`, by attribute.
 
-    Args:
-        entry: what is known of it.
-        files: its model.
-
     Raises:
         AircraftError: it cannot be loaded, trimmed or held; the message says where it failed.
     """

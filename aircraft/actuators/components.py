@@ -19,10 +19,6 @@ def insert(system: ElementTree.Element, actuators: Mapping[str, NormActuator]) -
     """Puts actuators between the autopilot's commands and the aircraft.
 
     Each counts at `wayproof/<control>-limited` the steps in which it was at its rate limit.
-
-    Args:
-        system: the autopilot's `<system>`, changed in place.
-        actuators: by control.
     """
     for control, actuator in actuators.items():
         name = f"wayproof/{control}-norm"

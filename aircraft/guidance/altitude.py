@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,8 @@ LEAD_S = 1.0
 """The slope is taken from so far ahead: what the climb takes to follow its command."""
 
 CLIMBS_FROM = (0.95, 0.88)
-"""Shares of the commanded airspeed: from the first on the fastest climb is commanded, below the second none."""
+"""Shares of the commanded airspeed: from the first on the fastest climb is commanded, below the second none:
+in a turn the engine has less left over for a climb than wings level."""
 
 SPEED_CHANGE_PER_S = 0.02
 """A commanded airspeed changes by no more than this share of itself a second."""
@@ -47,11 +49,13 @@ class VerticalProfile:
 
     def slopes(self, arc_length_m: FloatArray) -> FloatArray:
         """(n,) climb per distance at places along the route."""
+        return self._slopes[np.searchsorted(self.arc_length_m, arc_length_m, side="right")]
+
+    @cached_property
+    def _slopes(self) -> FloatArray:
         step = np.diff(self.arc_length_m)
         slope = np.divide(np.diff(self.altitude_m), step, out=np.zeros_like(step), where=step > 0.0)
-        return np.concatenate(([0.0], slope, [0.0]))[
-            np.searchsorted(self.arc_length_m, arc_length_m, side="right")
-        ]
+        return np.concatenate(([0.0], slope, [0.0]))
 
     def airspeeds(self, arc_length_m: FloatArray) -> FloatArray:
         """(n,) airspeeds asked for at places along the route."""
@@ -67,13 +71,7 @@ def flat(altitude_m: float, airspeed_mps: float) -> VerticalProfile:
 
 
 def slewed(airspeeds_mps: FloatArray, time_s: FloatArray, before_mps: float) -> FloatArray:
-    """(n,) airspeeds as they are commanded, row by row, where those are asked for.
-
-    Args:
-        airspeeds_mps: (n,) asked for.
-        time_s: (n,) when.
-        before_mps: commanded before the first row.
-    """
+    """(n,) airspeeds as they are commanded, row by row, where those are asked for."""
     if (airspeeds_mps == before_mps).all():
         return airspeeds_mps
     commanded = np.empty(len(airspeeds_mps))
@@ -86,12 +84,7 @@ def slewed(airspeeds_mps: FloatArray, time_s: FloatArray, before_mps: float) -> 
 
 
 class LevelFlight:
-    """One altitude and one airspeed all along. Implements `VerticalLaw`.
-
-    Args:
-        altitude_m: above mean sea level.
-        airspeed_mps: true airspeed.
-    """
+    """One altitude and one airspeed all along. Implements `VerticalLaw`."""
 
     def __init__(self, altitude_m: float, airspeed_mps: float) -> None:
         self._held = altitude_m, airspeed_mps
@@ -107,67 +100,28 @@ class AltitudeGuidance:
     The inner loop climbs at its gain times the altitude error. The command is put where that gives the climb of the
     profile, plus what takes the present error back, within what the aircraft can climb and sink at its airspeed. A
     level profile is commanded as it is.
-
-    Args:
-        profile: along the route.
-        gain_1ps: of the inner loop, climb rate over altitude error.
-        limits: the fastest climb and descent at an airspeed, both positive (m/s).
     """
 
     def __init__(
         self, profile: VerticalProfile, gain_1ps: float, limits: Callable[[float], tuple[float, float]]
     ) -> None:
         self._profile, self._gain, self._limits = profile, gain_1ps, limits
-        self._slopes = _Slopes(profile)
         self._airspeed_mps = float(profile.airspeed_mps[0])
         self._level = profile.level
 
     def command(self, state: AircraftState, arc_length_m: float) -> tuple[float, float]:
-        """Altitude above mean sea level and true airspeed to be held until the next update.
-
-        Args:
-            state: the aircraft now.
-            arc_length_m: where on the route it is.
-        """
+        """Altitude above mean sea level and true airspeed to be held until the next update."""
         if self._level:
             return float(self._profile.altitude_m[0]), self._airspeed_mps
-        wanted = self._slopes.airspeed(arc_length_m)
+        here, ahead = np.array(arc_length_m), np.array(arc_length_m + LEAD_S * state.groundspeed_mps)
+        wanted = float(self._profile.airspeeds(here))
         change = SPEED_CHANGE_PER_S * self._airspeed_mps / UPDATE_RATE_HZ
         self._airspeed_mps += min(max(wanted - self._airspeed_mps, -change), change)
-        altitude, slope = self._slopes.at(arc_length_m, arc_length_m + LEAD_S * state.groundspeed_mps)
+        altitude, slope = float(self._profile.altitudes(here)), float(self._profile.slopes(ahead))
         up, down = self._limits(self._airspeed_mps)
-        up *= _speed_kept(state.airspeed_mps / self._airspeed_mps)
+        most, none = CLIMBS_FROM
+        up *= min(max((state.airspeed_mps / self._airspeed_mps - none) / (most - none), 0.0), 1.0)
         climb = self._gain * (altitude - state.up_m) + slope * state.groundspeed_mps
         climb = min(max(climb, -down), up)
         # The command is held, and the error shrinks by then: half an update on average.
         return state.up_m + climb * (1.0 / self._gain + 0.5 / UPDATE_RATE_HZ), self._airspeed_mps
-
-
-def _speed_kept(share: float) -> float:
-    """The share of the fastest climb that is commanded at a share of the airspeed that is: speed goes before height.
-
-    In a turn the engine has less left over for a climb than wings level.
-    """
-    most, none = CLIMBS_FROM
-    return min(max((share - none) / (most - none), 0.0), 1.0)
-
-
-class _Slopes:
-    """A profile that is asked for one place after the other."""
-
-    def __init__(self, profile: VerticalProfile) -> None:
-        self._along = profile.arc_length_m
-        self._altitude = profile.altitude_m
-        self._from, self._speed = profile.speed_from_m, profile.airspeed_mps
-
-    def airspeed(self, arc_length_m: float) -> float:
-        return float(self._speed[max(int(np.searchsorted(self._from, arc_length_m, side="right")) - 1, 0)])
-
-    def at(self, here_m: float, ahead_m: float) -> tuple[float, float]:
-        """Altitude at a place, and the slope at another."""
-        altitude = float(np.interp(here_m, self._along, self._altitude))
-        row = int(np.searchsorted(self._along, ahead_m, side="right"))
-        if row in (0, len(self._along)):
-            return altitude, 0.0
-        run = float(self._along[row] - self._along[row - 1])
-        return altitude, float(self._altitude[row] - self._altitude[row - 1]) / run if run > 0.0 else 0.0

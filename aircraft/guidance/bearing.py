@@ -41,14 +41,7 @@ class BearingConfig:
 
 
 def bank_to_point(to_east_m: float, to_north_m: float, course_rad: float, gain: float) -> float:
-    """Bank (rad, positive right wing down) towards a point, not limited.
-
-    Args:
-        to_east_m: the way from the aircraft to the point.
-        to_north_m: likewise.
-        course_rad: direction of the ground velocity, clockwise from north.
-        gain: bank over angle.
-    """
+    """Bank (rad, positive right wing down) towards a point, not limited."""
     return gain * math.remainder(math.atan2(to_east_m, to_north_m) - course_rad, math.tau)
 
 

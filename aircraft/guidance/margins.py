@@ -32,12 +32,7 @@ class LawMargins(NamedTuple):
 
 
 def law_margins(kind: GuidanceKind, limits: GuidanceLimits) -> LawMargins:
-    """Margins of a law at its defaults.
-
-    Args:
-        kind: the law.
-        limits: of the aircraft at an airspeed.
-    """
+    """Margins of a law at its defaults."""
     speed = limits.airspeed_mps
 
     def roll_rad(off_m: float, course_rad: float) -> float:

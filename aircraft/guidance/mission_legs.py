@@ -72,14 +72,7 @@ def straight(
     acceptance_m: float | None,
     centre: complex | None = None,
 ) -> MissionLeg:
-    """A leg from one place to another, east + i north.
-
-    Args:
-        ends: of the leg.
-        stations_m: see `MissionLeg`.
-        acceptance_m: likewise.
-        centre: its end lies on a circle about this, for which the aircraft heads.
-    """
+    """A leg from one place to another, east + i north."""
     start, end = ends
     goal = end if centre is None else centre
     length_m = abs(goal - start)
@@ -94,11 +87,6 @@ class MissionLaw:
     """Flies the legs of a mission with another law. Implements `GuidanceLaw`.
 
     Cross-track error and arc length are those on the route that is followed, not on the leg.
-
-    Args:
-        flies: the law, and its autopilot's rule for reaching waypoints.
-        kind: the law's.
-        legs: in order.
     """
 
     def __init__(self, flies: WaypointLaw, kind: str, legs: tuple[MissionLeg, ...]) -> None:

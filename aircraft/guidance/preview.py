@@ -50,12 +50,7 @@ class PreviewConfig:
 
 
 class PreviewLaw:
-    """Follows a route by the curvature ahead. Implements `GuidanceLaw`.
-
-    Args:
-        config: resolved.
-        limits: what may be asked of the aircraft.
-    """
+    """Follows a route by the curvature ahead. Implements `GuidanceLaw`."""
 
     def __init__(self, config: PreviewConfig, limits: GuidanceLimits) -> None:
         from aircraft import kernels  # half a second

@@ -30,12 +30,7 @@ class PathPoint(NamedTuple):
 
 
 class RouteProgress:
-    """Keeps the place on one route. It only moves on, so a route may cross itself.
-
-    Args:
-        route: what is flown.
-        arc_length_m: where on it to begin looking for the nearest point, m from its start.
-    """
+    """Keeps the place on one route. It only moves on, so a route may cross itself."""
 
     def __init__(self, route: Route, arc_length_m: float = 0.0) -> None:
         from aircraft import kernels  # half a second

@@ -46,10 +46,6 @@ class GuidanceKind:
     def law(self, limits: GuidanceLimits, **keys: Any) -> GuidanceLaw:
         """The law for one flight, its own keys given or at their defaults.
 
-        Args:
-            limits: what may be asked of the aircraft.
-            **keys: own keys of the law.
-
         Raises:
             ValueError: keys contradict each other.
         """

@@ -90,11 +90,6 @@ class WaypointLaw:
     """Flies a route's waypoints with another law. Implements `GuidanceLaw`.
 
     Cross-track error and arc length are those on the route, not on the leg.
-
-    Args:
-        law: follows the legs.
-        acceptance_m: says from where a waypoint counts as reached.
-        by_passing: it counts as reached, too, when the aircraft is past it.
     """
 
     def __init__(self, law: GuidanceLaw, acceptance_m: Acceptance, by_passing: bool = True) -> None:
@@ -195,12 +190,6 @@ def acceptance(kind: str, config: Any, limits: GuidanceLimits, radius_m: float |
     (ArduPilot). `npfg`: its switch distance (PX4), a share of the track error bound. Any other: where a fillet of the
     turn would begin, R tan(turn / 2), at the bank limit less `BANK_KEPT_RAD`. A law that does not switch by passing
     would circle a point inside its turn for ever: the turn radius at the bank limit.
-
-    Args:
-        kind: the law.
-        config: its own keys, resolved.
-        limits: what may be asked of the aircraft.
-        radius_m: the same for every waypoint; None: as above.
     """
     if radius_m is not None:
         return lambda ground_speed_mps, turn_rad: radius_m

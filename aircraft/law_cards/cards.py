@@ -34,14 +34,6 @@ def law_card(
 ) -> LawCard | None:
     """The card of a law with its keys, flown unless that has been done before.
 
-    Args:
-        frame: the aircraft.
-        kind: the law.
-        config: its keys, resolved or not.
-        airspeed_mps: true airspeed; default: cruise.
-        waypoints: it flies the legs between the corners of its routes, not the routes.
-        acceptance_radius_m: a waypoint then counts as reached from here; None: by the law's own rule.
-
     Returns:
         The card; None for `preview` at its defaults, which the survey of the aircraft has.
 
@@ -54,8 +46,8 @@ def law_card(
         return None
     keys = json.dumps(asdict(resolved), sort_keys=True, default=repr)
 
-    def measured() -> dict[str, Any]:
-        from aircraft.law_cards.law_survey import LawSurvey  # loads JSBSim
+    def flown() -> dict[str, Any]:
+        from aircraft.law_cards.law_survey import measured  # loads JSBSim
 
         # A copy: a law that was given as an object is flown as it was given.
         def made() -> GuidanceLaw:
@@ -64,16 +56,16 @@ def law_card(
                 return law
             return waypoint_law(law, kind.kind, resolved, limits, acceptance_radius_m)
 
-        return LawSurvey(frame, kind.kind, limits.airspeed_mps, made, waypoints).measured()
+        return measured(frame, kind.kind, limits.airspeed_mps, made, waypoints)
 
     legs = f"waypoints {acceptance_radius_m!r}" if waypoints else ""
     known = (frame.name, frame.files, kind, keys, legs, limits.airspeed_mps)
     if known not in _kept and installed_kinds().get(kind.kind) != kind:
-        _kept[known] = _card(measured())  # nothing tells what it depends on
+        _kept[known] = _card(flown())  # nothing tells what it depends on
     if known not in _kept:
         what = (frame.files.digest(), kind.kind, keys, repr(limits.airspeed_mps), _source(kind), legs)
         digest = sha256("\0".join(what).encode()).hexdigest()
-        _kept[known] = cached(f"{frame.name}-{kind.kind}-law", digest, measured, _card)
+        _kept[known] = cached(f"{frame.name}-{kind.kind}-law", digest, flown, _card)
     return _kept[known]
 
 

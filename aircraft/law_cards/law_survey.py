@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any
 
 from aircraft.airframe import Airframe
@@ -24,98 +23,82 @@ from aircraft.survey import in_flight, weave
 
 WIND_SHARES = (0.0, 0.3, 0.6)
 """Winds that are flown, along the weave and against it, over the airspeed."""
-
 RADIUS_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
 """Turns are widened by these until the law tracks them."""
-
 TRACKED_SHARE = 0.1
 """Cross-track error over turn radius up to which a law counts as tracking the turns."""
-
 WAYPOINTS_TRACKED_SHARE = 1.0
-"""The same where a law flies the legs between the corners of the turns. They are not widened then: the wider the arc,
-the further its corner lies outside."""
-
+"""The same where a law flies the legs between the corners of the turns, with all the bank there is at each. They are
+not widened then: the wider the arc, the further its corner lies outside."""
 CUT_SHARE = 0.05
 """Share of the time for which the bank may be cut meanwhile."""
-
 SLOWEST_SHARE = 4.0
 """A weave is given up after this many times the time it takes."""
 
+Make = Callable[[], GuidanceLaw]
 
-@dataclass(frozen=True)
-class LawSurvey:
-    """One law, one aircraft, one airspeed.
 
-    Attributes:
-        frame: the aircraft.
-        kind: the law's name.
-        airspeed_mps: true airspeed.
-        make: makes the law for one flight.
-        waypoints: it flies the legs between the corners of the turns, with all the bank there is at each.
+def measured(frame: Airframe, kind: str, speed_mps: float, make: Make, waypoints: bool) -> dict[str, Any]:
+    """The law's name, and `points`: the attributes of a `WindPoint` in every wind.
+
+    Raises:
+        AircraftError: the law does not track.
     """
-
-    frame: Airframe
-    kind: str
-    airspeed_mps: float
-    make: Callable[[], GuidanceLaw]
-    waypoints: bool = False
-
-    @property
-    def _tracked_share(self) -> float:
-        return WAYPOINTS_TRACKED_SHARE if self.waypoints else TRACKED_SHARE
-
-    def measured(self) -> dict[str, Any]:
-        """The law's name, and `points`: the attributes of a `WindPoint` in every wind.
-
-        Raises:
-            AircraftError: the law does not track.
-        """
-        points: list[dict[str, float]] = []
-        for share in WIND_SHARES:
-            least = points[-1]["radius_factor"] if points else RADIUS_FACTORS[0]
-            factors = RADIUS_FACTORS[:1] if self.waypoints else RADIUS_FACTORS
-            points.append(self._point(share, [factor for factor in factors if factor >= least]))
-        return {"kind": self.kind, "points": points}
-
-    def _point(self, share: float, factors: Sequence[float]) -> dict[str, float]:
-        for factor in factors:
-            error_m = self._error_m(share * self.airspeed_mps, factor)
+    points: list[dict[str, float]] = []
+    for share in WIND_SHARES:
+        least = points[-1]["radius_factor"] if points else RADIUS_FACTORS[0]
+        factors = RADIUS_FACTORS[:1] if waypoints else RADIUS_FACTORS
+        for factor in (factor for factor in factors if factor >= least):
+            error_m = _error_m(frame, speed_mps, make, waypoints, share * speed_mps, factor)
             if error_m is not None:
-                return {"wind_share": share, "radius_factor": factor, "error_m": float(f"{error_m:.3g}")}
-        wind = f" in a wind of {share:.0%} of the airspeed" if share else ""
-        raise AircraftError(
-            f"the guidance law {self.kind} does not track with {self.frame.name}{wind}: on turns of "
-            f"{factors[-1]:g} times the radius that the aircraft needs it is off by more than "
-            f"{self._tracked_share:.0%} of the radius, or its bank is cut"
-        )
+                break
+        else:
+            wind = f" in a wind of {share:.0%} of the airspeed" if share else ""
+            tracked = WAYPOINTS_TRACKED_SHARE if waypoints else TRACKED_SHARE
+            raise AircraftError(
+                f"the guidance law {kind} does not track with {frame.name}{wind}: on turns of {factors[-1]:g} times "
+                f"the radius that the aircraft needs it is off by more than {tracked:.0%} of the radius, or its bank "
+                "is cut"
+            )
+        points.append({"wind_share": share, "radius_factor": factor, "error_m": float(f"{error_m:.3g}")})
+    return {"kind": kind, "points": points}
 
-    def _error_m(self, wind_mps: float, factor: float) -> float | None:
-        """Largest cross-track error (m) on the weave, along and against a wind; None if it is not tracked."""
-        radius_m = factor * performance(self.frame, self.airspeed_mps, wind_mps).turn_radius_m
-        worst_m = 0.0
-        for north_mps in (wind_mps, -wind_mps) if wind_mps else (0.0,):
-            error_m, cut = self._flown(weave(radius_m), north_mps)
-            if not error_m <= self._tracked_share * radius_m or (cut > CUT_SHARE and not self.waypoints):
-                return None
-            worst_m = max(worst_m, error_m)
-        return worst_m
 
-    def _flown(self, route: Route, north_mps: float) -> tuple[float, float]:
-        """Largest cross-track error (m), infinite if lost, and the share of the time for which the bank was cut."""
-        law, speed = self.make(), self.airspeed_mps
-        law.follow(route)
-        model = in_flight(self.frame, speed, Atmosphere(wind_north_mps=north_mps))
-        most_s = SLOWEST_SHARE * float(route.segments[:, 5].sum()) / (speed - abs(north_mps))
-        worst_m, cut, updates = 0.0, 0, 0
-        past: deque[AircraftState] = deque()
-        while True:
-            state = as_it_was(past, model.state(), self.frame.files.latency_s)
-            output = law.update(state)
-            if model.fault() or state.time_s > most_s:
-                return math.inf, 1.0
-            if output.past_end:
-                return worst_m, cut / max(updates, 1)
-            worst_m = max(worst_m, abs(output.cross_track_m))
-            cut, updates = cut + output.bank_saturated, updates + 1
-            model.command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed)
-            model.advance(model.step_rate_hz // UPDATE_RATE_HZ)
+def _error_m(
+    frame: Airframe, speed_mps: float, make: Make, waypoints: bool, wind_mps: float, factor: float
+) -> float | None:
+    """Largest cross-track error (m) on the weave, along and against a wind; None if it is not tracked."""
+    radius_m = factor * performance(frame, speed_mps, wind_mps).turn_radius_m
+    worst_m = 0.0
+    for north_mps in (wind_mps, -wind_mps) if wind_mps else (0.0,):
+        error_m, cut = _flown(frame, speed_mps, make(), weave(radius_m), north_mps)
+        if waypoints:
+            tracked = error_m <= WAYPOINTS_TRACKED_SHARE * radius_m
+        else:
+            tracked = error_m <= TRACKED_SHARE * radius_m and cut <= CUT_SHARE
+        if not tracked:
+            return None
+        worst_m = max(worst_m, error_m)
+    return worst_m
+
+
+def _flown(
+    frame: Airframe, speed_mps: float, law: GuidanceLaw, route: Route, north_mps: float
+) -> tuple[float, float]:
+    """Largest cross-track error (m), infinite if lost, and the share of the time for which the bank was cut."""
+    law.follow(route)
+    model = in_flight(frame, speed_mps, Atmosphere(wind_north_mps=north_mps))
+    most_s = SLOWEST_SHARE * float(route.segments[:, 5].sum()) / (speed_mps - abs(north_mps))
+    worst_m, cut, updates = 0.0, 0, 0
+    past: deque[AircraftState] = deque()
+    while True:
+        state = as_it_was(past, model.state(), frame.files.latency_s)
+        output = law.update(state)
+        if model.fault() or state.time_s > most_s:
+            return math.inf, 1.0
+        if output.past_end:
+            return worst_m, cut / max(updates, 1)
+        worst_m = max(worst_m, abs(output.cross_track_m))
+        cut, updates = cut + output.bank_saturated, updates + 1
+        model.command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed_mps)
+        model.advance(model.step_rate_hz // UPDATE_RATE_HZ)

@@ -138,7 +138,6 @@ def fly_course(
     route: Route,
     guidance: str = DEFAULT_KIND,
     navigator: StateEstimator | None = None,
-    as_believed: bool = False,
 ) -> Tracking:
     """Flies a route from its start to its end, under a guidance law at its defaults.
 
@@ -149,7 +148,6 @@ def fly_course(
         route: from (0, 0) along `COURSE_RAD`; it is moved to where the aircraft believes that it begins, as a plan is.
         guidance: the law.
         navigator: what the aircraft believes of its state; None: the truth.
-        as_believed: the errors are those that the aircraft believes it has, not the true ones.
 
     Raises:
         AircraftError: the aircraft cannot start in this air.
@@ -180,11 +178,8 @@ def fly_course(
         output = law.update(believed)
         if output.past_end:
             break
-        if as_believed or believed is true:
-            cross.append(abs(output.cross_track_m))
-        else:
-            cross.append(abs(progress.nearest(true.east_m, true.north_m).cross_track_m))
-        altitude.append(abs((believed if as_believed else true).up_m - ALTITUDE_M))
+        cross.append(abs(progress.nearest(true.east_m, true.north_m).cross_track_m))
+        altitude.append(abs(true.up_m - ALTITUDE_M))
         saturated += output.bank_saturated
         too_high_m, too_fast_mps = navigator.held_errors
         model.command(
@@ -212,11 +207,10 @@ def tracked(
     airspeed_mps: float | None = None,
     guidance: str = DEFAULT_KIND,
     actuators: Actuators | None = None,
-    as_believed: bool = False,
 ) -> Tracking:
     """The worst of the courses of some seeds, each at the radius that planning uses for `preview` in that air.
 
-    `actuators` are its servos, None: those of the airframe table; `as_believed` as `fly_course` has it.
+    `actuators` are its servos, None: those of the airframe table.
     """
     frame = airframe(name, actuators)
     speed = airspeed_mps or frame.cruise_mps
@@ -225,7 +219,7 @@ def tracked(
         air = case.atmosphere(speed, seed)
         radius_m = performance(frame, speed, air.wind_mps, air.intensity).turn_radius_m
         route, navigator = course(seed, radius_m), case.navigator(seed)
-        worst = worst.worse(fly_course(frame, speed, air, route, guidance, navigator, as_believed))
+        worst = worst.worse(fly_course(frame, speed, air, route, guidance, navigator))
     return worst
 
 
@@ -236,12 +230,6 @@ def bench_tracking(
     guidance: str = DEFAULT_KIND,
 ) -> dict[str, Any]:
     """Flies every case.
-
-    Args:
-        name: an aircraft.
-        seeds: courses per case, of seeds 1, 2 and so on.
-        progress: told what is done, of how much, and the case at hand.
-        guidance: a law; limits are promised for `preview` alone.
 
     Returns:
         `aircraft`, `guidance`, `airspeed_mps`, `seeds`, and `cases`: for each its name, the figures of `Tracking`,

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from aircraft.actuators.actuator import Actuator, Actuators
-from aircraft.airframes import AircraftError, airframe, parse_airframes
+from aircraft.airframes import AircraftError, airframe
 from aircraft.autopilot import NEEDED_DEG, gains, pitch_margin_deg, roll_margin_deg
 from aircraft.frames import LocalPlane
 from aircraft.jsbsim_loading import linearised, surface_travel_deg, trimmed
@@ -109,33 +109,3 @@ def test_servos_that_are_too_slow_are_refused() -> None:
 def test_degrees_mean_nothing_where_a_model_shows_no_surface() -> None:
     with pytest.raises(AircraftError, match=r"T38: its model does not show how far the aileron moves"):
         airframe("T38", Actuators.alike(SERVO))
-
-
-ENTRY = "kite: {{summary: a kite, cruise_mps: 9, verified: false, actuators: {0}}}"
-
-
-def test_the_table_may_have_servos() -> None:
-    entry = parse_airframes(ENTRY.format("{aileron: {lag_s: 0.1}, throttle: {rate_limit_degps: 60}}"))["kite"]
-    assert entry.actuators == Actuators(aileron=Actuator(0.1), throttle=Actuator(0.0, 60.0))
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ("[1]", "kite.actuators: must be a mapping"),
-        ("{flaps: {}}", "kite.actuators: unknown control 'flaps'"),
-        ("{aileron: 3}", "kite.actuators.aileron: must be a mapping"),
-        ("{aileron: {lag: 3}}", "kite.actuators.aileron: unknown key 'lag'"),
-        ("{aileron: {lag_s: soon}}", "kite.actuators.aileron.lag_s: must be a number; got 'soon'"),
-        ("{aileron: {lag_s: -1}}", "kite.actuators.aileron.lag_s is -1; must be from 0 to 10"),
-        (
-            "{rudder: {rate_limit_degps: 0}}",
-            "kite.actuators.rudder.rate_limit_degps is 0; must be greater than 0",
-        ),
-        ("{rudder: {deadband_deg: 100}}", "kite.actuators.rudder.deadband_deg is 100; must be from 0 to 90"),
-    ],
-)
-def test_the_table_refuses_servos_that_are_none(given: str, said: str) -> None:
-    with pytest.raises(ValueError) as refused:  # noqa: PT011
-        parse_airframes(ENTRY.format(given))
-    assert str(refused.value) == said

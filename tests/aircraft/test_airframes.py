@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.airframes import AircraftError, aircraft_names, airframe, parse_airframes
+from aircraft.airframes import AircraftError, aircraft_names, airframe
 from aircraft.envelope import LEAST_BANK_DEG, performance
 
 VERIFIED = ("aerosonde", "c172p", "T38")
@@ -33,43 +33,6 @@ def test_guidance_limits_are_in_radians() -> None:
     limits = airframe("aerosonde").guidance_limits()
     assert limits.bank_limit_rad == pytest.approx(math.pi / 4)
     assert limits.roll_rate_radps == pytest.approx(math.radians(74.0))
-
-
-GOOD = """
-one: {summary: "first", cruise_mps: 25.0, stall_angle_deg: 20, verified: true}
-two:
-  summary: second
-  cruise_mps: 50
-  verified: false
-  gains:
-    climb: 2.4
-"""
-
-
-def test_a_table_entry_says_what_replaces_the_survey() -> None:
-    table = parse_airframes(GOOD)
-    assert table["one"].figures == {"stall_angle_deg": 20.0}
-    assert table["two"].gains == {"climb": 2.4}
-    assert [entry.verified for entry in table.values()] == [True, False]
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("summary: second", "sumary: second", "two: unknown key 'sumary'"),
-        ("  cruise_mps: 50\n", "", "two: missing key 'cruise_mps'"),
-        ("cruise_mps: 50", "cruise_mps: -1", "two.cruise_mps: must be a positive number; got -1"),
-        ("cruise_mps: 50", "cruise_mps: 50\n  cruise_mps: 51", "'cruise_mps' is given twice"),
-        ("stall_angle_deg: 20", "stall_angle_deg: high", "one.stall_angle_deg: must be a positive number"),
-        ("verified: true", "verified: 1", "one.verified: must be true or false"),
-        ("    climb: 2.4", "    climbing: 2.4", "two.gains: unknown gain 'climbing'"),
-        ("    climb: 2.4", "    climb: high", "two.gains.climb: must be a finite number; got 'high'"),
-    ],
-)
-def test_a_broken_table_is_refused(old: str, new: str, message: str) -> None:
-    assert old in GOOD
-    with pytest.raises(ValueError, match=message):
-        parse_airframes(GOOD.replace(old, new, 1))
 
 
 def test_turn_radius_of_the_aerosonde() -> None:

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import gc
 import math
-import signal
 import subprocess
 import sys
-import threading
-import time
 import weakref
 from pathlib import Path
 
 import jsbsim
 import pytest
 
-from aircraft import jsbsim_loading
 from aircraft.airframes import AircraftError, airframe
 from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState, FlightModel
@@ -54,21 +50,6 @@ def test_is_a_flight_model() -> None:
     assert model.step_rate_hz == SECOND
 
 
-def test_is_loaded_on_a_heap_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another thread has one: among what flights before it left, steps of a model take longer."""
-    threads: list[threading.Thread] = []
-    make = jsbsim.FGFDMExec
-
-    def made(properties: None) -> jsbsim.FGFDMExec:
-        threads.append(threading.current_thread())
-        return make(properties)
-
-    monkeypatch.setattr(jsbsim, "FGFDMExec", made)
-    models = [model_of("aerosonde") for _ in range(2)]
-    assert models[0].state() == models[1].state()
-    assert threads[0] is threads[1] is not threading.current_thread()
-
-
 def test_a_model_that_is_not_used_any_more_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     """The thread that loaded it does not hold it."""
 
@@ -84,36 +65,12 @@ def test_a_model_that_is_not_used_any_more_is_gone(monkeypatch: pytest.MonkeyPat
     assert gone() is None
 
 
-def test_an_interrupt_waits_until_jsbsim_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Python's end would be a crash of the thread that is in JSBSim."""
-    began, left, here = threading.Event(), threading.Event(), threading.get_ident()
-
-    def slow(*_: object) -> None:
-        began.set()
-        time.sleep(0.5)
-        left.set()
-
-    def interrupt() -> None:
-        began.wait()
-        signal.pthread_kill(here, signal.SIGINT)
-
-    monkeypatch.setattr(jsbsim_loading, "_load", slow)
-    threading.Thread(target=interrupt).start()
-    with pytest.raises(KeyboardInterrupt):
-        model_of("aerosonde")
-    assert left.is_set()
-    monkeypatch.undo()
-    assert model_of("aerosonde").state().time_s == 0.0
-
-
 @pytest.mark.flights
 def test_threads_that_end_fly_too() -> None:
     """They have loggers of their own, of which JSBSim lets go after them, and compile what is to be compiled."""
     code = (
         "import sys\n"
         "from concurrent.futures import ThreadPoolExecutor\n"
-        "from threading import enumerate\n"
-        "from aircraft.jsbsim_loading import _orders\n"
         "from harness.run.scenario_flight import make_loop\n"
         "from harness.scenario.scenario import load_scenario\n"
         "from harness.scenario.shipped import scenario_path\n"
@@ -123,7 +80,6 @@ def test_threads_that_end_fly_too() -> None:
         "    with ThreadPoolExecutor(8) as threads:\n"
         "        loops = list(threads.map(make_loop, [scenario] * 8))\n"
         "    assert len({loop.model.state() for loop in loops}) == 1\n"
-        "assert [thread.name for thread in enumerate()].count('load models') == 1\n"
     )
     run = subprocess.run(
         [sys.executable, "-c", code],

@@ -28,7 +28,7 @@ SERVOS: Final = {
 
 
 def laws(seeds: range) -> None:
-    """A row for each air and aircraft, a column for each law: the true error, and with gnss the believed one too."""
+    """A row for each air and aircraft, a column for each law: the true error."""
     print(f"| air | aircraft | {' | '.join(f'`{law}`' for law in LAWS)} |", flush=True)
     for name in ("aerosonde", "c172p"):
         for case in (*IN_AIRS, "gnss"):
@@ -36,11 +36,6 @@ def laws(seeds: range) -> None:
             for law in LAWS:
                 print(f"| {_across(tracked(name, BY_NAME[case], seeds, guidance=law))} ", end="", flush=True)
             print("|", flush=True)
-        print(f"| gnss, as believed | {name} ", end="", flush=True)
-        for law in LAWS:
-            flown = tracked(name, BY_NAME["gnss"], seeds, guidance=law, as_believed=True)
-            print(f"| {_across(flown)} ", end="", flush=True)
-        print("|", flush=True)
 
 
 def servos(seeds: range) -> None:

