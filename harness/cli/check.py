@@ -79,6 +79,7 @@ def check(
         typer.Option(
             metavar="R",
             min=0.0,
+            max=1e6,
             help="Largest distance from corners. Default: T; at waypoints of a mission the acceptance radius in the "
             "file, else 90 m.",
         ),

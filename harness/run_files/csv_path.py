@@ -36,6 +36,9 @@ def read_csv(text: str, source: str) -> PathAsRead:
         )
     heights = [name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]
     wanted = (*names, *heights)
+    for name in wanted:
+        if header.count(name) > 1:
+            raise InputError(f"{source}:{line}: {name}: stands {header.count(name)} times; must stand once")
     found = [_numbers(row, header, wanted, f"{source}:{number}") for number, row in filled[1:]]
     return PathAsRead(
         names in LOCAL,

@@ -222,7 +222,7 @@ def _check_span(points: FloatArray, source: str) -> None:
         reach = max(float(np.ptp(points, axis=0).max()), float(np.abs(points).max()))
     if reach > MAX_SPAN_M:
         raise InputError(
-            f"{source}: reaches {reach / 1e3:.0f} km; must stay within {MAX_SPAN_M / 1e3:.0f} km of its origin"
+            f"{source}: reaches {reach / 1e3:,.6g} km; must stay within {MAX_SPAN_M / 1e3:.0f} km of its origin"
         )
 
 

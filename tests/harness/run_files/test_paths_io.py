@@ -185,6 +185,7 @@ BROKEN = {
     "no header": ("a.csv", "0,0\n1,1\n", ":1: has the columns 0, 0; must have x_m,y_m"),
     "text in csv": ("a.csv", "x_m,y_m\n0,0\n1,far\n", ":3: y_m: is 'far'; must be a finite number"),
     "nan in csv": ("a.csv", "x_m,y_m\n0,0\n1,nan\n", ":3: y_m: is 'nan'; must be a finite number"),
+    "column twice": ("a.csv", "x_m,x_m,y_m\n0,0,0\n1,1,1\n", ":1: x_m: stands 2 times"),
     "short row": ("a.csv", "x_m,y_m\n0,0\n1\n", ":3: has 1 cells, the header 2"),
     "one point": ("a.csv", "x_m,y_m\n0,0\n", ": has 1 point; a path has at least 2"),
     "one place": ("a.csv", "x_m,y_m\n5,5\n5,5\n", ": all its points are in one place"),
