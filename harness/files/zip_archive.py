@@ -14,14 +14,17 @@ from typing import Final, NamedTuple
 from harness.files.input_file import InputError
 from harness.files.wording import counted, printable
 
+DAMAGES: Final = (
+    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error),
+    *(EOFError, OSError, ValueError, IndexError),
+)
+"""What Python's unpacking raises of damaged archives."""
+
 FORKS: Final = ("__macosx/", "._")
 """How names begin that macOS adds to archives: they have the endings of files, and none of their content."""
 
 TOLD: Final = 3
-"""Names of files that a fault has at most."""
-
-MOST_SHOWN: Final = 60
-"""Characters of a name that a line shows."""
+"""Names of files that a fault has at most, each of at most 60 characters."""
 
 
 class Unpacked(NamedTuple):
@@ -36,6 +39,22 @@ class Unpacked(NamedTuple):
     name: str
     data: bytes
     others: int
+
+
+def kml_of(data: bytes, source: str, most: int) -> tuple[bytes, str, tuple[str, ...]]:
+    """The KML of a file that may be packed as KMZ (OGC 12-007r2), its name for faults, and notes on further files.
+
+    Raises:
+        InputError: it is packed, and cannot be unpacked or has no main KML file.
+    """
+    if not data.startswith(b"PK"):
+        return data, source, ()
+    try:
+        name, inner, others = unpacked(data, ".kml", most, "doc.kml")
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+    notes = (f"{counted(others, 'further KML file')} in the archive passed over",) if others else ()
+    return inner, f"{source} ({name})", notes
 
 
 def unpacked(data: bytes, ending: str, most: int, main: str = "") -> Unpacked:
@@ -54,7 +73,7 @@ def unpacked(data: bytes, ending: str, most: int, main: str = "") -> Unpacked:
     """
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
-            name, others = chosen(archive.namelist(), (ending,), main)
+            name, others = _chosen(archive.namelist(), (ending,), main)
             with archive.open(name) as member:
                 inner = member.read(most + 1)
     except InputError:
@@ -70,16 +89,7 @@ def unpacked(data: bytes, ending: str, most: int, main: str = "") -> Unpacked:
 
 
 def member_path(path: Path, endings: tuple[str, ...], most: int) -> str:
-    """The path by which GDAL opens the file with one of some endings in a ZIP archive.
-
-    Args:
-        path: of the archive.
-        endings: in lower case.
-        most: bytes that all of it may unpack to.
-
-    Raises:
-        InputError: there is none or several, it is damaged, or it unpacks to more. The text names no file.
-    """
+    """The path by which GDAL opens the one file with one of some endings in a ZIP archive; the rest as `unpacked`."""
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
@@ -87,42 +97,22 @@ def member_path(path: Path, endings: tuple[str, ...], most: int) -> str:
         raise InputError("is a damaged ZIP archive; get it again") from error
     if sum(each.file_size for each in members) > most:
         raise InputError(f"unpacks to more than {most // 10**6} MB; cut the area of interest out of it")
-    return f"/vsizip/{path.absolute()}/{chosen([each.filename for each in members], endings)[0]}"
-
-
-DAMAGES: Final = (
-    zipfile.BadZipFile,
-    zlib.error,
-    lzma.LZMAError,
-    struct.error,
-    EOFError,
-    OSError,
-    ValueError,
-    IndexError,
-)
-"""What Python's unpacking raises of damaged archives."""
-
-
-def _is_a(name: str, endings: tuple[str, ...]) -> bool:
-    return name.endswith(endings) and not name.startswith(FORKS[0]) and not _base(name).startswith(FORKS[1])
+    return f"/vsizip/{path.absolute()}/{_chosen([each.filename for each in members], endings)[0]}"
 
 
 def _base(name: str) -> str:
     return name.rpartition("/")[2]
 
 
-def chosen(names: Sequence[str], endings: tuple[str, ...], main: str = "") -> tuple[str, int]:
-    """The file that is meant of those in an archive, and how many more have such an ending.
-
-    Args:
-        names: of all.
-        endings: in lower case.
-        main: as that of `unpacked`.
-
-    Raises:
-        InputError: there is none, or it cannot be told.
-    """
-    held = [name for name in names if _is_a(name.lower(), endings)]
+def _chosen(names: Sequence[str], endings: tuple[str, ...], main: str = "") -> tuple[str, int]:
+    """The file that is meant of those in an archive, and how many more have such an ending."""
+    held = [
+        name
+        for name in names
+        if name.lower().endswith(endings)
+        and not name.lower().startswith(FORKS[0])
+        and not _base(name).startswith(FORKS[1])
+    ]
     kind = " or ".join(endings)
     if not held:
         raise InputError(f"is a ZIP archive without a {kind} file")
@@ -130,11 +120,10 @@ def chosen(names: Sequence[str], endings: tuple[str, ...], main: str = "") -> tu
     near = [name for name in held if name.count("/") == depth] if main else held
     called = [name for name in near if main and _base(name).lower() == main]
     if len(near) > 1 and len(called) != 1:
-        told = ", ".join(printable(name)[:MOST_SHOWN] for name in near[:TOLD])
-        more = ", ..." if len(near) > TOLD else ""
+        told = ", ".join(printable(name)[:60] for name in near[:TOLD]) + (", ..." if len(near) > TOLD else "")
         wanted = f"one, or one called {main}" if main else "one"
         raise InputError(
-            f"is a ZIP archive with {counted(len(near), f'{kind} file')} ({told}{more}); must have {wanted}: unpack it "
-            "and give the file that is meant"
+            f"is a ZIP archive with {counted(len(near), f'{kind} file')} ({told}); must have {wanted}: unpack it and "
+            "give the file that is meant"
         )
     return (called or near)[0], len(held) - 1

@@ -16,8 +16,8 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError, decoded, read_data
-from harness.files.kmz import kml_of
 from harness.files.wording import counted
+from harness.files.zip_archive import kml_of
 from harness.run_files.csv_path import read_csv
 from harness.run_files.fences import Fences, Place, in_plane
 from harness.run_files.geojson_path import read_geojson

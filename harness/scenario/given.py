@@ -29,13 +29,8 @@ Kind = PlannerKind | GuidanceKind
 class LoopPart(NamedTuple):
     """A part of the loop that may be given.
 
-    Attributes:
-        noun: what it is called, with its article.
-        methods: what an object has to have, the one that tells it first.
-        told: name of what a factory may take.
-        kind: type of its kinds.
-        kinds: those that this process knows, by name.
-        register: makes one more known.
+    Its noun with an article, the methods that an object has to have, the name of what a factory may take, the type of
+    its kinds, those that this process knows by name, and what makes one more known.
     """
 
     noun: str
@@ -198,14 +193,13 @@ def _file(path: Path) -> Any:
     folder = str(path.resolve().parent)
     if folder not in sys.path:
         sys.path.append(folder)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
     try:
         with redirect_stdout(sys.stderr):
             spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        raise ValueError(_not_imported(str(path), error)) from error
+        raise _not_imported(str(path), error) from error
     return module
 
 
@@ -213,16 +207,16 @@ def _module(name: str, source: str) -> Any:
     try:
         with redirect_stdout(sys.stderr):
             return importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        if error.name != name.partition(".")[0] and error.name != name:
-            raise ValueError(_not_imported(name, error)) from error
-        raise ValueError(f"{source}: there is no module {name}; give FILE.py:NAME or MODULE:NAME") from error
     except (Exception, SystemExit) as error:
-        raise ValueError(_not_imported(name, error)) from error
+        if isinstance(error, ModuleNotFoundError) and error.name in (name, name.partition(".")[0]):
+            raise ValueError(
+                f"{source}: there is no module {name}; give FILE.py:NAME or MODULE:NAME"
+            ) from error
+        raise _not_imported(name, error) from error
 
 
-def _not_imported(what: str, error: BaseException) -> str:
-    return f"{what} cannot be imported: {type(error).__name__}: {' '.join(str(error).split())}"
+def _not_imported(what: str, error: BaseException) -> ValueError:
+    return ValueError(f"{what} cannot be imported: {type(error).__name__}: {' '.join(str(error).split())}")
 
 
 def _is_own(value: object, module: Any) -> bool:

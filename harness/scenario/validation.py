@@ -34,6 +34,13 @@ NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"
 """Pattern of a name that a folder may be called after."""
 
 _PATTERNS: Final = {NAME_PATTERN: "have only a-z, 0-9, '.', '_' and '-', and not only dots"}
+_SENTENCES: Final = {
+    "missing": "is missing; it is required",
+    "literal_error": "is {shown}; must be {expected}",
+    "too_long": "has {actual_length} items; must have {max_length}",
+    "too_short": "has {actual_length} items; must have at least {min_length}",
+    "string_too_short": "is empty text; must be a name",
+}
 _BOUNDS: Final = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),
@@ -67,42 +74,37 @@ class KeyFaults(ValueError):
 
 
 def input_error(error: ValidationError, model: type[BaseModel], root: Node, source: str) -> InputError:
-    """What is wrong with a file, at most MAX_FAULTS lines of it.
-
-    Args:
-        error: what pydantic says of the values of `root`.
-        model: what they should have been.
-        root: the file.
-        source: its name.
-    """
+    """What pydantic says of the values of a file that should have been a model, at most MAX_FAULTS lines of it."""
     return fault_error(KeyFaults(faults(error, model)), root, source)
 
 
 def fault_error(found: KeyFaults, root: Node, source: str) -> InputError:
     """The same of faults that are told already."""
-    lines = [fault_line(source, root.line_of(loc), loc, sentence) for loc, sentence in found.every]
-    return in_lines(lines, source)
+    return in_lines([fault_line(source, root.line_of(loc), loc, told) for loc, told in found.every], source)
 
 
 def faults(error: ValidationError, model: type[BaseModel]) -> list[tuple[Loc, str]]:
     """Key and sentence of every fault."""
     every = error.errors(include_url=False)
+    short = {
+        each["loc"][:-1]: each
+        for each in every
+        if each["type"] == "missing" and isinstance(each["loc"][-1], int)
+    }
     found = []
     for details in every:
         loc: Loc = details["loc"]
-        if details["type"] == "missing" and isinstance(loc[-1], int):
-            last = max(int(each["loc"][-1]) for each in every if _lacks_number(each, loc[:-1]))
-            given = str(list(details["input"]))
-            short = given if len(given) <= 80 else f"{given[:77]}..."
-            found.append((loc[:-1], f"is {short}; must have {last + 1} numbers"))
+        last = short.get(loc[:-1])
+        if last is not None and details["type"] == "missing":  # numbers of a list that is too short
+            found.append(
+                (
+                    loc[:-1],
+                    f"is {str(list(last['input']))[:80]}; must have {int(last['loc'][-1]) + 1} numbers",
+                )
+            )
         else:
             found.append(_located(details, model))
     return found
-
-
-def _lacks_number(details: ErrorDetails, loc: Loc) -> bool:
-    """Whether the list at `loc` is too short."""
-    return details["type"] == "missing" and details["loc"][:-1] == loc
 
 
 def in_lines(every: Sequence[str], source: str) -> InputError:
@@ -147,8 +149,6 @@ def sentence(details: ErrorDetails, known: tuple[str, ...] = ()) -> str:
     kind, value, context = details["type"], details["input"], details.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])
-    if kind == "missing":
-        return "is missing; it is required"
     if kind == "extra_forbidden":
         return unknown_key(str(details["loc"][-1]), known)
     if kind == "finite_number" or (isinstance(value, float) and not math.isfinite(value)):
@@ -161,16 +161,10 @@ def sentence(details: ErrorDetails, known: tuple[str, ...] = ()) -> str:
     if kind in _BOUNDS:
         words, name = _BOUNDS[kind]
         return f"is {shown(value)}; must be {words} {context[name]:.12g}"
-    if kind == "literal_error":
-        return f"is {shown(value)}; must be {context['expected']}"
     if kind == "string_pattern_mismatch":
         return f"is {shown(value)}; must {_PATTERNS.get(context['pattern'], 'match ' + context['pattern'])}"
-    if kind == "too_long":
-        return f"has {context['actual_length']} items; must have {context['max_length']}"
-    if kind == "too_short":
-        return f"has {context['actual_length']} items; must have at least {context['min_length']}"
-    if kind == "string_too_short":
-        return "is empty text; must be a name"
+    if kind in _SENTENCES:
+        return _SENTENCES[kind].format(shown=shown(value), **context)
     return f"is {shown(value)}: {details['msg'][0].lower()}{details['msg'][1:]}"
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
@@ -14,7 +14,7 @@ from harness.flight.observer import Observer
 from harness.flight.record import AcceptedPlan, Track
 from harness.flight.track_log import TrackLog
 from harness.mapping.scan import RangeScan
-from harness.watching.relay import Call, Opening
+from harness.watching.relay import Call, Opening, RelayProcess
 
 if TYPE_CHECKING:
     from harness.flight.closed_loop import Loop
@@ -22,20 +22,6 @@ if TYPE_CHECKING:
 
 HAND_OVER_S: Final = 0.1
 """Wall time after which what has been flown is handed over: half of what is promised."""
-
-
-class Relay(Protocol):
-    """Takes what a viewer is to show, and never keeps the flight waiting, but before it begins."""
-
-    given_up: bool
-
-    def begin(self, opening: Opening) -> None:
-        """Takes what is told first."""
-        ...
-
-    def hand_over(self, calls: Sequence[Call]) -> None:
-        """Takes calls of the recording's."""
-        ...
 
 
 class LiveLog(Observer):
@@ -49,7 +35,7 @@ class LiveLog(Observer):
         url: of the viewer, as rerun+http://127.0.0.1:9876/proxy.
     """
 
-    def __init__(self, relay: Relay, url: str) -> None:
+    def __init__(self, relay: RelayProcess, url: str) -> None:
         self._relay, self._url = relay, url
         self._calls: list[Call] = []
         self._moving: Callable[[], Any] = tuple
@@ -57,13 +43,7 @@ class LiveLog(Observer):
         self._handed_s = 0.0
 
     def begin(self, loop: Loop, scene: Scene, identity: str) -> None:
-        """Shows the world before the flight.
-
-        Args:
-            loop: parts of the flight, not yet flown.
-            scene: what is known before it.
-            identity: of the recording.
-        """
+        """Shows the world before a flight, whose parts are not yet flown, under the identity of a recording."""
         self._moving = lambda: tuple(loop.seen.moving)
         self._track = TrackLog(loop.world.clearance, [self.on_rows], ground=loop.world.ground_heights)
         self._relay.begin(Opening(self._url, scene, identity))
@@ -96,12 +76,7 @@ class LiveLog(Observer):
             self._hand_over()
 
     def close(self, metrics: Mapping[str, Any], run: Mapping[str, Any]) -> None:
-        """Shows what the whole flight is summed up in.
-
-        Args:
-            metrics: content of `metrics.json`.
-            run: typed figures of the run.
-        """
+        """Shows the content of `metrics.json` and the typed figures of the run."""
         self._hand_over()
         self._keep("close", dict(metrics), dict(run))
         self._hand_over()

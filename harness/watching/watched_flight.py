@@ -15,7 +15,7 @@ from harness.run.scenario_flight import fly_to_folder, make_loop, scene_of
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.watching.live import LiveLog
 from harness.watching.pace import Pace
-from harness.watching.relay_process import RelayProcess
+from harness.watching.relay import RelayProcess
 
 
 @dataclass(frozen=True)
@@ -28,52 +28,27 @@ class Onlookers:
         viewer_gone: is told if the viewer goes away before the end.
     """
 
-    viewer: str | None = None
+    viewer: str
     speed: float | None = None
     viewer_gone: Callable[[], None] = lambda: None
 
 
 def fly_watched(
-    scenario: Scenario,
-    out: Path,
-    recording: bool,
-    progress: Progress | None = None,
-    onlookers: Onlookers | None = None,
+    scenario: Scenario, out: Path, recording: bool, progress: Progress | None, onlookers: Onlookers
 ) -> dict[str, Any]:
-    """The same as `fly_to_folder`, and with the same result, whoever looks on.
-
-    Args:
-        scenario: a complete scenario.
-        out: the run folder, made or written anew.
-        recording: whether to write `flight.rrd`.
-        progress: told of the flight as it goes on.
-        onlookers: who looks on.
-
-    Raises:
-        AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
-        RunFolderError: the folder holds something else or cannot be written.
-        WriteError: it could not be written to the end, a full disk perhaps.
-    """
-    asked = onlookers or Onlookers()
-    observers: list[Observer] = []
+    """The same as `fly_to_folder`, and with the same result and errors, whoever looks on."""
+    observers: list[Observer] = [] if onlookers.speed is None else [Pace(onlookers.speed)]
     with ExitStack() as stack:
-        live = None
-        if asked.viewer:
-            relay = RelayProcess(asked.viewer_gone)
-            stack.callback(relay.end)
-            live = LiveLog(relay, asked.viewer)
-            observers.append(live)
-        if asked.speed is not None:
-            observers.append(Pace(asked.speed))
+        relay = RelayProcess(onlookers.viewer_gone)
+        stack.callback(relay.end)
+        live = LiveLog(relay, onlookers.viewer)
 
         def make(scenario: Scenario) -> Loop:
             loop = make_loop(scenario)
-            if live is not None:
-                scene = scene_of(scenario, loop, dump_scenario(scenario))
-                live.begin(loop, scene, f"{scene.name}, live")
+            scene = scene_of(scenario, loop, dump_scenario(scenario))
+            live.begin(loop, scene, f"{scene.name}, live")
             return loop
 
-        figures = fly_to_folder(scenario, out, recording, progress, make=make, watching=observers)
-        if live is not None:
-            live.close(figures, run_properties(scenario, figures))
+        figures = fly_to_folder(scenario, out, recording, progress, make=make, watching=[live, *observers])
+        live.close(figures, run_properties(scenario, figures))
     return figures

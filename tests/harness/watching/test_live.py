@@ -81,14 +81,14 @@ def test_the_flight_is_the_same_whether_a_viewer_follows_or_is_killed(
     alone = fly_to_folder(scenario, tmp_path / "alone", recording=False)
     told: list[str] = []
     asked = Onlookers(f"rerun+http://{address}/proxy", viewer_gone=lambda: told.append("gone"))
-    followed = fly_watched(scenario, tmp_path / "followed", True, onlookers=asked)
+    followed = fly_watched(scenario, tmp_path / "followed", True, None, asked)
     assert followed["digest"] == alone["digest"]
     assert (tmp_path / "followed" / "flight.rrd").stat().st_size > 10_000
     assert told == []
     killed_at = KillsAt(process, 20.0)
     monkeypatch.setattr("harness.watching.watched_flight.Pace", lambda speed: killed_at)
     killed = fly_watched(
-        scenario, tmp_path / "killed", True, onlookers=Onlookers(asked.viewer, 1.0, asked.viewer_gone)
+        scenario, tmp_path / "killed", True, None, Onlookers(asked.viewer, 1.0, asked.viewer_gone)
     )
     assert process.poll() is not None
     assert killed["digest"] == alone["digest"]
