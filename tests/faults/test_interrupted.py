@@ -155,7 +155,7 @@ def test_a_comparison_is_ended_with_its_flights(tmp_path: Path) -> None:
 @pytest.mark.parametrize("size", [60_000, 300_000])
 def test_a_full_disk(size: int, tmp_path: Path) -> None:
     """No file may grow beyond some bytes, which a write finds out as it would a full disk."""
-    status, out, err = run(tmp_path, *FLY, file_bytes=size)
+    status, out, err = run(tmp_path, *FLY, "--quiet", file_bytes=size)
     assert (status, out) == (1, "")
     assert err == "wayproof: cannot write the run in run (File too large); it is marked incomplete\n"
     with pytest.raises(RunFolderError, match="incomplete"):
@@ -166,7 +166,7 @@ def test_a_full_disk(size: int, tmp_path: Path) -> None:
 
 @pytest.mark.flights
 def test_a_disk_that_is_full_for_the_track_alone(tmp_path: Path) -> None:
-    status, _, err = run(tmp_path, *FLY, "--no-recording", file_bytes=60_000)
+    status, _, err = run(tmp_path, *FLY, "--no-recording", "--quiet", file_bytes=60_000)
     assert status == 1
     assert (
         err

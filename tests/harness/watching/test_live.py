@@ -26,7 +26,7 @@ from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop,
 from harness.watching import live
 from harness.watching.live import LiveLog
 from harness.watching.pace import Pace
-from harness.watching.relay import Call, Opening
+from harness.watching.relay import Call, Opening, RelayProcess
 from harness.watching.watched_flight import Onlookers, fly_watched
 from tests.closed_loop.conftest import world
 from tests.point_mass import PointMass
@@ -96,7 +96,7 @@ def test_the_flight_is_the_same_whether_a_viewer_follows_or_is_killed(
     assert told == ["gone"]
 
 
-class Kept:
+class Kept(RelayProcess):
     """Takes what is handed over, and how often."""
 
     given_up = False
