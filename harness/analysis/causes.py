@@ -117,7 +117,7 @@ def cross_track_cause(
     return _at_a_limit(lead, limits, force, asked.roll_rate > ROUNDING)
 
 
-def corner_cause(corner: Corner, allowed_m: float, track: Track, row: int, force: InForce) -> str:
+def corner_cause(corner: Corner, allowed_m: float, row: int, force: InForce) -> str | None:
     """Why a corner was passed too far off: whether any turn would do in calm air, whether any would in that wind."""
     half_rad = math.radians(abs(corner.turn_deg)) / 2.0
     outside = 1.0 / max(math.cos(half_rad), 1e-9) - 1.0
@@ -127,9 +127,7 @@ def corner_cause(corner: Corner, allowed_m: float, track: Track, row: int, force
         return "turn radius too tight"
     if (speed + wind) ** 2 > needed:
         return "wind drift"
-    around = track.part(int(np.searchsorted(track.time_s, track.time_s[row] - LEAD_S)), row + 1)
-    banked = float(saturated(around, force.bank_limit_rad).mean())
-    return "bank limit" if banked >= SATURATED_SHARE else "tracking error"
+    return None
 
 
 def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven | None) -> str:

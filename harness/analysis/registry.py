@@ -8,7 +8,7 @@ are made of this list. To add a figure that follows from a flight alone, append 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, Final
 
 from harness.analysis.findings import bank_reversals_per_min, contradictions_s
@@ -21,74 +21,59 @@ def _causes(metrics: Mapping[str, Any]) -> list[str]:
     return [leg["cause"] for leg in metrics["trackability"] if leg["cause"]]
 
 
-def _spread(name: str, title: str, hint: str = "", short: str = "", rare: bool = False) -> list[Metric]:
+def _spread(name: str, title: str, short: str = "", rare: bool = False) -> list[Metric]:
     """rms, 95th percentile and maximum of an error in metres; the largest is a property of recordings."""
     stem = name.removesuffix("_m")
-    return [Metric(f"{stem}_rms_m", path=f"{name}.rms")] + [
-        Metric(
-            f"{stem}_{of}_m",
-            f"{title} {of}",
-            "m",
-            f"{short} {of}" if short else "",
-            f"{name}.{of}",
-            worse="more",
-            hint=hint if of == "p95" else "",
-            rare=rare,
-            recorded=True,
+    told = {
+        of: Metric(
+            f"{stem}_{of}_m", f"{title} {of}", "m", f"{short} {of}" if short else "", f"{name}.{of}",
+            worse="more", rare=rare, recorded=True,
             heading=f"{title} max, m" if short and not rare and of == "max" else "",
         )
         for of in ("p95", "max")
-    ]
+    }  # fmt: skip
+    return [Metric(f"{stem}_rms_m", path=f"{name}.rms"), *told.values()]
 
 
-def _smooth(
-    figure: str, title: str, unit: str, short: str, factor: float = 1.0, hint: str = ""
-) -> list[Metric]:
+def _smooth(figure: str, title: str, unit: str, short: tuple[str, str], factor: float = 1.0) -> list[Metric]:
     """A figure of the planned and of the flown path."""
     return [
         Metric(
-            f"{of}_{figure}",
-            f"{title} {of}",
-            unit,
-            each,
-            f"smoothness.{of}.{figure}",
-            factor=factor,
-            worse="more",
-            hint=hint if of == "planned" else "",
+            f"{of}_{figure}", f"{title} {of}", unit, each, f"smoothness.{of}.{figure}", factor=factor, worse="more"
         )
-        for of, each in (
-            ("planned", short),
-            ("flown", "flown \N{DEGREE SIGN}" if short.startswith("turn") else f"{short} fl."),
-        )
-    ]
+        for of, each in zip(("planned", "flown"), short, strict=True)
+    ]  # fmt: skip
 
 
 _SMOOTH_FOR_PEOPLE: Final = ("heading_change_deg", "bending_energy_1pm")
 
-METRICS: Final[tuple[Metric, ...]] = (
-    Metric(
-        "outcome",
-        "outcome",
-        short="outcome",
-        kind="text",
-        hint="how the flight ended; error: the software failed before the end, which says nothing of the aircraft",
-        recorded=True,
-        heading="outcome",
-    ),
+HINTS: Final[Mapping[str, str]] = {
+    "total_system_error_p95_m": "distance of the true position from the path, as planned or as given",
+    "flight_technical_error_p95_m": "distance of the believed position from the path",
+    "navigation_error_p95_m": "distance from the true position to the one that the aircraft believed to have",
+    "planned_heading_change_deg": "sum of all changes of direction of the plans in effect",
+    "planned_bending_energy_1pm": "integral of the squared curvature along the plans in effect",
+    "bank_reversals_per_min": "how often a minute the bank command goes from 10° on one side to as much on the other",
+    "outcome": "how the flight ended; error: the software failed before the end, which says nothing of the aircraft",
+    "ratio": "flown length over the shortest path to the goal circle for a point that knows the world and keeps clear",
+    "tightest_turn": "largest planned curvature times the smallest turn radius; above 1 the aircraft cannot follow",
+    "tightest_flown_turn": "largest curvature of the track times the smallest turn radius that a plan may ask for",
+    "trackable": "every leg was flown within the limits for cross-track error, altitude, airspeed and load",
+    "navigation_jump_m": "the most that the navigation error changes in a tenth of a second, as when a fix comes back",
+    "plan_delay_max_s": "simulated time from the latest scan that a plan could know of until it was flown",
+    "lost_returns": "share of the beams that met something and returned nothing",
+    "plan_contradictions": "they lead to the other side of the course within 5 s of flight",
+}
+"""What figures mean whose title does not say it."""
+
+_METRICS: Final = (
+    Metric("outcome", "outcome", short="outcome", kind="text", recorded=True, heading="outcome"),
     Metric("reason", kind="text", recorded=True),
     Metric("flown_length_m", "flown length", "km", "km", factor=1e-3, recorded=True, heading="flown, m"),
     Metric("planned_length_m"),
     Metric("flight_time_s", "flight time", "s", recorded=True, heading="flight, s"),
     Metric("optimum_m", derived=True),
-    Metric(
-        "ratio",
-        "ratio to the clairvoyant optimum",
-        short="ratio",
-        digits=4,
-        derived=True,
-        worse="more",
-        hint="flown length over the shortest path to the goal circle for a point that knows the world and keeps clear",
-    ),
+    Metric("ratio", "ratio to the clairvoyant optimum", short="ratio", digits=4, derived=True, worse="more"),
     Metric(
         "min_clearance_m",
         "least clearance",
@@ -104,21 +89,19 @@ METRICS: Final[tuple[Metric, ...]] = (
     Metric("turn_radius_m", derived=True),
     Metric(
         "tightest_turn",
-        "tightest planned turn, curvature \N{MIDDLE DOT} turn radius",
-        short="\N{GREEK SMALL LETTER KAPPA}\N{MIDDLE DOT}R",
+        "tightest planned turn, curvature · turn radius",
+        short="κ·R",
         digits=2,
         derived=True,
         worse="more",
-        hint="largest planned curvature times the smallest turn radius; above 1 the aircraft cannot follow",
     ),
     Metric(
         "tightest_flown_turn",
-        "tightest flown turn, curvature \N{MIDDLE DOT} turn radius",
-        short="\N{GREEK SMALL LETTER KAPPA}\N{MIDDLE DOT}R fl.",
+        "tightest flown turn, curvature · turn radius",
+        short="κ·R fl.",
         digits=2,
         derived=True,
         worse="more",
-        hint="largest curvature of the track times the smallest turn radius that a plan may ask for",
     ),
     Metric(
         "trackable",
@@ -126,7 +109,6 @@ METRICS: Final[tuple[Metric, ...]] = (
         short="tracks",
         kind="bool",
         worse="less",
-        hint="every leg was flown within the limits for cross-track error, altitude, airspeed and load",
         recorded=True,
         heading="trackable",
     ),
@@ -164,54 +146,25 @@ METRICS: Final[tuple[Metric, ...]] = (
         heading="bank at limit, %",
     ),
     Metric("max_load_factor", "load factor max", worse="more"),
-    *_spread(
-        "total_system_error_m",
-        "total system error",
-        "distance of the true position from the path, as planned or as given",
-        short="tse",
-    ),
+    *_spread("total_system_error_m", "total system error", "tse"),
     *_spread("cross_track_m", "cross-track error"),
     *_spread("altitude_error_m", "altitude error"),
-    *_spread(
-        "flight_technical_error_m",
-        "flight technical error",
-        "distance of the believed position from the path",
-    ),
-    *_spread(
-        "navigation_error_m",
-        "navigation error",
-        "distance from the true position to the one that the aircraft believed to have",
-        short="nav",
-        rare=True,
-    ),
+    *_spread("flight_technical_error_m", "flight technical error"),
+    *_spread("navigation_error_m", "navigation error", "nav", rare=True),
     Metric(
         "navigation_jump_m",
         "jump of the believed position max",
         "m",
         "nav jump",
         worse="more",
-        hint="the most that the navigation error changes in a tenth of a second, when a fix comes back for example",
         rare=True,
         recorded=True,
         heading="navigation jump, m",
     ),
     Metric("navigation_margin_m"),
     Metric("min_altitude_above_ground_m", worse="less"),
-    *_smooth(
-        "heading_change_deg",
-        "heading change",
-        "\N{DEGREE SIGN}",
-        "turn \N{DEGREE SIGN}",
-        hint="sum of all changes of direction of the plans in effect",
-    ),
-    *_smooth(
-        "bending_energy_1pm",
-        "bending energy",
-        "1/km",
-        "bend",
-        1e3,
-        hint="integral of the squared curvature along the plans in effect",
-    ),
+    *_smooth("heading_change_deg", "heading change", "°", ("turn °", "flown °")),
+    *_smooth("bending_energy_1pm", "bending energy", "1/km", ("bend", "bend fl."), 1e3),
     *(
         Metric(f"{of}_{each.name}", path=f"smoothness.{of}.{each.name}", worse="more")
         for of in ("planned", "flown")
@@ -242,7 +195,6 @@ METRICS: Final[tuple[Metric, ...]] = (
         "delay s",
         "plan_delay_s.max",
         worse="more",
-        hint="simulated time from the latest scan that a plan could know of until it was flown",
         rare=True,
         recorded=True,
         heading="plan delay max, s",
@@ -255,7 +207,6 @@ METRICS: Final[tuple[Metric, ...]] = (
         "lost_returns.share",
         factor=100.0,
         worse="more",
-        hint="share of the beams that met something and returned nothing",
         rare=True,
     ),
     Metric(
@@ -275,7 +226,6 @@ METRICS: Final[tuple[Metric, ...]] = (
         "1/min",
         "rev/min",
         worse="more",
-        hint="how often a minute the bank command goes from 10\N{DEGREE SIGN} on one side to as much on the other",
         recorded=True,
         of=lambda flight, limits: bank_reversals_per_min(flight.track),
     ),
@@ -285,7 +235,6 @@ METRICS: Final[tuple[Metric, ...]] = (
         short="contra",
         kind="int",
         worse="more",
-        hint="they lead to the other side of the course within 5 s of flight",
         rare=True,
         recorded=True,
         of=lambda flight, limits: len(contradictions_s(flight.track, flight.plans)),
@@ -298,6 +247,7 @@ METRICS: Final[tuple[Metric, ...]] = (
     Metric("error", kind="text"),
     Metric("digest", "digest", short="digest", kind="text"),
 )
+METRICS: Final[tuple[Metric, ...]] = tuple(replace(each, hint=HINTS.get(each.name, "")) for each in _METRICS)
 """All figures, in the order in which people are shown them."""
 
 BY_NAME: Final[Mapping[str, Metric]] = {metric.name: metric for metric in METRICS}

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.analysis.as_given import AsGiven
+from harness.analysis.as_given import AsGiven, Corner
 from harness.analysis.causes import (
     LEAD_S,
     NAVIGATION_ERROR,
@@ -72,6 +72,23 @@ class Leg:
     cause: str | None
 
 
+@dataclass(frozen=True, eq=False)
+class _Flown:
+    """A flight that is judged: its track and plans, the limits, what was in force, and the path that was given."""
+
+    track: Track
+    plans: Sequence[AcceptedPlan]
+    limits: FlightLimits
+    force: InForce
+    given: AsGiven | None
+
+    def wanted(self, rows: slice) -> tuple[FloatArray | float, FloatArray | float]:
+        """Altitude and airspeed to be held at some rows."""
+        if self.given is None:
+            return self.limits.altitude_m, self.limits.airspeed_mps
+        return self.given.altitude_m[rows], self.given.airspeed_mps[rows]
+
+
 def legs(
     track: Track,
     plans: Sequence[AcceptedPlan],
@@ -79,7 +96,7 @@ def legs(
     lost: str | None = None,
     given: AsGiven | None = None,
 ) -> tuple[Leg, ...]:
-    """Judges a flight leg by leg.
+    """Judges a flight leg by leg; empty where no plan was flown.
 
     Args:
         track: the flown track.
@@ -87,37 +104,32 @@ def legs(
         limits: what to judge by.
         lost: why control was lost at the end of the flight, whose last leg is then not trackable; None: it was not.
         given: the path as given that the only plan follows.
-
-    Returns:
-        The legs in order of time; empty where no plan was flown.
     """
-    force = InForce.of(track, limits, given.airspeed_mps if given else None)
+    flown = _Flown(
+        track, plans, limits, InForce.of(track, limits, given.airspeed_mps if given else None), given
+    )
     past_end = is_past_end(track, plans, limits)
     corners = given.corners if given else ()
     ends = np.array([corner.arc_length_m for corner in corners])
-    leg = track.plan_index + np.searchsorted(ends, track.arc_length_m) if corners else track.plan_index
+    number = track.plan_index + np.searchsorted(ends, track.arc_length_m) if corners else track.plan_index
     along = np.maximum.accumulate(np.nan_to_num(track.arc_length_m))
     reached = np.searchsorted(along, ends) - 1
     judged, over_m = [], -math.inf
-    for first, last in _stretches(track, leg):
-        passed = [c for c, row in zip(corners, reached, strict=True) if first <= row <= last]
-        verdict = _judge(track, first, last, plans, limits, force, given)
+    for first, last in _stretches(track, number):
+        leg = _judge(flown, first, last)
         if given is not None:
             # All of a corner belongs to the leg that it ends.
-            verdict = replace(
-                verdict,
-                waypoint=passed[-1].waypoint if passed else None,
-                corner_cut_m=max((corner.cut_m for corner in passed), default=0.0),
-            )
+            passed = [c for c, row in zip(corners, reached, strict=True) if first <= row <= last]
             since_m, over_m = over_m, passed[-1].arc_length_m + passed[-1].half_m if passed else math.inf
             rows = np.flatnonzero((along > since_m) & (along <= over_m))
-            verdict = _judged_as_given(verdict, given, rows, (track, plans, limits, force))
+            leg = _judged_as_given(leg, flown, given, rows, passed)
         if past_end[first : last + 1].any():
-            verdict = replace(verdict, trackable=False, cause=PLAN_ENDED)
-        if lost is not None and last == len(track) - 1:
-            cause = "stall" if "stalled" in lost else "lost control"
-            verdict = replace(verdict, trackable=False, cause=cause)
-        judged.append(verdict)
+            leg = replace(leg, trackable=False, cause=PLAN_ENDED)
+        judged.append(leg)
+    if lost is not None and judged and last == len(track) - 1:
+        judged[-1] = replace(
+            judged[-1], trackable=False, cause="stall" if "stalled" in lost else "lost control"
+        )
     return tuple(judged)
 
 
@@ -127,10 +139,9 @@ def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
     if not len(flown):
         return []
     changes = np.flatnonzero(np.diff(leg[flown]) != 0) + 1
-    bounds = [0, *changes.tolist(), len(flown)]
     joined: list[tuple[int, int]] = []
     first = int(flown[0])
-    for end in bounds[1:]:
+    for end in [*changes.tolist(), len(flown)]:
         last = int(flown[end - 1])
         if track.time_s[last] - track.time_s[first] >= SHORTEST_LEG_S:
             joined.append((first, last))
@@ -141,53 +152,31 @@ def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
     return joined
 
 
-def _judge(
-    track: Track,
-    first: int,
-    last: int,
-    plans: Sequence[AcceptedPlan],
-    limits: FlightLimits,
-    force: InForce,
-    given: AsGiven | None,
-) -> Leg:
-    leg, rows = track.part(first, last + 1), slice(first, last + 1)
-    off = np.nan_to_num(np.abs(leg.cross_track_m))
-    wanted_m = given.altitude_m[rows] if given else limits.altitude_m
-    high = np.abs(leg.up_m - wanted_m)
-    commanded_mps = given.airspeed_mps[rows] if given else limits.airspeed_mps
+def _judge(flown: _Flown, first: int, last: int) -> Leg:
+    """A leg by its plan, or of a given path by altitude, airspeed and load factor alone."""
+    leg, limits = flown.track.part(first, last + 1), flown.limits
+    wanted_m, commanded_mps = flown.wanted(slice(first, last + 1))
+    off, high = np.nan_to_num(np.abs(leg.cross_track_m)), np.abs(leg.up_m - wanted_m)
     slow = np.abs(averaged(leg.airspeed_mps - commanded_mps, leg, SPEED_S))
     loads = averaged(leg.load_factor, leg, LOAD_S)
-    load = float(loads.max())
-    threshold = limits.cross_track_threshold_m
     cause = None
-    wide = given is None and off.max() > threshold
-    if wide and _is_misled(leg.believed_cross_track_m, leg.cross_track_m, threshold, off.argmax()):
-        cause = NAVIGATION_ERROR
-    elif wide:
-        cause = cross_track_cause(track, first + int(off.argmax()), plans, limits, force)
-    elif load > limits.max_load_factor:
-        cause = _steep(track, first + int(loads.argmax()), len(leg) - len(loads) + 1, given) or "load factor"
+    if flown.given is None and off.max() > limits.cross_track_threshold_m:
+        cause = _cross_track_cause(flown, leg, first, int(off.argmax()))
+    elif loads.max() > limits.max_load_factor:
+        cause = _steep(flown, first + int(loads.argmax()), len(leg) - len(loads) + 1) or "load factor"
     elif slow.max() > limits.max_airspeed_error_mps:
-        begins, rows_of_mean = int(slow.argmax()), len(leg) - len(slow) + 1
-        steep = _steep(track, first + begins, rows_of_mean, given)
-        cause = steep or speed_cause(leg.part(begins, begins + rows_of_mean), limits)
-    elif high.max() > limits.max_altitude_error_m and _is_misled(
-        None if leg.believed_up_m is None else leg.believed_up_m - wanted_m,
-        leg.up_m - wanted_m,
-        limits.max_altitude_error_m,
-        high.argmax(),
-    ):
-        cause = NAVIGATION_ERROR
+        begins, rows = int(slow.argmax()), len(leg) - len(slow) + 1
+        cause = _steep(flown, first + begins, rows) or speed_cause(leg.part(begins, begins + rows), limits)
     elif high.max() > limits.max_altitude_error_m:
-        cause = altitude_cause(track, first + int(high.argmax()), limits, given)
+        cause = _altitude_cause(flown, leg, wanted_m, first, int(high.argmax()))
     return Leg(
-        start_s=float(track.time_s[first]),
-        end_s=float(track.time_s[last]),
+        start_s=float(leg.time_s[0]),
+        end_s=float(leg.time_s[-1]),
         max_cross_track_m=float(off.max()),
-        threshold_m=threshold,
+        threshold_m=limits.cross_track_threshold_m,
         max_altitude_error_m=float(high.max()),
         max_airspeed_error_mps=float(slow.max()) if np.isfinite(slow.max()) else None,
-        max_load_factor=load,
+        max_load_factor=float(loads.max()),
         waypoint=None,
         corner_cut_m=0.0,
         max_deviation_m=None,
@@ -196,7 +185,22 @@ def _judge(
     )
 
 
-def _is_misled(believed: FloatArray | None, true: FloatArray, most: float, row: np.intp) -> bool:
+def _cross_track_cause(flown: _Flown, leg: Track, first: int, row: int) -> str:
+    """Why a leg is off its plan at a row of it."""
+    if _is_misled(leg.believed_cross_track_m, leg.cross_track_m, flown.limits.cross_track_threshold_m, row):
+        return NAVIGATION_ERROR
+    return cross_track_cause(flown.track, first + row, flown.plans, flown.limits, flown.force)
+
+
+def _altitude_cause(flown: _Flown, leg: Track, wanted_m: FloatArray | float, first: int, row: int) -> str:
+    """Why a leg is off its altitude at a row of it."""
+    believed = None if leg.believed_up_m is None else leg.believed_up_m - wanted_m
+    if _is_misled(believed, leg.up_m - wanted_m, flown.limits.max_altitude_error_m, row):
+        return NAVIGATION_ERROR
+    return altitude_cause(flown.track, first + row, flown.limits, flown.given)
+
+
+def _is_misled(believed: FloatArray | None, true: FloatArray, most: float, row: int) -> bool:
     """Whether the larger part of the largest true error, or all of it beyond the limit, is navigation's.
 
     It is not where the belief is unknown. At other rows the aircraft may have believed to be off: it flies to where its
@@ -207,44 +211,42 @@ def _is_misled(believed: FloatArray | None, true: FloatArray, most: float, row: 
     return bool(abs(believed[row]) <= max(most, abs(true[row] - believed[row])))
 
 
-def _steep(track: Track, first: int, rows: int, given: AsGiven | None) -> str | None:
+def _steep(flown: _Flown, first: int, rows: int) -> str | None:
     """Whether the path was too steep over the rows of a mean, or shortly before."""
-    since = int(np.searchsorted(track.time_s, track.time_s[first] - LEAD_S))
-    return steepness_cause(track, since, first + rows, given)
+    time_s = flown.track.time_s
+    since = int(np.searchsorted(time_s, time_s[first] - LEAD_S))
+    return steepness_cause(flown.track, since, first + rows, flown.given)
 
 
 def _judged_as_given(
-    leg: Leg,
-    given: AsGiven,
-    rows: IntArray,
-    flown: tuple[Track, Sequence[AcceptedPlan], FlightLimits, InForce],
+    leg: Leg, flown: _Flown, given: AsGiven, rows: IntArray, passed: Sequence[Corner]
 ) -> Leg:
-    """A leg that is not trackable either where it is too far from the path as given."""
+    """A leg that is not trackable either where it is too far from the path as given; the last corner is at its end."""
     off, cause = np.nan_to_num(given.deviation_m[rows]), leg.cause
     excess = off - given.allowed_m[rows]
     if len(rows) and excess.max() > 0.0:
-        cause = _cause_off_given(given, int(rows[excess.argmax()]), *flown)
-    return replace(leg, max_deviation_m=float(off.max(initial=0.0)), trackable=cause is None, cause=cause)
+        cause = _cause_off_given(flown, given, int(rows[excess.argmax()]))
+    return replace(
+        leg,
+        waypoint=passed[-1].waypoint if passed else None,
+        corner_cut_m=max((corner.cut_m for corner in passed), default=0.0),
+        max_deviation_m=float(off.max(initial=0.0)),
+        trackable=cause is None,
+        cause=cause,
+    )
 
 
-def _cause_off_given(
-    given: AsGiven,
-    worst: int,
-    track: Track,
-    plans: Sequence[AcceptedPlan],
-    limits: FlightLimits,
-    force: InForce,
-) -> str:
+def _cause_off_given(flown: _Flown, given: AsGiven, worst: int) -> str:
     """Why the aircraft is too far off the path as given, at the row where that is worst."""
+    track, believed_m = flown.track, given.believed_off_m
     allowed_m, along_m = float(given.allowed_m[worst]), float(track.arc_length_m[worst])
-    believed_m = given.believed_off_m
     if believed_m is not None and believed_m[worst] <= max(allowed_m, track.navigation_error_m[worst]):
         return NAVIGATION_ERROR
     for corner in given.corners:
         reach_m = max(corner.half_m, ABOUT * allowed_m)
         after_m = reach_m + LEAD_S * float(track.groundspeed_mps[worst])
         if -reach_m <= along_m - corner.arc_length_m <= after_m:
-            cause = corner_cause(corner, allowed_m, track, worst, force)
-            if cause in ("turn radius too tight", "wind drift"):
+            cause = corner_cause(corner, allowed_m, worst, flown.force)
+            if cause is not None:
                 return cause
-    return cross_track_cause(track, worst, plans, limits, force)
+    return cross_track_cause(track, worst, flown.plans, flown.limits, flown.force)
