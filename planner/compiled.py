@@ -1,9 +1,8 @@
 """Geometry compiled to machine code (numba): the loops over edge points that most of a planner's time goes to.
 
-All functions are compiled together, for the types of arguments that they name, by `compile_all` before a flight: what
-was compiled is kept on disk, by file, so that a compiled function calls none of another file (but `fused`, which is an
-instruction), and numbers that it takes from one never change. To import them takes no time. Fast mathematics is left
-off: the same numbers give the same results.
+All functions are compiled together, for the types of arguments that they name, by `compile_all` before a flight. What
+was compiled is kept on disk by file: a compiled function calls none of another file, and numbers that it takes from one
+never change. To import them takes no time. Fast mathematics is off: the same numbers give the same results.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from fractions import Fraction
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from planner.kernel_cache import seal
@@ -42,23 +40,16 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def fused(a: float, b: float, c: float) -> float:
-    """Product of two numbers and a third added, rounded once."""
-    return float(Fraction(a) * Fraction(b) + Fraction(c))
-
-
 class Compiled(Generic[P, R]):
     """A function that is compiled before it is first called.
 
     Args:
         function: the function.
         arguments: their types. Others are refused: nothing is ever compiled anew.
-        unchecked: others are not refused, and may overwrite anything: to compare types takes as long as a short
-            function does. Not for one that other compiled ones call.
     """
 
-    def __init__(self, function: Callable[P, R], arguments: tuple[str, ...], unchecked: bool = False) -> None:
-        self._function, self._arguments, self._unchecked = function, arguments, unchecked
+    def __init__(self, function: Callable[P, R], arguments: tuple[str, ...]) -> None:
+        self._function, self._arguments = function, arguments
         self._code: Callable[..., R] = self._compile_first
         self.anew = False
         """It was compiled by this process, not loaded."""
@@ -81,7 +72,6 @@ class Compiled(Generic[P, R]):
         """Compiles it, or loads what was compiled before. Division by zero gives what it gives in numpy."""
         import numba  # half a second
 
-        _learn_to_fuse()
         seal()
         signature = f"({', '.join(self._arguments)},)"
         try:
@@ -93,9 +83,6 @@ class Compiled(Generic[P, R]):
             self.kept = False
             code = numba.njit(signature, error_model="numpy")(self._function)
         self.anew = not code.stats.cache_hits
-        if self._unchecked:
-            (only,) = code.overloads.values()
-            code = only.entry_point
         self._code = code
         # Functions of the same file that call it find what is compiled.
         self._function.__globals__[self._function.__name__] = code
@@ -105,32 +92,15 @@ _waiting: list[Compiled[..., Any]] = []
 _compiling = threading.RLock()
 
 
-def compiled(*arguments: str, unchecked: bool = False) -> Callable[[Callable[P, R]], Compiled[P, R]]:
+def compiled(*arguments: str) -> Callable[[Callable[P, R]], Compiled[P, R]]:
     """Has a function compiled for arguments of these types."""
 
     def compile_later(function: Callable[P, R]) -> Compiled[P, R]:
-        made = Compiled(function, arguments, unchecked)
+        made = Compiled(function, arguments)
         _waiting.append(made)
         return made
 
     return compile_later
-
-
-@functools.cache
-def _learn_to_fuse() -> None:
-    """Has `fused` be one instruction of the processor, where it has that."""
-    from numba import types
-    from numba.extending import intrinsic, overload
-
-    @intrinsic
-    def fma(_typing: Any, a: Any, b: Any, c: Any) -> Any:
-        def code(_context: Any, builder: Any, _signature: Any, numbers: Any) -> Any:
-            return builder.fma(*numbers)
-
-        return types.float64(a, b, c), code
-
-    instruction: Any = fma
-    overload(fused)(lambda a, b, c: lambda a, b, c: instruction(a, b, c))
 
 
 def compile_all() -> None:
@@ -163,10 +133,6 @@ def begin_compiling(busy_bytes: int) -> None:
     """Has a second process compile some of the functions imported so far, until `compile_all` needs them.
 
     It does nothing where they are on disk, or where there is one processor.
-
-    Args:
-        busy_bytes: what this process has to do before it calls `compile_all`: it takes about as long as to compile so
-            much byte code.
     """
     with _compiling, _no_garbage_looked_for():
         _start_second(busy_bytes)

@@ -22,9 +22,6 @@ class ObstacleMemory:
 
     Points nearer to each other than twice the clearance leave no way between them: they are one obstacle. They are
     gathered on a grid whose neighbouring cells (diagonals too) are always that near (`planner.obstacle_labels`).
-
-    Args:
-        clearance_m: distance to be kept from every point.
     """
 
     def __init__(self, clearance_m: float) -> None:

@@ -63,13 +63,7 @@ class ObstacleLabels:
         self._labels[begin:end] = [self._of_cell[cell] for cell in cells_of]
 
     def _join(self, cell: tuple[int, int], joined: list[tuple[int, int]], before_m: FloatArray) -> None:
-        """Gives a new cell the label of its neighbours, which become one obstacle if they were several.
-
-        Args:
-            cell: the cell.
-            joined: the other new cells that have a label already.
-            before_m: (k, 2) the points that have a label already.
-        """
+        """Gives a new cell the label of its neighbours, which become one obstacle if they were several."""
         x, y = cell
         around = ((x + i, y + j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
         found = {self._of_cell[near] for near in around if near in self._of_cell}

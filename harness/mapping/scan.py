@@ -27,7 +27,6 @@ from planner.compiled import (
     PLACES,
     PLACES_OUT,
     compiled,
-    fused,
 )
 from planner.interface import ComplexArray, FloatArray, IntArray
 
@@ -201,7 +200,7 @@ def _returned(
                 if side != 0.0:
                     aside = side * half_sin
                     right, ahead = right * half_cos + ahead * aside, ahead * half_cos - right * aside
-            x, y = fused(right, cos, -(ahead * sin)), fused(right, sin, ahead * cos)
+            x, y = right * cos - ahead * sin, right * sin + ahead * cos
             rays[many], places[many] = ray, complex(x + east, y + north)
             many += 1
     return many

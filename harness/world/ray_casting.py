@@ -270,7 +270,7 @@ def _lower_to_edges(
                     ranges[beam] = min(ranges[beam], distance)
 
 
-@compiled(FACES, FACES, FLOAT, FLOAT, unchecked=True)  # every scan begins with it
+@compiled(FACES, FACES, FLOAT, FLOAT)
 def nearest_face_m(circles: FloatArray, edges: FloatArray, east: float, north: float) -> float:
     """Distance from a place to the nearest face, ahead or not; +inf where there is none."""
     nearest = math.inf

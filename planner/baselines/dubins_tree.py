@@ -27,7 +27,6 @@ from planner.geometry.joining import branch_off, stuck
 from planner.geometry.margin import MARGIN_KEY, margin_of
 from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
-from planner.kernels.fans import too_near
 from planner.memory import ObstacleMemory
 
 GOAL_COURSES = 8
@@ -246,7 +245,8 @@ def is_free(terrain: Terrain, east_m: float, north_m: float) -> bool:
     """Whether a place is in the area and keeps its distance from all that is known."""
     xmin, ymin, xmax, ymax = terrain.bounds_m
     inside = xmin <= east_m <= xmax and ymin <= north_m <= ymax
-    return inside and not too_near(*terrain.squares, east_m, north_m)
+    away = np.hypot(terrain.points_m[:, 0] - east_m, terrain.points_m[:, 1] - north_m)
+    return inside and bool((away >= terrain.keep_m).all())
 
 
 def dubins_chain(poses: Sequence[Pose], radius_m: float, terrain: Terrain) -> list[list[Segment]] | None:

@@ -142,11 +142,7 @@ def turns_onto(pose: Pose, target: Point, radius_m: float) -> list[list[Segment]
 
 
 def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | None:
-    """The shorter of the turns from a pose onto a straight line that ends at a point, and that line.
-
-    Returns:
-        The segments; None for a point at the pose itself.
-    """
+    """The shorter of the turns from a pose onto a straight line that ends at a point, and that line."""
     ways = turns_onto(pose, target, radius_m)
     return ways[0] if ways else None
 
@@ -195,9 +191,6 @@ def fillet(
         start_curvature: curvature (1/m) flown on arrival at the start.
         longer_turn: begin with the longer of the two turns towards the first corner.
         first_radius_m: radius of that turn.
-
-    Returns:
-        The path, or None where a corner cannot be rounded.
     """
     radius_m = first_radius_m or limits.radius_m
     ways = turns_onto(start, nodes[0], radius_m)[longer_turn:]

@@ -37,14 +37,7 @@ APART_RADII = 0.25
 
 
 def stuck(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray) -> Plan:
-    """The answer where there is no way on: a turn to hold in, or the one that is being flown.
-
-    Args:
-        why: the beginning of the sentence.
-        request: the question to the planner.
-        mission: what stays the same for the flight.
-        points_m: (m, 2) edge points.
-    """
+    """The answer where there is no way on: a turn to hold in, or the one that is being flown."""
     path = request.flown.path if request.flown else None
     if path is not None and path.loiter:
         turn = Path(path.segments[-1:])

@@ -13,12 +13,12 @@ from planner.kernels.buckets import Buckets, bucketed
 SQUARE = 3.0
 """Side of the squares in which edge points near a line are looked for, as a multiple of the distance kept."""
 
-CALL, TANGENT, PLACE, HUGGED = 14.0, 0.04, 0.0016, 0.006
+CALL_WORK, TANGENT_WORK, POINT_WORK, HUG_WORK = 14.0, 0.04, 0.0016, 0.006
 """Work in about microseconds: of one question, and of each point that it lays tangents at, compares with a line, or
 looks at for how long a step hugs it."""
 
 
-class Tally:
+class WorkCount:
     """Work done so far, counted by what was looked at and never timed: one is about a microsecond on an ordinary core.
 
     Counted work makes a search that is cut short end at the same place in every run.
@@ -29,7 +29,7 @@ class Tally:
 
     def add(self, calls: float, each: float = 0.0, count: int = 0) -> None:
         """Counts questions, and what each of so many points or pairs adds to them."""
-        self.done += CALL * calls + each * count
+        self.done += CALL_WORK * calls + each * count
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,19 +40,19 @@ class Terrain:
         points_m: (m, 2) edge points.
         keep_m: (m,) distance to be kept from each.
         bounds_m: xmin, ymin, xmax, ymax: area that must not be left.
-        tally: work is counted here.
+        work_count: work is counted here.
     """
 
     points_m: FloatArray
     keep_m: FloatArray
     bounds_m: tuple[float, float, float, float]
-    tally: Tally = field(default_factory=Tally)
+    work_count: WorkCount = field(default_factory=WorkCount)
 
     def admits(self, path: Path) -> bool:
         """Whether a path keeps its distance and stays inside."""
         if not inside_bounds(path, self.bounds_m):
             return False
-        self.tally.add(1, PLACE, len(self.points_m) * len(path.segments))
+        self.work_count.add(1, POINT_WORK, len(self.points_m) * len(path.segments))
         return math.isinf(first_breach(path, self.points_m, self.keep_m))
 
     @cached_property

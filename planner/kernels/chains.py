@@ -67,20 +67,7 @@ def link_all(
     clearance: float,
     border: float,
 ) -> bool:
-    """Links nodes, from the first one on, with all before that are near enough; whether that closes a chain.
-
-    Args:
-        places: of each node but that of the outside, which is the first.
-        first: the first one to be linked.
-        parent: of each node in its tree.
-        parity: whether the chain to it crosses the line from start to goal an odd number of times.
-        last: by where they lie, told by squares: the last node there.
-        before: of each node the one before it there.
-        ends: start and goal.
-        bounds: xmin, ymin, xmax, ymax.
-        clearance: distance that a way keeps,
-        border: and from the border, but for what of that is nearer to start or goal.
-    """
+    """Links nodes, from the first one on, with all before that are near enough; whether that closes a chain."""
     closed, reach = False, 2.0 * clearance
     for node in range(first, len(places)):
         x, y = places[node, 0], places[node, 1]

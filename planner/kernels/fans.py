@@ -1,7 +1,9 @@
 """What obstacles look like from a track point: where their fans end, and how far lines lead past their edge points.
 
-Metres, ENU. Points are (3, m): east, north and the distance to be kept from each, which gives the processor one row
-after the other. Compiled: see `planner.kernels`.
+Metres, ENU. `places`, `first` and `circles` are all edge points by squares, `planner.kernels.buckets.Buckets`. `own`
+are those of one obstacle, (3, m): east, north and the distance to be kept from each. Its cells, of a `side`, are
+`first`, `counts`, `one` and `other`: `planner.kernels.buckets.Cells`. A ray begins at (east, north), along (ux, uy).
+Compiled: see `planner.kernels`.
 """
 
 from __future__ import annotations
@@ -27,17 +29,7 @@ def first_met(
     ux: float,
     uy: float,
 ) -> tuple[float, int]:
-    """How far a ray leads before it comes too near to a point, and to which; infinite and 0: it never does.
-
-    Args:
-        places: all edge points by squares, as `planner.kernels.buckets.Buckets` has them,
-        first: where each square begins among them,
-        circles: and the circle about it.
-        east: where the ray begins.
-        north: where the ray begins.
-        ux: along the ray.
-        uy: along the ray.
-    """
+    """How far a ray leads before it comes too near to a point, and to which; infinite and 0: it never does."""
     squares, begins, count = np.empty(len(first), dtype=np.intp), np.empty(len(first)), 0
     for block in range(len(first) - 1):
         dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
@@ -80,20 +72,7 @@ def hugged(
     outer: float,
     touch: float,
 ) -> float:
-    """How far along a ray an outer distance from an obstacle, which it touches, is reached again; 0: it never is.
-
-    Args:
-        own: (3, m) east and north of the obstacle's points, and what is not asked for here.
-        first: where each cell begins among them,
-        counts: and how many it has.
-        side: of the cells.
-        east: where the ray begins.
-        north: where the ray begins.
-        ux: along the ray.
-        uy: along the ray.
-        outer: that distance.
-        touch: distance along the ray at which it touches.
-    """
+    """How far along a ray an outer distance from an obstacle, which it touches, is reached again; 0: it never is."""
     begin, end, count, least = np.empty(own.shape[1]), np.empty(own.shape[1]), 0, 0
     within = outer + 1.5 * side  # points of one cell lie no further apart than its diagonal
     for cell in range(len(first)):
@@ -141,17 +120,9 @@ def _find_ends(
     outmost: IntArray,
     ends: BoolArray,
 ) -> None:
-    """The cells in which the fan of an obstacle ends on one side.
+    """Writes the outmost point of each cell, and whether the fan ends there, on the left (row 0) or the right (2).
 
-    Args:
-        tangents: (4, m) unit vectors of the tangents to its points: those on the left, then those on the right.
-        row: 0 for the left, 2 for the right.
-        first: where each cell begins among the points,
-        counts: and how many it has.
-        one: a cell,
-        other: and one that touches it; each pair once.
-        outmost: the outmost point of each cell; written.
-        ends: whether the fan ends there; written.
+    `tangents` are (4, m) unit vectors: those on the left of the points, then those on the right.
     """
     side, cells = 1.0 - row, len(first)
     east, north = np.empty(cells), np.empty(cells)
@@ -193,22 +164,6 @@ def fan_edges(
     outer: float,
 ) -> tuple[FloatArray, IntArray, int]:
     """The tangents to the ends of an obstacle's fan that are free as far as they touch, and what hides the others.
-
-    Args:
-        places: all edge points by squares, as `planner.kernels.buckets.Buckets` has them,
-        block: where each square begins among them,
-        circles: and the circle about it.
-        labels: the obstacle of each of these points.
-        own: (3, m) east, north and the distance to be kept of the obstacle's points, those of a cell next to each
-            other.
-        first: where each cell begins in `own`.
-        counts: how many points it has.
-        one: a cell,
-        other: and one that touches it; each pair once.
-        side: of the cells.
-        east: of the track point.
-        north: of the track point.
-        outer: distance from the obstacle of interest on a tangent.
 
     Returns:
         (k, 6) unit vector, distance at which it touches, distance up to which it is free, side (1 for M, -1 for N),
@@ -331,17 +286,3 @@ def encircled(loop: FloatArray, points: FloatArray) -> BoolArray:
                 odd[i] = not odd[i]
         before = corner
     return odd
-
-
-@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT)
-def too_near(places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float) -> bool:
-    """Whether a place is nearer to a point, of those by squares, than is to be kept from it."""
-    for block in range(len(first) - 1):
-        dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
-        if dx * dx + dy * dy >= reach * reach:
-            continue
-        for k in range(first[block], first[block + 1]):
-            dx, dy, keep = places[0, k] - east, places[1, k] - north, places[2, k]
-            if dx * dx + dy * dy < keep * keep:
-                return True
-    return False

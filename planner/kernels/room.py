@@ -7,26 +7,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from planner.compiled import COUNTS, FLOAT, ROWS, compiled
 from planner.interface import FloatArray, IntArray
-
-
-@compiled(ROWS, FLOAT, FLOAT, FLOAT)
-def near_place(points: FloatArray, east: float, north: float, reach: float) -> FloatArray:
-    """(k, 2) those of (n, 2) points that are nearer to a place than so much, m."""
-    near, many = np.empty(len(points), dtype=np.intp), 0
-    for i in range(len(points)):
-        dx, dy = abs(points[i, 0] - east), abs(points[i, 1] - north)
-        # Most are far off; so there is no need of their distance.
-        if dx < reach and dy < reach and math.hypot(dx, dy) < reach:
-            near[many] = i
-            many += 1
-    found = np.empty((many, 2))
-    for i in range(many):
-        found[i, 0], found[i, 1] = points[near[i], 0], points[near[i], 1]
-    return found
 
 
 @compiled(ROWS, ROWS, COUNTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)

@@ -108,16 +108,6 @@ def inside_bounds(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax:
     return True
 
 
-@compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
-def to_nearer(points: FloatArray, ax: float, ay: float, bx: float, by: float) -> FloatArray:
-    """(m,) distance of each point to the nearer of two places a and b, m."""
-    away = np.empty(len(points))
-    for i in range(len(points)):
-        ux, uy, vx, vy = points[i, 0] - ax, points[i, 1] - ay, points[i, 0] - bx, points[i, 1] - by
-        away[i] = math.sqrt(min(ux * ux + uy * uy, vx * vx + vy * vy))
-    return away
-
-
 @compiled(ROWS, ROWS)
 def to_nearest(places: FloatArray, points: FloatArray) -> FloatArray:
     """(k,) distance of each of (k, 2) places to the nearest of (m, 2) points, m; infinite where there is none."""

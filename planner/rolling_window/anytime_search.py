@@ -15,7 +15,7 @@ import numpy as np
 
 from planner.geometry.course import Course
 from planner.interface import FloatArray, Path
-from planner.rolling_window.local_planning import DOUBTED, Attempt, LocalPlanning, Start
+from planner.rolling_window.local_planning import DOUBTFUL_SHARE, Attempt, LocalPlanning, Start
 from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.route_optimisation import FlyableRoute
 
@@ -34,13 +34,6 @@ class _Found(NamedTuple):
 class AnytimeSearch:
     """One search for ways to the goal, those that are wanted most first.
 
-    Args:
-        local: does the work.
-        known: number of edge points, of what stands still, that it begins with.
-        effort: how often the work of a wide search is doubled.
-        closed: asked before more work than usual: whether it is proved that there is no way.
-        roomy: the widest ways are looked for first, however long.
-
     Attributes:
         known: number of edge points, of what stands still, that it began with.
         done: whether all ways have been looked for.
@@ -49,31 +42,30 @@ class AnytimeSearch:
     """
 
     def __init__(
-        self, local: LocalPlanning, known: int, effort: int, closed: Callable[[], bool], roomy: bool = False
+        self,
+        local: LocalPlanning,
+        known: int,
+        effort: int,
+        closed: Callable[[], bool],
+        widest_first: bool = False,
     ) -> None:
-        self._local, self._effort, self._closed, self._roomy = local, effort, closed, roomy
+        self._local, self._effort, self._closed, self._widest_first = local, effort, closed, widest_first
         self._start: Start | None = None
         self._flown: Course | None = None
-        self._thoughts = self._think()
+        self._steps = self._searched()
         self.known = known
         self.done = False
         self.stuck: Course | None = None
         self.candidates: list[Candidate] = []
 
     def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
-        """Ways found with one more portion of work.
-
-        Args:
-            start: where a plan would begin now.
-            flown: what is flown now.
-            work: how much may be done, as the tally of the local planning has it.
-        """
-        enough = self._local.tally.done + work
+        """Ways found with one more portion of work."""
+        enough = self._local.work_count.done + work
         self._start, self._flown = start, flown
-        for thought in self._thoughts:
-            if thought is not None:
-                yield thought
-            elif self._local.tally.done >= enough:
+        for step in self._steps:
+            if step is not None:
+                yield step
+            elif self._local.work_count.done >= enough:
                 return
         self.done = True
 
@@ -81,15 +73,15 @@ class AnytimeSearch:
         assert self._start is not None
         return self._start, self._flown
 
-    def _think(self) -> Generator[Course | None, None, None]:
+    def _searched(self) -> Generator[Course | None, None, None]:
         """Ways as they are found; None after each step of work."""
         found = False
         waiting: list[_Found] = []
         closed_m = math.inf
         attempts = self._local.attempts()
-        if self._effort or self._roomy:
+        if self._effort or self._widest_first:
             # In vain so far: what is closed to the narrowest way is closed to all.
-            attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._roomy)
+            attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._widest_first)
         for i, attempt in enumerate(attempts):
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
@@ -128,7 +120,7 @@ class AnytimeSearch:
     def _passed_over(self, found: list[_Found]) -> bool:
         """Whether a much shorter way could not be flown: further from obstacles it may have room for its turns."""
         least_m = min((each.route.path.length_m for each in found), default=0.0)
-        return least_m > (1.0 + DOUBTED) * min(
+        return least_m > (1.0 + DOUBTFUL_SHARE) * min(
             (candidate.cost_m for candidate in self.candidates), default=math.inf
         )
 

@@ -32,15 +32,7 @@ SQUARES = 4096
 
 
 class Barrier:
-    """Watches for a closed chain of edge points between two places.
-
-    Args:
-        start: a place that keeps the clearance from all points.
-        goal: another.
-        bounds_m: xmin, ymin, xmax, ymax of the area, which is never left.
-        clearance_m: distance that a way keeps from every point,
-        border_m: and from the border, but for those places of it that are nearer to start or goal.
-    """
+    """Watches for a closed chain of edge points between two places."""
 
     def __init__(
         self,
@@ -80,17 +72,7 @@ class Barrier:
 
 
 class Proof:
-    """Asks what a planner remembers, again and again, whether it leaves no way to the goal.
-
-    Args:
-        mission: goal and bounds.
-        memory: the edge points.
-        keeps_m: what a way has to keep from every point, but for those that are nearer than this to the goal or to
-            where the aircraft is at first: they prove nothing.
-        border_m: what it has to keep from the border of the area.
-        with_refused: count what was refused: asks whether it leaves no way but through that. Else it proves
-            nothing either.
-    """
+    """Asks what a planner remembers, again and again, whether it leaves no way to the goal."""
 
     def __init__(
         self,
@@ -141,11 +123,6 @@ class Proof:
 
 class Proofs:
     """What a planner asks of the edge points seen, one proof a question.
-
-    Args:
-        mission: goal, clearance and turn radius.
-        memory: the edge points.
-        least_keeps_m: what a way has to keep from every point to be found at all.
 
     Attributes:
         no_way: no vehicle can pass.

@@ -27,15 +27,7 @@ CONCENTRIC = 0.05
 
 
 class Commitment:
-    """Certifies courses.
-
-    Args:
-        mission: goal and limits.
-        memory: what is remembered.
-        local: limits of curves, and where they may lie.
-        least_m: a plan that leaves its course for a turn before this arc length leads nowhere.
-        shielded: what is put into effect is certified; else it is the whole course.
-    """
+    """Certifies courses."""
 
     def __init__(
         self,
@@ -57,16 +49,7 @@ class Commitment:
         cut_m: float,
         wants_more_time: bool = False,
     ) -> CommittedPlan | None:
-        """The part of a course that ends in a turn seen to be free, or in the goal circle where no turn leads on.
-
-        Args:
-            request: what was asked.
-            start: where the course begins.
-            course: the course.
-            candidates: candidates that were looked at.
-            cut_m: arc length at which it comes too near to something.
-            wants_more_time: as the plan has it.
-        """
+        """The part of a course that ends in a turn seen to be free, or in the goal circle where no turn leads on."""
         certified: Certified | None = Certified(course.path, course.path.length_m)
         if self._shielded:
             certified = self._certified(request.seen, course, cut_m)
@@ -100,11 +83,6 @@ class Commitment:
         """Whether a certified plan gets anywhere: to the goal, or along its course to a hold elsewhere.
 
         Flying on round the hold that the plan in effect ends in is no progress along the course.
-
-        Args:
-            found: the certified plan.
-            start: where it leaves the plan in effect.
-            effective: the plan in effect; None without one.
         """
         if not found.path.loiter:
             return True
@@ -155,13 +133,7 @@ class Commitment:
 
 
 def explanation(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
-    """What is ahead of the aircraft, and on which side it is passed.
-
-    Args:
-        position: of the aircraft.
-        goal: of the mission.
-        nodes: track points of the course, the goal last.
-    """
+    """What is ahead of the aircraft, and on which side it is passed."""
     ux, uy, left = guide_vector(position, goal)
     if len(nodes) < 2:
         return f"way to the goal in view, {left / 1000:.1f} km to go"

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from planner.geometry.curves import Point
-from planner.geometry.terrain import Tally
+from planner.geometry.terrain import WorkCount
 from planner.interface import FloatArray
 from planner.kernels.wave import close_cells, spread_wave
 
@@ -34,16 +34,7 @@ CLOSED, REACHED = 0.002, 0.012
 
 
 class CostToGo:
-    """Distances to the goal on a grid.
-
-    Args:
-        start: where ways begin; it and the goal lie in cells that are open.
-        goal: where they end.
-        bounds_m: xmin, ymin, xmax, ymax of the area, which is never left.
-        points_m: (m, 2) edge points.
-        keep_m: (m,) distance to be kept from each.
-        tally: work is counted here.
-    """
+    """Distances to the goal on a grid."""
 
     def __init__(
         self,
@@ -52,9 +43,9 @@ class CostToGo:
         bounds_m: tuple[float, float, float, float],
         points_m: FloatArray,
         keep_m: FloatArray,
-        tally: Tally,
+        work_count: WorkCount,
     ) -> None:
-        self._goal, self._points, self._keep, self._tally = goal, points_m, keep_m, tally
+        self._goal, self._points, self._keep, self._work_count = goal, points_m, keep_m, work_count
         # Beyond all that is known, and a way round it, nothing is nearer to anything.
         most = max(float(keep_m.max(initial=0.0)), LEAST_M)
         places = np.vstack((points_m, start, goal))
@@ -85,7 +76,7 @@ class CostToGo:
         for i in range(0, len(self._points), some):
             points, keep = self._points[i : i + some], self._keep[i : i + some]
             close_cells(open_, points, keep, west, south, self._cell, self._columns, self._rows)
-            self._tally.add(1, CLOSED, len(points) * width**2)
+            self._work_count.add(1, CLOSED, len(points) * width**2)
             yield
         goal = self._index(self._goal)
         order = np.zeros(len(open_), dtype=np.intp)
@@ -94,7 +85,7 @@ class CostToGo:
         while state[1] < state[3]:
             before = int(state[3])
             spread_wave(self._levels, open_, order, state, self._rows, PAIRS_AT_ONCE)
-            self._tally.add(1, REACHED, int(state[3]) - before)
+            self._work_count.add(1, REACHED, int(state[3]) - before)
             yield
 
     def _index(self, place: Point) -> int:

@@ -28,12 +28,7 @@ to be safe from elsewhere on the turn, or at another look."""
 
 
 class DeadEnds:
-    """Counts how often the aircraft had to turn before a place, and gives places up.
-
-    Args:
-        mission: goal and limits.
-        memory: what is given up is refused there.
-    """
+    """Counts how often the aircraft had to turn before a place, and gives places up."""
 
     def __init__(self, mission: Mission, memory: ObstacleMemory) -> None:
         self._mission, self._memory = mission, memory
@@ -75,10 +70,6 @@ class DeadEnds:
 
 class GivingUp:
     """What follows from searches that found no way: more effort, places given up, and given-up places tried again.
-
-    Args:
-        mission: goal and limits.
-        memory: the edge points; what is given up is refused there.
 
     Attributes:
         dead_ends: the places.
@@ -126,13 +117,8 @@ class GivingUp:
         """Whether more than a whole turn has been flown since the loiter was entered or a place was given up."""
         return arc_length_m - max(loiter_entry_m, self._given_up_at_m) > self._whole_turn_m
 
-    def tried_enough(self, edges_went: bool, only_given_up: bool) -> bool:
-        """Whether all searches have been made that a proof for want of room to turn has to wait for.
-
-        Args:
-            edges_went: edge points were let go of since the search began: what was given up may yet be entered.
-            only_given_up: no way is left but through places that were given up.
-        """
+    def effort_spent(self, edges_went: bool, only_given_up: bool) -> bool:
+        """Whether all searches have been made that a proof for want of room to turn has to wait for."""
         needed = MOST_EFFORT if edges_went else 1
         return self.effort >= needed or (only_given_up and self.tried_again)
 
@@ -142,12 +128,7 @@ class GivingUp:
         self.dead_ends.give_up(place)
 
     def narrow(self, no_room: bool, settled: bool) -> bool:
-        """Whether nothing is left but ways without room to turn.
-
-        Args:
-            no_room: it is proved that no way has room to turn everywhere.
-            settled: the world has stood still long enough.
-        """
+        """Whether nothing is left but ways without room to turn."""
         # What moved may have closed the way. Where edge points were taken back the sensor errs, and a place that was
         # given up may be seen to be free at another look.
         doubtful = self.dead_ends.stability.ever or self._memory.ever_cleared
@@ -158,13 +139,7 @@ class GivingUp:
         return self._retries == MOST_RETRIES
 
     def try_again(self, narrow: bool, at_end: bool, arc_length_m: float) -> None:
-        """After a search that found nothing: doubles the effort, or tries again what was given up.
-
-        Args:
-            narrow: nothing is left but ways without room to turn.
-            at_end: nothing is left but what was given up, or the effort is spent, and the turn has shown nothing.
-            arc_length_m: of the aircraft on the plan in effect.
-        """
+        """After a search that found nothing: doubles the effort, or tries again what was given up."""
         self._retries += narrow
         if narrow or at_end:
             self._given_up_at_m = arc_length_m

@@ -10,9 +10,8 @@ import numpy as np
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Limits, Point, Pose, Segment, onward_in_turn
-from planner.geometry.terrain import PLACE, Tally, Terrain
+from planner.geometry.terrain import POINT_WORK, Terrain, WorkCount
 from planner.interface import FloatArray, Mission, Path
-from planner.kernels.segments import to_nearer
 from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, search_candidates
@@ -40,8 +39,8 @@ WIDER, FURTHER = 4, 60
 """A wide search follows where N steps with n candidates each find no way. It has `WIDER` times as many of both and is
 led by the cost to go, so that the best come first; after the first it looks at only `FURTHER` steps more."""
 
-DOUBTED, MOST_AROUND = 0.1, 8
-"""A way that is longer than the one flown by the share `DOUBTED` is doubtful. Then the `MOST_AROUND` obstacles
+DOUBTFUL_SHARE, MOST_AROUND = 0.1, 8
+"""A way that is longer than the one flown by the share `DOUBTFUL_SHARE` is doubtful. Then the `MOST_AROUND` obstacles
 nearest to the start are looked at as well."""
 
 SWITCH = 0.03
@@ -56,12 +55,7 @@ TRAIL_CLEARANCES = 4.0
 
 @dataclass(frozen=True)
 class Attempt:
-    """How far from obstacles to search.
-
-    Attributes:
-        distance_m: kept from every edge point.
-        margin_m: more of it, of which shares are given up for straight steps and for curves.
-    """
+    """How far from obstacles to search."""
 
     distance_m: float
     margin_m: float
@@ -89,15 +83,7 @@ Now = Callable[[], tuple[Start, Course | None]]
 
 
 class LocalPlanning:
-    """Looks for the shortest flyable way to the goal through what is remembered.
-
-    Args:
-        mission: goal and limits.
-        memory: the edge points.
-        margin_m: planned distance beyond the clearance.
-        steps: N.
-        candidates: n.
-    """
+    """Looks for the shortest flyable way to the goal through what is remembered."""
 
     def __init__(
         self,
@@ -111,12 +97,12 @@ class LocalPlanning:
         self._mission, self._memory = mission, memory
         self._margin_m = margin_m
         self._steps, self._candidates = steps, candidates
-        self.tally = Tally()
+        self.work_count = WorkCount()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
         self._hug_m = LEAST_HUG * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
         self.limits = Limits.of(mission)
-        self.room = Room(mission, memory, mission.clearance_m + PATH_SHARE * margin_m, self.tally)
+        self.room = Room(mission, memory, mission.clearance_m + PATH_SHARE * margin_m, self.work_count)
 
     @property
     def least_keeps_m(self) -> float:
@@ -159,14 +145,6 @@ class LocalPlanning:
         What comes in while this goes on is left for the next search: else the shortest way round something that is
         just coming into view would be dropped, again and again, for a long one that leads away.
 
-        Args:
-            attempt: how far from obstacles.
-            effort: how often the work of a wide search is doubled.
-            now: tells where a plan would begin, and what is flown: the other side of something is taken only for
-                a shorter way.
-            candidates: the candidates that were looked at are added to it.
-            closed: whether it is proved that there is no way; asked before a wider search.
-
         Yields:
             None after each step of work.
         """
@@ -175,14 +153,14 @@ class LocalPlanning:
         room = self._room_m(start, points)
         keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
         labels = self._memory.labels.copy()
-        window = Window(start.pose[:2], points, labels, self._memory.cell_m, keep, self.tally)
+        window = Window(start.pose[:2], points, labels, self._memory.cell_m, keep, self.work_count)
         begun = start
         fitted: list[tuple[float, FlyableRoute]] = []
 
         def doubtful() -> bool:
             _, course = now()
             least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
-            return course is None or least_m > (1.0 + DOUBTED) * course.path.length_m
+            return course is None or least_m > (1.0 + DOUBTFUL_SHARE) * course.path.length_m
 
         for search_on in self._searches(window, attempt, effort, candidates, doubtful, closed):
             for candidate in search_on:
@@ -217,7 +195,7 @@ class LocalPlanning:
     def _reluctance_m(self, candidate: Candidate, course: Course | None) -> float:
         """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""
         if course is not None:
-            self.tally.add(4, PLACE, 4 * len(candidate.nodes) * course.known)
+            self.work_count.add(4, POINT_WORK, 4 * len(candidate.nodes) * course.known)
             if course.same_side(candidate.nodes, self._memory.points_m):
                 return 0.0
         switching = 0.0 if course is None else SWITCH * candidate.cost_m
@@ -239,7 +217,7 @@ class LocalPlanning:
         start, _ = now()
         terrain = self._terrain(start, self._tight, self._memory.points_m)
         goal, points = self._mission.goal_m, (terrain.points_m, terrain.keep_m)
-        to_go = CostToGo(start.pose[:2], goal, self._mission.bounds_m, *points, self.tally)
+        to_go = CostToGo(start.pose[:2], goal, self._mission.bounds_m, *points, self.work_count)
         yield from to_go.spread()
         route = yield from search_poses(start.pose, start.curvature, goal, self.limits, terrain, to_go)
         begins, _ = now()
@@ -267,11 +245,13 @@ class LocalPlanning:
     def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:
         keep = self._mission.clearance_m + PATH_SHARE * attempt.margin_m
         room = self._room_m(start, points)
-        return Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.tally)
+        return Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.work_count)
 
     def _room_m(self, start: Start, points: FloatArray) -> FloatArray:
         """(m,) distance of each point to the nearer of start and goal: more than that cannot be kept from it."""
-        return to_nearer(points, *start.pose[:2], *self._mission.goal_m) - 1e-3
+        ends = (start.pose[:2], self._mission.goal_m)
+        away: FloatArray = np.minimum(*(np.hypot(*(points - end).T) for end in ends)) - 1e-3
+        return away
 
     def _searches(
         self,
@@ -303,7 +283,7 @@ class LocalPlanning:
         to_go: CostToGo | None = None
         if widening > 1:
             ends = window.center_m, self._mission.goal_m
-            to_go = CostToGo(*ends, self._mission.bounds_m, window.points_m, window.keep_m, self.tally)
+            to_go = CostToGo(*ends, self._mission.bounds_m, window.points_m, window.keep_m, self.work_count)
             yield from to_go.spread()
         found = steps_since = 0
         for candidate in search_candidates(

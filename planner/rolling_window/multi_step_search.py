@@ -71,20 +71,6 @@ def search_candidates(
 ) -> Iterator[Candidate | None]:
     """Candidates from the centre of the window to the goal, cheapest first, as far as they are asked for.
 
-    Args:
-        window: the planning window; `window.keep_m` is kept from every point in it.
-        goal: where the guide vector points.
-        bounds_m: area that no track point may leave.
-        steps: N, how many steps are looked ahead.
-        keep_best: n, how many candidates are kept at every step.
-        outer_m: track points lie this far from the obstacle that they pass, a little more than `window.keep_m`,
-            so that steps around a round obstacle are long.
-        most_tracks: so many are looked at.
-        around: obstacles that the first step may go past, though they do not lie towards the goal.
-        wide: also take steps that hardly ever belong to a shortest way.
-        to_go: distances to the goal round what is known, by which the cheapest are told instead, within a few per
-            cent; default: straight on, as equation (4) has it.
-
     Yields:
         Candidates that see the goal from their last track point but one; none where n candidates at every one
         of N steps were not enough. None after each step looked at.

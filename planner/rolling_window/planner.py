@@ -69,9 +69,6 @@ class RollingWindow:
         config: its keys.
         mission: goal and limits.
         shielded: it commits only to what is certified. Else it flies whole courses, and nothing where it has none.
-
-    Attributes:
-        state: what it did at the last request.
     """
 
     def __init__(self, config: RollingWindowConfig, mission: Mission, shielded: bool = True) -> None:
@@ -327,7 +324,7 @@ class RollingWindow:
         position, proofs = now.request.position_m, self._proofs
         only_given_up = len(self._memory.refused_m) > 0 and proofs.only_given_up.closed(position)
         edges_went = self._memory.cleared != self._search.gone
-        tried = self._giving_up.tried_enough(edges_went, only_given_up)
+        tried = self._giving_up.effort_spent(edges_went, only_given_up)
         return tried and proofs.no_room_to_turn.closed(position), only_given_up
 
     def _proved_closed(self, now: Situation) -> bool:

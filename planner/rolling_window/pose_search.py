@@ -38,17 +38,6 @@ def search_poses(
 
     A left turn never follows a right one without a straight step between.
 
-    Args:
-        start: first pose.
-        start_curvature: curvature (1/m) flown on arrival there.
-        goal: the end.
-        limits: smallest radius.
-        terrain: where the route may lie.
-        to_go: distance from a place to the goal, m; infinite where there is no way.
-
-    Yields:
-        None after each pose.
-
     Returns:
         The route, to the goal or as far towards it as is asked for; None where the search ran out of poses or of
         its count.

@@ -23,12 +23,7 @@ BETTER = 0.005
 
 
 class Work(NamedTuple):
-    """How much is searched before the planner answers, as `planner.geometry.terrain.Tally` counts it: about 1 us.
-
-    Attributes:
-        first: when a search begins.
-        more: each further time that the planner is asked.
-    """
+    """How much is searched when a search begins, and each further time that the planner is asked; about us."""
 
     first: float
     more: float
@@ -66,15 +61,6 @@ class RollingStep(NamedTuple):
 
 class RollingSearch:
     """Searches for a new committed plan, a portion of work at a time.
-
-    Args:
-        mission: goal and limits.
-        memory: the edge points.
-        local: does the search.
-        commitment: certifies what was found.
-        monitor: of the plan in effect.
-        giving_up: how much effort is made.
-        no_way: asked before a wide search whether it is proved that there is no way.
 
     Attributes:
         running: the search that is not done yet.
@@ -161,7 +147,7 @@ class RollingSearch:
             self._memory.known,
             self._giving_up.effort,
             lambda: self._no_way.closed(position),
-            roomy=self._giving_up.tried_again,
+            widest_first=self._giving_up.tried_again,
         )
 
     def _end(self, search: AnytimeSearch, ahead: Course | None, course: Course) -> None:

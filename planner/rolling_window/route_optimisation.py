@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.geometry.curves import Limits, Point, Pose, fillet
-from planner.geometry.terrain import PLACE, Terrain
+from planner.geometry.terrain import POINT_WORK, Terrain
 from planner.interface import Path
 from planner.kernels.fans import shortcuts
 
@@ -18,12 +18,7 @@ MOST_LEFT_OUT = 6
 
 @dataclass(frozen=True)
 class FlyableRoute:
-    """A candidate that can be flown.
-
-    Attributes:
-        nodes: its track points after the start, the goal last.
-        path: the curve through them.
-    """
+    """A candidate that can be flown."""
 
     nodes: tuple[Point, ...]
     path: Path
@@ -32,7 +27,7 @@ class FlyableRoute:
 def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
     """Drops the track points between each one and the furthest that it sees; the first and the last stay."""
     kept, lines = shortcuts(*terrain.squares, np.array(nodes))
-    terrain.tally.add(lines, PLACE, lines * len(terrain.points_m))
+    terrain.work_count.add(lines, POINT_WORK, lines * len(terrain.points_m))
     return [nodes[i] for i in kept.tolist()]
 
 
@@ -50,14 +45,6 @@ def optimise(
     to something, the turn that is being flown at the start is flown on, past the first corners; then the first turn
     is flown the other way round, then one corner after the other is left out, then corners are rounded as tightly
     as may be, and then the track is tried as it came.
-
-    Args:
-        start: pose at which the curve begins.
-        start_curvature: curvature (1/m) flown on arrival there.
-        nodes: track points, that of `start` first.
-        limits: smallest radius and room to roll.
-        cut_m: how far from a track point a wider turn may pass it.
-        terrain: where the curve may lie.
 
     Returns:
         The route; None where no choice can be flown.

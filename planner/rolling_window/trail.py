@@ -14,11 +14,7 @@ AROUND = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1))
 
 
 class Trail:
-    """Squares of the plane that were flown through, and those around them.
-
-    Args:
-        side_m: of a square.
-    """
+    """Squares of the plane that were flown through, and those around them."""
 
     def __init__(self, side_m: float) -> None:
         self._side = side_m

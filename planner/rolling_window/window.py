@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.geometry.curves import Point
-from planner.geometry.terrain import HUGGED, PLACE, TANGENT, Tally
+from planner.geometry.terrain import HUG_WORK, POINT_WORK, TANGENT_WORK, WorkCount
 from planner.interface import FloatArray, IntArray
 from planner.kernels.buckets import Buckets, Cells, bucketed, cells_of, gathered
 from planner.kernels.fans import entered, fan_edges
@@ -73,7 +73,7 @@ class Window:
         labels: (m,) the obstacle that each belongs to.
         cell_m: points within a square of this side are looked at as one piece of wall.
         keep_m: (m,) distance to be kept from each point.
-        tally: work is counted here.
+        work_count: work is counted here.
     """
 
     center_m: Point
@@ -81,7 +81,7 @@ class Window:
     labels: IntArray
     cell_m: float
     keep_m: FloatArray
-    tally: Tally = field(default_factory=Tally)
+    work_count: WorkCount = field(default_factory=WorkCount)
     _obstacles: dict[int, _Obstacle] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
@@ -94,7 +94,7 @@ class Window:
         """The points of an obstacle, gathered once."""
         if label not in self._obstacles:
             members = np.flatnonzero(self.labels == label)
-            self.tally.add(4, TANGENT, len(members))
+            self.work_count.add(4, TANGENT_WORK, len(members))
             members, squares = cells_of(self.points_m, members, self.cell_m)
             self._obstacles[label] = gathered(self.points_m, self.keep_m, members), squares
         return self._obstacles[label]
@@ -102,13 +102,13 @@ class Window:
     def entered(self, origin: Point, goal: Point) -> tuple[FloatArray, IntArray]:
         """Where the line to the goal comes too near to edge points, m from the origin, and the obstacle of each."""
         blocked, labels = self._buckets
-        self.tally.add(1, PLACE, len(labels))
+        self.work_count.add(1, POINT_WORK, len(labels))
         entry, which = entered(*blocked, *origin, *goal, len(labels))
         return entry, labels[which]
 
     def nearest_obstacles(self, most: int) -> list[int]:
         """The obstacles nearest to the centre, so many at most."""
-        self.tally.add(2, TANGENT, len(self.points_m))
+        self.work_count.add(2, TANGENT_WORK, len(self.points_m))
         order = np.argsort(np.hypot(*(self.points_m - self.center_m).T))
         return list(itertools.islice(dict.fromkeys(self.labels[order].tolist()), most))
 
@@ -117,25 +117,20 @@ class Window:
 
         Where something hides an edge, or closes it right behind the place where it touches, the edges of that are
         taken as well.
-
-        Args:
-            origin: the track point.
-            beside: labels of the obstacles.
-            outer_m: distance from an obstacle up to which an edge hugs it.
         """
         edges: list[SectorEdge] = []
         pending = list(dict.fromkeys(beside))
         looked_at = set(pending)
         blocked, labels = self._buckets
         if not self._obstacles:  # the squares were laid for this
-            self.tally.add(1, TANGENT, len(self.points_m))
+            self.work_count.add(1, TANGENT_WORK, len(self.points_m))
         while pending:
             obstacle = pending.pop()
             own, squares = self._obstacle(obstacle)
             found, hiding, looked = fan_edges(*blocked, labels, own, *squares, self.cell_m, *origin, outer_m)
-            self.tally.add(1, TANGENT, len(own[0]))
-            self.tally.add(0, PLACE, looked * len(labels))
-            self.tally.add(0, HUGGED, len(found) * len(own[0]))
+            self.work_count.add(1, TANGENT_WORK, len(own[0]))
+            self.work_count.add(0, POINT_WORK, looked * len(labels))
+            self.work_count.add(0, HUG_WORK, len(found) * len(own[0]))
             edges += [SectorEdge._make((*edge, obstacle)) for edge in found.tolist()]
             # Hidden, or closed right behind: the way goes round what hides it.
             for other in hiding.tolist():

@@ -21,7 +21,7 @@ from planner.geometry.curves import Limits, Point, Pose, Segment, along, full_tu
 from planner.geometry.path_samples import poses_at
 from planner.interface import FloatArray, Mission, Path, PlanRequest
 from planner.kernels.buckets import Buckets, bucketed
-from planner.kernels.room import near_place, room_along
+from planner.kernels.room import room_along
 from planner.shield.encounters import EARLIEST, LATEST
 
 AHEAD_S = 30.0
@@ -76,7 +76,7 @@ class Threats:
     def about(cls, request: PlanRequest, still_m: FloatArray, mission: Mission) -> Threats:
         """What can be met within `AHEAD_S`; still_m: (n, 2) all edge points that stand still."""
         reach_m = AHEAD_S * LATEST * mission.speed_mps + mission.clearance_m
-        near_m = near_place(still_m, *request.position_m, reach_m)
+        near_m = still_m[np.hypot(*(still_m - request.position_m).T) < reach_m]
         moving = [np.zeros((0, 5))]
         for each in request.seen.moving:
             seen = each.points_m + np.array(each.velocity_mps) * (request.time_s - each.time_s)

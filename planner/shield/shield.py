@@ -26,7 +26,7 @@ from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, Segment, along, between, on_loiter, place_on
 from planner.geometry.path_samples import poses_at
-from planner.geometry.terrain import Tally
+from planner.geometry.terrain import WorkCount
 from planner.interface import (
     FloatArray,
     Mission,
@@ -79,7 +79,7 @@ class Shield:
     def __init__(self, inner: Planner, mission: Mission) -> None:
         self._inner, self._mission = inner, mission
         self._memory = memory = ObstacleMemory(mission.clearance_m)
-        self._room = Room(mission, memory, mission.clearance_m, Tally())
+        self._room = Room(mission, memory, mission.clearance_m, WorkCount())
         self._escapes = Escapes(mission, memory, self._room)
         self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
         self._monitor = PlanMonitor(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from planner.interface import BoolArray, FloatArray, MovingEdges
-from planner.memory import MOVED, ObstacleMemory
+from planner.memory import ObstacleMemory
 from tests.examples import examples
 
 CLEARANCE = 100.0
@@ -116,27 +116,6 @@ def test_point_by_point_gives_the_same_obstacles_as_at_once(seed: int, count: in
     assert is_finer(by_and_by.labels, at_once.labels)
 
 
-def test_a_bridge_makes_two_obstacles_one() -> None:
-    left, right = np.array([(0.0, 0.0), (50.0, 0.0)]), np.array([(400.0, 0.0)])
-    memory = memory_of(left, right)
-    assert len(set(memory.labels.tolist())) == 2
-    bridge = np.column_stack((np.arange(90.0, 390.0, 50.0), np.zeros(6)))
-    assert set(memory_of(left, right, bridge).labels.tolist()) == {int(memory.labels[0])}
-
-
-def test_only_what_is_new_is_returned() -> None:
-    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
-    assert memory.take_in(seen).shape == (0, 2)
-    first, second = scattered(1, 300, 1000.0), scattered(2, 400, 1000.0)
-    seen.add(first)
-    np.testing.assert_array_equal(memory.take_in(seen), first)
-    assert len(memory.take_in(seen)) == 0
-    seen.add(second)
-    np.testing.assert_array_equal(memory.take_in(seen), second)
-    np.testing.assert_array_equal(memory.points_m, np.concatenate((first, second)))
-    assert memory.labels.shape == (700,)
-
-
 @pytest.mark.parametrize("known_before", [True, False])
 def test_what_is_taken_back_is_forgotten(known_before: bool) -> None:
     seen, memory = Batches(), ObstacleMemory(CLEARANCE)
@@ -172,59 +151,6 @@ def test_what_moves_comes_last_and_is_an_obstacle_of_its_own_each() -> None:
     assert memory.labels[30] != memory.labels[42]
 
 
-def test_where_it_moves_on_it_is_replaced_and_told_anew() -> None:
-    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
-    seen.add(scattered(1, 30, 500.0))
-    memory.take_in(seen, [ring(0.0, 0.0)])
-    less, more = 0.9 * MOVED * memory.cell_m, 1.1 * MOVED * memory.cell_m
-    assert len(memory.take_in(seen, [ring(less, 0.0)])) == 0
-    np.testing.assert_array_equal(memory.points_m[30:], ring(0.0, 0.0))
-    # Slow ones do not creep away: what counts is how far it is from where it was told.
-    np.testing.assert_array_equal(memory.take_in(seen, [ring(more, 0.0)]), ring(more, 0.0))
-    np.testing.assert_array_equal(memory.points_m[30:], ring(more, 0.0))
-    assert len(memory.take_in(seen, [ring(more, 0.0)])) == 0
-    np.testing.assert_array_equal(
-        memory.take_in(seen, [ring(more, 0.0, 9)] * 2), np.tile(ring(more, 0.0, 9), (2, 1))
-    )
-    assert memory.take_in(seen, []).shape == (0, 2)
-    assert len(memory.points_m) == len(memory.labels) == memory.known == 30
-
-
-def test_without_being_told_where_it_is_met_it_is_where_it_is() -> None:
-    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
-    seen.moving = (MovingEdges(3.0, ring(0.0, 0.0), (1.0, 0.0)),)
-    np.testing.assert_array_equal(memory.take_in(seen), ring(0.0, 0.0))
-
-
-@settings(max_examples=examples(25))
-@given(seed=SEEDS)
-def test_what_was_given_does_not_change_and_points_that_stand_still_keep_their_order(seed: int) -> None:
-    """A search takes several scans: meanwhile obstacles move, others come into view, a place is refused."""
-    rng = np.random.default_rng(seed)
-    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
-    given_points, before, refused = memory.points_m, memory.points_m.copy(), 0
-    for step in range(8):
-        known = memory.points_m[: memory.known].copy()
-        if rng.random() < 0.5:
-            seen.add(rng.uniform(-900.0, 900.0, (int(rng.integers(1, 400)), 2)))
-        if rng.random() < 0.2:
-            memory.refuse((float(step), 0.0))
-            refused += 1
-        moving = [
-            ring(rng.uniform(-900.0, 900.0) + 2000.0 * step, 0.0, int(rng.integers(1, 30)))
-            for _ in range(rng.integers(0, 4))
-        ]
-        memory.take_in(seen, moving)
-        np.testing.assert_array_equal(given_points, before)
-        np.testing.assert_array_equal(memory.points_m[: len(known)], known)
-        np.testing.assert_array_equal(
-            memory.points_m[memory.known :], np.concatenate([np.zeros((0, 2)), *moving])
-        )
-        assert memory.points_m.shape == (len(memory.labels), 2)
-        assert len(memory.genuine_m) == memory.known - refused == len(seen.edges_since(-1))
-        given_points, before = memory.points_m, memory.points_m.copy()
-
-
 @settings(max_examples=examples(25))
 @given(seed=SEEDS)
 def test_taken_back_bit_by_bit_all_that_is_new_lies_behind_what_was_known_but_for_what_has_gone(
@@ -252,22 +178,6 @@ def test_taken_back_bit_by_bit_all_that_is_new_lies_behind_what_was_known_but_fo
             later = seen.edges_since(revision)
             assert {*map(tuple, later.tolist())} <= {*map(tuple, behind.tolist())}
         known_at.append((seen.revision, memory.known, memory.cleared))
-
-
-def test_what_moves_outlasts_what_is_taken_back_and_what_is_forgiven() -> None:
-    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
-    seen.add(scattered(1, 30, 500.0))
-    memory.take_in(seen, [ring(0.0, 0.0)])
-    seen.take_back(scattered(1, 7, 500.0))
-    memory.take_in(seen, [ring(0.0, 0.0)])
-    np.testing.assert_array_equal(memory.points_m[7:], ring(0.0, 0.0))
-    memory.refuse((900.0, 900.0))
-    assert memory.known == 8
-    np.testing.assert_array_equal(memory.points_m[8:], ring(0.0, 0.0))
-    memory.forgive()
-    memory.take_in(seen, [ring(0.0, 0.0)])
-    assert memory.known == 7
-    np.testing.assert_array_equal(memory.points_m[7:], ring(0.0, 0.0))
 
 
 def test_what_was_refused_outlasts_what_is_taken_back_until_it_is_forgiven() -> None:

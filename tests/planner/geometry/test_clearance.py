@@ -11,7 +11,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.geometry.clearance import behind, distances, first_breach, first_entry, inside_bounds
+from planner.geometry.clearance import behind, distances, first_breach, inside_bounds
 from planner.geometry.curves import Pose, along, full_turn, pose_at
 from planner.interface import FloatArray, Path
 from tests.examples import examples
@@ -116,43 +116,6 @@ def test_the_boundary_belongs_to_the_area() -> None:
     assert inside_bounds(STRAIGHT, (0.0, 0.0, 1000.0, 10.0))
     assert not inside_bounds(STRAIGHT, (0.0, 0.0, 999.9, 10.0))
     assert not inside_bounds(STRAIGHT, (0.1, -1.0, 1000.0, 10.0))
-
-
-@settings(max_examples=examples(75))
-@given(seed=SEEDS, count=st.integers(1, 8))
-def test_first_entry_against_shapely(seed: int, count: int) -> None:
-    rng = np.random.default_rng(seed)
-    a, b = rng.uniform(-1000.0, 1000.0, (2, 2)).tolist()
-    points, radius = rng.uniform(-1000.0, 1000.0, (count, 2)), rng.uniform(20.0, 300.0, count)
-    line = shapely.LineString([a, b])
-    assume(line.length > 1.0)
-    # Judged apart: a start inside a disc, and lines that hardly touch one.
-    assume((np.hypot(*(points - a).T) > radius).all())
-    assume((np.abs(shapely.distance(line, shapely.points(points)) - radius) > 1.0).all())
-    # Circles of 4 * 200 chords are 2 mm too small at most.
-    discs = [shapely.Point(p).buffer(r, quad_segs=200) for p, r in zip(points, radius, strict=True)]
-    entries = [line.intersection(disc).distance(shapely.Point(a)) for disc in discs]
-    entries = [entry if math.isfinite(entry) else math.inf for entry in entries]
-    distance, index = first_entry((a[0], a[1]), (b[0], b[1]), points, radius)
-    assert math.isfinite(distance) == any(math.isfinite(entry) for entry in entries)
-    if math.isinf(distance):
-        assert index == -1
-    else:
-        assert distance == pytest.approx(min(entries), abs=0.2)
-        assert entries[index] == pytest.approx(distance, abs=0.2)
-
-
-def test_a_disc_about_the_start_bars_only_the_way_deeper_into_it() -> None:
-    disc = np.array([(30.0, 0.0)])
-    assert first_entry((0.0, 0.0), (500.0, 0.0), disc, 50.0) == (0.0, 0)
-    assert first_entry((0.0, 0.0), (-500.0, 0.0), disc, 50.0) == (math.inf, -1)
-    assert first_entry((0.0, 0.0), (0.0, 500.0), disc, 50.0) == (math.inf, -1)
-    assert first_entry((0.0, 0.0), (100.0, 500.0), disc, 50.0) == (0.0, 0)
-
-
-def test_no_points_and_no_line_are_clear() -> None:
-    assert first_entry((0.0, 0.0), (10.0, 0.0), np.zeros((0, 2)), 50.0) == (math.inf, -1)
-    assert first_entry((5.0, 5.0), (5.0, 5.0), np.array([(5.0, 5.0)]), 50.0) == (math.inf, -1)
 
 
 def test_what_lies_behind_an_edge_point() -> None:

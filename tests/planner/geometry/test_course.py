@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, end_of, pose_at
-from planner.interface import BoolArray, FloatArray, Path
+from planner.interface import FloatArray, Path
 from planner.kernels.fans import encircled
 from tests.examples import examples
 
@@ -61,30 +61,6 @@ def test_what_was_not_known_then_does_not_count() -> None:
     points = np.array([(500.0, 300.0), (500.0, 0.0)])
     assert course(BELOW, 1).same_side((START, *ABOVE), points)
     assert not course(BELOW, 2).same_side((START, *ABOVE), points)
-
-
-@settings(max_examples=examples(30))
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    one=st.lists(st.integers(-400, 400), min_size=1, max_size=4),
-    other=st.lists(st.integers(-400, 400), min_size=1, max_size=4),
-)
-def test_ways_from_west_to_east_are_on_one_side_where_no_point_lies_between_them(
-    seed: int, one: list[int], other: list[int]
-) -> None:
-    points = np.random.default_rng(seed).uniform((10.0, -400.0), (990.0, 400.0), (12, 2))
-
-    def way(offsets: list[int]) -> tuple[Point, ...]:
-        east = np.linspace(0.0, 1000.0, len(offsets) + 2)[1:-1]
-        return (*((float(x), float(y)) for x, y in zip(east, offsets, strict=True)), GOAL)
-
-    def above(nodes: tuple[Point, ...]) -> BoolArray:
-        line = np.array([START, *nodes])
-        higher: BoolArray = points[:, 1] > np.interp(points[:, 0], line[:, 0], line[:, 1])
-        return higher
-
-    same = bool((above(way(one)) == above(way(other))).all())
-    assert course(way(one), len(points)).same_side((START, *way(other)), points) is same
 
 
 def test_what_is_left_of_a_course_begins_at_the_station_and_keeps_the_nodes_ahead() -> None:

@@ -30,7 +30,6 @@ from planner.geometry.curves import (
     pose_at,
     sample,
     turn_onto,
-    turns_onto,
 )
 from planner.geometry.path_samples import places_along, poses_at, turn_centres
 from planner.interface import FloatArray, Path
@@ -76,15 +75,6 @@ def corners(start: Pose, walk: list[tuple[float, float]]) -> list[Point]:
     return nodes
 
 
-@given(start=POSES, pieces=PIECES)
-def test_joined_segments_are_where_integration_says(
-    start: Pose, pieces: list[tuple[float, float]], integrated: Integrated
-) -> None:
-    segments = joined(start, pieces)
-    dense = integrated(start, segments, 0.2)
-    np.testing.assert_allclose(end_of(Path(np.array(segments))), dense[-1], atol=1e-3)
-
-
 @given(start=POSES, pieces=PIECES, share=st.floats(0.0, 1.0), more=st.floats(0.0, 1.0))
 def test_pose_sample_and_stretch_agree(
     start: Pose, pieces: list[tuple[float, float]], share: float, more: float, integrated: Integrated
@@ -115,12 +105,6 @@ def test_sample_keeps_chords_near_their_arcs(
     line = shapely.LineString(sample(Path(np.array(segments)), math.inf, deviation))
     dense = integrated(start, segments, 2.0)[:, :2]
     assert shapely.distance(line, shapely.points(dense)).max() <= deviation + 0.02
-
-
-def test_stations_beyond_the_ends_are_the_ends() -> None:
-    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 100.0)]))
-    assert pose_at(path, -5.0) == (0.0, 0.0, 1.0, 0.0)
-    assert pose_at(path, 105.0) == (100.0, 0.0, 1.0, 0.0)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -169,12 +153,6 @@ def test_turn_onto_is_the_shorter_tangent(pose: Pose, away: float, bearing: floa
     length = sum(segment[5] for segment in segments)
     assert length == pytest.approx(shortest_turn_by_search(pose, target, radius), abs=2e-3 * radius)
     np.testing.assert_allclose(along(segments[-1], segments[-1][5])[:2], target, atol=1e-5)
-
-
-def test_turn_onto_goes_straight_at_what_lies_ahead() -> None:
-    segments = turn_onto(Pose(0.0, 0.0, 0.6, 0.8), (600.0, 800.0), 100.0)
-    assert segments is not None
-    assert sum(segment[5] for segment in segments) == pytest.approx(1000.0)
 
 
 def assert_room_to_roll(path: Path, roll_m: float, before: float) -> None:
@@ -246,16 +224,6 @@ def test_a_turn_against_the_one_before_begins_after_the_room_to_roll() -> None:
     assert against.segments[1, 4] == pytest.approx(-0.01)
 
 
-def test_a_first_corner_against_the_turn_before_leaves_the_room_to_roll() -> None:
-    limits = Limits(100.0, 40.0)
-    nodes = [(100.0, 0.0), (100.0, -1000.0)]
-    at_once = fillet(EAST, nodes, limits, 0.0)
-    assert at_once is not None
-    assert_room_to_roll(at_once, 40.0, -1.0)
-    # The corner needs all of the first leg: a left turn before it leaves no room.
-    assert fillet(EAST, nodes, limits, 0.0, 1.0 / 100.0) is None
-
-
 @pytest.mark.parametrize(
     ("nodes", "radius"),
     [
@@ -267,37 +235,6 @@ def test_a_first_corner_against_the_turn_before_leaves_the_room_to_roll() -> Non
 )
 def test_what_cannot_be_rounded_has_no_fillet(nodes: list[Point], radius: float) -> None:
     assert fillet(EAST, nodes, Limits(radius, 0.0), 50.0) is None
-
-
-def test_a_node_at_the_start_has_no_fillet_whatever_the_course() -> None:
-    for i in range(200):
-        start = Pose(10.0 * i, 7.0 * i, math.cos(i), math.sin(i))
-        path = fillet(start, [start[:2], (start[0] + 1000.0, start[1])], Limits(100.0, 10.0), 50.0)
-        assert path is None or path.length_m > 600.0
-
-
-def test_a_straight_run_through_nodes_is_straight() -> None:
-    path = fillet(EAST, [(300.0, 0.0), (700.0, 0.0), (1000.0, 0.0)], Limits(100.0, 50.0), 50.0)
-    assert path is not None
-    assert path.max_curvature_1pm == 0.0
-    assert path.length_m == pytest.approx(1000.0)
-
-
-def test_the_curvature_at_a_place_is_that_of_its_segment() -> None:
-    path = Path(np.array(joined(EAST, [(0.0, 100.0), (0.01, 50.0), (-0.02, 30.0)])))
-    assert [place_on(path, s)[1] for s in (50.0, 120.0, 160.0, 999.0)] == [0.0, 0.01, -0.02, -0.02]
-    assert place_on(path, 120.0)[0] == pose_at(path, 120.0)
-
-
-def test_stations_on_a_loiter_go_round_and_round() -> None:
-    turn = math.tau * 150.0
-    rows = [(0.0, 0.0, 1.0, 0.0, 0.0, 400.0), full_turn(Pose(400.0, 0.0, 1.0, 0.0), 150.0, 1.0)]
-    path = Path(np.array(rows), loiter=True)
-    assert on_loiter(path, 300.0) == 300.0
-    for turns in range(4):
-        assert on_loiter(path, 450.0 + turns * turn) == pytest.approx(450.0)
-    straight = Path(path.segments)
-    assert on_loiter(straight, 400.0 + 2.5 * turn) == 400.0 + 2.5 * turn
 
 
 @settings(max_examples=examples(30))
@@ -318,13 +255,6 @@ def test_poses_at_many_stations_are_those_of_integration(
     end_m = float(arc_lengths_m.max())
     even = np.linspace(0.0, end_m, len(shares) + 1)
     np.testing.assert_allclose(places_along(path, end_m, len(shares)), poses_at(path, even)[:, :2], atol=1e-6)
-
-
-def test_a_path_may_be_given_column_by_column() -> None:
-    rows = joined(EAST, [(0.0, 100.0), (0.01, 50.0)])
-    arc_lengths_m = np.array([30.0, 120.0])
-    by_columns = poses_at(Path(np.asfortranarray(rows)), arc_lengths_m)
-    np.testing.assert_array_equal(by_columns, poses_at(Path(np.array(rows)), arc_lengths_m))
 
 
 @settings(max_examples=examples(30))
@@ -379,33 +309,6 @@ def test_onward_goes_round_the_loiter_as_integration_does(
     np.testing.assert_allclose(end, truth, atol=2e-2)
     np.testing.assert_allclose(
         along(stretch[-1], stretch[-1][5]), pose_at(path, on_loiter(path, arc_length_m + further)), atol=1e-4
-    )
-
-
-def test_onward_stops_at_the_end_of_a_path_without_loiter() -> None:
-    path = Path(np.array([(*EAST, 0.0, 100.0), (100.0, 0.0, 1.0, 0.0, 0.01, 50.0)]))
-    assert sum(segment[5] for segment in onward(path, 30.0, 1000.0)) == pytest.approx(120.0)
-
-
-@given(pose=POSES, away=st.floats(1.0, 3000.0), bearing=ANGLES, radius=st.floats(50.0, 800.0))
-@settings(max_examples=examples(30))
-def test_turns_onto_are_one_to_each_side_the_shorter_first(
-    pose: Pose, away: float, bearing: float, radius: float, integrated: Integrated
-) -> None:
-    target = (pose.east_m + away * math.cos(bearing), pose.north_m + away * math.sin(bearing))
-    ways = turns_onto(pose, target, radius)
-    lengths = [sum(segment[5] for segment in way) for way in ways]
-    assert all(a <= b + 1e-9 for a, b in itertools.pairwise(lengths))
-    for way in ways:
-        end = integrated(pose, way, 0.5)[-1]
-        assert math.dist(end[:2], target) < 1e-2
-    centres = [
-        (pose.east_m - s * radius * pose.tangent_north, pose.north_m + s * radius * pose.tangent_east)
-        for s in (1.0, -1.0)
-    ]
-    assert len(ways) == sum(math.dist(centre, target) > radius for centre in centres)
-    assert len({math.copysign(1.0, way[0][4]) for way in ways if way[0][4]}) == sum(
-        bool(way[0][4]) for way in ways
     )
 
 

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from itertools import pairwise
-from typing import cast
 
 import numpy as np
 import pytest
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose
-from planner.geometry.terrain import Tally
-from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdges, Path
+from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdges
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
-from planner.rolling_window.local_planning import Attempt, LocalPlanning, Now, Start
-from planner.rolling_window.multi_step_search import Candidate
-from planner.rolling_window.route_optimisation import FlyableRoute
-from planner.rolling_window.window import Window
+from planner.rolling_window.local_planning import LocalPlanning, Start
 
 MakePoints = Callable[..., FloatArray]
 Known = Callable[[FloatArray], MapView]
@@ -83,9 +78,9 @@ def test_a_portion_is_hardly_larger_than_asked_for(trap: MapView) -> None:
     local, thinking = planning(trap)
     portions = 0
     while not thinking.done:
-        before = local.tally.done
+        before = local.work_count.done
         list(thinking.courses(START, None, 800.0))
-        assert local.tally.done - before < 2 * 800.0
+        assert local.work_count.done - before < 2 * 800.0
         portions += 1
     assert portions > 7
 
@@ -155,14 +150,6 @@ def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(w
     assert course.path.length_m < 12_500.0
 
 
-def test_among_many_edge_points_a_portion_leads_less_far(wall: MakePoints, known: Known) -> None:
-    portions = {}
-    for spacing_m in (50.0, 2.5):
-        seen = known(wall((6000.0, -5000.0), (6000.0, 5500.0), spacing_m))
-        _, portions[spacing_m] = all_courses(deliberation(seen), 1000, lambda: START)
-    assert portions[2.5] > 2 * portions[50.0]
-
-
 @pytest.mark.parametrize("flown_before", [False, True])
 def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
     wall: MakePoints, known: Known, flown_before: bool
@@ -178,41 +165,6 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
     assert (course.nodes[0][1] > 0.0) is flown_before
 
 
-def test_no_other_way_round_is_taken_while_a_narrower_one_leads_on(wall: MakePoints, known: Known) -> None:
-    memory = ObstacleMemory(MISSION.clearance_m)
-    # Too narrow for all of the margin.
-    gap = [wall((6000.0, side * 3000.0), (6000.0, side * 207.0), 50.0) for side in (-1.0, 1.0)]
-    memory.take_in(known(np.concatenate(gap)))
-    local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
-    straight = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 12_000.0)]))
-    through = Course(straight, (MISSION.goal_m,), memory.known, shortest=True)
-
-    def found(flown: Course | None) -> list[Course]:
-        return list(AnytimeSearch(local, memory.known, 0, lambda: False).courses(START, flown, 10**6))
-
-    assert found(None)[0].path.length_m > 13_000.0
-    first, second, *_ = found(through)
-    assert first.path.length_m < 12_100.0
-    assert second.nodes == found(None)[0].nodes
-
-
-def test_a_way_that_waited_for_narrower_ones_begins_where_the_aircraft_has_got_to(
-    wall: MakePoints, known: Known
-) -> None:
-    gap = [wall((6000.0, side * 3000.0), (6000.0, side * 207.0), 50.0) for side in (-1.0, 1.0)]
-    local, thinking = planning(known(np.concatenate(gap)))
-    straight = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 12_000.0)]))
-    through = Course(straight, (MISSION.goal_m,), local.known, shortest=True)
-    flown_m, begun = 0.0, []
-    while not thinking.done:
-        flown_m += 12.5
-        start = Start((flown_m, 0.0), Pose(flown_m, 0.0, 1.0, 0.0))
-        courses = thinking.courses(start, through, 200.0)
-        begun += [(float(course.path.segments[0, 0]), flown_m) for course in courses]
-    assert len(begun) > 1
-    assert [found_m for found_m, _ in begun] == [now_m for _, now_m in begun]
-
-
 @pytest.mark.parametrize("gap_m", [0.0, 600.0])
 def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_is_none(
     gap_m: float, ring: MakePoints, wall: MakePoints, known: Known
@@ -225,7 +177,7 @@ def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_
     rings = [ring(x, y, 200.0, 50.0) for x, y in columns if math.hypot(x, y) > 700.0]
     local, thinking = planning(known(np.concatenate([*walls, *rings])))
     courses, _ = all_courses(thinking, 10**9, lambda: START)
-    assert local.tally.done < (400_000.0 if gap_m else 100_000.0)
+    assert local.work_count.done < (400_000.0 if gap_m else 100_000.0)
     assert (len(thinking.candidates) > 0) == (len(courses) > 0) == (gap_m > 0.0)
     shortest = (
         3000.0
@@ -236,67 +188,3 @@ def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_
     for course in courses:
         assert course.nodes[-1] == MISSION.goal_m
         assert course.path.length_m < 1.06 * shortest
-
-
-@pytest.mark.parametrize(("flown_m", "again"), [(30_000.0, False), (9_000.0, True)])
-def test_a_way_much_longer_than_the_one_flown_is_looked_for_once_more(
-    flown_m: float, again: bool, trap: MapView, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What lies around the start is looked at as well."""
-    looked_round: list[int] = []
-    nearest = Window.nearest_obstacles
-
-    def counted(window: Window, most: int) -> list[int]:
-        looked_round.append(most)
-        return nearest(window, most)
-
-    monkeypatch.setattr(Window, "nearest_obstacles", counted)
-    flown = Course(Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, flown_m)])), (MISSION.goal_m,), 0, shortest=True)
-    assert list(deliberation(trap).courses(START, flown, 10**9))
-    assert bool(looked_round) == again
-
-
-class TightNearObstacles:
-    """Finds a short way that has room for its turns only further from obstacles, and a long one near them."""
-
-    known, points_m, tally = 0, np.zeros((0, 2)), Tally()
-
-    def attempts(self) -> list[Attempt]:
-        return [Attempt(60.0, 6.0), Attempt(60.0, 2.4), Attempt(110.0, 6.0)]
-
-    def route(
-        self, attempt: Attempt, effort: int, now: Now, candidates: list[Candidate], closed: Callable[[], bool]
-    ) -> Generator[None, None, FlyableRoute | None]:
-        candidates.append(Candidate((START.position, MISSION.goal_m), 6400.0, 0.0))
-        yield
-        if attempt.margin_m < 6.0:
-            return None
-        length = 14_000.0 if attempt.distance_m == 60.0 else 6500.0
-        return FlyableRoute((MISSION.goal_m,), Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, length)])))
-
-
-@pytest.mark.parametrize("roomy", [False, True])
-def test_the_widest_ways_are_looked_for_first_where_that_is_asked_for(roomy: bool) -> None:
-    asked: list[Attempt] = []
-
-    class InVain(TightNearObstacles):
-        def route(self, attempt: Attempt, *_: object) -> Generator[None, None, FlyableRoute | None]:
-            asked.append(attempt)
-            yield
-            return None
-
-        def tight_route(self, now: Now) -> Generator[None, None, FlyableRoute | None]:
-            yield
-            return None
-
-    local = InVain()
-    thinking = AnytimeSearch(cast(LocalPlanning, local), 0, 0, lambda: False, roomy=roomy)
-    assert not list(thinking.courses(START, None, math.inf))
-    widest = max(local.attempts(), key=lambda each: each.distance_m)
-    assert (asked[0] == widest) is roomy
-
-
-def test_a_long_way_waits_where_a_much_shorter_one_had_no_room_for_its_turns() -> None:
-    thinking = AnytimeSearch(cast(LocalPlanning, TightNearObstacles()), 0, 0, lambda: False)
-    lengths = [course.path.length_m for course in thinking.courses(START, None, math.inf)]
-    assert lengths == [6500.0, 14_000.0]

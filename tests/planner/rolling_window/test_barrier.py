@@ -69,27 +69,6 @@ def test_random_points_close_it_where_their_discs_part_the_area(seed: int, count
         assert closed
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_points_on_the_very_line_from_start_to_goal_count_once(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    start, goal = (225.0, 500.0), (775.0, 500.0)
-    points = 50.0 * np.unique(rng.integers(0, 21, (int(rng.integers(60, 220)), 2)), axis=0)
-    points = rng.permutation(points)
-    away = np.minimum(np.hypot(*(points - start).T), np.hypot(*(points - goal).T))
-    points = points[away > 1.01 * CLEARANCE]
-    assert barrier_of(points, start=start, goal=goal).closed is parted(points, CLEARANCE, start, goal)
-
-
-@pytest.mark.parametrize("about", [START, GOAL])
-@pytest.mark.parametrize(("gap_m", "closed"), [(0.0, True), (79.0, True), (81.0, False), (150.0, False)])
-def test_a_ring_is_closed_by_a_gap_of_no_more_than_two_clearances(
-    about: Point, gap_m: float, closed: bool
-) -> None:
-    points = circle_of(*about, 120.0, 10.0, gap_m)
-    assert barrier_of(points).closed is closed
-    assert parted(points, CLEARANCE) is closed
-
-
 @settings(max_examples=examples(30))
 @given(
     x=st.floats(100.0, 900.0),
@@ -150,66 +129,6 @@ def test_a_border_beside_an_end_counts_for_nothing() -> None:
             assert barrier.closed is closed
 
 
-def test_a_wall_beside_both_parts_nothing() -> None:
-    along = np.linspace(0.0, 1000.0, 60)
-    points = np.column_stack((along, np.full(60, 700.0)))
-    assert not barrier_of(points).closed
-
-
-def test_a_corner_cut_off_parts_what_lies_in_it() -> None:
-    along = np.linspace(0.0, 300.0, 30)
-    points = np.column_stack((along, 300.0 - along))
-    assert barrier_of(points, start=(60.0, 60.0)).closed
-    assert not barrier_of(points).closed
-
-
-@pytest.mark.parametrize("turns", [1.0, 2.0, 3.0])
-def test_a_spiral_is_open_until_its_end_is_closed(turns: float) -> None:
-    angle = np.linspace(0.0, turns * math.tau, 600)
-    radius = 70.0 + 110.0 * angle / math.tau
-    spiral = np.column_stack((500.0 + radius * np.cos(angle), 500.0 + radius * np.sin(angle)))
-    start, goal = (500.0, 500.0), (30.0, 30.0)
-    assert not barrier_of(spiral, start=start, goal=goal).closed
-    step = np.linspace(0.0, 1.0, 12)[:, None]
-    end, inwards = spiral[-1], spiral[-1] - (110.0, 0.0)
-    lid = end + step * (inwards - end)
-    assert barrier_of(spiral, lid, start=start, goal=goal).closed
-
-
-def test_twice_across_the_straight_line_is_not_between() -> None:
-    points = circle_of(500.0, 500.0, 150.0, 10.0)
-    assert not barrier_of(points).closed
-
-
-def test_a_ring_round_both_parts_nothing() -> None:
-    points = circle_of(500.0, 500.0, 440.0, 10.0)
-    assert not barrier_of(points).closed
-
-
-@settings(max_examples=examples(30))
-@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 160), parts=st.integers(1, 12))
-def test_in_parts_it_is_the_same_as_at_once_and_never_opens_again(seed: int, count: int, parts: int) -> None:
-    points = np.random.default_rng(seed).uniform(0.0, 1000.0, (count, 2))
-    barrier, closed = barrier_of(), False
-    for batch in np.array_split(points, parts):
-        barrier.add(batch)
-        assert barrier.closed or not closed
-        closed = barrier.closed
-    assert closed is barrier_of(points).closed
-
-
-@settings(max_examples=examples(30))
-@given(seed=st.integers(0, 2**32 - 1), count=st.integers(60, 160))
-def test_order_does_not_matter_to_points_far_enough_apart(seed: int, count: int) -> None:
-    rng = np.random.default_rng(seed)
-    # One point in a cell of the thinning grid at most: then none is left out.
-    cell = THIN * CLEARANCE
-    places = rng.choice(math.floor(1000.0 / cell) ** 2, count, replace=False)
-    side = math.floor(1000.0 / cell)
-    points = (np.column_stack(np.divmod(places, side)) + rng.uniform(0.1, 0.9, (count, 2))) * cell
-    assert barrier_of(points).closed is barrier_of(rng.permutation(points)).closed
-
-
 def proof_of(seen: MapView, keeps_m: float) -> tuple[Proof, int]:
     mission = Mission(
         goal_m=GOAL,
@@ -232,21 +151,6 @@ def proved(seen: MapView, keeps_m: float) -> bool:
     answers = [proof.closed(START) for _ in range(portions)]
     assert not any(answers[:-1]) or answers[-1]
     return answers[-1]
-
-
-def test_a_proof_takes_its_time(wall: MakePoints, known: Known) -> None:
-    points = wall((500.0, 0.0), (500.0, 1000.0), 1.5)
-    assert len(points) > PROVED_AT_ONCE
-    proof, portions = proof_of(known(points), CLEARANCE)
-    assert not proof.closed(START)
-    assert all(proof.closed(START) or portions > i for i in range(2, portions + 2))
-    assert proof.closed(START)
-
-
-def test_what_lies_about_the_ends_proves_nothing(ring: MakePoints, known: Known) -> None:
-    assert proved(known(ring(*GOAL, 150.0, 10.0)), 140.0)
-    assert not proved(known(ring(*GOAL, 130.0, 10.0)), 140.0)
-    assert not proved(known(ring(*START, 130.0, 10.0)), 140.0)
 
 
 def test_what_was_refused_proves_nothing(wall: MakePoints, known: Known) -> None:

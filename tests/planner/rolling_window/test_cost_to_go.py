@@ -6,13 +6,12 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner.geometry.curves import Point
-from planner.geometry.terrain import Tally
+from planner.geometry.terrain import WorkCount
 from planner.interface import FloatArray
 from planner.rolling_window import cost_to_go
 from planner.rolling_window.cost_to_go import CostToGo
@@ -24,8 +23,8 @@ BOUNDS = (0.0, 0.0, 10_000.0, 5000.0)
 KEEP = 200.0
 
 
-def spread(points: FloatArray, tally: Tally | None = None, keep: float = KEEP) -> CostToGo:
-    to_go = CostToGo(START, GOAL, BOUNDS, points, np.full(len(points), keep), tally or Tally())
+def spread(points: FloatArray, work_count: WorkCount | None = None, keep: float = KEEP) -> CostToGo:
+    to_go = CostToGo(START, GOAL, BOUNDS, points, np.full(len(points), keep), work_count or WorkCount())
     assert all(step is None for step in to_go.spread())
     return to_go
 
@@ -61,38 +60,11 @@ def test_no_way_is_told_only_where_there_is_none(seed: int, count: int) -> None:
     assert not told or any(shapely.contains(part, ends).all() for part in parts)
 
 
-@pytest.mark.parametrize(("gap_m", "way"), [(0.0, False), (200.0, False), (410.0, True)])
-def test_a_gap_is_open_from_twice_the_distance_on(gap_m: float, way: bool, wall: MakePoints) -> None:
-    low, high = 2200.0 - 0.5 * gap_m, 2200.0 + 0.5 * gap_m
-    below, above = wall((5000.0, 0.0), (5000.0, low), 50.0), wall((5000.0, high), (5000.0, 5000.0), 50.0)
-    points = np.concatenate((below, above))
-    assert (spread(points)(START) < math.inf) is way
-
-
-def test_a_coarse_grid_closes_nothing_that_is_open(wall: MakePoints, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cost_to_go, "MOST_CELLS", 200)
-    below, above = wall((5000.0, 0.0), (5000.0, 2000.0), 50.0), wall((5000.0, 2410.0), (5000.0, 5000.0), 50.0)
-    points = np.concatenate((below, above))
-    assert math.dist(START, GOAL) <= spread(points)(START) < math.inf
-
-
 def test_ends_nearer_to_something_than_is_kept_are_open(ring: MakePoints) -> None:
     """As the search has it, from such points no more is kept than the distance of the ends."""
     points = np.concatenate((ring(1000.0, 2700.0, 100.0, 30.0), ring(9000.0, 2300.0, 90.0, 30.0)))
     room = np.min([np.hypot(*(points - end).T) for end in (START, GOAL)], axis=0) - 1e-3
-    to_go = CostToGo(START, GOAL, BOUNDS, points, np.minimum(KEEP, room), Tally())
+    to_go = CostToGo(START, GOAL, BOUNDS, points, np.minimum(KEEP, room), WorkCount())
     for _ in to_go.spread():
         pass
     assert to_go(START) < 1.1 * math.dist(START, GOAL)
-
-
-def test_no_step_of_work_is_large(ring: MakePoints) -> None:
-    points = np.concatenate(
-        [ring(x, y, 150.0, 10.0) for x in range(2000, 8000, 900) for y in range(400, 5000, 900)]
-    )
-    tally = Tally()
-    to_go = CostToGo(START, GOAL, BOUNDS, points, np.full(len(points), KEEP), tally)
-    before, largest = 0.0, 0.0
-    for _ in to_go.spread():
-        before, largest = tally.done, max(largest, tally.done - before)
-    assert 0.0 < largest < 1000.0

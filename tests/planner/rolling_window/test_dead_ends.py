@@ -30,14 +30,6 @@ def test_a_place_is_given_up_at_the_second_turn_before_it() -> None:
     assert ends.turned_before((0.0, 60.0))
 
 
-def test_a_place_that_was_given_up_is_counted_anew() -> None:
-    ends = DeadEnds(MISSION, ObstacleMemory(MISSION.clearance_m))
-    ends.turned_before((0.0, 0.0))
-    assert ends.turned_before((0.0, 0.0))
-    assert not ends.turned_before((0.0, 0.0))
-    assert ends.turned_before((0.0, 0.0))
-
-
 def test_what_lies_beside_a_place_is_given_up_with_it() -> None:
     memory = ObstacleMemory(MISSION.clearance_m)
     DeadEnds(MISSION, memory).give_up(Pose(1000.0, 0.0, 1.0, 0.0))

@@ -22,7 +22,6 @@ AssertFlyable = Callable[[Path, float], None]
 
 EAST = Pose(0.0, 0.0, 1.0, 0.0)
 WIDE = (-1e5, -1e5, 1e5, 1e5)
-NOTHING = np.zeros((0, 2))
 KEEP, RADIUS, CUT = 100.0, 150.0, 30.0
 LIMITS = Limits(RADIUS, 40.0)
 SEEDS = st.integers(0, 2**32 - 1)
@@ -56,18 +55,6 @@ def walk(seed: int, count: int) -> list[Point]:
 def room(nodes: list[Point], points: FloatArray) -> float:
     """Least distance of a polyline from points."""
     return float(shapely.distance(shapely.LineString(nodes), shapely.points(points)).min(initial=math.inf))
-
-
-def test_needless_nodes_are_dropped() -> None:
-    nodes = [(0.0, 0.0), (1000.0, 300.0), (2000.0, -300.0), (3000.0, 500.0), (4000.0, 0.0)]
-    assert shortcut(nodes, terrain(NOTHING)) == [nodes[0], nodes[-1]]
-
-
-def test_a_node_that_leads_round_something_stays() -> None:
-    nodes = [(0.0, 0.0), (1000.0, 100.0), (2000.0, 300.0), (3000.0, 100.0), (4000.0, 0.0)]
-    kept = shortcut(nodes, terrain(np.array([(2000.0, 50.0)])))
-    assert (2000.0, 300.0) in kept
-    assert len(kept) < len(nodes)
 
 
 @given(seed=SEEDS, count=st.integers(0, 6), nodes=st.integers(1, 8))
@@ -111,14 +98,6 @@ def test_what_is_optimised_can_be_flown(
     assert ymax <= bounds[3] + 1e-6
 
 
-def test_in_the_open_only_the_end_is_left() -> None:
-    found = optimise(EAST, 0.0, walk(3, 5), LIMITS, CUT, terrain(NOTHING))
-    assert found is not None
-    choice, path = found.nodes, found.path
-    assert choice == ((10_000.0, 0.0),)
-    assert path.length_m == pytest.approx(10_000.0)
-
-
 def test_round_a_circle_the_curve_keeps_its_distance_and_is_hardly_longer_than_need_be(
     ring: MakePoints,
 ) -> None:
@@ -135,33 +114,6 @@ def test_round_a_circle_the_curve_keeps_its_distance_and_is_hardly_longer_than_n
     assert shapely.distance(line, shapely.points(points)).min() >= KEEP - 0.02
     assert exact - 1.0 < found.path.length_m < 1.01 * exact
     assert len(found.nodes) < len(nodes) - 1
-
-
-def flown(nodes: list[Point], where: Terrain, start_curvature: float = 0.0) -> bool:
-    return optimise(EAST, start_curvature, [(0.0, 0.0), *nodes], LIMITS, CUT, where) is not None
-
-
-def test_what_cannot_be_flown_is_not() -> None:
-    ahead, behind = [(3000.0, 0.0)], [(-3000.0, 0.0)]
-    assert not flown(ahead, terrain(np.array([(1500.0, 99.0)])))
-    assert flown(ahead, terrain(np.array([(1500.0, 101.0)])))
-    assert flown(ahead, terrain(np.array([(1500.0, 99.0)]), keep_m=90.0))
-    assert not flown(ahead, terrain(NOTHING, bounds=(-10.0, -10.0, 2999.0, 10.0)))
-    # The turn back sweeps 300 m to the side.
-    assert not flown(behind, terrain(NOTHING, bounds=(-4000.0, -250.0, 4000.0, 250.0)))
-    assert flown(behind, terrain(NOTHING, bounds=(-4000.0, -310.0, 4000.0, 310.0)))
-
-
-def test_room_to_roll_counts_from_the_curvature_flown_before() -> None:
-    # To the right, with room for that turn alone.
-    place, side = [(150.0, -3000.0)], (-10.0, -4000.0, 155.0, 10.0)
-    assert flown(place, terrain(NOTHING, bounds=side))
-    assert flown(place, terrain(NOTHING, bounds=side), start_curvature=-1.0 / RADIUS)
-    assert not flown(place, terrain(NOTHING, bounds=side), start_curvature=1.0 / RADIUS)
-
-
-def test_walled_in_there_is_nothing_to_optimise(ring: MakePoints) -> None:
-    assert not flown([(3000.0, 0.0)], terrain(ring(0.0, 0.0, 600.0, 25.0)))
 
 
 def test_a_turn_round_something_is_flown_on_where_its_track_points_lie_outside(

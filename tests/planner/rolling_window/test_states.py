@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +13,7 @@ from planner.geometry.curves import on_loiter
 from planner.interface import BoolArray, FloatArray, Mission, NoWayToBegin, Plan, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
-from planner.rolling_window.planner import NO_BETTER, NO_WAY_ON, THINKING_ON, RollingWindow
+from planner.rolling_window.planner import NO_BETTER, THINKING_ON, RollingWindow
 from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
 from planner.shield.certificate import CertificateBroken
 from planner.shield.escape import Escape
@@ -75,10 +74,6 @@ def in_the_loiter() -> tuple[RollingWindow, Situation]:
     pilot.plan(request)
     assert pilot._monitor.plan is not None
     return pilot, Situation(request, pilot._monitor.plan, entry_m + 50.0)
-
-
-def test_before_the_first_plan_nothing_certified_is_flown() -> None:
-    assert planner().state is PlanningState.ESCAPING
 
 
 def test_a_plan_that_is_found_is_followed() -> None:
@@ -193,17 +188,6 @@ def test_a_search_that_is_not_done_goes_on_while_the_plan_is_flown() -> None:
     assert pilot.state is before
 
 
-def test_after_a_search_in_vain_more_effort_is_made() -> None:
-    pilot, now = in_the_loiter()
-    proved(pilot)
-    searched_in_vain(pilot)
-    pilot._giving_up.effort = 0
-    answer = pilot._no_way_found(now)
-    assert (answer.status, answer.reason) == (PlanStatus.NO_PATH, NO_WAY_ON)
-    assert pilot.state is PlanningState.GIVING_UP
-    assert pilot._giving_up.effort == 1
-
-
 @pytest.mark.parametrize(("turns", "given_up"), [(0.9, False), (1.1, True)])
 def test_a_course_that_cannot_be_entered_is_given_up_after_a_whole_turn(turns: float, given_up: bool) -> None:
     pilot, now = in_the_loiter()
@@ -243,29 +227,6 @@ def test_want_of_room_to_turn_is_proved_after_all_was_tried_again() -> None:
     assert "does not prove the goal unreachable" in str(error)
     assert pilot.state is PlanningState.PROVING
     assert pilot._giving_up.tried_again
-
-
-def test_effort_grows_to_its_end_and_begins_again_with_every_retry() -> None:
-    giving_up = GivingUp(MISSION, ObstacleMemory(MISSION.clearance_m))
-    for _ in range(MOST_EFFORT + 2):
-        giving_up.try_again(narrow=False, at_end=False, arc_length_m=0.0)
-    assert giving_up.out_of_effort
-    assert not giving_up.tried_again
-    for retry in range(MOST_RETRIES):
-        assert giving_up.retries_used() is False, retry
-        giving_up.try_again(narrow=True, at_end=False, arc_length_m=0.0)
-        assert giving_up.effort == 0
-    assert giving_up.retries_used()
-
-
-def test_a_whole_turn_is_counted_from_the_entry_or_from_what_was_given_up_last() -> None:
-    giving_up = GivingUp(replace(MISSION, turn_radius_m=100.0), ObstacleMemory(MISSION.clearance_m))
-    assert not giving_up.turned_since(1000.0, 1000.0 + 628.0)
-    assert giving_up.turned_since(1000.0, 1000.0 + 629.0)
-    giving_up.try_again(narrow=False, at_end=True, arc_length_m=1629.0)
-    assert not giving_up.turned_since(1000.0, 1629.0 + 628.0)
-    giving_up.new_plan()
-    assert giving_up.turned_since(1000.0, 1000.0 + 629.0)
 
 
 def test_no_room_to_turn_is_no_verdict_while_a_place_is_given_up_that_the_sensor_may_err_about() -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from planner.rolling_window.trail import Trail
 
@@ -25,13 +23,3 @@ def test_the_way_back_counts_and_a_new_one_does_not() -> None:
     assert trail.retraced_m([(20_000.0, 9000.0), (5000.0, 9000.0)]) == 0.0
     off_it = trail.retraced_m([(10_000.0, 500.0), (10_000.0, 20_000.0)])
     assert off_it == pytest.approx(1500.0, abs=SIDE)
-
-
-def test_before_the_flight_nothing_is_retraced() -> None:
-    assert Trail(SIDE).retraced_m([(0.0, 0.0), (9000.0, 100.0), (9000.0, 100.0)]) == 0.0
-
-
-@given(nodes=st.lists(st.tuples(st.floats(-3e4, 3e4), st.floats(-3e4, 3e4)), min_size=2, max_size=6))
-def test_no_more_is_retraced_than_there_is(nodes: list[tuple[float, float]]) -> None:
-    length = float(np.hypot(*np.diff(np.array(nodes), axis=0).T).sum())
-    assert 0.0 <= flown_east(8000.0).retraced_m(nodes) <= length * (1.0 + 1e-9)

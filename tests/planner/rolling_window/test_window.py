@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from planner.interface import FloatArray
-from planner.rolling_window.window import SectorEdge, Window, guide_vector
+from planner.rolling_window.window import SectorEdge, Window
 from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]
@@ -46,31 +46,6 @@ def assert_tangent(edge: SectorEdge, window: Window, origin: tuple[float, float]
         clear = (origin[0] + edge.ux * edge.clear_m, origin[1] + edge.uy * edge.clear_m)
         line = shapely.LineString([origin, clear])
         assert shapely.distance(line, shapely.points(window.points_m)).min() > KEEP * (1.0 - 1e-6)
-
-
-@given(x=st.floats(-1e5, 1e5), y=st.floats(-1e5, 1e5), gx=st.floats(-1e5, 1e5), gy=st.floats(-1e5, 1e5))
-def test_the_guide_vector_leads_to_the_goal(x: float, y: float, gx: float, gy: float) -> None:
-    ux, uy, length = guide_vector((x, y), (gx, gy))
-    assert math.hypot(ux, uy) == pytest.approx(1.0)
-    assert x + ux * length == pytest.approx(gx, abs=1e-6)
-    assert y + uy * length == pytest.approx(gy, abs=1e-6)
-
-
-def test_at_the_goal_the_guide_vector_has_no_length() -> None:
-    assert guide_vector((3.0, 4.0), (3.0, 4.0))[2] == 0.0
-
-
-@pytest.mark.parametrize("east", [-3000.0, 3000.0])
-def test_the_edges_of_a_lone_disc_are_its_two_tangents(east: float) -> None:
-    window = window_of(np.array([(east, 700.0)]))
-    edges = window.sector_edges((0.0, 0.0), [0])
-    away = math.hypot(east, 700.0)
-    half = math.asin(KEEP / away)
-    offs = sorted((bearing(e.ux, e.uy) - bearing(east, 700.0) + math.pi) % math.tau - math.pi for e in edges)
-    assert offs == pytest.approx([-half, half], abs=1e-6)
-    for edge in edges:
-        assert edge.touch_m == pytest.approx(math.sqrt(away**2 - KEEP**2), rel=1e-9)
-        assert edge.clear_m == math.inf
 
 
 @given(
@@ -126,10 +101,3 @@ def test_hidden_edges_are_not_returned_but_those_of_what_hides_them(ring: MakePo
     assert from_far
     assert sorted(from_far) == sorted(window.sector_edges((0.0, 0.0), [0]))
     assert max(edge.touch_m for edge in from_far) < 3000.0
-
-
-def test_an_edge_ends_where_the_next_obstacle_begins(ring: MakePoints) -> None:
-    window = window_of(np.array([(2000.0, 0.0)]), ring(6000.0, 0.0, 900.0, SPACING))
-    for edge in window.sector_edges((0.0, 0.0), [0]):
-        assert_tangent(edge, window, (0.0, 0.0))
-        assert 4000.0 < edge.clear_m < 6000.0

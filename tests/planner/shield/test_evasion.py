@@ -68,13 +68,13 @@ def room_by_hand(path: Path, of: Threats) -> float:
     return room
 
 
-PLACE = st.tuples(st.floats(-800, 1200), st.floats(-900, 900))
+POINT_WORK = st.tuples(st.floats(-800, 1200), st.floats(-900, 900))
 VELOCITY = st.tuples(st.floats(-12, 12), st.floats(-12, 12))
 
 
 @given(
-    st.lists(PLACE, max_size=8),
-    st.lists(st.tuples(PLACE, VELOCITY), max_size=5),
+    st.lists(POINT_WORK, max_size=8),
+    st.lists(st.tuples(POINT_WORK, VELOCITY), max_size=5),
     st.sampled_from([-1 / 230.0, -1 / 1000.0, 0.0, 1 / 400.0]),
 )
 # Far from one thing, what is nearer to the way must not be stepped over: not even where it comes to meet one.
@@ -99,7 +99,7 @@ def test_room_is_the_least_distance_from_what_stands_and_from_what_is_met(
         assert of.room_m(path, least_m=room + 1.0) < room + 1.0
 
 
-@given(PLACE, st.sampled_from([-1 / 230.0, 0.0]))
+@given(POINT_WORK, st.sampled_from([-1 / 230.0, 0.0]))
 @settings(max_examples=examples(20))
 def test_from_what_has_just_appeared_it_keeps_further(place: tuple[float, float], curvature: float) -> None:
     """It is met wherever it can get to."""
