@@ -99,7 +99,7 @@ def check(
 def replay(
     log: str | Path,
     aircraft: str,
-    mission: str | Path,
+    mission: str | Path | None = None,
     *,
     out: str | Path,
     settings: Mapping[str, str] | None = None,
@@ -114,7 +114,8 @@ def replay(
     Args:
         log: a table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...).
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
-        mission: a file that `wayproof check` takes, or a JSON with `mission.corners_east_north_m`.
+        mission: a file that `wayproof check` takes, or a JSON with `mission.corners_east_north_m`; None: the mission
+            that an ArduPilot log (.bin) has.
         out: the folder to write.
         settings: keys of the simulated flight's scenario, by key path; values as YAML.
         steady_wind: one wind, not the wind as it changed in the log.
@@ -130,7 +131,7 @@ def replay(
             Path(log),
             aircraft,
             Path(out),
-            Path(mission),
+            None if mission is None else Path(mission),
             list((settings or {}).items()),
             windows=not steady_wind,
             recording=recording,

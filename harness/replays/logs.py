@@ -69,17 +69,53 @@ def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list
             f"{path}: has {path.stat().st_size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:g} MB are read"
         )
     notes: list[str] = []
+    with _reading(path):
+        found = reader(path, notes)
+    return _columns(found, plane, path), notes
+
+
+class Command(NamedTuple):
+    """A command of a mission: its number, MAV_CMD, first and second parameter, latitude and longitude in degrees."""
+
+    number: int
+    command: int
+    first: float
+    acceptance_m: float
+    latitude_deg: float
+    longitude_deg: float
+
+
+def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
+    """The mission that an ArduPilot log has (CMD), the last of each number, and the parameters (PARM).
+
+    Raises:
+        InputError: the log cannot be read, or a package is missing.
+    """
+    commands: dict[int, Command] = {}
+    parameters: dict[str, float] = {}
+    with _reading(path):
+        for each in _messages(path, ("CMD", "PARM"), []):
+            if each.get_type() == "PARM":
+                parameters[each.Name] = float(each.Value)
+            else:
+                row = (int(each.CNum), int(each.CId), each.Prm1, each.Prm2, each.Lat, each.Lng)
+                commands[row[0]] = Command(*row)
+    return [commands[number] for number in sorted(commands)], parameters
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Makes one line of what a library says of a log, which may be damaged."""
     try:
         with _silent():  # of a damaged file libraries print a line for each byte
-            found = reader(path, notes)
+            yield
     except ImportError as error:
         raise InputError(f"{path}: {NEEDS_LOGS} ({error.name})") from error
     except InputError:
         raise
-    except Exception as error:  # whatever a library says of a damaged file
+    except Exception as error:
         text = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(f"{path}: cannot be read as {path.suffix} ({text})") from error
-    return _columns(found, plane, path), notes
 
 
 def _columns(found: Series, plane: LocalPlane, path: Path) -> dict[str, FloatArray]:
@@ -150,33 +186,35 @@ def _is_whole(path: Path) -> bool:
 
 def _dataflash(path: Path, notes: list[str]) -> Series:
     """ArduPilot: the estimator's position (POS), or else the receiver's (GPS); airspeed (ARSP) and roll (ATT)."""
+    place = ("Lat", "Lng", "Alt")
+    keys: dict[str, tuple[str, ...]] = {"POS": place, "GPS": place, "ARSP": ("Airspeed",), "ATT": ("Roll",)}
+    found: dict[str, list[tuple[float, ...]]] = {kind: [] for kind in keys}
+    for each in _messages(path, tuple(keys), notes):
+        if getattr(each, "I", 0) or getattr(each, "Status", FIX_3D) < FIX_3D:
+            continue  # a second receiver, some metres from the first, or one without a fix
+        kind = each.get_type()
+        found[kind].append((each._timestamp, *(float(getattr(each, key)) for key in keys[kind])))
+    others = {"airspeed_ias_mps": np.array(found["ARSP"]), "roll_deg": np.array(found["ATT"])}
+    return Series(np.array(found["POS"] or found["GPS"]), others)
+
+
+def _messages(path: Path, kinds: tuple[str, ...], notes: list[str]) -> Iterator[Any]:
+    """Messages of a DataFlash log, as pymavlink has them."""
     from pymavlink.DFReader import DFReader_binary
 
     with path.open("rb") as file:
         if file.read(len(DATAFLASH)) != DATAFLASH:
             raise InputError(f"{path}: is no DataFlash log: such a file begins with {DATAFLASH.hex(' ')}")
-    keys = {
-        "POS": ("Lat", "Lng", "Alt"),
-        "GPS": ("Lat", "Lng", "Alt"),
-        "ARSP": ("Airspeed",),
-        "ATT": ("Roll",),
-    }
-    found: dict[str, list[tuple[float, ...]]] = {kind: [] for kind in keys}
     log: Any = DFReader_binary(str(path), zero_time_base=True)
     try:
-        while (message := log.recv_match(type=list(keys))) is not None:
-            if getattr(message, "I", 0) or getattr(message, "Status", FIX_3D) < FIX_3D:
-                continue  # a second receiver, some metres from the first, or one without a fix
-            kind = message.get_type()
-            found[kind].append((message._timestamp, *(float(getattr(message, key)) for key in keys[kind])))
+        while (message := log.recv_match(type=list(kinds))) is not None:
+            yield message
     finally:
         log.data_map.close()
         log.filehandle.close()
     held = sum(len(places) * log.formats[kind].len for kind, places in enumerate(log.offsets) if len(places))
     if log.data_len - held > LAST_PAGE:
         notes.append(DAMAGED)
-    others = {"airspeed_ias_mps": np.array(found["ARSP"]), "roll_deg": np.array(found["ATT"])}
-    return Series(np.array(found["POS"] or found["GPS"]), others)
 
 
 def _igc(path: Path, notes: list[str]) -> Series:

@@ -9,10 +9,16 @@ from typing import Annotated, Any, Final
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
+from aircraft.frames import LocalPlane
 from harness.files.input_file import MAX_JSON_BYTES, InputError, read_text
 from harness.flight.record import FloatArray
+from harness.replays.logs import logged_mission
+from harness.run_files.mission.commands import FLOWN, JUMP, WAYPOINT, name_of
 from harness.run_files.path_files import read_path
 
+CRUISE: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}
+BANK: Final = {"ROLL_LIMIT_DEG": 1.0, "LIM_ROLL_CD": 0.01}
+"""Parameters of ArduPlane, today's name before the earlier one, and their units in m/s and degrees."""
 CORNERS: Final = "two or more pairs [east, north] of numbers in m"
 
 
@@ -90,6 +96,43 @@ def read_mission(path: Path) -> FlownMission:
     place = given.origin_deg
     origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
     return FlownMission(points, radius, height_m=height_m, origin=origin)
+
+
+def mission_of_log(path: Path) -> tuple[FlownMission, str]:
+    """The mission that a log has: of ArduPilot's, the waypoints between a jump and its target; and a note on it.
+
+    Raises:
+        InputError: the log has none, or more than waypoints is flown in it.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    commands, parameters = logged_mission(path) if path.suffix.lower() == ".bin" else ([], {})
+    jump = next((each for each in commands[::-1] if each.command == JUMP and each.first < each.number), None)
+    if jump is None:
+        raise InputError(f"{path}: its mission is not known; give --mission FILE")
+    lap = [each for each in commands if jump.first <= each.number < jump.number and each.command in FLOWN]
+    for each in lap:
+        if each.command != WAYPOINT:
+            told = f"item {each.number} of its mission, {name_of(each.command)}, is no corner"
+            raise InputError(f"{path}: {told}; give --mission FILE with the corners")
+    if len(lap) < 2:
+        raise InputError(
+            f"{path}: its mission has fewer than 2 waypoints before its jump; give --mission FILE"
+        )
+    known = [value for value in (lap[0].acceptance_m, parameters.get("WP_RADIUS", 0.0)) if value > 0.0]
+    origin = Origin(latitude_deg=lap[0].latitude_deg, longitude_deg=lap[0].longitude_deg)
+    plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
+    found = FlownMission(
+        np.array([plane.plane(each.latitude_deg, each.longitude_deg) for each in lap]),
+        known[0] if known else None,
+        next((parameters[name] * unit for name, unit in CRUISE.items() if name in parameters), None),
+        bank_limit_deg=next(
+            (parameters[name] * unit for name, unit in BANK.items() if name in parameters), None
+        ),
+        origin=origin,
+    )
+    radius = f"{known[0]:g} m" if known else "by the rule of the law"
+    return found, f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {radius}"
 
 
 def _of_json(text: str, source: str) -> FlownMission:

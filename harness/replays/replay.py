@@ -12,12 +12,11 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.files.errors import RunFolderError
-from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight, read_flown
 from harness.replays.measures import Side, compared, legs_of
-from harness.replays.mission import FlownMission, read_mission
+from harness.replays.mission import FlownMission, mission_of_log, read_mission
 from harness.replays.simulated import Asked, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows
 
@@ -66,7 +65,7 @@ def replay(
         log: as `harness.replays.flown.read_flown` takes it.
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
         out: folder to write.
-        mission: as `harness.replays.mission.read_mission` takes it.
+        mission: as `harness.replays.mission.read_mission` takes it; None: that of the log, if it has one.
         overrides: keys of the simulated flight's scenario to replace, `guidance.kind` for one, as
             `harness.scenario.scenario.load_scenario` takes them.
         windows: the wind changes as the log shows it; else it is steady.
@@ -77,11 +76,9 @@ def replay(
         RunFolderError: the folder holds something else or cannot be written.
         AircraftError: the aircraft cannot be loaded or trimmed.
     """
-    if mission is None:
-        raise InputError(f"{log}: its mission is not known; give --mission FILE")
     if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / INDEX).exists())):
         raise RunFolderError(f"{out} holds other things; give a new folder")
-    flown_mission = read_mission(mission)
+    flown_mission, *notes = (read_mission(mission),) if mission else mission_of_log(log)
     origin = flown_mission.origin
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg) if origin else LocalPlane(0.0, 0.0)
     flight = read_flown(log, plane)
@@ -108,7 +105,7 @@ def replay(
         "airspeed_mps": asked.airspeed_mps,
         "latency_s": scenario.navigation.latency_s,
         **compared(flown, simulated),
-        "notes": list(flight.notes),
+        "notes": [*notes, *flight.notes],
     }
     found = Replay(told, flown.columns, columns, corners_m, out)
     _write(found, {"flown": flown, "simulated": simulated}, recording)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ import pyarrow.parquet as pq
 import pytest
 
 import wayproof
+from aircraft.frames import LocalPlane
 from harness.cli.app import main
+from tests.harness.replays.test_logs import FORMATS, form
 
 FLOWN = Path(__file__).parents[4] / "shared" / "flown"
 needs_flown = pytest.mark.skipif(not (FLOWN / "thor75.json").is_file(), reason="shared/flown is not here")
@@ -94,6 +97,55 @@ def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
     assert (out / "flight.rrd").stat().st_size > 100_000
     again = wayproof.load_run(out / "simulated")
     assert again.digest == wayproof.fly(again.scenario).digest or again.outcome == "reached"
+
+
+def test_the_mission_of_an_ardupilot_log_is_its_waypoints_between_a_jump_and_its_target(
+    tmp_path: Path,
+) -> None:
+    log, _ = circles(tmp_path, (4.0, -3.0), laps=3)
+    plane, flown = LocalPlane(47.0, 8.0), pq.read_table(log).to_pydict()
+
+    def row(kind: int, form: str, *values: object) -> bytes:
+        return b"\xa3\x95" + bytes([kind]) + struct.pack(f"<{form}", *values)
+
+    def degrees(east: float, north: float) -> tuple[int, int]:
+        latitude, longitude = plane.geodetic(east, north)
+        return round(latitude * 1e7), round(longitude * 1e7)
+
+    commands = [(16, 0.0, 0.0, (0.0, 0.0)), (22, 15.0, 0.0, (0.0, 0.0))]
+    commands += [(16, 0.0, 45.0, (float(east), float(north))) for east, north in SQUARE]
+    commands += [(177, 2.0, -1.0, (0.0, 0.0))]
+    data = FORMATS + form(140, b"POS", 23, b"QLLf", b"TimeUS,Lat,Lng,Alt")
+    data += form(143, b"PARM", 3 + 8 + 16 + 4, b"QNf", b"TimeUS,Name,Value")
+    data += form(142, b"ARSP", 3 + 8 + 1 + 4, b"QBf", b"TimeUS,I,Airspeed")
+    names = b"TimeUS,CTot,CNum,CId,Prm1,Prm2,Lat,Lng,Alt"
+    data += form(144, b"CMD", 3 + 8 + 6 + 8 + 8 + 4, b"QHHHffLLf", names)
+    data += row(143, "Q16sf", 1, b"LIM_ROLL_CD", 4500.0) + row(143, "Q16sf", 1, b"TRIM_ARSPD_CM", 1800.0)
+    for number, (command, first, second, place) in enumerate(commands):
+        data += row(
+            144, "QHHHffiif", 1, len(commands), number, command, first, second, *degrees(*place), 100.0
+        )
+    for time, east, north in zip(*(flown[name] for name in ("time_s", "east_m", "north_m")), strict=True):
+        time_us = int(1e6 * time) + 2
+        data += row(140, "Qiif", time_us, *degrees(east, north), 300.0) + row(
+            142, "QBf", time_us, 0, math.tau * 90 / 40
+        )
+    (tmp_path / "log.bin").write_bytes(data)
+    found = wayproof.replay(tmp_path / "log.bin", "aerosonde", out=tmp_path / "out")
+    assert found.corners_m == pytest.approx(np.array(SQUARE), abs=0.05)
+    assert found.told["notes"][0] == "mission: items 2 to 5 of the log, reached from 45 m"
+    assert found.told["airspeed_mps"] == pytest.approx(18.0)
+    assert max(found.told["wind"][name] for name in ("speed_mps", "residual_mps")) < 0.1
+    autopilot = wayproof.load_run(tmp_path / "out" / "simulated").scenario.aircraft.autopilot
+    assert autopilot is not None
+    assert autopilot.bank_limit_deg == 45.0
+    (tmp_path / "log.bin").write_bytes(
+        data.replace(struct.pack("<HHH", 7, 3, 16), struct.pack("<HHH", 7, 3, 18))
+    )
+    with pytest.raises(
+        wayproof.InputError, match="item 3 of its mission, loiter turns, is no corner; give --mission"
+    ):
+        wayproof.replay(tmp_path / "log.bin", "aerosonde", out=tmp_path / "out")
 
 
 @needs_flown
