@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -78,8 +79,6 @@ def check(
         float | None,
         typer.Option(
             metavar="R",
-            min=0.0,
-            max=1e6,
             help="Largest distance from corners. Default: T; at waypoints of a mission the acceptance radius in the "
             "file, else 90 m.",
         ),
@@ -116,6 +115,8 @@ def check(
     from harness.run_files.path_files import read_path
     from harness.scenario.shipped import scenario_path
 
+    if corner_m is not None and not 0.0 <= corner_m < math.inf:
+        raise typer.BadParameter(f"is {corner_m:g}; must be at least 0, and finite", param_hint="--corner-m")
     replaced = overrides(
         settings,
         aircraft=aircraft,

@@ -20,7 +20,7 @@ GIB = 2**30
 HEAD = """\
 schema: wayproof/scenario/1
 name: absurd
-area: {bounds_m: [0, 0, 350000, 350000]}
+area: {bounds_m: [0, 0, 280000, 280000]}
 mission: {start_m: [1000, 1000], goal_m: [20000, 20000], time_limit_s: 15}
 """
 
@@ -28,7 +28,7 @@ mission: {start_m: [1000, 1000], goal_m: [20000, 20000], time_limit_s: 15}
 def circles(number: int) -> str:
     draw = random.Random(1).uniform
     rows = (
-        f"  - circle: {{center_m: [{draw(30e3, 3.5e5):.2f}, {draw(30e3, 3.5e5):.2f}], radius_m: {draw(10, 300):.2f}}}\n"
+        f"  - circle: {{center_m: [{draw(30e3, 2.8e5):.2f}, {draw(30e3, 2.8e5):.2f}], radius_m: {draw(10, 300):.2f}}}\n"
         for _ in range(number)
     )
     return HEAD + "obstacles:\n" + "".join(rows)
@@ -36,7 +36,7 @@ def circles(number: int) -> str:
 
 def squares(number: int) -> str:
     draw = random.Random(1).uniform
-    corners = ((x, y) for x, y in ((draw(30e3, 3.5e5), draw(30e3, 3.5e5)) for _ in range(number)))
+    corners = ((x, y) for x, y in ((draw(30e3, 2.8e5), draw(30e3, 2.8e5)) for _ in range(number)))
     rows = (
         f"  - polygon: {{vertices_m: [[{x:.1f}, {y:.1f}], [{x + 50:.1f}, {y:.1f}], [{x:.1f}, {y + 50:.1f}]]}}\n"
         for x, y in corners
@@ -146,7 +146,7 @@ def test_a_value_beyond_reason_is_refused(
             [
                 ("sensor.rays", "100000"),
                 ("obstacles[0].circle.radius_m", "1e-9"),
-                ("area.bounds_m", "[-3e5, -3e5, 3e5, 3e5]"),
+                ("area.bounds_m", "[-2.8e5, -2.8e5, 2.8e5, 2.8e5]"),
                 ("sensor.rate_hz", "120"),
                 ("sensor.rate_hz", "0.01"),
                 ("sensor.range_m", "1e6"),

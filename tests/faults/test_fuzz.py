@@ -82,77 +82,49 @@ GEOJSON = {
         {"type": "Feature", "properties": {}, "geometry": {"type": "LineString", "coordinates": LINE}}
     ],
 }
-PLAN = {
-    "fileType": "Plan",
-    "mission": {
-        "plannedHomePosition": [47.0, 8.0, 400],
-        "items": [
-            {
-                "type": "SimpleItem",
-                "command": 16,
-                "frame": 3,
-                "doJumpId": 1,
-                "params": [0, 0, 0, None, *place, 120],
-            }
-            for place in ([47.0, 8.0], [47.0, 8.01], [47.01, 8.02])
-        ],
+
+
+def item(command: int, north: float, *params: float | None) -> dict[str, Any]:
+    """A simple item of a plan, 120 m above home."""
+    place = [47.0 + north, 8.0, 120]
+    return {"type": "SimpleItem", "command": command, "frame": 3, "params": [*params, *place]}
+
+
+def plan(*items: dict[str, Any], **more: Any) -> dict[str, Any]:
+    mission = {"firmwareType": 3, "plannedHomePosition": [47.0, 8.0, 400], "items": list(items)}
+    return {"fileType": "Plan", "mission": mission, **more}
+
+
+PLAN = plan(*(item(16, north, 0, 0, 0, None) for north in (0.0, 0.01, 0.02)))
+MISSION = plan(
+    item(22, 0.0, 15, 0, 0, None),
+    item(16, 0.01, 0, 30, 0, None),
+    item(18, 0.02, 2, 0, 150, None),
+    item(178, 0.0, 0, 22, 0, 0),
+    item(31, 0.03, 1, -150, 0, 1),
+    item(19, 0.04, 30, 0, 0, 0),
+    item(177, 0.0, 2, 1, 0, 0),
+    item(30, 0.0, 0, 0, 0, 0),
+    {
+        "type": "ComplexItem",
+        "complexItemType": "survey",
+        "TransectStyleComplexItem": {"Items": [item(16, 0.05, 0, 0, 0, None)]},
     },
-}
-MISSION = {
-    "fileType": "Plan",
-    "geoFence": {
+    {
+        "type": "ComplexItem",
+        "complexItemType": "fwLandingPattern",
+        "altitudesAreRelative": True,
+        "landCoordinate": [47.0, 8.0, 0],
+        "landingApproachCoordinate": [47.02, 8.0, 60],
+        "loiterRadius": 120,
+        "loiterClockwise": False,
+    },
+    geoFence={
         "polygons": [{"inclusion": True, "polygon": [[46.9, 7.9], [46.9, 8.2], [47.2, 8.0]]}],
         "circles": [{"inclusion": False, "circle": {"center": [47.1, 8.1], "radius": 100}}],
     },
-    "rallyPoints": {"points": [[47.0, 8.0, 50]]},
-    "mission": {
-        "firmwareType": 3,
-        "plannedHomePosition": [47.0, 8.0, 400],
-        "items": [
-            *(
-                {
-                    "type": "SimpleItem",
-                    "command": command,
-                    "frame": 3,
-                    "params": [*params, 47.0 + north, 8.0, 120],
-                }
-                for command, north, params in (
-                    (22, 0.0, [15, 0, 0, None]),
-                    (16, 0.01, [0, 30, 0, None]),
-                    (18, 0.02, [2, 0, 150, None]),
-                    (178, 0.0, [0, 22, 0, 0]),
-                    (31, 0.03, [1, -150, 0, 1]),
-                    (19, 0.04, [30, 0, 0, 0]),
-                    (177, 0.0, [2, 1, 0, 0]),
-                    (30, 0.0, [0, 0, 0, 0]),
-                )
-            ),
-            {
-                "type": "ComplexItem",
-                "complexItemType": "survey",
-                "TransectStyleComplexItem": {
-                    "Items": [
-                        {
-                            "type": "SimpleItem",
-                            "command": 16,
-                            "frame": 3,
-                            "params": [0, 0, 0, None, 47.05, 8.01, 90],
-                        }
-                    ]
-                },
-            },
-            {
-                "type": "ComplexItem",
-                "complexItemType": "fwLandingPattern",
-                "altitudesAreRelative": True,
-                "landCoordinate": [47.0, 8.0, 0],
-                "landingApproachCoordinate": [47.02, 8.0, 60],
-                "loiterRadius": 120,
-                "loiterClockwise": False,
-            },
-        ],
-    },
-}
+    rallyPoints={"points": [[47.0, 8.0, 50]]},
+)
 CSV = [["x_m", "y_m"], ["0", "0"], ["500", "0"], ["900", "700"]]
 WAYPOINTS = [
     ["QGC WPL 110"],

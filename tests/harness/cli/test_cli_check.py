@@ -130,6 +130,10 @@ def test_the_same_check_gives_the_same_digest(strip: Path, tmp_path: Path) -> No
         ),
         (["--aircraft", "aerosonde", "--set", "trackability.load_facter=2"], "did you mean load_factor?"),
         (["--aircraft", "c172p", "--airspeed-mps", "60", "--altitude-m", "9000"], "cannot be trimmed"),
+        (
+            ["--aircraft", "aerosonde", "--corner-m", "inf"],
+            "--corner-m: is inf; must be at least 0, and finite",
+        ),
         ([], "Missing option"),
     ],
 )
