@@ -15,7 +15,7 @@ import numpy as np
 from harness.files.wording import counted
 from harness.world_files.cells import outlines
 from harness.world_files.height_field import HeightField
-from harness.world_files.parts import Box, Datum, FloatArray, Part, WorldFileError
+from harness.world_files.parts import Box, Datum, FloatArray, Limit, Part, WorldFileError
 from harness.world_files.plane import Mapping
 
 PROBES: Final = 5
@@ -111,36 +111,47 @@ def _solid(part: Part, shape: Any, band: HeightBand, ground: KnownGround) -> lis
     """A part as far as it reaches into the band, where its limits make it largest; None: the ground is not known."""
     import shapely
 
-    sea_low = part.bottom.height_m if part.bottom.datum is Datum.SEA else -math.inf
-    sea_high = part.top.height_m if part.top.datum is Datum.SEA else math.inf
-    if sea_low > band.high_m or sea_high < band.low_m:  # whatever the ground
+    if part.bottom.datum is Datum.SEA and part.bottom.height_m > band.high_m:
         return []
-    field, heights, corner = ground.field, np.zeros((1, 1)), (0.0, 0.0)
+    if part.top.datum is Datum.SEA and part.top.height_m < band.low_m:  # whatever the ground
+        return []
     on_ground = Datum.GROUND in (part.bottom.datum, part.top.datum)
-    if on_ground and field is None:
-        heights = np.array([[math.nan]])
-    elif on_ground and field is not None and part.rigid:
-        heights = _probed(field, shape)
-    elif on_ground and field is not None:
+    if on_ground and ground.field is not None and not part.rigid:
         shape = shapely.intersection(shape, shapely.box(*ground.known_in))
         if shape.is_empty:
             return []
-        heights, corner = _nodes_under(field, shapely.bounds(shape).tolist())
-    if ground.flat_m is not None:
-        heights = np.where(np.isfinite(heights), heights, ground.flat_m)
+    heights, corner = _ground_below(part, shape, ground) if on_ground else (np.zeros((1, 1)), (0.0, 0.0))
     if not heights.size or not np.isfinite(heights).all():
         return None
-    lows, tops = (
-        limit.height_m + (heights if limit.datum is Datum.GROUND else 0.0 * heights)
-        for limit in (part.bottom, part.top)
-    )
+    lows, tops = _heights(part.bottom, heights), _heights(part.top, heights)
     solid = Solid(shape, float(lows.min()), float(tops.max()))
     mask = (lows <= band.high_m) & (tops >= band.low_m)
-    if part.rigid or mask.all() or field is None:
-        return [solid] if solid.low_m <= band.high_m and solid.high_m >= band.low_m else []
-    cells, _ = outlines(mask)
-    placed = shapely.transform(cells, lambda p: p * field.spacing_m + corner)
+    if part.rigid:  # it stands level, as low and as high as its limits are anywhere
+        mask = np.array([[solid.low_m <= band.high_m and solid.high_m >= band.low_m]])
+    if mask.all() or not mask.any() or ground.field is None:
+        return [solid] if mask.all() else []
+    spacing = ground.field.spacing_m
+    placed = shapely.transform(outlines(mask)[0], lambda p: p * spacing + corner)
     return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]
+
+
+def _heights(limit: Limit, ground_m: FloatArray) -> FloatArray:
+    """A limit above mean sea level, wherever the ground is known."""
+    return limit.height_m + (ground_m if limit.datum is Datum.GROUND else np.zeros(ground_m.shape))
+
+
+def _ground_below(part: Part, shape: Any, ground: KnownGround) -> tuple[FloatArray, tuple[float, float]]:
+    """Heights of the ground below a part, NaN where it is not known; and the first corner of their cells."""
+    import shapely
+
+    heights, corner = np.array([[math.nan]]), (0.0, 0.0)
+    if ground.field is not None and part.rigid:
+        heights = _probed(ground.field, shape)
+    elif ground.field is not None:
+        heights, corner = _nodes_under(ground.field, shapely.bounds(shape).tolist())
+    if ground.flat_m is not None:
+        heights = np.where(np.isfinite(heights), heights, ground.flat_m)
+    return heights, corner
 
 
 def _nodes_under(field: HeightField, bounds: list[float]) -> tuple[FloatArray, tuple[float, float]]:

@@ -58,24 +58,39 @@ def read(path: Path, reading: Reading) -> Contents:
         ):
             vertices, turned = vertices[:, [1, 0, 2]], True
         for name, thing in content["CityObjects"].items():
-            kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
-            if not kind.startswith(SOLID):
-                passed[kind] += 1
-                continue
-            instances = sum(each["type"] == INSTANCE for each in _geometries(thing))
-            passed[INSTANCE] += instances
-            part = _part(name, thing, vertices, reading, doubts)
-            parts += [] if part is None else [part]
-            passed["building without a shape"] += part is None and not (thing.get("children") or instances)
+            parts += _object(name, thing, vertices, reading, doubts, passed)
     if not parts:
         raise WorldFileError("has no building with a shape; must have some")
     notes += ["its latitudes are taken to come first"] if turned else []
-    notes += doubts.notes(reading)
-    if told := [f"{number} {kind}" for kind, number in passed.most_common() if number]:
-        notes.append(f"passed over: {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}")
+    notes += [*doubts.notes(reading), *_passed_over(passed)]
     if crs is None:
         notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
     return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
+
+
+def _passed_over(passed: Counter[str]) -> list[str]:
+    told = [f"{number} {kind}" for kind, number in passed.most_common() if number]
+    return [f"passed over: {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}"] if told else []
+
+
+def _object(
+    name: str,
+    thing: Any,
+    vertices: FloatArray,
+    reading: Reading,
+    doubts: limits.Doubts,
+    passed: Counter[str],
+) -> list[Part]:
+    """The part that an object is, if it is one; what of it is passed over is counted."""
+    kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
+    if not kind.startswith(SOLID):
+        passed[kind] += 1
+        return []
+    instances = sum(each["type"] == INSTANCE for each in _geometries(thing))
+    passed[INSTANCE] += instances
+    part = _part(name, thing, vertices, reading, doubts)
+    passed["building without a shape"] += part is None and not (thing.get("children") or instances)
+    return [] if part is None else [part]
 
 
 def _height_unit_m(crs: str, notes: list[str]) -> float:
@@ -115,20 +130,17 @@ def _part(
     import shapely
 
     shapes, low, high = [], math.inf, -math.inf
-    areal = [each for each in _geometries(thing) if each["type"].endswith(("Surface", "Solid"))]
-    best = max((str(each.get("lod", "0")) for each in areal), default="")
-    for geometry in (each for each in areal if str(each.get("lod", "0")) == best):
-        for surface in _surfaces(geometry.get("boundaries")):
-            rings = [_places(ring, vertices, name) for ring in surface if len(ring) >= 3]
-            if not rings or len(surface[0]) < 3:
-                continue
-            heights = np.concatenate(rings)[:, 2]
-            low, high = min(low, float(heights.min())), max(high, float(heights.max()))
-            shape = shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]])
-            if not shape.is_valid:
-                shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
-            if shape.area > WALL * shape.length**2:
-                shapes.append(shape)
+    for surface in _best_surfaces(thing):
+        rings = [_places(ring, vertices, name) for ring in surface if len(ring) >= 3]
+        if not rings or len(surface[0]) < 3:
+            continue
+        heights = np.concatenate(rings)[:, 2]
+        low, high = min(low, float(heights.min())), max(high, float(heights.max()))
+        shape = shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]])
+        if not shape.is_valid:
+            shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
+        if shape.area > WALL * shape.length**2:
+            shapes.append(shape)
     if not shapes:
         return None
     footprint, tags = shapely.union_all(shapes), thing.get("attributes")
@@ -138,6 +150,15 @@ def _part(
         if high <= low:
             high = low + limits.building(tags, footprint, reading, doubts).top.height_m
     return Part(footprint, Limit(low), Limit(high), name=name[:40])
+
+
+def _best_surfaces(thing: dict[str, Any]) -> Iterator[list[list[Any]]]:
+    """Surfaces of an object at its highest level of detail."""
+    areal = [each for each in _geometries(thing) if each["type"].endswith(("Surface", "Solid"))]
+    best = max((str(each.get("lod", "0")) for each in areal), default="")
+    for geometry in areal:
+        if str(geometry.get("lod", "0")) == best:
+            yield from _surfaces(geometry.get("boundaries"))
 
 
 def _places(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:

@@ -37,22 +37,21 @@ _WORD: Final = re.compile(
     r"M(?!\w)|M(?=AMSL|MSL|AGL|ASFC|GND|SFC)|AGL|ASFC|GND|SFC|GROUND|ALT|STD|QNH|ABOVE|SEA|LEVEL|RELATIVE|[()'./]"
 )
 """Words that a limit may consist of. Nothing is guessed of a limit with other words, as `ASK 123.5`."""
+_SIDES: Final = {"lower": ("lower|floor|bottom", "min"), "upper": ("upper|ceiling|top", "max")}
+"""Beginnings of the names of attributes with a limit; the last belong to altitudes only."""
 _NAMES: Final = {
     side: re.compile(
         rf"(?:(?:{words})(?:limit)?(?:val|altitude)?|{end}alt(?:itude)?)((?:ft|feet|m|metres|agl|amsl|msl|gnd)*)"
     )
-    for side, words, end in (("lower", "lower|floor|bottom", "min"), ("upper", "upper|ceiling|top", "max"))
+    for side, (words, end) in _SIDES.items()
 }
 """Names of attributes with a limit, without underscores; unit and reference may follow, as in `floor_ft_agl`."""
-_BEGINS: Final = {"lower": ("lower", "min", "floor", "bottom"), "upper": ("upper", "max", "ceiling", "top")}
-"""Beginnings of the names of attributes that say something of one of the limits."""
-_UNITS: Final = (("uom", "unit"), ("uom", "unit", "units", "uomdimensions", "altitudeunit"))
-"""Parts of the name of the attribute with the unit of one limit, and names of an attribute with that of both."""
-_REFERENCES: Final = (
-    ("ref", "code", "datum", "type"),
-    ("reference", "altitudereference", "verticalreference", "datum", "verticaldatum", "heightreference"),
+_OWN: Final = re.compile("uom|unit|ref|code|datum|type")
+"""Parts of the names of attributes with the unit or the reference of one limit."""
+_BOTH: Final = re.compile(
+    r"uom|units?|uomdimensions|altitudeunit|(altitude|vertical|height)?reference|(vertical)?datum"
 )
-"""The same for what a limit is counted from."""
+"""Names of attributes with the unit or the reference of both."""
 _NO_NUMBER: Final = -9000.0
 """A limit as low as this stands for one that is not known, as -9998 in files of the FAA."""
 
@@ -105,35 +104,50 @@ def limit_of(text: str) -> Limit | None:
     return Limit(value * (1.0 if _METRES.search(word) else FOOT_M), Datum.GROUND if ground else Datum.SEA)
 
 
-def limit_told(value: Any, unit: str, reference: str, notes: list[str], name: str) -> Limit | None:
-    """A limit whose unit and reference stand apart; what is missing is metres above mean sea level, which is noted.
+def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | None:
+    """A limit whose unit and reference may stand apart; what is missing is metres above mean sea level, and noted.
 
     Args:
-        value: a number or a text, which may have a unit and a reference of its own.
-        unit: as m, ft, FL; empty where none is given.
-        reference: as AGL, AMSL; empty where none is given.
+        value: a number or a text.
+        said: the unit and the reference, where the value has none, as `FT AGL`, `m AMSL`, `FL`.
         notes: are added to.
         name: of the part.
     """
     if isinstance(value, bool | Mapping | list) or value is None:
         return None
-    word, unit, reference = str(value).strip().upper(), unit.strip().upper(), reference.upper()
-    if re.fullmatch(r"[-+]?[\d.]+", word) and float(word.strip(".") or 0) != 0.0 and unit == "FL":
-        word = f"FL {word}"
-    told = []
-    if re.search(r"[1-9]", word) and not _UNIT.search(word):
-        told += [] if unit else ["its limits name no unit; taken as metres"]
-        word = re.sub(r"([\d.]+)", rf"\1 {'FT' if unit.startswith('F') else 'M'} ", word, count=1)
-    if re.search(r"[1-9]", word) and not (_GROUND.search(word) or _SEA.search(word)):
-        word += " AGL" if _GROUND.search(reference) else " AMSL"
-        if re.search("WGS|W84|HAE|ELLIPS", reference):
-            told.append("its limits are above the ellipsoid; taken as above mean sea level")
-        elif not (_GROUND.search(reference) or _SEA.search(reference)):
-            told.append("its limits name no reference; taken as above mean sea level")
+    word, said, told = str(value).strip().upper(), said.upper(), list[str]()
+    if re.search(r"[1-9]", word):  # a height, and not the surface
+        word = _with_reference(_with_unit(word, said, told), said, told)
     limit = limit_of(word)
     new = [f"{name or 'a part'}: {each}" for each in told] if limit is not None else []
     notes += [each for each in new if each not in notes[-4:]]
     return limit
+
+
+def _with_unit(word: str, said: str, told: list[str]) -> str:
+    """A height with the unit that is said of it, where it has none."""
+    if _UNIT.search(word):
+        return word
+    unit = re.search(r"\b(FL|F|FT|FEET|FOOT|M|MTR|MET(ER|RE)S?)\b", said)
+    if unit is None:
+        told.append("its limits name no unit; taken as metres")
+    elif unit[1] == "FL":
+        return f"FL {word}"
+    metres = unit is None or unit[1].startswith("M")
+    return re.sub(r"([\d.]+)", rf"\1 {'M' if metres else 'FT'} ", word, count=1)
+
+
+def _with_reference(word: str, said: str, told: list[str]) -> str:
+    """A height with the reference that is said of it, where it has none."""
+    if _GROUND.search(word) or _SEA.search(word):
+        return word
+    if _GROUND.search(said):
+        return f"{word} AGL"
+    if re.search("WGS|W84|HAE|ELLIPS", said):
+        told.append("its limits are above the ellipsoid; taken as above mean sea level")
+    elif not _SEA.search(said):
+        told.append("its limits name no reference; taken as above mean sea level")
+    return f"{word} AMSL"
 
 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:
@@ -142,8 +156,9 @@ def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: st
     Files write an upper limit of 0 where there is none; a zone of no height would forbid nothing.
     """
     told = f"{name or 'a part'}: its"
-    if lower is None or upper is None:
-        which = "limits are" if lower is upper else "lower limit is" if lower is None else "upper limit is"
+    unknown = [side for side, limit in (("lower", lower), ("upper", upper)) if limit is None]
+    if unknown:
+        which = "limits are" if len(unknown) == 2 else f"{unknown[0]} limit is"
         notes.append(f"{told} {which} not known; taken as without")
     bottom, top = lower or NO_BOTTOM, upper or NO_TOP
     if top == NO_BOTTOM or (top.height_m == 0.0 and bottom.height_m in (0.0, -math.inf)):
@@ -151,7 +166,7 @@ def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: st
         top = NO_TOP
     if bottom == NO_TOP or (bottom.datum is top.datum and bottom.height_m > top.height_m):
         notes.append(f"{told} lower limit lies above the upper one; taken the other way round")
-        bottom, top = (NO_BOTTOM if bottom == NO_TOP else top), (NO_TOP if bottom == NO_TOP else bottom)
+        bottom, top = (NO_BOTTOM, NO_TOP) if bottom == NO_TOP else (top, bottom)
     return bottom, top
 
 
@@ -166,21 +181,25 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
         raise WorldFileError(
             "is a facility map of the FAA, up to whose ceilings one may fly; give the airspace"
         )
-    found: list[Limit | None] = []
-    for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
-        matches = ((key, _NAMES[side].fullmatch(key)) for key in said)
-        key, tail = next(((key, match[1]) for key, match in matches if match), ("", ""))
-        unit = "ft" if "f" in tail else "m" if tail.startswith("m") and tail != "msl" else ""
-        reference = "agl" if "agl" in tail or "gnd" in tail else "msl" if "msl" in tail else ""
-        unit, reference = unit or _said(said, side, _UNITS), reference or _said(said, side, _REFERENCES)
-        found.append(limit_told(said[key], unit, reference, notes, name) if key else none)
-    return band_of(found[0], found[1], notes, name)
+    both = [str(value) for key, value in said.items() if _BOTH.fullmatch(key)]
+    lower = _side(said, "lower", both, notes, name) if _key(said, "lower") else NO_BOTTOM
+    upper = _side(said, "upper", both, notes, name) if _key(said, "upper") else NO_TOP
+    return band_of(lower, upper, notes, name)
 
 
-def _said(said: Mapping[str, Any], side: str, names: tuple[tuple[str, ...], tuple[str, ...]]) -> str:
-    """What an attribute says of one limit, else one that says it of both; empty where none does."""
-    own = [each for each in said if each.startswith(_BEGINS[side]) and any(part in each for part in names[0])]
-    return next((str(said[each]) for each in (*own, *names[1]) if each in said), "")
+def _key(said: Mapping[str, Any], side: str) -> re.Match[str] | None:
+    """The name of the attribute with a limit; None where there is none."""
+    return next((match for key in said if (match := _NAMES[side].fullmatch(key))), None)
+
+
+def _side(said: Mapping[str, Any], side: str, both: list[str], notes: list[str], name: str) -> Limit | None:
+    """One limit of an airspace, with what its name and other attributes say of it."""
+    match, begins = _key(said, side), re.compile("|".join(_SIDES[side]))
+    if match is None:
+        return None
+    own = [str(value) for key, value in said.items() if begins.match(key) and _OWN.search(key)]
+    words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
+    return limit_told(said[match[0]], " ".join((*words, *own, *both)), notes, name)
 
 
 def has_limits(tags: Mapping[str, Any]) -> bool:

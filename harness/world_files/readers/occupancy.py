@@ -67,18 +67,20 @@ def read_ros(path: Path, reading: Reading) -> Contents:
         raise WorldFileError(str(error).removeprefix("map:")) from error
     if not isinstance(keys, dict) or not isinstance(keys.get("image"), str):
         raise WorldFileError("names no image; must be a map of ROS map_server")
-    mode = str(keys.get("mode", "trinary")).lower()
-    if mode not in MODES:
-        raise WorldFileError(f"has the mode {mode[:20]!r}; must be one of {', '.join(MODES)}")
-    size = keys.get("resolution", 0.0)
-    if not _is_number(size) or not 0 < size < 1e6:
-        raise WorldFileError("has no positive resolution; must be a map of ROS map_server")
+    mode, size = str(keys.get("mode", "trinary")).lower(), keys.get("resolution", 0.0)
     origin = keys.get("origin", (0.0, 0.0, 0.0))
-    if not (isinstance(origin, tuple) and len(origin) in (2, 3) and all(map(_is_number, origin))):
-        raise WorldFileError("has an origin that is not [x, y, yaw]")
     over, under = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
-    if not all(_is_number(each) and 0.0 <= each <= 1.0 for each in (over, under)):
-        raise WorldFileError(f"has the thresholds {over} and {under}; must be shares between 0 and 1")
+    shares = all(_is_number(each) and 0.0 <= each <= 1.0 for each in (over, under))
+    for is_right, fault in (
+        (mode in MODES, f"the mode {mode[:20]!r}; must be one of {', '.join(MODES)}"),
+        (_is_number(size) and 0 < size < 1e6, "no positive resolution; must be a map of ROS map_server"),
+        (isinstance(origin, tuple) and len(origin) in (2, 3), "an origin that is not [x, y, yaw]"),
+        (shares, f"the thresholds {over} and {under}; must be shares between 0 and 1"),
+    ):
+        if not is_right:
+            raise WorldFileError(f"has {fault}")
+    if not all(map(_is_number, origin)):
+        raise WorldFileError("has an origin that is not [x, y, yaw]")
     grey = _greys(path.parent / keys["image"])
     share = grey / (100.0 if mode == "raw" else 255.0)
     if mode == "raw":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -38,30 +38,35 @@ class _Airspace:
 
     def take(self, command: str, rest: str) -> None:
         """One command of it."""
-        name, _, value = rest.partition("=")
-        word = command if command != "V" else f"V{name.strip().upper()}"
-        if word == "AN":
+        name, _, value = (part.strip() for part in rest.partition("="))
+        if command == "AN":
             self.name = rest[:40]
-        elif word in ("AL", "AH"):
-            (self.lower if word == "AL" else self.upper).append(limits.limit_of(rest))
-        elif word in ("DP", "DY"):
-            (self.ring if word == "DP" else self.line).append(_places(rest, 1)[0])
-        elif word == "VX":
+        elif command in ("AL", "AH"):
+            (self.lower if command == "AL" else self.upper).append(limits.limit_of(rest))
+        elif command != "V":
+            self._draw(command, rest)
+        elif name.upper() == "X":
             self.center = _places(value, 1)[0]
-        elif word == "VD":
-            self.clockwise = not value.strip().startswith("-")
-        elif word == "VW":
+        elif name.upper() == "D":
+            self.clockwise = not value.startswith("-")
+        elif name.upper() == "W":
             self.width_m = _numbers(value, 1)[0] * MILE_M
-        elif word in ("DC", "DA", "DB") and self.center is None:
+
+    def _draw(self, command: str, rest: str) -> None:
+        """A corner, a circle or an arc."""
+        if command in ("DP", "DY"):
+            (self.ring if command == "DP" else self.line).append(_places(rest, 1)[0])
+        elif self.center is None:
             raise WorldFileError("has an arc or circle before its centre `V X=`")
-        elif word == "DC" and self.center:
+        elif command == "DC":
             self.shapes.append(circle(self.center, _numbers(rest, 1)[0] * MILE_M))
-        elif word == "DA" and self.center:
+        elif command == "DA":
             radius, begin, end = _numbers(rest, 3)
-            radius_m, whole = radius * MILE_M, begin != end and (end - begin) % 360.0 == 0.0
-            self.shapes += [circle(self.center, radius_m)] if whole else []
-            self.ring += [] if whole else arc(self.center, begin, end, (radius_m,) * 2, self.clockwise)
-        elif word == "DB" and self.center:
+            if begin != end and (end - begin) % 360.0 == 0.0:
+                self.shapes.append(circle(self.center, radius * MILE_M))
+            else:
+                self.ring += arc(self.center, begin, end, (radius * MILE_M,) * 2, self.clockwise)
+        else:
             first, last = _places(rest, 2)
             (begin, near), (end, far) = (polar(self.center, place) for place in (first, last))
             if first == last and not self.ring:  # else a small arc whose ends were rounded
@@ -96,21 +101,12 @@ def read(path: Path, reading: Reading) -> Contents:
     spaces: list[_Airspace] = []
     ignored = Counter[str]()
     for number, line in enumerate(text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines(), 1):
-        command, *more = line.partition("*")[0].split(None, 1) or ("",)
-        command, rest = command.upper(), more[0].strip() if more else ""
-        last = spaces[-1] if spaces else None
-        is_drawn = last is not None and bool(last.ring or last.line or last.shapes)
-        if command == "AC" and last and not last.kind and not is_drawn:
-            last.kind = rest  # its name stood before its class
-        elif command == "AC" or (command == "AN" and (last is None or is_drawn)):
-            spaces.append(_Airspace(rest) if command == "AC" else _Airspace("", rest[:40]))
-        elif last and command in ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V"):
-            try:
-                last.take(command, rest)
-            except WorldFileError as error:
-                raise WorldFileError(f"line {number}: {error}") from error
-        elif command:
-            ignored[command] += 1
+        command, _, rest = (part.strip() for part in line.partition("*")[0].strip().partition(" "))
+        try:
+            if command:
+                _take(spaces, command.upper(), rest, ignored)
+        except WorldFileError as error:
+            raise WorldFileError(f"line {number}: {error}") from error
     notes: list[str] = []
     parts = [each.parts(notes) for each in spaces]
     if not any(parts):
@@ -120,14 +116,36 @@ def read(path: Path, reading: Reading) -> Contents:
         len(classes) > 6
     )
     notes.append(f"airspaces of every class are solid ({told}): take out what may be flown in")
-    if timed := ignored.pop("AA", 0):
-        notes.append(f"{counted(timed, 'time')} of activation passed over: taken as always active")
-    if ignored:
-        words, lines = ", ".join(repr(word[:12]) for word in [*ignored][:4]), counted(ignored.total(), "line")
-        notes.append(f"{lines} with commands that say nothing of a shape passed over: {words}")
-    if empty := sum(not each for each in parts):
-        notes.append(f"{counted(empty, 'airspace')} without an area passed over")
+    notes += _passed_over(ignored, sum(not each for each in parts))
     return Contents("openair", WGS84, tuple(part for each in parts for part in each), notes=tuple(notes))
+
+
+def _passed_over(ignored: Counter[str], empty: int) -> Iterator[str]:
+    """What is said of lines by their commands, and of airspaces without an area."""
+    if timed := ignored.pop("AA", 0):
+        yield f"{counted(timed, 'time')} of activation passed over: taken as always active"
+    if ignored:
+        words = ", ".join(repr(word[:12]) for word in [*ignored][:4])
+        yield f"{counted(ignored.total(), 'line')} with commands that say nothing of a shape passed over: {words}"
+    if empty:
+        yield f"{counted(empty, 'airspace')} without an area passed over"
+
+
+def _take(spaces: list[_Airspace], command: str, rest: str, ignored: Counter[str]) -> None:
+    """One line of a file; an airspace begins with its class, or without one with its name."""
+    # Before the first it is as behind one that is whole.
+    last = spaces[-1] if spaces else _Airspace("none", shapes=[None])
+    is_drawn = bool(last.ring or last.line or last.shapes)
+    if command == "AC" and not last.kind and not is_drawn:
+        last.kind = rest  # its name stood before its class
+    elif command == "AC":
+        spaces.append(_Airspace(rest))
+    elif command == "AN" and is_drawn:
+        spaces.append(_Airspace("", rest[:40]))
+    elif spaces and command in ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V"):
+        last.take(command, rest)
+    else:
+        ignored[command] += 1
 
 
 def _numbers(text: str, count: int) -> Sequence[float]:

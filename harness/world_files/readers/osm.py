@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -68,52 +69,74 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
     Raises:
         WorldFileError: it is damaged, has no building, or osmium is not installed.
     """
-    import shapely
-
     read_bytes(path, first=1)
     osmium = _osmium()
     keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
-    shape_of = osmium.geom.WKBFactory()
-    parts: list[Part] = []
-    doubts, told = limits.Doubts(), Counter[str]()
-    ways: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = {}
+    found = _Found(reading, osmium.geom.WKBFactory())
     try:
         for each in osmium.FileProcessor(str(path)).with_locations().with_areas().with_filter(keys):
-            tags = {tag.k: tag.v for tag in each.tags}
-            if each.is_area():
-                name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
-                if is_building(tags) and each.num_rings()[0]:
-                    shape = shapely.from_wkb(shape_of.create_multipolygon(each))
-                    shape = shape.geoms[0] if len(shape.geoms) == 1 else shape
-                    parts.append(limits.building(tags, shape, reading, doubts, name))
-                    ways.pop(name, None)
-                continue
-            kind = "point" if each.is_node() else "way" if each.is_way() else "relation"
-            if is_building(tags) and kind != "point":
-                nodes = each.nodes if kind == "way" else ()
-                places = [(node.lon, node.lat) for node in nodes if node.location.valid()]
-                ways[f"{kind} {each.id}"] = tags, places  # its area comes later, or none
-            elif is_tall(tags) or limits.metres_of(tags.get("height")) is not None:
-                told[kind] += 1
+            found.take(each, {tag.k: tag.v for tag in each.tags})
     except (RuntimeError, ValueError, OSError, MemoryError) as error:
         raise WorldFileError(
             f"cannot be read by osmium ({' '.join(str(error).split())[:80]}); it may be torn"
         ) from error
-    for name, (tags, places) in ways.items():
-        is_there = len(set(places)) >= 3
-        told["closed" if is_there else "broken"] += 1
-        if is_there:
-            parts.append(limits.building(tags, shapely.Polygon(places), reading, doubts, name))
-    if not parts:
-        raise WorldFileError("has no building with an outline; must be an extract of OpenStreetMap with some")
-    notes = doubts.notes(reading)
-    if told["closed"]:
-        notes.append(f"{counted(told['closed'], 'building')} with an open outline closed by a straight line")
-    if told["broken"]:
-        notes.append(f"{counted(told['broken'], 'building')} whose outline is not there passed over")
-    if plain := [counted(told[kind], kind) for kind in ("point", "way", "relation") if told[kind]]:
-        notes.append(f"{' and '.join(plain)} with a height, or a mast, without an area passed over")
-    return Contents("osm", WGS84, tuple(parts), notes=tuple(notes))
+    return found.contents()
+
+
+@dataclass
+class _Found:
+    """What was found so far; `ways` are buildings whose area comes later, or never, by their names."""
+
+    reading: Reading
+    shape_of: Any
+    parts: list[Part] = field(default_factory=list)
+    doubts: limits.Doubts = field(default_factory=limits.Doubts)
+    told: Counter[str] = field(default_factory=Counter)
+    ways: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = field(default_factory=dict)
+
+    def take(self, each: Any, tags: dict[str, str]) -> None:
+        """An object of osmium."""
+        import shapely
+
+        if each.is_area():
+            name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
+            if is_building(tags) and each.num_rings()[0]:
+                shape = shapely.from_wkb(self.shape_of.create_multipolygon(each))
+                self._add(tags, shape.geoms[0] if len(shape.geoms) == 1 else shape, name)
+                self.ways.pop(name, None)
+            return
+        kind = "point" if each.is_node() else "way" if each.is_way() else "relation"
+        if is_building(tags) and kind != "point":
+            nodes = each.nodes if kind == "way" else ()
+            places = [(node.lon, node.lat) for node in nodes if node.location.valid()]
+            self.ways[f"{kind} {each.id}"] = tags, places
+        elif is_tall(tags) or limits.metres_of(tags.get("height")) is not None:
+            self.told[kind] += 1
+
+    def _add(self, tags: dict[str, str], shape: Any, name: str) -> None:
+        self.parts.append(limits.building(tags, shape, self.reading, self.doubts, name))
+
+    def contents(self) -> Contents:
+        """All buildings, those with an open outline closed."""
+        import shapely
+
+        whole = {name: (tags, ring) for name, (tags, ring) in self.ways.items() if len(set(ring)) >= 3}
+        for name, (tags, ring) in whole.items():
+            self._add(tags, shapely.Polygon(ring), name)
+        if not self.parts:
+            raise WorldFileError(
+                "has no building with an outline; must be an extract of OpenStreetMap with some"
+            )
+        notes = self.doubts.notes(self.reading)
+        if whole:
+            notes.append(f"{counted(len(whole), 'building')} with an open outline closed by a straight line")
+        if broken := len(self.ways) - len(whole):
+            notes.append(f"{counted(broken, 'building')} whose outline is not there passed over")
+        if plain := [
+            counted(self.told[kind], kind) for kind in ("point", "way", "relation") if self.told[kind]
+        ]:
+            notes.append(f"{' and '.join(plain)} with a height, or a mast, without an area passed over")
+        return Contents("osm", WGS84, tuple(self.parts), notes=tuple(notes))
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:

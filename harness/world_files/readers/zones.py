@@ -135,7 +135,7 @@ def _band(
     found: list[Limit | None] = []
     for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
         value, reference = says.get(f"{side}{ends[0]}"), str(says.get(f"{side}{ends[1]}") or "")
-        told = limits.limit_told(value, _unit(unit), reference, notes, name)
+        told = limits.limit_told(value, f"{_unit(unit)} {reference}", notes, name)
         found.append(none if value is None else told)
     return limits.band_of(found[0], found[1], notes, name)
 
