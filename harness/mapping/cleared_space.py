@@ -56,6 +56,38 @@ def first_over(bearing_rad: float, spacing_rad: float, beam_rad: float, aside: i
     return math.floor((bearing_rad + 0.5 * min(beam_rad, spacing_rad)) / spacing_rad) - aside
 
 
+@compiled(FLOAT, FLOAT, FLOAT)
+def clockwise_of(east: float, north: float, start_rad: float) -> float:
+    """The bearing of an offset, clockwise from another one in [0, 2 pi); not negative."""
+    turned = math.atan2(east, north) - start_rad
+    while turned < 0.0:
+        turned += math.tau
+    return turned
+
+
+@compiled(FLOAT, FLOAT, FLOAT, FLOAT, FLOATS, FLOAT)
+def is_hidden(
+    east: float, north: float, start_rad: float, spacing_rad: float, ranges: FloatArray, beyond: float
+) -> bool:
+    """Whether the beam towards an offset, or a neighbour, surely goes no further than `beyond`."""
+    if spacing_rad <= 2.0 * NEARLY_RAD:
+        return False
+    ray = nearly_towards(east, north, start_rad, spacing_rad)
+    return 0 <= ray < len(ranges) and ranges[ray] <= beyond
+
+
+@compiled(FLOATS, COUNT, COUNT, FLOAT)
+def first_short(ranges: FloatArray, first: int, many: int, beyond: float) -> int:
+    """The first of so many neighbouring beams that does not go beyond a distance; -1 where all do."""
+    rays = len(ranges)
+    beside = first % rays
+    for _ in range(many):
+        if not ranges[beside] > beyond:
+            return beside
+        beside = beside + 1 if beside + 1 < rays else 0
+    return -1
+
+
 @compiled(CELLS_OUT, LOOKS_OUT, CELLS, FLOATS, *[FLOAT] * 6, BOOL, FLOAT, FLOAT, COUNT, COUNT)
 def through_cells(
     seen: BoolArray,
@@ -83,7 +115,7 @@ def through_cells(
     is not read where once is enough (`needed`). The first cell's corner lies at `x_first`, `y_first` from the sensor.
     Ranges count up to `reach`; beams have to go beyond a cell by `noise`, and so have `aside` more to either side.
     """
-    rays, half, coarse = len(ranges), 0.75 * cell, spacing_rad > 2.0 * NEARLY_RAD
+    rays, half = len(ranges), 0.75 * cell
     for column in range(seen.shape[0]):
         x = (column + 0.5) * cell + x_first
         for row in range(seen.shape[1]):
@@ -95,33 +127,23 @@ def through_cells(
             beyond = distance + half + noise
             if beyond >= reach:
                 continue
-            if coarse and needed == 1:
-                ray = nearly_towards(x, y, start_rad, spacing_rad)
-                if 0 <= ray < rays and ranges[ray] <= beyond:
-                    continue
-            clockwise = math.atan2(x, y) - start_rad
-            while clockwise < 0.0:
-                clockwise += math.tau
+            if needed == 1 and is_hidden(x, y, start_rad, spacing_rad, ranges, beyond):
+                continue
+            clockwise = clockwise_of(x, y, start_rad)
             wide = math.asin(half / distance) if distance > half else math.pi
             first = first_over(clockwise - wide, spacing_rad, beam_rad, aside)
             # Seen from the other side, the last is the first.
             last = -first_over(-clockwise - wide, spacing_rad, beam_rad, aside)
-            if last - first + 1 >= rays:
-                first, last = 0, rays - 1
-                if not closed:
-                    continue
-            elif not closed and not 0 <= first <= last < rays:
+            many = min(last - first + 1, rays)
+            if not closed and (many == rays or not 0 <= first <= last < rays):
                 continue
-            beside, left = first % rays, last - first + 1
-            while left and ranges[beside] > beyond:
-                beside = beside + 1 if beside + 1 < rays else 0
-                left -= 1
+            short = first_short(ranges, 0 if many == rays else first, many, beyond)
             if needed == 1:
-                seen[column, row] = not left
-            elif not left:
+                seen[column, row] = short < 0
+            elif short < 0:
                 looks[column, row] += 1
                 seen[column, row] = looks[column, row] >= needed
-            elif ranges[beside] > distance - half - noise:
+            elif ranges[short] > distance - half - noise:
                 looks[column, row] = 0
 
 
@@ -148,30 +170,21 @@ def through_places(
     these one in `every`. The beams, the one towards a place and `abreast` to either side, have to go further by
     `sure_m`, and the middle of that one to pass by no further than `aimed_m`.
     """
-    many, rays, coarse = 0, len(ranges), spacing_rad > 2.0 * NEARLY_RAD
+    many, rays = 0, len(ranges)
     for i in range(0, len(places), every):
         dx, dy = places[i].real - east, places[i].imag - north
         distance = math.hypot(dx, dy)
         if distance >= within_m:
             continue
-        if coarse:
-            ray = nearly_towards(dx, dy, start_rad, spacing_rad)
-            if 0 <= ray < rays and ranges[ray] <= distance + sure_m:
-                continue
-        clockwise = math.atan2(dx, dy) - start_rad
-        while clockwise < 0.0:
-            clockwise += math.tau
-        towards = clockwise / spacing_rad
+        if is_hidden(dx, dy, start_rad, spacing_rad, ranges, distance + sure_m):
+            continue
+        towards = clockwise_of(dx, dy, start_rad) / spacing_rad
         ray = round(towards)
         if (abs(towards - ray) * spacing_rad - 0.5 * beam_rad) * distance >= aimed_m:
             continue
         if not closed and not abreast <= ray < rays - abreast:
             continue
-        beside, left = (ray - abreast) % rays, 2 * abreast + 1
-        while left and ranges[beside] > distance + sure_m:
-            beside = beside + 1 if beside + 1 < rays else 0
-            left -= 1
-        if not left:
+        if first_short(ranges, ray - abreast, 2 * abreast + 1, distance + sure_m) < 0:
             through[i] = True
             many += 1
     return many

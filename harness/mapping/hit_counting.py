@@ -113,12 +113,11 @@ def ends(
     if not closed:
         found[k], found[k + 1] = 0, n - 1
         k += 2
-    if corners:
-        for i in range(pairs - 1):
-            turn = (step[i + 1] * step[i].conjugate()).imag
-            if joined[i] and joined[i + 1] and turn > CORNER * gap_m[i + 1] * gap_m[i]:
-                found[k] = i + 1
-                k += 1
+    for i in range(pairs - 1 if corners else 0):
+        turn = (step[i + 1] * step[i].conjugate()).imag
+        if joined[i] & joined[i + 1] & (turn > CORNER * gap_m[i + 1] * gap_m[i]):
+            found[k] = i + 1
+            k += 1
     for i in range(pairs):
         # So does what stands before something that it is joined to.
         if joined[i] and gap_m[i] > cell_m:

@@ -305,23 +305,28 @@ class MovingObstacles:
         if laid is None:
             return np.zeros(0, dtype=np.intp)
         track.note(scan.time_s, laid.shift)
-        mine = whole = laid.members
-        if len(mine) >= FEWEST:
-            track.seen_s = scan.time_s
-            if self._is_free or track.moves:
-                whole = self._whole(mine, own_hits, own, scan)
-            if self._is_free:
-                more = extent_m(own[whole]) > GROWN * extent_m(track.outline.points)
-            else:
-                more = len(whole) > GROWN * len(mine)
-            if more or scan.time_s - track.outline_s > NEW_OUTLINE_S:
-                new = whole if more or self._is_free else mine
-                track.renew(self._outline(scan, own_hits[new], own[new]), scan.time_s)
-            if track.moves and not self._is_free:
-                near = joined(own[whole], self._step(scan, own_hits[whole]))
-                track.shown = own[whole][near] if near.any() else None
-                mine = whole
-        return some[mine]
+        if len(laid.members) < FEWEST:
+            return some[laid.members]
+        return some[self._renewed(track, laid.members, own_hits, own, scan)]
+
+    def _renewed(
+        self, track: FollowedOutline, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan
+    ) -> IntArray:
+        """Which returns are of an outline that was found, which goes on with another one where more of it is seen."""
+        track.seen_s = scan.time_s
+        shows_all = track.moves and not self._is_free
+        whole = self._whole(mine, hits, places, scan) if self._is_free or track.moves else mine
+        if self._is_free:
+            more = extent_m(places[whole]) > GROWN * extent_m(track.outline.points)
+        else:
+            more = len(whole) > GROWN * len(mine)
+        if more or scan.time_s - track.outline_s > NEW_OUTLINE_S:
+            new = whole if more or self._is_free else mine
+            track.renew(self._outline(scan, hits[new], places[new]), scan.time_s)
+        if shows_all:
+            near = joined(places[whole], self._step(scan, hits[whole]))
+            track.shown = places[whole][near] if near.any() else None
+        return whole if shows_all else mine
 
     def _whole(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
         """Returns of something that moves, and those that go on from their ends, but for what was there before."""

@@ -15,6 +15,17 @@ CELLS, CELLS_OUT = "Array(int32, 1, 'C', readonly=True)", "int32[::1]"
 COUNTED_OUT, FLAGS, FLAGS_OUT = "float32[:, ::1]", "Array(boolean, 1, 'C', readonly=True)", "boolean[::1]"
 
 
+@compiled(COUNTED_OUT, "int32", FLOAT, FLOAT, FLOAT)
+def _count(counts: NDArray[np.float32], slot: int, beyond: float, half: float, noise: float) -> None:
+    """Counts a ray that went so much further than a cell: it was stopped, passed, or ended before it."""
+    if abs(beyond) <= half:
+        counts[slot, 0] += np.float32(1.0)
+    elif beyond > half:
+        counts[slot, 1] += np.float32(1.0)
+    elif beyond > -half - 2.0 * noise:
+        counts[slot, 2] += np.float32(1.0)
+
+
 @compiled(
     CELLS_OUT, CELLS, FLOATS, FLOATS, FLOATS, FLAGS, COUNTED_OUT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, BOOL
 )
@@ -61,13 +72,7 @@ def count_rays(
             # The ray itself comes first.
             other = ray + (0 if side == -1 else (2 * side - 1) * aside)
             other = other % rays if closed else min(max(other, 0), rays - 1)
-            beyond = ranges[other] - distance
-            if abs(beyond) <= half:
-                counts[slot, 0] += np.float32(1.0)
-            elif beyond > half:
-                counts[slot, 1] += np.float32(1.0)
-            elif beyond > -half - 2.0 * noise:
-                counts[slot, 2] += np.float32(1.0)
+            _count(counts, slot, ranges[other] - distance, half, noise)
         if counts[slot, 0] + counts[slot, 1] + counts[slot, 2] > forget_at:
             for column in range(3):
                 counts[slot, column] *= np.float32(0.5)

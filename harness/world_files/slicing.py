@@ -111,9 +111,7 @@ def _solid(part: Part, shape: Any, band: HeightBand, ground: KnownGround) -> lis
     """A part as far as it reaches into the band, where its limits make it largest; None: the ground is not known."""
     import shapely
 
-    if part.bottom.datum is Datum.SEA and part.bottom.height_m > band.high_m:
-        return []
-    if part.top.datum is Datum.SEA and part.top.height_m < band.low_m:  # whatever the ground
+    if _is_out(part, band):
         return []
     on_ground = Datum.GROUND in (part.bottom.datum, part.top.datum)
     if on_ground and ground.field is not None and not part.rigid:
@@ -133,6 +131,12 @@ def _solid(part: Part, shape: Any, band: HeightBand, ground: KnownGround) -> lis
     spacing = ground.field.spacing_m
     placed = shapely.transform(outlines(mask)[0], lambda p: p * spacing + corner)
     return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]
+
+
+def _is_out(part: Part, band: HeightBand) -> bool:
+    """Whether a part lies above or below a band, whatever the ground."""
+    above = part.bottom.datum is Datum.SEA and part.bottom.height_m > band.high_m
+    return above or (part.top.datum is Datum.SEA and part.top.height_m < band.low_m)
 
 
 def _heights(limit: Limit, ground_m: FloatArray) -> FloatArray:

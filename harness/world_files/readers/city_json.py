@@ -16,7 +16,7 @@ import numpy as np
 
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import Contents, FloatArray, Limit, Part, Reading, WorldFileError
-from harness.world_files.plane import axis_units, in_degrees
+from harness.world_files.plane import axis_units
 from harness.world_files.readers import limits
 
 SOLID: Final = ("Building", "Bridge", "OtherConstruction")
@@ -46,22 +46,14 @@ def read(path: Path, reading: Reading) -> Contents:
     notes: list[str] = []
     unit_m = 1.0 if crs is None else _height_unit_m(crs, notes)
     parts: list[Part] = []
-    passed, doubts, turned = Counter[str](), limits.Doubts(), False
+    passed, doubts = Counter[str](), limits.Doubts()
     for content in contents:
         vertices = _vertices(content, contents[0].get("transform"))
         vertices[:, 2] *= unit_m
-        # Some programs write latitudes first; only degrees beyond 90 tell.
-        if (
-            in_degrees(crs)
-            and len(vertices)
-            and np.abs(vertices[:, 1]).max() > 90 >= np.abs(vertices[:, 0]).max()
-        ):
-            vertices, turned = vertices[:, [1, 0, 2]], True
         for name, thing in content["CityObjects"].items():
             parts += _object(name, thing, vertices, reading, doubts, passed)
     if not parts:
         raise WorldFileError("has no building with a shape; must have some")
-    notes += ["its latitudes are taken to come first"] if turned else []
     notes += [*doubts.notes(reading), *_passed_over(passed)]
     if crs is None:
         notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
