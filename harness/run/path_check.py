@@ -26,160 +26,135 @@ from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of
 from harness.scenario.obstacles import WorldFile
 from harness.scenario.overrides import overridden, with_key
-from harness.scenario.scenario import Scenario, node_of_keys, validated
+from harness.scenario.scenario import Scenario, validated
 
 if TYPE_CHECKING:
     from harness.world_files.expansion import FileSpec
 
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
-"""The area of a checked path reaches this far beyond it: so much, and so much of its span."""
+"""The area of a checked path reaches this far beyond it: this length, and this share of its span."""
 
 OF_THE_WORLD: Final = (
-    *("seed", "area", "obstacles", "ground", "sources"),
-    *("environment", "conditions", "uncertainty"),
+    "seed",
+    "area",
+    "obstacles",
+    "ground",
+    "sources",
+    "environment",
+    "conditions",
+    "uncertainty",
 )
 """Sections that a check takes from a scenario that it flies a path in; mission, aircraft and sensor are its own."""
 
 KEYS_OF_THE_WORLD: Final = (
-    ("mission", "altitude_m"),
-    ("planner", "clearance_m"),
-    ("trackability", "cross_track_m"),
-    ("trackability", "altitude_m"),
+    *(("mission", "altitude_m"), ("planner", "clearance_m")),
+    *(("trackability", "cross_track_m"), ("trackability", "altitude_m")),
 )
 """Single keys that it takes from there too: the altitude, and what sets the limits."""
 
 
-def scenario_for(
-    name: str,
-    points_m: FloatArray,
-    sections: Mapping[str, Mapping[str, Any]],
-    overrides: Sequence[tuple[str, str]] = (),
-    world: FilePath | None = None,
-    files: bool = True,
-    ground: GroundSpec | None = None,
-) -> Scenario:
-    """The mission of a path as a scenario: from its start to its end, or to its furthest point where it leads back.
+@dataclass(frozen=True, eq=False)
+class _Keys:
+    """What the scenario of a path is made of, beside the path.
 
-    Start and goal may lie anywhere, in an obstacle too: that is then what the flight finds.
-
-    Args:
+    Attributes:
         name: of the scenario.
-        points_m: (n, 2) the path.
         sections: `aircraft`, `environment`, ... as in a file; what is left out has its default.
         overrides: keys to replace.
         world: a scenario file with the obstacles, the area, the air, the altitude, the clearance and the seed. None:
             nothing is there, and the area reaches beyond the path.
-        files: files among the obstacles are obstacles where they are solid at the altitude of the start; else they
-            are left out, for a path that is not flown at one altitude, see `files_of`.
-        ground: in place of what these files say of it.
-
-    Raises:
-        InputError: the sections contradict each other; the fault names the key.
     """
-    root, source = _root(name, points_m, sections, overrides, world)
-    if not files:
-        root = _without_files(root, ground)
-    return validated(root, source, _folder(world), ends_checked=False)
+
+    name: str
+    sections: Mapping[str, Mapping[str, Any]]
+    overrides: Sequence[tuple[str, str]]
+    world: FilePath | None
+
+    @property
+    def folder(self) -> FilePath | None:
+        """Where files are that the world names."""
+        return None if self.world is None else self.world.parent
+
+    @property
+    def has_bounds(self) -> bool:
+        """Whether somebody named the bounds of the area; else they only reach beyond the path."""
+        named = any(key.strip().startswith("area") and "origin" not in key for key, _ in self.overrides)
+        return named or self.world is not None or "bounds_m" in self.sections.get("area", {})
+
+    def scenario(
+        self, points_m: FloatArray, files: bool = True, ground: GroundSpec | None = None
+    ) -> Scenario:
+        """The mission of a path (n, 2) as a scenario: from its start to its end, or to where it is furthest from there.
+
+        Start and goal may lie anywhere, in an obstacle too: that is then what the flight finds.
+
+        Args:
+            points_m: the path.
+            files: files among the obstacles are obstacles where they are solid at the altitude of the start; else they
+                are left out, for a path that is not flown at one altitude.
+            ground: in place of what these files say of it.
+
+        Raises:
+            InputError: the keys contradict each other; the fault names the key.
+        """
+        root = self._root(points_m)
+        if not files:
+            kept = tuple(each for each in _obstacles(root) if each.at(("file",)) is None)
+            root = with_key(root, ("obstacles",), Node(kept, root.line))
+            if ground is not None:
+                root = with_key(root, ("ground",), node_of(ground.model_dump(), strict_yaml.COMMAND_LINE))
+        source = "command line" if self.world is None else str(self.world)
+        return validated(root, source, self.folder, ends_checked=False)
+
+    def files(self, points_m: FloatArray) -> tuple[FileSpec, ...]:
+        """The files among the obstacles."""
+        found = [each.at(("file",)) for each in _obstacles(self._root(points_m))]
+        return tuple(spec_of(WorldFile.model_validate(file.plain()), self.folder) for file in found if file)
+
+    def _root(self, points_m: FloatArray) -> Node:
+        root = self._of_the_world()
+        start, far = points_m[0], np.hypot(*(points_m - points_m[0]).T)
+        goal_radius = min(100.0, float(0.25 * far.max()))
+        goal = points_m[-1] if far[-1] > 2.0 * goal_radius else points_m[int(far.argmax())]
+        out = points_m[int(np.argmax(far > SAME_PLACE_M))] - start
+        mission = {
+            "start_m": start.tolist(),
+            "course_deg": math.degrees(math.atan2(out[0], out[1])) % 360.0,
+            "goal_m": goal.tolist(),
+            "goal_radius_m": goal_radius,
+        }
+        lowest, highest = points_m.min(axis=0), points_m.max(axis=0)
+        margin = MARGIN_M + MARGIN_SHARE * float((highest - lowest).max())
+        bounds_m = [*(lowest - margin).tolist(), *(highest + margin).tolist()]
+        area = {} if root.at(("area", "bounds_m")) else {"bounds_m": bounds_m}
+        every: dict[str, Any] = {"schema": "wayproof/scenario/1", "name": self.name, **self.sections}
+        every["area"] = {**area, **self.sections.get("area", {})}
+        every["mission"] = {**mission, **self.sections.get("mission", {})}
+        for key, section in every.items():
+            if isinstance(section, Mapping):
+                for name, value in section.items():
+                    root = with_key(root, (key, name), node_of(value, strict_yaml.COMMAND_LINE))
+            else:
+                root = with_key(root, (key,), node_of(section, strict_yaml.COMMAND_LINE))
+        return overridden(root, self.overrides)
+
+    def _of_the_world(self) -> Node:
+        """What is taken from the world."""
+        if self.world is None:
+            return Node({}, strict_yaml.COMMAND_LINE)
+        root = strict_yaml.read(self.world)
+        validated(root, str(self.world), self.world.parent)  # its faults are told as those of a scenario
+        assert isinstance(root.value, dict)
+        base = Node({key: node for key, node in root.value.items() if key in OF_THE_WORLD}, root.line)
+        for section, key in KEYS_OF_THE_WORLD:
+            written = root.at((section, key))
+            base = base if written is None else with_key(base, (section, key), written)
+        return base
 
 
-def files_of(
-    sections: Mapping[str, Mapping[str, Any]],
-    overrides: Sequence[tuple[str, str]] = (),
-    world: FilePath | None = None,
-) -> tuple[FileSpec, ...]:
-    """The files among the obstacles, of sections, overrides and a world as `scenario_for` takes them."""
-    root, _ = _root("path", np.array([(0.0, 0.0), (1.0, 0.0)]), sections, overrides, world)
-    obstacles = root.at(("obstacles",))
-    listed = obstacles.value if obstacles is not None and isinstance(obstacles.value, tuple) else ()
-    files = [each.at(("file",)) for each in listed]
-    return tuple(spec_of(WorldFile.model_validate(file.plain()), _folder(world)) for file in files if file)
-
-
-def _without_files(root: Node, ground: GroundSpec | None) -> Node:
-    """A scenario's keys with the ground in place of the files among its obstacles."""
-    obstacles = root.at(("obstacles",))
-    if obstacles is not None and isinstance(obstacles.value, tuple):
-        kept = tuple(each for each in obstacles.value if each.at(("file",)) is None)
-        root = with_key(root, ("obstacles",), Node(kept, obstacles.line))
-    if ground is None:
-        return root
-    return with_key(root, ("ground",), node_of(ground.model_dump(), strict_yaml.COMMAND_LINE))
-
-
-def _root(
-    name: str,
-    points_m: FloatArray,
-    sections: Mapping[str, Mapping[str, Any]],
-    overrides: Sequence[tuple[str, str]],
-    world: FilePath | None,
-) -> tuple[Node, str]:
-    """The keys of `scenario_for`, and what their faults name."""
-    root, source = _base(world)
-    for key, section in _sections(name, points_m, sections, root).items():
-        keys = (
-            node_of_keys(section) if isinstance(section, dict) else node_of(section, strict_yaml.COMMAND_LINE)
-        )
-        before = root.at((key,))
-        if before is not None and isinstance(before.value, dict) and isinstance(keys.value, dict):
-            keys = Node({**before.value, **keys.value}, keys.line)
-        root = with_key(root, (key,), keys)
-    return overridden(root, overrides), source
-
-
-def has_bounds(
-    sections: Mapping[str, Any], overrides: Sequence[tuple[str, str]], world: FilePath | None
-) -> bool:
-    """Whether somebody named the bounds of the area; else they only reach beyond the path."""
-    named = any(key.strip().startswith("area") and "origin" not in key for key, _ in overrides)
-    return named or world is not None or "bounds_m" in sections.get("area", {})
-
-
-def _base(world: FilePath | None) -> tuple[Node, str]:
-    """What is taken from a world, and what faults name it."""
-    if world is None:
-        return Node({}, strict_yaml.COMMAND_LINE), "command line"
-    root = strict_yaml.read(world)
-    validated(root, str(world), world.parent)  # its faults are told as those of a scenario
-    assert isinstance(root.value, dict)
-    kept = {key: node for key, node in root.value.items() if key in OF_THE_WORLD}
-    base = Node(kept, root.line)
-    for section, key in KEYS_OF_THE_WORLD:
-        written = root.at((section, key))
-        if written is not None:
-            base = with_key(base, (section, key), written)
-    return base, str(world)
-
-
-def _folder(world: FilePath | None) -> FilePath | None:
-    return None if world is None else world.parent
-
-
-def _sections(
-    name: str, points_m: FloatArray, sections: Mapping[str, Mapping[str, Any]], root: Node
-) -> dict[str, Any]:
-    """All that is not the world's."""
-    start = points_m[0]
-    far = np.hypot(*(points_m - start).T)
-    goal_radius = min(100.0, float(0.25 * far.max()))
-    goal = points_m[-1] if far[-1] > 2.0 * goal_radius else points_m[int(far.argmax())]
-    out = points_m[int(np.argmax(far > SAME_PLACE_M))] - start
-    mission = {
-        "start_m": start.tolist(),
-        "course_deg": math.degrees(math.atan2(out[0], out[1])) % 360.0,
-        "goal_m": goal.tolist(),
-        "goal_radius_m": goal_radius,
-    }
-    lowest, highest = points_m.min(axis=0), points_m.max(axis=0)
-    margin = MARGIN_M + MARGIN_SHARE * float((highest - lowest).max())
-    about = {"bounds_m": [*(lowest - margin).tolist(), *(highest + margin).tolist()]}
-    area = {**({} if root.at(("area", "bounds_m")) else about), **sections.get("area", {})}
-    return {
-        "schema": "wayproof/scenario/1",
-        "name": name,
-        **{key: dict(section) for key, section in sections.items() if section},
-        **({"area": area} if area else {}),
-        "mission": {**mission, **sections.get("mission", {})},
-    }
+def _obstacles(root: Node) -> tuple[Node, ...]:
+    listed = root.at(("obstacles",))
+    return listed.value if listed is not None and isinstance(listed.value, tuple) else ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,7 +249,7 @@ def asked(
         given: the path.
         sections: of a scenario: `aircraft`, `environment`, `planner`, `trackability`.
         settings: keys to replace.
-        world: a scenario file, see `scenario_for`.
+        world: a scenario file, see `_Keys`.
         altitude_m: above mean sea level; None: the path's, else the world's.
         corner_m: see `PathCheck`.
         name: of the scenario.
@@ -293,7 +268,8 @@ def asked(
     if world is None and given.origin_deg is not None:
         latitude, longitude = given.origin_deg
         own["area"] = {"origin": {"latitude_deg": latitude, "longitude_deg": longitude}}
-    scenario = scenario_for(name, about(given.points_m), own, settings, world)
+    keys = _Keys(name, own, settings, world)
+    scenario = keys.scenario(about(given.points_m))
     field = None if scenario.ground is None else scenario.ground.field()
     plan = planned(given, scenario, altitude_m, None if field is None else field.at, corner_m)
     files: tuple[FileSpec, ...] = ()
@@ -303,9 +279,9 @@ def asked(
         mission["course_deg"] = math.degrees(math.atan2(east, north)) % 360.0
         mission["altitude_m"] = float(plan.profile.altitude_m[0])
         level, line = plan.profile.level, plan.way.given_m[:, :2]
-        scenario = scenario_for(name, line, own, settings, world, files=level, ground=scenario.ground)
-        files = () if level else files_of(sections, settings, world)
-    return PathCheck(given, scenario, plan, has_bounds(own, settings, world), corner_m, files)
+        scenario = keys.scenario(line, files=level, ground=scenario.ground)
+        files = () if level else keys.files(line)
+    return PathCheck(given, scenario, plan, keys.has_bounds, corner_m, files)
 
 
 def about(points_m: FloatArray) -> FloatArray:
