@@ -77,13 +77,24 @@ def windy_at_a_corner(draw: Draw) -> Asked:
 
 
 def rolling(draw: Draw) -> Asked:
-    """A sine whose bank is below the limit and whose roll rate is above 60 degrees a second."""
+    """A sine whose bank is below the limit and whose roll rate is above that of the autopilot, 60 degrees a second."""
     bank, rate = math.radians(draw(25.0, 38.0)), math.radians(draw(75.0, 110.0))
     wave = 25.0 * bank / rate
     east = np.arange(0.0, 1200.0, 1.5)
     north = wave**2 * G * math.tan(bank) / 25.0**2 * (np.cos(east / wave) - 1.0)
     line = np.vstack(([[-300.0, 0.0]], np.column_stack((east, north))))
-    return line, keys(trackability__cross_track_m="0.3")
+    limit = {"aircraft__autopilot__roll_rate_limit_degps": "60", "trackability__cross_track_m": "0.3"}
+    return line, keys(**limit)
+
+
+def slow_servo(draw: Draw) -> Asked:
+    """In severe turbulence an elevator of 20 degrees a second is late, and altitude is lost; a fast one loses 1 m."""
+    rough = {
+        "environment__turbulence": "{intensity: severe}",
+        "aircraft__actuators__rate_limit_degps": f"{draw(15, 21):.1f}",
+    }
+    limits = {"trackability__cross_track_m": "60", "trackability__altitude_m": "4"}
+    return np.array([(0.0, 0.0), (5000.0, 0.0)]), keys(**rough, **limits)
 
 
 def climbing(draw: Draw) -> Asked:
@@ -134,6 +145,7 @@ FAMILIES: Mapping[str, tuple[Callable[[Draw], Asked], ...]] = {
     "wind drift": (windy, windy_at_a_corner),
     "bank limit": (disturbed,),
     "roll rate": (rolling,),
+    "actuator": (slow_servo,),
     "load factor": (heavy,),
     "speed or throttle saturation": (slow,),
     "climb too steep": (climbing, climbing_high_up, climbing_with_another),
