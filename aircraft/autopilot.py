@@ -144,16 +144,9 @@ def derivatives(
     alpha_rad: float,
     qbar_psf: float,
 ) -> Derivatives:
-    """Picks the derivatives from a linear model, propeller speeds eliminated as settled.
+    """Picks the derivatives from a linear model x_dot = A x + B u, propeller speeds eliminated as settled.
 
-    Args:
-        states: names of the states as JSBSim's FGLinearization gives them ("Vt", "Alpha", "Q", "Rpm0", ...).
-        inputs: names of the controls ("ThtlCmd", "DaCmd", "DeCmd", "DrCmd").
-        system: (n, n) A of x_dot = A x + B u.
-        control: (n, m) B.
-        airspeed_fps: true airspeed of the trim.
-        alpha_rad: angle of attack of the trim.
-        qbar_psf: dynamic pressure of the trim.
+    States and inputs have the names of JSBSim's FGLinearization ("Vt", "Alpha", "Rpm0", ...; "ThtlCmd", "DaCmd", ...).
     """
     fast = [i for i, state in enumerate(states) if state.lower().startswith("rpm")]
     slow = [i for i in range(len(states)) if i not in fast]
@@ -165,33 +158,30 @@ def derivatives(
     row = {states[i]: k for k, i in enumerate(slow)}
     column = {name: k for k, name in enumerate(inputs)}
 
-    def by_state(of: str, by: str) -> float:
-        return float(a[row[of], row[by]])
-
-    def by_control(of: str, by: str) -> float:
-        return float(b[row[of], column[by]])
+    def by(of: str, name: str) -> float:
+        return float(a[row[of], row[name]] if name in row else b[row[of], column[name]])
 
     return Derivatives(
         airspeed_fps=airspeed_fps,
         alpha_rad=alpha_rad,
         qbar_psf=qbar_psf,
-        lp=by_state("P", "P"),
-        lr=by_state("P", "R"),
-        lda=by_control("P", "DaCmd"),
-        ldr=by_control("P", "DrCmd"),
-        np=by_state("R", "P"),
-        nr=by_state("R", "R"),
-        nb=by_state("R", "Beta"),
-        yb=by_state("Beta", "Beta"),
-        nda=by_control("R", "DaCmd"),
-        ndr=by_control("R", "DrCmd"),
-        za=by_state("Alpha", "Alpha"),
-        ma=by_state("Q", "Alpha"),
-        mq=by_state("Q", "Q"),
-        mde=by_control("Q", "DeCmd"),
+        lp=by("P", "P"),
+        lr=by("P", "R"),
+        lda=by("P", "DaCmd"),
+        ldr=by("P", "DrCmd"),
+        np=by("R", "P"),
+        nr=by("R", "R"),
+        nb=by("R", "Beta"),
+        yb=by("Beta", "Beta"),
+        nda=by("R", "DaCmd"),
+        ndr=by("R", "DrCmd"),
+        za=by("Alpha", "Alpha"),
+        ma=by("Q", "Alpha"),
+        mq=by("Q", "Q"),
+        mde=by("Q", "DeCmd"),
         # Along the flight path gravity counts with alpha at constant pitch; what is left is drag.
-        xa=GRAVITY_FPS2 - by_state("Vt", "Alpha"),
-        xdt=by_control("Vt", "ThtlCmd"),
+        xa=GRAVITY_FPS2 - by("Vt", "Alpha"),
+        xdt=by("Vt", "ThtlCmd"),
     )
 
 
@@ -204,11 +194,8 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
     times slower than the one inside.
     Throttle: 1.5 rad/s on airspeed, less where that would ask for more than 0.05 per ft/s.
 
-    Args:
-        at: the aircraft at trim.
-        pace: share of the feedback in roll and yaw, for aircraft whose actuators or control laws, which the
-            derivatives do not show, take a part of the phase.
-        pitch_pace: the same in pitch, climb and altitude.
+    `pace` is the share of the feedback in roll and yaw, `pitch_pace` in pitch, climb and altitude, for aircraft whose
+    actuators or control laws, which the derivatives do not show, take a part of the phase.
 
     Raises:
         ValueError: if a control has no authority or the wrong sign, or the short period is not oscillatory.
@@ -284,34 +271,25 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
 
 
 def roll_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
-    """The lesser of the phase margins of the roll rate loop and of the roll loop around it."""
+    """The lesser phase margin of the roll rate and the roll loop, behind the aileron's lag, with an old roll."""
     s = 1j * FREQUENCIES_RADPS
     plant = at.lda / (s - at.lp) / (1.0 + lag_s * s)
-    return _margin_deg(
-        plant, gains.aileron_p + gains.aileron_p_integral / s, gains.aileron_p_forward, gains.roll, latency_s
-    )
+    inner = (gains.aileron_p + gains.aileron_p_integral / s) * plant
+    return _margin_deg(inner, gains.aileron_p_forward * plant, gains.roll, latency_s)
 
 
 def pitch_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
-    """The lesser of the phase margins of the pitch rate loop and of the pitch loop around it."""
+    """The same of the pitch rate loop and of the pitch loop, behind the elevator's lag, with an old pitch."""
     s = 1j * FREQUENCIES_RADPS
     short_period = s * s - (at.mq + at.za) * s + at.mq * at.za - at.ma
     plant = -at.mde * (s - at.za) / short_period / (1.0 + lag_s * s)
-    return _margin_deg(
-        plant,
-        gains.elevator_q + gains.elevator_q_integral / s,
-        gains.elevator_q_forward,
-        gains.pitch,
-        latency_s,
-    )
+    inner = (gains.elevator_q + gains.elevator_q_integral / s) * plant
+    return _margin_deg(inner, gains.elevator_q_forward * plant, gains.pitch, latency_s)
 
 
-def _margin_deg(
-    plant: ComplexArray, feedback: ComplexArray, forward: float, outer: float, latency_s: float
-) -> float:
+def _margin_deg(inner: ComplexArray, forward: Any, outer: float, latency_s: float) -> float:
     """The lesser margin of a rate loop and of the attitude loop around it, which has a feed-forward of the rate."""
-    inner = feedback * plant
-    rate = (forward * plant + inner) / (1.0 + inner)
+    rate = (forward + inner) / (1.0 + inner)
     old = 1j * FREQUENCIES_RADPS * latency_s  # the angle of then, and what the rate of now makes of it since
     attitude = outer / (1j * FREQUENCIES_RADPS) * rate * (np.exp(-old) + old)
     return min(_phase_margin_deg(inner), _phase_margin_deg(attitude))

@@ -59,9 +59,7 @@ class ClimbRates:
 
 
 def climb_rates(frame: Airframe) -> ClimbRates:
-    """The rates of an airframe, flown unless that has been done before.
-
-    They are those near sea level with wings level; in a turn and high up there is less.
+    """The rates of an airframe near sea level, wings level, flown unless that has been done before.
 
     Raises:
         AircraftError: it cannot be flown at one of the speeds.

@@ -87,7 +87,6 @@ def performance(
     airspeed_mps: float,
     wind_mps: float = 0.0,
     turbulence: str | None = None,
-    gust_mps: float = 0.0,
     law: LawCard | None = None,
 ) -> Performance:
     """Planning figures at one airspeed.
@@ -102,18 +101,15 @@ def performance(
         airspeed_mps: true airspeed.
         wind_mps: speed of the steady wind.
         turbulence: None, "light", "moderate" or "severe".
-        gust_mps: speed of a gust front on top of the wind; it may be faster than the aircraft.
         law: card of the guidance law; default: of `preview`, which the aircraft's survey was flown with.
 
     Raises:
         AircraftError: if the airframe cannot hold the airspeed or cannot make way against the wind.
-        ValueError: if `wind_mps` or `gust_mps` is negative or not finite, or `turbulence` is none of the above.
+        ValueError: if `wind_mps` is negative or not finite, or `turbulence` is none of the above.
     """
     airframe.check_airspeed(airspeed_mps)
     if not 0.0 <= wind_mps < math.inf:
         raise ValueError(f"wind_mps must be a finite number of at least 0; got {wind_mps:g}")
-    if not 0.0 <= gust_mps < math.inf:
-        raise ValueError(f"gust_mps must be a finite number of at least 0; got {gust_mps:g}")
     if turbulence not in BANK_RESERVE_DEG:
         raise ValueError(f"turbulence must be light, moderate, severe or None; got {turbulence!r}")
     if wind_mps >= airspeed_mps:
@@ -131,7 +127,7 @@ def performance(
     acceleration = _turn_acceleration(min(bank_limit_deg - BANK_RESERVE_DEG[turbulence], most_deg))
     holding = _turn_acceleration(min(bank_limit_deg - HOLD_RESERVE_DEG[turbulence], most_deg))
     calm = _turn_acceleration(min(bank_limit_deg - CALM_HOLD_RESERVE_DEG, most_deg))
-    fastest = airspeed_mps + wind_mps + gust_mps
+    fastest = airspeed_mps + wind_mps
     radius_m = fastest * fastest / acceleration
     hold_radius_m = min(max(fastest * fastest / holding, airspeed_mps * airspeed_mps / calm), radius_m)
     error_m = TRACKING_FACTOR[turbulence] * max(

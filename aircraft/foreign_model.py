@@ -62,43 +62,12 @@ def _file_faults(path: Path) -> Iterator[str]:
     if path.stat().st_size > MAX_BYTES:
         yield f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a JSBSim file"
         return
-    look = _Look()
-    try:
-        look.read(path.read_bytes())
-    except expat.ExpatError:
-        return  # whoever loads the model says where it is broken
-    except OSError as error:
-        yield f"{path}: cannot be read ({error.strerror})"
-    except ForeignError as error:
-        yield f"{path}:{look.line}: {error}"
+    parser, depth = expat.ParserCreate(), 0
 
-
-class ForeignError(ValueError):
-    """Something that a model may not have."""
-
-
-class _Look:
-    """Goes through one file."""
-
-    def __init__(self) -> None:
-        self._parser = expat.ParserCreate()
-        self._depth = 0
-        self._parser.StartElementHandler = self._begin
-        self._parser.EndElementHandler = self._end
-        self._parser.EntityDeclHandler = self._entity
-
-    @property
-    def line(self) -> int:
-        """Where it is, or stopped."""
-        return self._parser.CurrentLineNumber
-
-    def read(self, data: bytes) -> None:
-        """Goes to the end; raises ForeignError or ExpatError."""
-        self._parser.Parse(data, True)
-
-    def _begin(self, name: str, attributes: dict[str, str]) -> None:
-        self._depth += 1
-        if self._depth > MAX_DEPTH:
+    def begin(name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > MAX_DEPTH:
             raise ForeignError(f"is nested deeper than {MAX_DEPTH} elements; must be flatter")
         file = PurePath(attributes.get("file", ""))
         if file.is_absolute() or ".." in file.parts:
@@ -107,11 +76,26 @@ class _Look:
                 "copy the file into it and give its name"
             )
 
-    def _end(self, name: str) -> None:
-        self._depth -= 1
+    def end(name: str) -> None:
+        nonlocal depth
+        depth -= 1
 
-    def _entity(self, name: str, parameter: bool, value: str | None, *_: object) -> None:
+    def entity(name: str, parameter: bool, value: str | None, *_: object) -> None:
         if parameter or value is None or "&" in value or len(value) > MAX_ENTITY:
             raise ForeignError(
                 f"declares the entity {name:.40}, which is not a short text of its own; write it out"
             )
+
+    parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = begin, end, entity
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except expat.ExpatError:
+        return  # whoever loads the model says where it is broken
+    except OSError as error:
+        yield f"{path}: cannot be read ({error.strerror})"
+    except ForeignError as error:
+        yield f"{path}:{parser.CurrentLineNumber}: {error}"
+
+
+class ForeignError(ValueError):
+    """Something that a model may not have."""

@@ -21,7 +21,7 @@ from aircraft.properties import (
     TURBULENCE_W20_FPS,
     WIND_PROPERTIES,
 )
-from aircraft.start import Atmosphere, DrydenGusts, Gust, StartConditions, VerticalGusts
+from aircraft.start import Atmosphere, DrydenGusts, StartConditions, VerticalGusts
 
 GROUND_FT = 2.0 / FOOT_M
 """Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
@@ -63,7 +63,7 @@ class JsbsimModel:
             frame: the airframe, see `aircraft.airframes.airframe`.
             start: where and how fast it starts.
             plane: the local plane that all positions refer to.
-            atmosphere: steady wind, gust and turbulence; default: calm.
+            atmosphere: wind, gusts and turbulence; default: calm.
             step_rate_hz: integration steps per second.
             climb_limit_mps: the fastest climb or descent that the altitude loop asks for; None: its own, for flight
                 at one altitude.
@@ -90,7 +90,6 @@ class JsbsimModel:
         convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
         """Of the meridian convergence where the state was last read."""
-        self._gust: Gust | None = None
         self._vertical_gusts: VerticalGusts | None = None
         self._turbulence: DrydenGusts | None = None
         self._windy = atmosphere.wind_mps > 0.0
@@ -122,7 +121,7 @@ class JsbsimModel:
                 self._start_turbulence(atmosphere.turbulence, atmosphere.intensity, atmosphere.seed)
             else:
                 self._turbulence = DrydenGusts(atmosphere.intensity, atmosphere.seed)
-        self._gust, self._vertical_gusts = atmosphere.gust, atmosphere.vertical_gusts
+        self._vertical_gusts = atmosphere.vertical_gusts
         self.engage()
 
     @property
@@ -192,7 +191,7 @@ class JsbsimModel:
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
         run = self._fdm.run
-        if self._gust or self._vertical_gusts or self._turbulence:
+        if self._vertical_gusts or self._turbulence:
             for _ in range(steps):
                 self._apply_wind()
                 run()
@@ -280,15 +279,12 @@ class JsbsimModel:
         self._fdm.set_dt(1.0 / self._step_rate_hz)
 
     def _wind_true(self) -> tuple[float, float]:
-        """The wind towards true east and north where the aircraft is now, ft/s, the gust included."""
+        """The wind towards true east and north where the aircraft is now, ft/s."""
         east, north = self._wind
         if self._air is not None:
             height_m = (self._place[2] - self._terrain_ft) * FOOT_M
             east, north = self._air.wind_at(self._step / self._step_rate_hz, height_m)
             east, north = east / FOOT_M, north / FOOT_M
-        if self._gust is not None:
-            share = self._gust.share(self._step / self._step_rate_hz) / FOOT_M
-            east, north = east + share * self._gust.east_mps, north + share * self._gust.north_mps
         return east * self._cosine + north * self._sine, north * self._cosine - east * self._sine
 
     def _apply_wind(self) -> None:

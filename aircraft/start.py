@@ -9,43 +9,6 @@ import numpy as np
 
 TURBULENCE_MODELS = ("tustin", "milspec")
 TURBULENCE_INTENSITIES = ("light", "moderate", "severe")
-GUST_SHAPES = ("step", "one_minus_cosine")
-
-
-@dataclass(frozen=True)
-class Gust:
-    """A gust front that reaches all of the air at one time, on top of the wind.
-
-    Attributes:
-        shape: "step": the whole gust from one instant to the next, until its end; "one_minus_cosine": the
-            discrete gust of certification, g/2 (1 - cos(2 pi t / T)) over its duration T (CS 25.341).
-        east_mps, north_mps: the gust at its strongest in the local plane, the direction it blows towards.
-        start_s: when it begins.
-        duration_s: after which it has passed; infinite: it stays.
-    """
-
-    shape: str
-    east_mps: float
-    north_mps: float
-    start_s: float
-    duration_s: float = math.inf
-
-    def __post_init__(self) -> None:
-        if self.shape not in GUST_SHAPES:
-            raise ValueError(f"shape must be step or one_minus_cosine; got {self.shape!r}")
-        if not math.isfinite(self.east_mps + self.north_mps) or not 0.0 <= self.start_s < math.inf:
-            raise ValueError("a gust must be finite and begin at 0 or later")
-        if not self.duration_s > 0.0 or (self.shape != "step" and self.duration_s == math.inf):
-            raise ValueError(
-                f"duration_s must be positive, and finite but of a step; got {self.duration_s:g}"
-            )
-
-    def share(self, time_s: float) -> float:
-        """How much of the gust blows at a time, 0 to 1."""
-        since = time_s - self.start_s
-        if not 0.0 <= since < self.duration_s:
-            return 0.0
-        return 1.0 if self.shape == "step" else 0.5 - 0.5 * math.cos(math.tau * since / self.duration_s)
 
 
 @dataclass(frozen=True)
@@ -139,7 +102,6 @@ class Atmosphere:
         turbulence: "tustin", "milspec" or None.
         intensity: "light", "moderate" or "severe"; None exactly if `turbulence` is.
         seed: of the turbulence, 0 to 2^31 - 1.
-        gust: a gust front, or None.
         changes: (time s, east m/s, north m/s) rows, time rising from above 0: the wind goes over linearly from one to
             the next, and stays as the last has it.
         measured_at_m: height over ground at which the wind is as told, which has the profile of `profile_share`;
@@ -152,7 +114,6 @@ class Atmosphere:
     turbulence: str | None = None
     intensity: str | None = None
     seed: int = 0
-    gust: Gust | None = None
     changes: tuple[tuple[float, float, float], ...] = ()
     measured_at_m: float | None = None
     vertical_gusts: VerticalGusts | None = None
@@ -171,7 +132,7 @@ class Atmosphere:
 
     @property
     def steady(self) -> bool:
-        """Whether the wind is the same at all times and heights, gust front and turbulence aside."""
+        """Whether the wind is the same at all times and heights, turbulence aside."""
         return not self.changes and self.measured_at_m is None
 
     @property
@@ -181,7 +142,7 @@ class Atmosphere:
         return max(math.hypot(*wind) for wind in winds)
 
     def wind_at(self, time_s: float, height_m: float) -> tuple[float, float]:
-        """East and north of the wind (m/s) at a time and a height over ground, gust front and turbulence left out."""
+        """East and north of the wind (m/s) at a time and a height over ground, turbulence left out."""
         east, north, before_s = self.wind_east_mps, self.wind_north_mps, 0.0
         for after_s, east_after, north_after in self.changes:
             if time_s < after_s:

@@ -38,7 +38,7 @@ class PointMass:
                 this does not model.
         """
         atmosphere = atmosphere or Atmosphere()
-        if atmosphere.turbulence is not None or atmosphere.gust is not None:
+        if atmosphere.turbulence is not None:
             raise ValueError("the point mass does not model turbulence or gusts")
         if not roll_lag_s > 0.0:
             raise ValueError(f"roll_lag_s must be positive; got {roll_lag_s:g}")
