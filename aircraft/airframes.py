@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import cache, lru_cache, partial
@@ -14,7 +13,7 @@ from typing import Any
 from aircraft.actuators.actuator import Actuator, Actuators, NormActuator
 from aircraft.airframe import DERIVED, FIGURES, Airframe, AirframeEntry, AutopilotKeys
 from aircraft.autopilot import Gains
-from aircraft.card_cache import cached, figure, is_kept
+from aircraft.card_cache import cached, is_kept
 from aircraft.model_files import AircraftError as AircraftError
 from aircraft.model_files import ModelFiles, model_files
 
@@ -105,32 +104,19 @@ def _of_commands(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple
 
 
 def _of_survey(entry: AirframeEntry, found: ModelFiles, measured: Mapping[str, Any]) -> Airframe:
-    """The airframe that a survey measured.
-
-    Raises:
-        KeyError, TypeError, ValueError: it is no survey.
-    """
-    banks = tuple((figure(speed), figure(bank)) for speed, bank in measured["level_banks"])
-    low, high = map(figure, measured["airspeed_range_mps"])
-    figures = {key: figure(measured[key]) for key in _MEASURED}
-    gains = Gains(**{name: figure(gain, -math.inf) for name, gain in measured["gains"].items()})
-    speeds = [speed for speed, _ in banks]
-    if not (low <= high and speeds and speeds == sorted(speeds) and figures["mass_kg"] > 0.0):
-        raise ValueError("speeds out of order, or no mass")
+    """The airframe that a survey measured."""
+    low, high = measured["airspeed_range_mps"]
     return Airframe(
         name=found.name,
         summary=entry.summary,
         files=found,
         airspeed_range_mps=(low, high),
-        level_banks=banks,
-        gains=gains,
+        level_banks=tuple((speed, bank) for speed, bank in measured["level_banks"]),
+        gains=Gains(**measured["gains"]),
         verified=entry.verified,
         autopilot=entry.autopilot,
-        **figures,
+        **{key: measured[key] for key in ("mass_kg", "cruise_mps", "roll_in_s", "weave_error_m", *FIGURES)},
     )
-
-
-_MEASURED = ("mass_kg", "cruise_mps", "roll_in_s", "weave_error_m", *FIGURES)
 
 
 @cache

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import os
 from collections.abc import Callable
 from contextlib import suppress
@@ -30,14 +29,14 @@ def cached(
 ) -> Card:
     """What is read from the result of a measurement, which comes from the cache if it is there.
 
-    Both ways give the same values: JSON keeps every bit of a float. A cache that cannot be read or written, or
-    holds what no measurement gives, costs time and nothing else.
+    Both ways give the same values: JSON keeps every bit of a float. A cache that cannot be read or written, or whose
+    numbers are not those that were measured (its SHA-256 tells), costs time and nothing else.
 
     Args:
         title: what was measured of what, for the file's name.
         digest: of everything that the result depends on.
         measure: measures; its result consists of what JSON has.
-        read: makes what is wanted of a result; raises KeyError, TypeError or ValueError where it is none.
+        read: makes what is wanted of a result.
     """
     file = _file(title, digest)
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -63,17 +62,6 @@ def is_kept(title: str, digest: str) -> bool:
 
 def _file(title: str, digest: str) -> Path:
     return cache_folder() / f"{title}-{digest[:16]}.json"
-
-
-def figure(value: object, least: float = 0.0) -> float:
-    """A number of a result.
-
-    Raises:
-        ValueError: it is not a finite number of at least `least`.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < math.inf:
-        raise ValueError(f"is {value!r}")
-    return float(value)
 
 
 def _write(file: Path, text: str) -> None:

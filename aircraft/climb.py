@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from aircraft.airframe import Airframe
-from aircraft.card_cache import cached, figure
+from aircraft.card_cache import cached
 from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import STEP_RATE_HZ
@@ -68,13 +68,7 @@ def climb_rates(frame: Airframe) -> ClimbRates:
 
 
 def _read(result: dict[str, Any]) -> ClimbRates:
-    columns = [
-        tuple(figure(value) for value in result[name])
-        for name in ("airspeeds_mps", "climb_mps", "descent_mps")
-    ]
-    if len({len(column) for column in columns}) != 1 or not columns[0]:
-        raise ValueError("columns of different lengths")
-    return ClimbRates(*columns)
+    return ClimbRates(**{name: tuple(column) for name, column in result.items()})
 
 
 def _measured(frame: Airframe) -> dict[str, Any]:

@@ -10,12 +10,11 @@ from copy import deepcopy
 from dataclasses import asdict
 from hashlib import sha256
 from inspect import getsourcefile
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from aircraft.airframe import Airframe
-from aircraft.card_cache import cached, figure
+from aircraft.card_cache import cached
 from aircraft.envelope import LawCard, WindPoint
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.guidance.preview import PreviewConfig
@@ -79,12 +78,5 @@ def _source(kind: GuidanceKind) -> str:
 
 
 def _card(measured: dict[str, Any]) -> LawCard:
-    """What `LawSurvey.measured` returned, as a card."""
-    points = [
-        WindPoint(figure(point["wind_share"]), figure(point["radius_factor"], 1.0), figure(point["error_m"]))
-        for point in measured["points"]
-    ]
-    shares = [point.wind_share for point in points]
-    if shares[0] != 0.0 or any(after <= before for before, after in pairwise(shares)):
-        raise ValueError("its winds are not in order")
-    return LawCard(str(measured["kind"]), tuple(points))
+    """What `law_survey.measured` returned, as a card."""
+    return LawCard(measured["kind"], tuple(WindPoint(**point) for point in measured["points"]))

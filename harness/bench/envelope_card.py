@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from aircraft.airframe import Airframe
 from aircraft.airframes import AircraftError, airframe
-from aircraft.card_cache import cached, figure
+from aircraft.card_cache import cached
 from aircraft.climb import climb_rates
 from aircraft.envelope import performance
 from aircraft.guidance.interface import UPDATE_RATE_HZ
@@ -71,7 +71,7 @@ def envelope_card(
         if report is not None:
             report(done, len(speeds), f"{frame.name} at {speed:g} m/s")
         title = f"{frame.name}-envelope-{FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
-        pages.append(cached(title, digest, partial(_page, frame, speed, winds), _read))
+        pages.append(cached(title, digest, partial(_page, frame, speed, winds), dict))
     return {
         "aircraft": frame.name,
         "mass_kg": frame.mass_kg,
@@ -86,25 +86,6 @@ def envelope_card(
         },
         "at": pages,
     }
-
-
-_PAGE: Final = ("airspeed_mps", "roll_in_s", "level_bank_deg", "climb_mps", "descent_mps")
-_TURN: Final = ("bank_deg", "radius_m", "load_factor", "altitude_lost_m", "airspeed_lost_mps")
-_TRACKED: Final = ("wind_mps", "planned_radius_m", "tightest_radius_m")
-
-
-def _read(page: dict[str, Any]) -> dict[str, Any]:
-    """A page as it was measured.
-
-    Raises:
-        KeyError, TypeError, ValueError: it is none.
-    """
-    parts = ([page], _PAGE), (page["turns"], _TURN), (page["tracked"], _TRACKED)
-    for row, keys in ((row, keys) for rows, keys in parts for row in rows):
-        for key in keys:
-            if row[key] is not None or key not in ("radius_m", "tightest_radius_m"):
-                figure(row[key], -math.inf)
-    return page
 
 
 def _page(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, Any]:
@@ -143,13 +124,8 @@ def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, floa
         model.advance(steps)
         state = model.state()
         if model.fault():
-            return {
-                "bank_deg": bank_deg,
-                "radius_m": None,
-                "load_factor": load,
-                "altitude_lost_m": lost_m,
-                "airspeed_lost_mps": lost_mps,
-            }
+            turned = math.nan
+            break
         lost_m = max(lost_m, ALTITUDE_M - state.up_m)
         lost_mps = max(lost_mps, speed - state.airspeed_mps)
         load = max(load, state.load_factor)
@@ -159,7 +135,7 @@ def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, floa
         before = state
     return {
         "bank_deg": bank_deg,
-        "radius_m": length / turned,
+        "radius_m": None if math.isnan(turned) else length / turned,
         "load_factor": load,
         "altitude_lost_m": lost_m,
         "airspeed_lost_mps": lost_mps,

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import resource
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from aircraft.airframe import FIGURES
-from aircraft.airframes import airframe
-from aircraft.autopilot import Gains
-from aircraft.card_cache import cache_folder, figure
+from aircraft.card_cache import cache_folder
 from aircraft.card_cache import cached as read_or_measured
 
 
@@ -23,13 +18,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "wayproof"
 
 
-def as_it_is(result: dict[str, Any]) -> dict[str, Any]:
-    """A result that has a list."""
-    return {**result, "list": list(result["list"])}
-
-
 def cached(title: str, digest: str, measure: Measurement) -> dict[str, Any]:
-    return read_or_measured(title, digest, measure, as_it_is)
+    return read_or_measured(title, digest, measure, dict)
 
 
 class Measurement:
@@ -106,59 +96,3 @@ def test_a_full_disk_costs_only_time_and_leaves_nothing_behind(folder: Path) -> 
 def test_the_default_folder_is_in_the_home(home: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", home)
     assert cache_folder() == Path.home() / ".cache" / "wayproof"
-
-
-@pytest.mark.parametrize(
-    ("key", "wrong"),
-    [
-        ("level_banks", None),
-        ("level_banks", [[20.0, float("nan")]]),
-        ("level_banks", []),
-        ("cruise_mps", float("nan")),
-        ("cruise_mps", "25"),
-        ("cruise_mps", True),
-        ("airspeed_range_mps", [30.0, 20.0]),
-        ("airspeed_range_mps", [20.0]),
-        ("mass_kg", -1.0),
-        ("gains", {"roll": 1.0}),
-    ],
-)
-def test_an_airframe_whose_kept_survey_is_wrong_is_surveyed_anew(
-    folder: Path, key: str, wrong: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    survey: dict[str, Any] = {
-        "mass_kg": 13.5,
-        "airspeed_range_mps": [18.0, 36.0],
-        "cruise_mps": 25.0,
-        "roll_in_s": 1.0,
-        "weave_error_m": 2.0,
-        "level_banks": [[18.0, 30.0], [36.0, 45.0]],
-        "gains": {each.name: 1.0 for each in fields(Gains)},
-        **dict.fromkeys(FIGURES, 5.0),
-    }
-    times = 0
-
-    def surveyed(*_: object) -> dict[str, Any]:
-        nonlocal times
-        times += 1
-        return survey
-
-    monkeypatch.setattr("aircraft.survey.survey", surveyed)
-    first = airframe.__wrapped__("aerosonde")
-    (file,) = folder.iterdir()
-    kept = json.loads(file.read_text("utf-8"))
-    if wrong is None:
-        del kept["result"][key]
-    else:
-        kept["result"][key] = wrong
-    file.write_text(json.dumps(kept), "utf-8")
-    assert airframe.__wrapped__("aerosonde") == first
-    assert airframe.__wrapped__("aerosonde") == first
-    assert times == 2, "made anew once, and kept"
-
-
-def test_a_figure_is_a_finite_number() -> None:
-    assert figure(3) == 3.0
-    for wrong in (True, "3", None, float("nan"), float("inf"), -0.1):
-        with pytest.raises(ValueError, match="is "):
-            figure(wrong)

@@ -226,7 +226,10 @@ def test_the_digest_changes_with_every_file_of_the_model(tmp_path: Path) -> None
 def test_loops_are_as_fast_as_the_weave_allows() -> None:
     """The T-37's control laws take phase: at full pace its roll swings."""
     aerosonde, tweet = airframe("aerosonde"), airframe("T37")
-    assert aerosonde.guidance_bandwidth_radps == pytest.approx(0.36 * aerosonde.gains.roll)
+    assert tweet.guidance_bandwidth_radps == pytest.approx(0.36 * tweet.gains.roll)
+    # Half a second more of delay: atan(1.8 x) / x of it all, with x = sqrt(1.62 + sqrt(3.6244)) of the damping 0.9.
+    late_s, x = 0.5 + aerosonde.roll_delay_s + 0.05, math.sqrt(1.62 + math.sqrt(3.6244))
+    assert aerosonde.guidance_bandwidth_radps == pytest.approx(math.atan(1.8 * x) / x / late_s, rel=0.01)
     assert weaving_error_m(aerosonde, 25.0) == pytest.approx(aerosonde.weave_error_m, rel=0.01)
     assert tweet.gains.roll == pytest.approx(0.7 * 2.5)
     at = linearised(trimmed(tweet.files, tweet.cruise_mps))
