@@ -10,7 +10,7 @@ from harness.files.input_file import InputError
 from harness.run_files.fences import Fences
 from harness.run_files.mission.items import Item, MissionAsRead
 from harness.run_files.mission.program import program
-from harness.run_files.mission.steps import Program, Told
+from harness.run_files.mission.steps import Program
 from harness.run_files.mission.vertices import altitude_m
 
 HOME = (47.0, 8.0)
@@ -41,12 +41,6 @@ def told(done: Program) -> dict[int, tuple[str, str]]:
 def test_a_jump_is_taken_as_often_as_it_says() -> None:
     done = run(at(1), at(2), at(3), item(4, 177, 2, 2), at(5))
     assert flown(done) == [1, 2, 3, 2, 3, 2, 3, 5]
-
-
-def test_a_jump_that_is_never_taken_is_passed_over() -> None:
-    done = run(at(1), item(2, 177, 1, 0), at(3, 18, first=1.0))
-    assert flown(done) == [1, 3]
-    assert told(done) == {1: ("flown", ""), 2: ("passed over", "is never taken"), 3: ("flown", "1 turn")}
 
 
 def test_a_jump_without_end_forwards_is_a_way_and_backwards_closes_a_loop() -> None:
@@ -101,13 +95,25 @@ def test_what_ends_a_mission() -> None:
     assert (flown(home), home.steps[-1].position) == ([1, 2, 3], HOME)
 
 
-def test_what_has_no_effect_is_passed_over_and_what_cannot_be_flown_is_named() -> None:
-    done = run(at(1), item(2, 183, 7, 1430), item(3, 206, 25), item(4, 112, 10), item(5, 31999), at(6))
-    assert flown(done) == [1, 6]
-    assert [what for what, _ in told(done).values()] == [
-        "flown", "passed over", "passed over", "passed over", "not flown", "flown"
-    ]  # fmt: skip
-    assert done.items[4] == Told(5, "command 31999", "not flown", "an aeroplane here cannot")
+@pytest.mark.parametrize(
+    ("second", "what", "why"),
+    [
+        (item(2, 177, 1, 0), "passed over", "is never taken"),
+        (item(2, 183, 7, 1430), "passed over", "no effect on the path"),
+        (item(2, 206, 25), "passed over", "no effect on the path"),
+        (item(2, 31999), "not flown", "an aeroplane here cannot"),
+        (item(2, 42702, 1, 10), "not flown", "a script of the aircraft flies it"),
+        (at(2, 36, first=90), "not flown", "an arc of a multicopter: ArduPlane goes on to the next item"),
+        (at(2, third=80.0), "flown", "passing by or beyond it, 80 m, is not flown"),
+        (at(2, 18, first=1.0), "flown", "1 turn"),
+        (at(2, 82), "flown", "as a plain waypoint"),
+    ],
+)
+def test_what_becomes_of_an_item_is_told(second: Item, what: str, why: str) -> None:
+    done = run(at(1), second, at(3))
+    assert flown(done) == ([1, 2, 3] if what == "flown" else [1, 3])
+    assert told(done) == {1: ("flown", ""), 2: (what, why), 3: ("flown", "")}
+    assert (done.items[1].name == "command 31999") is (second.command == 31999)
 
 
 def test_a_takeoff_begins_the_flight_at_its_altitude() -> None:
@@ -178,22 +184,11 @@ def test_a_radius_of_one_metre_is_a_side(radius: float) -> None:
     assert (loiter.radius_m, loiter.clockwise) == (0.0, radius > 0)
 
 
-def test_a_distance_to_pass_by_is_named() -> None:
-    done = run(at(1), at(2, third=80.0))
-    assert told(done)[2] == ("flown", "passing by or beyond it, 80 m, is not flown")
-
-
 def test_a_vertical_takeoff_far_from_home_is_at_home() -> None:
     done = run(item(1, 84, 0.0, 0.0, 0.0, 0.0, 8.0, 1.8, 50.0), at(2))
     assert done.steps[0].position == HOME
     assert told(done)[1][1].endswith("at home: the place it names is far from there")
     assert run(at(1, 84), at(2)).steps[0].position == (47.01, 8.0)
-
-
-def test_a_script_may_fly_anywhere() -> None:
-    """MAV_CMD_NAV_SCRIPT_TIME: what it does is not in the mission."""
-    done = run(at(1), item(2, 42702, 1, 10), at(3))
-    assert told(done)[2] == ("not flown", "a script of the aircraft flies it")
 
 
 @pytest.mark.parametrize("condition", [112, 114, 116])
@@ -218,9 +213,3 @@ def test_one_item_is_flown_to_from_above_home() -> None:
         run(at(1, 21))
     with pytest.raises(InputError, match="has 1 item to fly to"):
         program(MissionAsRead("m", (at(1),), None, 0.0, Fences()))
-
-
-def test_arcs_are_named_as_aeroplanes_do_not_fly_them() -> None:
-    done = run(at(1), at(2, 36, first=90), at(3))
-    assert flown(done) == [1, 3]
-    assert told(done)[2] == ("not flown", "an arc of a multicopter: ArduPlane goes on to the next item")
