@@ -156,7 +156,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("obstacle_labels",),
         ("geometry",),
         ("kernels",),
-        ("compiled", "plan_checks"),
+        ("compiled", "keys", "plan_checks"),
         ("interface", "kernel_cache"),
     ),
 }

@@ -17,7 +17,7 @@ ArduPilot's vehicles turn on the spot or nearly so. Here the bearing is steered 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -28,6 +28,7 @@ from planner.geometry.curves import Point
 from planner.geometry.joining import branch_off
 from planner.geometry.margin import margin_of
 from planner.interface import FloatArray, Mission, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.keys import key
 from planner.memory import ObstacleMemory
 
 BEARING_STEP = math.radians(5.0)
@@ -42,40 +43,24 @@ UPDATE_S = 1.0
 class BendyRulerConfig:
     """Keys of `planner.kind: bendy_ruler`, ArduPilot's parameters but for their scale."""
 
-    lookahead_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "OA_BR_LOOKAHEAD, length of a probed line; default: 8 turn radii, at most the sensor range",
-            "unit": "m",
-            "above": 0.0,
-        },
+    lookahead_m: float | None = key(
+        None,
+        "OA_BR_LOOKAHEAD, length of a probed line; default: 8 turn radii, at most the sensor range",
+        "m",
+        above=0.0,
     )
-    margin_max_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "OA_MARGIN_MAX, distance that a line keeps from obstacles; default: the clearance and the margin "
-            "that other planners keep",
-            "unit": "m",
-            "minimum": 0.0,
-        },
+    margin_max_m: float | None = key(
+        None,
+        "OA_MARGIN_MAX, distance that a line keeps from obstacles; default: the clearance and "
+        "the margin that other planners keep",
+        "m",
+        minimum=0.0,
     )
-    cont_ratio: float = field(
-        default=1.5,
-        metadata={
-            "doc": "OA_BR_CONT_RATIO, how much larger the margin of a new bearing must be",
-            "unit": "1",
-            "minimum": 1.0,
-            "maximum": 2.0,
-        },
+    cont_ratio: float = key(
+        1.5, "OA_BR_CONT_RATIO, how much larger the margin of a new bearing must be", minimum=1.0, maximum=2.0
     )
-    cont_angle_deg: float = field(
-        default=75.0,
-        metadata={
-            "doc": "OA_BR_CONT_ANGLE, largest change of bearing without that",
-            "unit": "deg",
-            "minimum": 0.0,
-            "maximum": 180.0,
-        },
+    cont_angle_deg: float = key(
+        75.0, "OA_BR_CONT_ANGLE, largest change of bearing without that", "deg", minimum=0.0, maximum=180.0
     )
 
     def resolved(self, mission: Mission) -> BendyRulerConfig:

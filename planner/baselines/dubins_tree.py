@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 
@@ -24,9 +24,10 @@ import numpy as np
 from planner.geometry.clearance import first_breach
 from planner.geometry.curves import SHORTEST_M, Point, Pose, Segment, along
 from planner.geometry.joining import branch_off, stuck
-from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.geometry.margin import margin_of
 from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.keys import key, margin_key
 from planner.memory import ObstacleMemory
 
 GOAL_COURSES = 8
@@ -52,14 +53,9 @@ LOOK_SHARE = 0.5
 class DubinsTreeConfig:
     """Keys of `planner.kind: dubins_tree`."""
 
-    iterations: int = field(
-        default=300,
-        metadata={"doc": "how many times the tree is grown", "unit": "1", "minimum": 1, "maximum": 1_000_000},
-    )
-    tree_seed: int = field(
-        default=1, metadata={"doc": "seed of the samples", "unit": "1", "minimum": 1, "maximum": 1_000_000}
-    )
-    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
+    iterations: int = key(300, "how many times the tree is grown", minimum=1, maximum=1_000_000)
+    tree_seed: int = key(1, "seed of the samples", minimum=1, maximum=1_000_000)
+    margin_m: float | None = margin_key()
 
     def resolved(self, mission: Mission) -> DubinsTreeConfig:
         """This config with every None replaced by its default for the mission.

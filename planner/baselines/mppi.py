@@ -16,7 +16,7 @@ The path is the rollout of the nominal controls. It is deterministic: the sample
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -24,9 +24,10 @@ import numpy as np
 from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.curves import Pose, Segment, along
 from planner.geometry.joining import branch_off, stuck
-from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.geometry.margin import margin_of
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.kernels.segments import to_nearest
+from planner.keys import key, margin_key
 from planner.memory import ObstacleMemory
 
 STEP_RADII = 0.5
@@ -58,23 +59,10 @@ DRAWN = 24
 class MppiConfig:
     """Keys of `planner.kind: mppi`."""
 
-    samples: int = field(
-        default=256,
-        metadata={"doc": "K, sequences drawn in a round", "unit": "1", "minimum": 8, "maximum": 10_000},
-    )
-    steps: int = field(
-        default=24,
-        metadata={
-            "doc": "steps of the horizon, half a turn radius each",
-            "unit": "1",
-            "minimum": 4,
-            "maximum": 200,
-        },
-    )
-    seed: int = field(
-        default=1, metadata={"doc": "the samples follow from it", "unit": "1", "minimum": 0, "maximum": 2**31}
-    )
-    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
+    samples: int = key(256, "K, sequences drawn in a round", minimum=8, maximum=10_000)
+    steps: int = key(24, "steps of the horizon, half a turn radius each", minimum=4, maximum=200)
+    seed: int = key(1, "the samples follow from it", minimum=0, maximum=2**31)
+    margin_m: float | None = margin_key()
 
     def resolved(self, mission: Mission) -> MppiConfig:
         """This config with every None replaced by its default for the mission."""

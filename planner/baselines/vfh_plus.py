@@ -17,7 +17,7 @@ It looks no further than its window and remembers no way: it is caught in dead e
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -26,8 +26,9 @@ from planner.baselines.steering import off, steer
 from planner.geometry.clearance import first_breach
 from planner.geometry.curves import Limits, Point, Pose, Segment
 from planner.geometry.joining import branch_off, stuck
-from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.geometry.margin import margin_of
 from planner.interface import BoolArray, FloatArray, Mission, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.keys import key, margin_key
 from planner.memory import ObstacleMemory
 
 WIDE_RAD = math.radians(80.0)
@@ -41,32 +42,21 @@ GOAL_WEIGHT, COURSE_WEIGHT, CHOICE_WEIGHT = 5.0, 2.0, 2.0
 class VfhPlusConfig:
     """Keys of `planner.kind: vfh_plus`."""
 
-    window_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "radius of the active window, at most the sensor range; "
-            "default: 12 turn radii and 6 clearances, at most the sensor range",
-            "unit": "m",
-            "above": 0.0,
-        },
+    window_m: float | None = key(
+        None,
+        "radius of the active window, at most the sensor range; default: 12 turn radii and 6 "
+        "clearances, at most the sensor range",
+        "m",
+        above=0.0,
     )
-    sectors: int = field(
-        default=72,
-        metadata={"doc": "sectors of the polar histogram", "unit": "1", "minimum": 8, "maximum": 720},
+    sectors: int = key(72, "sectors of the polar histogram", minimum=8, maximum=720)
+    free_below: float = key(
+        0.05,
+        "a sector is free below this magnitude; 1 is an edge at the aircraft, 0 one at the window's rim",
+        minimum=0.0,
     )
-    free_below: float = field(
-        default=0.05,
-        metadata={
-            "doc": "a sector is free below this magnitude; 1 is an edge at the aircraft, 0 one at the window's rim",
-            "unit": "1",
-            "minimum": 0.0,
-        },
-    )
-    blocked_above: float = field(
-        default=0.10,
-        metadata={"doc": "a sector is blocked above this magnitude", "unit": "1", "minimum": 0.0},
-    )
-    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
+    blocked_above: float = key(0.10, "a sector is blocked above this magnitude", minimum=0.0)
+    margin_m: float | None = margin_key()
 
     def resolved(self, mission: Mission) -> VfhPlusConfig:
         """This config with every None replaced by its default for the mission.

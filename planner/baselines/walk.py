@@ -23,8 +23,9 @@ from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import NOWHERE, Mark, beside, length_of, piece
 from planner.geometry.clearance import first_breach
 from planner.geometry.curves import SHORTEST_M, Point, end_of, pose_at
-from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.geometry.margin import margin_of
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.keys import key, margin_key
 from planner.world_stability import WorldStability
 
 BREACH_SHARE = 0.25
@@ -41,17 +42,10 @@ WalkState = TypeVar("WalkState")
 class PointConfig:
     """Keys that all planners of the BUG family have."""
 
-    turn: Literal["left", "right"] = field(
-        default="left", metadata={"doc": "the way a point turns when it meets an obstacle"}
-    )
-    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
-    horizon_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "how far along a boundary a plan reaches; default: the sensor range",
-            "unit": "m",
-            "above": 0.0,
-        },
+    turn: Literal["left", "right"] = key("left", "the way a point turns when it meets an obstacle")
+    margin_m: float | None = margin_key()
+    horizon_m: float | None = key(
+        None, "how far along a boundary a plan reaches; default: the sensor range", "m", above=0.0
     )
 
     def resolved(self, mission: Mission) -> Self:

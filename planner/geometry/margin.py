@@ -2,18 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from planner.interface import Mission
-
-MARGIN_KEY: Final = {
-    "doc": "planned distance beyond the clearance; "
-    "default: 0.1 of the clearance, at least twice the tracking error",
-    "unit": "m",
-    "minimum": 0.0,
-}
-"""What is told of `margin_m` among the keys of a planner."""
-
 
 TOLERATED_SHARE, TOLERATED_ERRORS = 0.1, 2.0
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
-from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.geometry.margin import margin_of
 from planner.interface import Mission
+from planner.keys import key, margin_key
 from planner.paper.step_model import most_units
 
 
@@ -14,58 +15,25 @@ from planner.paper.step_model import most_units
 class ImprovedBugConfig:
     """Keys of `planner.kind: improved_bug`."""
 
-    planning_window_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "radius r1 of the planning window; no track point lies further from where the plan begins; "
-            "default: the sensor range, which is the most",
-            "unit": "m",
-            "above": 0.0,
-        },
+    planning_window_m: float | None = key(
+        None,
+        "radius r1 of the planning window; no track point lies further from where the plan "
+        "begins; default: the sensor range, which is the most",
+        "m",
+        above=0.0,
     )
-    steps: int = field(
-        default=8,
-        metadata={"doc": "N, steps of a search", "unit": "1", "minimum": 1, "maximum": 100},
+    steps: int = key(8, "N, steps of a search", minimum=1, maximum=100)
+    candidates: int = key(8, "n, candidates kept at every step", minimum=1, maximum=100)
+    step_m: float | None = key(
+        None, "S0, length of a step; default: r1 / N, at least half of the turn radius", "m", above=0.0
     )
-    candidates: int = field(
-        default=8,
-        metadata={"doc": "n, candidates kept at every step", "unit": "1", "minimum": 1, "maximum": 100},
+    course_unit_deg: float = key(1.0, "theta0, smallest change of course", "deg", above=0.0, maximum=45.0)
+    sectors: int = key(4, "sectors planned in at every step", minimum=1, maximum=100)
+    refinement_deg: float = key(
+        0.25, "a sector is refined down to this angle; 360 takes its middle", "deg", above=0.0, maximum=360.0
     )
-    step_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "S0, length of a step; default: r1 / N, at least half of the turn radius",
-            "unit": "m",
-            "above": 0.0,
-        },
-    )
-    course_unit_deg: float = field(
-        default=1.0,
-        metadata={
-            "doc": "theta0, smallest change of course",
-            "unit": "deg",
-            "above": 0.0,
-            "maximum": 45.0,
-        },
-    )
-    sectors: int = field(
-        default=4,
-        metadata={"doc": "sectors planned in at every step", "unit": "1", "minimum": 1, "maximum": 100},
-    )
-    refinement_deg: float = field(
-        default=0.25,
-        metadata={
-            "doc": "a sector is refined down to this angle; 360 takes its middle",
-            "unit": "deg",
-            "above": 0.0,
-            "maximum": 360.0,
-        },
-    )
-    route_optimisation: bool = field(
-        default=True,
-        metadata={"doc": "whether track points between which the way is free are cancelled", "unit": "1"},
-    )
-    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
+    route_optimisation: bool = key(True, "whether track points between which the way is free are cancelled")
+    margin_m: float | None = margin_key()
 
     def resolved(self, mission: Mission) -> ImprovedBugConfig:
         """This config with every None replaced by its default for the mission.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from planner.geometry.joining import LEAD_S as LEAD_S
-from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.geometry.margin import margin_of
 from planner.interface import Mission
+from planner.keys import key, margin_key
 from planner.shield.certificate import least_sensor_range_m
 
 
@@ -15,33 +16,15 @@ from planner.shield.certificate import least_sensor_range_m
 class RollingWindowConfig:
     """Keys of `planner.kind: rolling_window`."""
 
-    steps: int = field(
-        default=16,
-        metadata={
-            "doc": "N, how many steps the search looks ahead",
-            "unit": "1",
-            "minimum": 1,
-            "maximum": 100,
-        },
-    )
-    candidates: int = field(
-        default=12,
-        metadata={
-            "doc": "n, how many candidates are kept at every step",
-            "unit": "1",
-            "minimum": 1,
-            "maximum": 100,
-        },
-    )
-    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
-    rolling_step_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "distance flown before the window rolls, unless the plan is cut near by; "
-            "default: 1/16 of the sensor range",
-            "unit": "m",
-            "above": 0.0,
-        },
+    steps: int = key(16, "N, how many steps the search looks ahead", minimum=1, maximum=100)
+    candidates: int = key(12, "n, how many candidates are kept at every step", minimum=1, maximum=100)
+    margin_m: float | None = margin_key()
+    rolling_step_m: float | None = key(
+        None,
+        "distance flown before the window rolls, unless the plan is cut near by; default: 1/16 "
+        "of the sensor range",
+        "m",
+        above=0.0,
     )
 
     def resolved(self, mission: Mission) -> RollingWindowConfig:
