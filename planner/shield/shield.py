@@ -46,6 +46,7 @@ from planner.shield.encounters import encounters
 from planner.shield.escape import BROKEN_SHARE, Escapes, left_of, room_m
 from planner.shield.evasion import Threats
 from planner.shield.intervention_log import InterventionLog, ShieldReport
+from planner.shield.refused_places import RefusedPlaces
 from planner.shield.room import Room
 from planner.shield.tracking import MOST_RADII, Tracked, can_be_flown, tracked
 
@@ -96,6 +97,7 @@ class Shield:
         self._proposed: Adopted | None = None
         self._own = Plan(PlanStatus.KEPT, "")  # the inner planner's last answer, as it gave it
         self._refused: Refused | None = None
+        self._places, self._shown_s = RefusedPlaces(), -math.inf
         self._threats: Threats | None = None
         self._ever_changed = False
         self._log = InterventionLog()
@@ -150,7 +152,8 @@ class Shield:
             flown = adopted.own
             assert adopted.plan.path is not None
             arc_length_m = _nearest_m(adopted.plan.path, request.position_m, adopted.certified_m)
-        told = request._replace(flown=flown, arc_length_m=arc_length_m, refused=self._refused)
+        seen = self._places.on(request.seen)
+        told = request._replace(seen=seen, flown=flown, arc_length_m=arc_length_m, refused=self._refused)
         try:
             self._own = self._inner.plan(told)
             return checked_plan(self._own, request.position_m, self._mission)
@@ -214,11 +217,11 @@ class Shield:
         if found is None or room_m(found.path, self._threats) < mission.clearance_m:
             free_m = min(certifier.seen_free_to_m(way, request.seen), cut_m)
             why = (
-                "comes too near to something or leaves the area"
+                f"the path comes too near to something or leaves the area {free_m:.0f} m ahead"
                 if cut_m <= free_m
-                else "has not been seen to be free"
+                else f"no turn off the path that gets on has been seen to be free within {free_m:.0f} m"
             )
-            self._not_taken(place_on(way, free_m)[0][:2], f"the path {why} {free_m:.0f} m ahead", new)
+            self._not_taken(place_on(way, free_m)[0][:2], why, new)
             return None
         if not new and effective is not None and self._monitor.broken:
             return None
@@ -324,9 +327,22 @@ class Shield:
             self._log.note(time_s, "")
             return Plan(PlanStatus.KEPT, GOES_ON)
         self._log.note(time_s, why)
-        if answer.status is PlanStatus.UNREACHABLE and self._refused is None:
+        if answer.status is PlanStatus.UNREACHABLE and self._refused is None and not len(self._places):
             return answer
+        self._show_where(request)
         return Plan(PlanStatus.NO_PATH, f"stuck in the turn since {self._log.since_s:.0f} s: {why}")
+
+    def _show_where(self, request: PlanRequest) -> None:
+        """After every full turn that is held the place that was refused last becomes an edge point to the planner."""
+        mission, here = self._mission, request.position_m
+        turn_s = math.tau * self._room.holds.radius_m / mission.speed_mps
+        if self._refused is None or request.time_s < max(self._log.since_s, self._shown_s) + turn_s:
+            return
+        place = self._refused.place_m
+        beside_m = mission.clearance_m + mission.goal_radius_m
+        if math.dist(place, here) > 2.0 * mission.clearance_m and math.dist(place, mission.goal_m) > beside_m:
+            self._places.add(place, request.seen)
+            self._shown_s = request.time_s
 
 
 def first_exit_m(path: Path, bounds_m: tuple[float, float, float, float]) -> float:

@@ -68,7 +68,7 @@ def obstacles(number: int) -> list[Polygon]:
     return made
 
 
-def flown(name: str, number: int, shield: str) -> dict[str, Any]:
+def flown(name: str, number: int, shield: str, limit_s: float = 130.0) -> dict[str, Any]:
     """One flight, judged."""
     shapes = obstacles(number)
     course = 90.0 + float(np.random.default_rng(number + 10_000).uniform(-60.0, 60.0))
@@ -82,7 +82,7 @@ def flown(name: str, number: int, shield: str) -> dict[str, Any]:
                 "start_m": list(START),
                 "goal_m": list(GOAL),
                 "course_deg": course % 360.0,
-                "time_limit_s": 130,
+                "time_limit_s": limit_s,
                 "goal_radius_m": 60,
             },
             "planner": {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ import wayproof
 from planner.interface import Path
 from planner.shield import shield as shield_module
 from planner.shield.certificate import Certified, Certifier
+from tests.closed_loop import shield_table
 from tests.closed_loop.hostile import HOSTILE, Kinked, NotANumber, Outwards, Raising, Straight, Teleporting
 
 WORLD = {
@@ -70,10 +73,18 @@ def test_without_a_part_of_the_shield_a_planner_does_harm(part: str, monkeypatch
         assert flown(Kinked).metrics.cross_track_m.max > 10.0
 
 
+def test_a_planner_that_is_stuck_in_a_turn_gets_on_when_it_is_shown_where() -> None:
+    """Bug2 does not read why its path is refused; without the places on its map it holds to the time limit."""
+    row = shield_table.flown("bug2", 18, "loiter", limit_s=420.0)
+    assert (row["outcome"], row["contact"], row["departed"]) == ("reached", 0, 0)
+    assert row["backup_s"] > 30.0
+
+
 def test_corners_are_rounded_before_they_are_certified() -> None:
     run = flown(Kinked)
     assert run.metrics.cross_track_m.max < 4.0
-    assert max(run.plans.to_pandas().max_curvature_1pm) <= 1.0 / 110.0
+    hold_m = 25.0**2 / (9.80665 * math.tan(math.radians(45.0 - 10.0)))  # 10 degrees less than the bank limit
+    assert max(run.plans.to_pandas().max_curvature_1pm) <= 1.005 / hold_m
 
 
 def test_the_names_of_the_command_line() -> None:

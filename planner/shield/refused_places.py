@@ -1,0 +1,52 @@
+"""The map as a planner under the shield sees it: places that were refused while it was stuck are edge points too."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+
+from planner.geometry.curves import Point
+from planner.interface import FloatArray, MapView
+
+
+class RefusedPlaces:
+    """A planner that does not read `PlanRequest.refused` learns from its map where not to go on."""
+
+    def __init__(self) -> None:
+        self._places: list[tuple[int, Point]] = []  # the map's revision before each, and the place
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def add(self, place: Point, seen: MapView) -> None:
+        """One more edge point."""
+        self._places.append((seen.revision, place))
+
+    def on(self, seen: MapView) -> MapView:
+        """The map with them."""
+        return cast(MapView, _SeenWith(seen, self._places)) if self._places else seen
+
+
+class _SeenWith:
+    """A map and edge points beside it; each counts as one revision more."""
+
+    def __init__(self, seen: MapView, places: list[tuple[int, Point]]) -> None:
+        self._seen, self._places = seen, tuple(places)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._seen, name)
+
+    @property
+    def revision(self) -> int:
+        return self._seen.revision + len(self._places)
+
+    @property
+    def last_removal_revision(self) -> int:
+        last = self._seen.last_removal_revision
+        return last + len(self._places) if last else 0
+
+    def edges_since(self, revision: int) -> FloatArray:
+        known = sum(at + i < revision for i, (at, _) in enumerate(self._places))
+        fresh = np.array([place for _, place in self._places[known:]]).reshape(-1, 2)
+        return np.concatenate((fresh, self._seen.edges_since(revision - known)))

@@ -1,0 +1,51 @@
+"""A planner's memory of the map with refused places, against all that was shown."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planner.interface import BoolArray, FloatArray, MovingEdges
+from planner.memory import ObstacleMemory
+from planner.shield.refused_places import RefusedPlaces
+
+
+class Growing:
+    """A map that gets one edge point more at every step, and loses its first one at one of them."""
+
+    spacing_m = 10.0
+    moving: tuple[MovingEdges, ...] = ()
+    last_contradiction_s = -math.inf
+
+    def __init__(self) -> None:
+        self.edges: list[tuple[int, float]] = []
+        self.revision = self.last_removal_revision = 0
+
+    def step(self, remove: bool) -> None:
+        self.revision += 1
+        self.edges.append((self.revision, 100.0 * self.revision))
+        if remove:
+            del self.edges[0]
+            self.last_removal_revision = self.revision
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return np.array([(east, 0.0) for at, east in self.edges if at > revision]).reshape(-1, 2)
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.ones(len(points_m), dtype=np.bool_)
+
+
+def test_every_edge_and_every_refused_place_is_remembered_once() -> None:
+    seen, refused, memory = Growing(), RefusedPlaces(), ObstacleMemory(10.0)
+    shown: list[tuple[float, float]] = []
+    for number in range(12):
+        seen.step(remove=number == 7)
+        if number in (2, 3, 9):
+            shown.append((50.0 + number, 400.0))
+            refused.add(shown[-1], seen)
+        memory.take_in(refused.on(seen))
+        expected = sorted([(east, 0.0) for _, east in seen.edges] + shown)
+        assert sorted(map(tuple, memory.points_m.tolist())) == expected
+    assert len(refused) == 3
+    assert refused.on(seen).spacing_m == seen.spacing_m
