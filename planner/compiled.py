@@ -16,8 +16,8 @@ import subprocess
 import sys
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from planner.kernel_cache import seal
@@ -113,15 +113,14 @@ def compile_all() -> None:
     with _compiling:
         if not _waiting:
             return
-        with _no_garbage_looked_for():
-            while _waiting:
-                _start_second(0)
-                elsewhere = _second.names if _second else frozenset()
-                _compile([each for each in _waiting if each.__module__ not in elsewhere])
-                if _second:
-                    _second.wait()
-                    _second = None
-                _compile(list(_waiting))
+        while _waiting:
+            _start_second(0)
+            elsewhere = _second.names if _second else frozenset()
+            _compile([each for each in _waiting if each.__module__ not in elsewhere])
+            if _second:
+                _second.wait()
+                _second = None
+            _compile(list(_waiting))
         # The compiler stays for good. Once it is counted among the old objects, garbage is looked for there only when
         # as many new ones have come as would be a quarter of it: that would hold a flight up for a tenth of a second.
         gc.collect()
@@ -134,7 +133,7 @@ def begin_compiling(busy_bytes: int) -> None:
 
     It does nothing where they are on disk, or where there is one processor.
     """
-    with _compiling, _no_garbage_looked_for():
+    with _compiling:
         _start_second(busy_bytes)
 
 
@@ -188,18 +187,6 @@ def _start_second(busy_bytes: int) -> None:
     names = _share(_waiting, busy_bytes) if first.kept and os.cpu_count() != 1 else frozenset()
     with suppress(OSError):  # All are then compiled here.
         _second = _SecondProcess(names) if names else None
-
-
-@contextmanager
-def _no_garbage_looked_for() -> Iterator[None]:
-    """The compiler makes many objects that stay: to look through them for garbage takes a tenth of its time."""
-    looked = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if looked:
-            gc.enable()
 
 
 def _compile(functions: Sequence[Compiled[..., Any]]) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from planner.interface import FloatArray, IntArray, MapView
-from planner.obstacle_labels import ObstacleLabels
+from planner.kernels.buckets import cells_of, joined
 
 FIRST_MOVING = -1000
 """Label of the first obstacle that moves; the next ones have the numbers below it."""
@@ -21,7 +21,7 @@ class ObstacleMemory:
     """Every edge point seen so far and the obstacle that it belongs to.
 
     Points nearer to each other than twice the clearance leave no way between them: they are one obstacle. They are
-    gathered on a grid whose neighbouring cells (diagonals too) are always that near (`planner.obstacle_labels`).
+    gathered on a grid whose neighbouring cells (diagonals too) are always that near.
     """
 
     def __init__(self, clearance_m: float) -> None:
@@ -38,7 +38,7 @@ class ObstacleMemory:
         self._points = np.zeros((256, 2))
         self._genuine = np.zeros(256, dtype=np.bool_)
         self._count = self._refused = 0
-        self._labels = ObstacleLabels(self.cell_m)
+        self._labels: IntArray | None = None
         self._with_moving: FloatArray | None = None
 
     @property
@@ -58,7 +58,9 @@ class ObstacleMemory:
     @property
     def labels(self) -> IntArray:
         """(m,) the obstacle that each point belongs to; each that moves is one."""
-        labels = self._labels.of(self._points[: self._count])
+        if self._labels is None:
+            self._labels = obstacles_of(self._points[: self._count], self.cell_m)
+        labels = self._labels
         numbers = [np.full(len(outline), FIRST_MOVING - i) for i, outline in enumerate(self._outlines)]
         return np.concatenate((labels, *numbers)) if numbers else labels
 
@@ -93,12 +95,7 @@ class ObstacleMemory:
             self._keep_only(self.genuine_m, NOTHING)
 
     def take_in(self, seen: MapView, met: Sequence[FloatArray] | None = None) -> FloatArray:
-        """Remembers what has come in since the last call, and returns it: (k, 2). Lets go of what was taken back.
-
-        Args:
-            seen: what has been seen so far.
-            met: for each obstacle that moves, (k, 2) where its edge is to be thought of; default: where it is.
-        """
+        """Remembers what has come in since the last call, and returns it: (k, 2). Lets go of what was taken back."""
         fresh = NOTHING if seen.revision == self._revision else self._take_in(seen)
         outlines = [each.points_m for each in seen.moving] if met is None else met
         if not (outlines or self._outlines) or self._alike(outlines):
@@ -146,6 +143,13 @@ class ObstacleMemory:
         self._genuine[new] = genuine
         self._refused += 0 if genuine else len(fresh)
         self._count, self._with_moving = total, None
-        self._labels.add(total)
-        if not self.ever_cleared:  # They stay: a search, which takes longest, finds them gathered.
-            self._labels.of(self._points[:total])
+        self._labels = None
+
+
+def obstacles_of(points_m: FloatArray, cell_m: float) -> IntArray:
+    """(m,) the obstacle that each of (m, 2) points belongs to: one for all that are joined by cells that touch."""
+    labels = np.zeros(len(points_m), dtype=np.intp)
+    if len(points_m):
+        members, (_, counts, one, other) = cells_of(points_m, np.arange(len(points_m)), cell_m)
+        labels[members] = np.repeat(joined(len(counts), one, other), counts)
+    return labels

@@ -153,7 +153,6 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("paper",),
         ("shield",),
         ("memory", "world_stability"),
-        ("obstacle_labels",),
         ("geometry",),
         ("kernels",),
         ("compiled", "keys", "plan_checks"),

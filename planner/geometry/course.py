@@ -50,10 +50,6 @@ class Course:
         """Whether another way from here to the goal passes all that was known on the same side.
 
         That is so where the two ways together go round none of it.
-
-        Args:
-            nodes: the other way, from the present track point to the goal.
-            points_m: all remembered edge points.
         """
         loop = np.array([*nodes, *self.nodes[-2::-1]])
         return not encircled(loop, points_m[: self.known]).any()

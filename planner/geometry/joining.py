@@ -63,16 +63,7 @@ def divert_to_loiter(
 ) -> Path | None:
     """The path in effect from one arc length on, left before another, as late as may be, for a full turn.
 
-    Args:
-        path: the path in effect.
-        from_m: arc length of the aircraft on it.
-        to_m: arc length up to which it can still be flown.
-        limits: smallest radius and room to roll.
-        terrain: where the turn and the way there may lie.
-        seen: the turn lies in space that was seen to be free; None: anywhere.
-
-    Returns:
-        A path that ends in a loiter circle; None where no place on it has room for one.
+    The turn lies in `terrain` and, if given, in space `seen` to be free. None where there is no room for one.
     """
     # Where the way there comes too near to something, it is left before.
     way = between(path, from_m, to_m)

@@ -34,13 +34,9 @@ class WorkCount:
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
-    """Where a curve may lie.
+    """Where a curve may lie: (m, 2) edge points, (m,) the distance to be kept from each, and the area.
 
-    Attributes:
-        points_m: (m, 2) edge points.
-        keep_m: (m,) distance to be kept from each.
-        bounds_m: xmin, ymin, xmax, ymax: area that must not be left.
-        work_count: work is counted here.
+    The work of asking is counted.
     """
 
     points_m: FloatArray

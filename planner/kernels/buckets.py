@@ -27,11 +27,6 @@ among them, and the end; (3, b) centre and radius of a circle about each that ho
 def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray, Cells]:
     """Some points by squares: what lies in one of them is looked at as one piece of wall.
 
-    Args:
-        points: (n, 2) all points, m.
-        some: (m,) indices of those that are gathered, at least one.
-        side: of the squares, m.
-
     Returns:
         (m,) the indices, those of a square next to each other; where the squares begin, and which touch.
     """
@@ -45,12 +40,7 @@ def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray,
 
 @compiled(COUNTS, COUNT)
 def _touching(keys: IntArray, width: int) -> Cells:
-    """Where squares begin, how many points each has, and which touch.
-
-    Args:
-        keys: (m,) the square of each point, column times width and row added; sorted.
-        width: rows side by side, one more than there are.
-    """
+    """`Cells` of (m,) sorted keys: column times `width`, one more than there are rows, and row added."""
     count = 1
     for j in range(1, len(keys)):
         if keys[j] != keys[j - 1]:
@@ -80,6 +70,24 @@ def _touching(keys: IntArray, width: int) -> Cells:
     return first, counts, one[:pairs], other[:pairs]
 
 
+@compiled(COUNT, COUNTS, COUNTS)
+def joined(count: int, one: IntArray, other: IntArray) -> IntArray:
+    """(count,) the first of the squares that each is joined with, by pairs that touch: union-find."""
+    first = np.arange(count)
+    for pair in range(len(one)):
+        a, b = one[pair], other[pair]
+        while first[a] != a:
+            first[a] = first[first[a]]
+            a = first[a]
+        while first[b] != b:
+            first[b] = first[first[b]]
+            b = first[b]
+        first[max(a, b)] = min(a, b)
+    for square in range(count):
+        first[square] = first[first[square]]
+    return first
+
+
 @compiled(ROWS, FLOATS, COUNTS)
 def gathered(points: FloatArray, keep: FloatArray, some: IntArray) -> FloatArray:
     """(3, k) east and north of k of (n, 2) points, and the distance to be kept from each, one row after the other."""
@@ -93,11 +101,6 @@ def gathered(points: FloatArray, keep: FloatArray, some: IntArray) -> FloatArray
 @compiled(ROWS, FLOATS, FLOAT)
 def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, Buckets]:
     """All points by squares.
-
-    Args:
-        points: (m, 2) points, m.
-        keep: (m,) distance to be kept from each, m.
-        side: of the squares, m.
 
     Returns:
         (m,) indices, those of a square next to each other; the points in this order.

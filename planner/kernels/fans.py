@@ -21,13 +21,7 @@ EDGE_OFF_RAD = 1e-7
 
 @compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
 def first_met(
-    places: FloatArray,
-    first: IntArray,
-    circles: FloatArray,
-    east: float,
-    north: float,
-    ux: float,
-    uy: float,
+    places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float, ux: float, uy: float
 ) -> tuple[float, int]:
     """How far a ray leads before it comes too near to a point, and to which; infinite and 0: it never does."""
     squares, begins, count = np.empty(len(first), dtype=np.intp), np.empty(len(first)), 0
@@ -73,7 +67,7 @@ def hugged(
     touch: float,
 ) -> float:
     """How far along a ray an outer distance from an obstacle, which it touches, is reached again; 0: it never is."""
-    begin, end, count, least = np.empty(own.shape[1]), np.empty(own.shape[1]), 0, 0
+    begin, end, count = np.empty(own.shape[1]), np.empty(own.shape[1]), 0
     within = outer + 1.5 * side  # points of one cell lie no further apart than its diagonal
     for cell in range(len(first)):
         dx, dy = own[0, first[cell]] - east, own[1, first[cell]] - north
@@ -86,27 +80,16 @@ def hugged(
             if reach > 0.0 and ahead > -outer:
                 half = math.sqrt(reach)
                 begin[count], end[count] = ahead - half, ahead + half
-                if begin[count] < begin[least]:
-                    least = count
                 count += 1
     if not count:
         return 0.0
     # Stretches of the ray near to a point, from the first on: those that overlap are one.
-    furthest = float(end[least])
-    while True:
-        grown = True
-        while grown:
-            grown = False
-            for k in range(count):
-                if begin[k] <= furthest < end[k]:
-                    furthest, grown = float(end[k]), True
-        beyond = -1
-        for k in range(count):
-            if begin[k] > furthest and (beyond < 0 or begin[k] < begin[beyond]):
-                beyond = k
-        if beyond < 0 or furthest > touch:
-            return furthest
-        furthest = float(end[beyond])
+    furthest = -math.inf
+    for k in np.argsort(begin[:count]):
+        if begin[k] > furthest > touch:
+            break
+        furthest = max(furthest, end[k])
+    return furthest
 
 
 @compiled(ROWS, COUNT, COUNTS, COUNTS, COUNTS, COUNTS, COUNTS_OUT, BOOLS_OUT)

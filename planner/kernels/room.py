@@ -26,21 +26,12 @@ def room_along(
     latest: float,
     unknown_s: float,
 ) -> float:
-    """How far an aircraft that flies along some places keeps from all edge points, m.
+    """How far an aircraft that flies along (n, 2) places, a step (m) apart, keeps from all edge points, m.
 
-    Args:
-        places: (n, 2) places, in order, one step apart.
-        still: (3, m) edge points that stand, by squares, as `planner.kernels.buckets.Buckets` has them,
-        first: where each square begins among them,
-        circles: and the circle about it.
-        moving: (k, 5) edge points now, their velocity, and how fast they may come nearer beyond that.
-        step: distance between two places, m.
-        speed: of the aircraft, m/s.
-        least: with less room the rest is not looked at, m.
-        farther: for each metre along the way, what is met counts as so much further away.
-        earliest: share of the time at that speed after which the aircraft may be at a place,
-        latest: and until which.
-        unknown_s: an edge point of unknown velocity comes nearer for so long.
+    Those that stand are `Buckets`; `moving` are (k, 5): edge points now, their velocity, and how fast they may come
+    nearer beyond that, for `unknown_s`. For each metre along the way, what is met counts as `farther` m further away.
+    At each place the aircraft may be from `earliest` to `latest` times the time at its speed. With less room than
+    `least` the rest is not looked at.
     """
     room, i, fastest, beside = math.inf, 0, 0.0, 0
     for j in range(len(moving)):

@@ -124,12 +124,9 @@ class Proof:
 class Proofs:
     """What a planner asks of the edge points seen, one proof a question.
 
-    Attributes:
-        no_way: no vehicle can pass.
-        no_room_to_turn: no vehicle can pass that keeps, beside the clearance, a turn radius from everything.
-        only_given_up: there is no way but through places that were given up.
-        no_way_gap_m: every gap that `no_way` counts as open is wider than this.
-        turning_gap_m: the same for `no_room_to_turn`.
+    `no_way`: no vehicle can pass; every gap that it counts as open is wider than `no_way_gap_m`. `no_room_to_turn`:
+    none can that keeps a hold radius beside the clearance (`turning_gap_m`). `only_given_up`: no way but through places
+    that were given up.
     """
 
     def __init__(self, mission: Mission, memory: ObstacleMemory, least_keeps_m: float) -> None:

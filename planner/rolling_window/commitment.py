@@ -143,11 +143,7 @@ def explanation(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
 
 
 def picture_of(
-    position: Point,
-    goal: Point,
-    nodes: Sequence[Point],
-    candidates: Iterable[Candidate],
-    met_m: FloatArray,
+    position: Point, goal: Point, nodes: Sequence[Point], candidates: Iterable[Candidate], met_m: FloatArray
 ) -> PlanPicture:
     """Guide vector, what was compared (the chosen course first), what is met."""
     return PlanPicture(

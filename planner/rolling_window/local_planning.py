@@ -10,7 +10,7 @@ import numpy as np
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Limits, Point, Pose, Segment, onward_in_turn
-from planner.geometry.terrain import POINT_WORK, Terrain, WorkCount
+from planner.geometry.terrain import POINT_WORK, TANGENT_WORK, Terrain, WorkCount
 from planner.interface import FloatArray, Mission, Path
 from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
@@ -55,7 +55,7 @@ TRAIL_CLEARANCES = 4.0
 
 @dataclass(frozen=True)
 class Attempt:
-    """How far from obstacles to search."""
+    """Distance kept from every edge point, and a margin beyond it: shares are given up for steps and curves; m."""
 
     distance_m: float
     margin_m: float
@@ -63,14 +63,7 @@ class Attempt:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where a new plan begins.
-
-    Attributes:
-        position: of the aircraft.
-        pose: where the new plan leaves the old one.
-        curvature: of the old one there, 1/m.
-        prefix: the stretch of the old one up to there.
-    """
+    """Where a new plan leaves the old one: pose and curvature (1/m) there, and the stretch (`prefix`) up to there."""
 
     position: Point
     pose: Pose
@@ -86,13 +79,7 @@ class LocalPlanning:
     """Looks for the shortest flyable way to the goal through what is remembered."""
 
     def __init__(
-        self,
-        mission: Mission,
-        memory: ObstacleMemory,
-        *,
-        margin_m: float,
-        steps: int,
-        candidates: int,
+        self, mission: Mission, memory: ObstacleMemory, *, margin_m: float, steps: int, candidates: int
     ) -> None:
         self._mission, self._memory = mission, memory
         self._margin_m = margin_m
@@ -133,26 +120,19 @@ class LocalPlanning:
         return self._memory.points_m
 
     def route(
-        self,
-        attempt: Attempt,
-        effort: int,
-        now: Now,
-        candidates: list[Candidate],
-        closed: Callable[[], bool],
+        self, attempt: Attempt, effort: int, now: Now, candidates: list[Candidate], closed: Callable[[], bool]
     ) -> Generator[None, None, FlyableRoute | None]:
         """The shortest of the n best candidates, after route optimisation.
 
         What comes in while this goes on is left for the next search: else the shortest way round something that is
         just coming into view would be dropped, again and again, for a long one that leads away.
-
-        Yields:
-            None after each step of work.
         """
         start, _ = now()
         points = self._memory.points_m
         room = self._room_m(start, points)
         keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
-        labels = self._memory.labels.copy()
+        labels = self._memory.labels
+        self.work_count.add(0, TANGENT_WORK, len(points))
         window = Window(start.pose[:2], points, labels, self._memory.cell_m, keep, self.work_count)
         begun = start
         fitted: list[tuple[float, FlyableRoute]] = []

@@ -36,14 +36,7 @@ APART_WIDE = 0.25
 
 @dataclass(frozen=True)
 class Candidate:
-    """A candidate of the search, or the beginning of one: a polyline of track points.
-
-    Attributes:
-        nodes: track points, from the present one on.
-        flown_m: length of the steps.
-        left_m: distance from the last track point to the goal.
-        last: the edge of the last step, where that ended by hugging it.
-    """
+    """A candidate of the search, or the beginning of one: a polyline, and the edge that the last step hugged."""
 
     nodes: tuple[Point, ...]
     flown_m: float

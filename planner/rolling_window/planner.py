@@ -65,10 +65,7 @@ NO_WAY_ON = "no way on can be seen to be safe; the plan in effect goes on"
 class RollingWindow:
     """The planner for one flight.
 
-    Args:
-        config: its keys.
-        mission: goal and limits.
-        shielded: it commits only to what is certified. Else it flies whole courses, and nothing where it has none.
+    Shielded, it commits only to what is certified. Else it flies whole courses, and nothing where it has none.
     """
 
     def __init__(self, config: RollingWindowConfig, mission: Mission, shielded: bool = True) -> None:
@@ -80,11 +77,7 @@ class RollingWindow:
         self._mission, self._rolling_step_m = mission, config.rolling_step_m
         self._memory = memory = ObstacleMemory(mission.clearance_m)
         self._local = LocalPlanning(
-            mission,
-            memory,
-            margin_m=config.margin_m,
-            steps=config.steps,
-            candidates=config.candidates,
+            mission, memory, margin_m=config.margin_m, steps=config.steps, candidates=config.candidates
         )
         self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
         least_m = self._lead_m + 2.0 * mission.turn_radius_m
@@ -315,12 +308,7 @@ class RollingWindow:
         return escape.plan
 
     def _proved(self, now: Situation) -> tuple[bool, bool]:
-        """Takes more edge points into the proofs.
-
-        Returns:
-            Whether no way has room to turn, which is asked only when enough has been tried; whether no way is left but
-            through places that were given up.
-        """
+        """Whether no way has room to turn, asked once enough was tried; whether no way is left but given-up ones."""
         position, proofs = now.request.position_m, self._proofs
         only_given_up = len(self._memory.refused_m) > 0 and proofs.only_given_up.closed(position)
         edges_went = self._memory.cleared != self._search.gone

@@ -37,10 +37,6 @@ def search_poses(
     """The cheapest flyable route by best-first search over (x, y, course), in steps S_0 of one turn radius.
 
     A left turn never follows a right one without a straight step between.
-
-    Returns:
-        The route, to the goal or as far towards it as is asked for; None where the search ran out of poses or of
-        its count.
     """
     step_m = limits.radius_m
     largest = 2.0 * math.asin(step_m / (2.0 * limits.radius_m))

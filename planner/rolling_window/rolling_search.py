@@ -40,16 +40,7 @@ WORK_WHILE_UNSAFE = Work(12_000.0, 12_000.0)
 
 
 class RollingStep(NamedTuple):
-    """What a rolling step begins with.
-
-    Attributes:
-        request: what was asked.
-        start: where a new plan begins.
-        ahead: what is left of the course in effect; None without one.
-        serves: that course leads to the goal, as far as is known.
-        work: how much is searched.
-        threats: what is near, while something moves or has just appeared.
-    """
+    """What a rolling step begins with."""
 
     request: PlanRequest
     start: Start

@@ -45,9 +45,6 @@ def optimise(
     to something, the turn that is being flown at the start is flown on, past the first corners; then the first turn
     is flown the other way round, then one corner after the other is left out, then corners are rounded as tightly
     as may be, and then the track is tried as it came.
-
-    Returns:
-        The route; None where no choice can be flown.
     """
     if len(nodes) < 2:
         return None

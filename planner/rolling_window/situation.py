@@ -26,11 +26,7 @@ class PlanningState(Enum):
 
 
 class NoRoomToTurn(RuntimeError):
-    """Every way that is left leads through a gap in which no full turn has been seen to be free.
-
-    Args:
-        gap_m: the width of a gap with room for a turn.
-    """
+    """Every way that is left leads through a gap in which no full turn has been seen to be free."""
 
     def __init__(self, gap_m: float) -> None:
         super().__init__(
@@ -42,13 +38,7 @@ class NoRoomToTurn(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """A request, and where the aircraft is on the plan in effect.
-
-    Attributes:
-        request: what was asked.
-        plan: the committed plan in effect; None without one.
-        here_m: arc length of the aircraft on its path, whole turns of the loiter taken off.
-    """
+    """A request, the plan in effect, and the arc length (m) of the aircraft on it, whole turns taken off."""
 
     request: PlanRequest
     plan: CommittedPlan | None

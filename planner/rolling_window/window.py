@@ -65,15 +65,9 @@ _Obstacle = tuple[FloatArray, Cells]
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """The obstacles that are known about a track point, to be searched through.
+    """The (m, 2) edge points known about a track point, the obstacle of each and the distance to be kept from each.
 
-    Attributes:
-        center_m: the present track point w_k.
-        points_m: (m, 2) sensed edge points.
-        labels: (m,) the obstacle that each belongs to.
-        cell_m: points within a square of this side are looked at as one piece of wall.
-        keep_m: (m,) distance to be kept from each point.
-        work_count: work is counted here.
+    Points within a square of `cell_m` are looked at as one piece of wall.
     """
 
     center_m: Point

@@ -48,11 +48,7 @@ def assert_tangent(edge: SectorEdge, window: Window, origin: tuple[float, float]
         assert shapely.distance(line, shapely.points(window.points_m)).min() > KEEP * (1.0 - 1e-6)
 
 
-@given(
-    away=st.floats(1500.0, 6000.0),
-    turn=st.floats(-math.pi, math.pi),
-    radius=st.floats(100.0, 1200.0),
-)
+@given(away=st.floats(1500.0, 6000.0), turn=st.floats(-math.pi, math.pi), radius=st.floats(100.0, 1200.0))
 def test_the_edges_of_a_lone_circle_end_its_fan(
     away: float, turn: float, radius: float, ring: MakePoints
 ) -> None:
