@@ -88,15 +88,7 @@ def kept(
     bounded: bool,
     others: tuple[Sequence[Breach], float] = ((), math.inf),
 ) -> Kept:
-    """Compares a track with obstacles, fences and the bounds of the area.
-
-    Args:
-        track: what was flown; `clearance_m` is the distance to the obstacles of `world`.
-        world: the truth.
-        fences: those of the path.
-        bounded: the bounds of the area must not be crossed.
-        others: contacts that have been found otherwise, and the least distance from what they are with.
-    """
+    """Compares a track with obstacles, fences and the bounds of the area."""
     import shapely
 
     heights = track.altitude_above_ground_m
@@ -190,16 +182,7 @@ def crossings(
     inside_of: Geometry | None = None,
     outside_of: Geometry | None = None,
 ) -> list[Breach]:
-    """Stretches of a track on the wrong side of a line, those between two rows among them.
-
-    Args:
-        track: the track.
-        margin_m: (n,) distance of its rows from the line, negative on the wrong side.
-        kind: of the breaches.
-        name: of the fence.
-        inside_of: what the track has to stay in; or
-        outside_of: what it has to stay out of.
-    """
+    """Stretches of a track on the wrong side of a line, those between two rows among them."""
     import shapely
 
     margin = margin_m.copy()

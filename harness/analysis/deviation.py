@@ -61,14 +61,7 @@ class Deviation:
 
 
 def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: float) -> Deviation:
-    """Measures a track against a path that was given.
-
-    Args:
-        track: rows that follow a plan have the arc length along the flown path.
-        given_m: (m, 3) the path as given: east, north, and the arc length of the flown path that belongs there.
-        spacing_m: points along the path are measured at least this close together, m.
-        window_m: what is further apart than this along the flown path is not compared.
-    """
+    """Measures a track against a path that was given."""
     # What is flown beyond the end is no part of the path.
     flown = np.flatnonzero(track.arc_length_m <= given_m[-1, 2])
     rows = np.full(len(track), math.nan)
@@ -108,13 +101,7 @@ def at_corner(track: Track, corner: Corner) -> NDArray[np.bool_]:
 
 
 def distances_m(points: FloatArray, line: FloatArray, window_m: float) -> FloatArray:
-    """(n,) distances of points from those parts of a line that are about as far along.
-
-    Args:
-        points: (n, 3) east, north, and how far along; the last need not rise.
-        line: (m, 3) the same of the line's vertices, m > 0; the last never falls.
-        window_m: how far apart along still counts.
-    """
+    """(n,) distances of points from those parts of a line that are about as far along."""
     line = np.concatenate((line, line[-1:])) if len(line) == 1 else line
     along = line[:, 2]
     found = np.empty(len(points))

@@ -41,11 +41,6 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     intervals at whose end the distance to an obstacle edge was below the wanted clearance. `compute_ms` is processor
     time of all calls in which the planner searched, `timing.planner_wall_ms` the wall-clock time of the same.
 
-    Args:
-        flight: the flight; its track has at least one row.
-        limits: what the flight is measured against.
-        given: the path as given that the flight follows; None where a planner made the path.
-
     Raises:
         ValueError: the track is empty.
     """
@@ -141,11 +136,7 @@ def percentiles(values: Sequence[float]) -> dict[str, float | None]:
 
 
 def lost_returns(counts: IntArray | None) -> dict[str, float | None]:
-    """`share` of the beams that met something and returned nothing, and `max` in the worst scan; None without a sensor.
-
-    Args:
-        counts: `Flight.lost_returns`.
-    """
+    """`share` of the beams that met something and returned nothing, `max` in the worst scan; None without a sensor."""
     if counts is None:
         return {"share": None, "max": None}
     met, lost = counts.sum(axis=0).tolist()

@@ -142,10 +142,6 @@ def polyline_profile(points_m: FloatArray, window_m: float) -> Profile:
 
     The turn at a vertex is spread over half of the legs on either side of it, but over no more than
     `window_m`: vertices that sample a curve get its curvature, a corner between long legs that of a corner.
-
-    Args:
-        points_m: (n, 2) vertices, no two neighbours in one place.
-        window_m: length over which a corner is taken to be turned.
     """
     legs = np.diff(points_m[:, 0]) + 1j * np.diff(points_m[:, 1])
     length = np.abs(legs)

@@ -160,12 +160,6 @@ def open_table(
 ) -> None:
     """Opens the table of a campaign in the viewer and waits until it is closed.
 
-    Args:
-        name: of the campaign.
-        recordings: files of its runs.
-        web: in a browser instead of a window; served until interrupted.
-        tell: is told the address for the browser.
-
     Raises:
         RunFolderError: the campaign has no recordings.
         ViewerError: there is no screen, or the viewer or the server does not start.

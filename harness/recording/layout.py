@@ -191,12 +191,6 @@ def series_views(
     """The time series, one a question, each over the whole flight.
 
     What the colours of a single flight's lines are stands in the title: a legend would cover the end of the curves.
-
-    Args:
-        frame: what to frame the views on.
-        runs: as in `blueprint`.
-        only: names of the series shown; default: all.
-        without: names of series that are not shown.
     """
     wanted = max(frame.clearance_m, 1.0)
     one, whole = len(runs) < 2, len(runs) == 1

@@ -223,13 +223,7 @@ class RerunLog:
         run: Mapping[str, Value] | None = None,
         varied: Mapping[str, Value] | None = None,
     ) -> None:
-        """Draws the whole track, writes summary and verdicts where there are metrics, and ends the file.
-
-        Args:
-            metrics: content of `metrics.json`; None where the flight broke off.
-            run: typed figures of the run (`harness.recording.properties.run_properties`).
-            varied: the keys that a campaign varied, and their values.
-        """
+        """Draws the whole track, writes summary and verdicts where there are metrics, and ends the file."""
         self._events += [
             (each["time_s"], Caution(f"{each['kind']}: {each['text']}"), look.WARNED)
             for each in (metrics or {}).get("findings", ())

@@ -34,11 +34,6 @@ FLOWN_LINE = "/flown"
 def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) -> str:
     """Writes the overlay of recordings to `path`, in the world of the first.
 
-    Args:
-        recordings: the files; incomplete ones may be among them.
-        names: name of each, for the legends.
-        path: the file to write.
-
     Returns:
         Which of them are of other worlds, a sentence that stands in the summary too; empty where none is.
 

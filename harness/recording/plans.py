@@ -66,15 +66,7 @@ def send_plans(
     chord_error_m: float,
     thin: bool = False,
 ) -> None:
-    """Draws plans, each from the time on at which it takes effect.
-
-    Args:
-        rec: where to.
-        plans: in order of time; none draws nothing.
-        held_m: altitudes of the path in the 3-D view, from arc lengths.
-        chord_error_m: how far a drawn path may be off the true one.
-        thin: no more than paths and waypoints.
-    """
+    """Draws plans, each from the time on at which it takes effect."""
     if not plans:
         return
     times = [look.time_column(np.array([each.time_s for each in plans]))]

@@ -29,12 +29,6 @@ def write_tracks(
 ) -> None:
     """Writes the recording.
 
-    Args:
-        name: of the recording.
-        corners_m: (k, 2) east and north of the mission's corners.
-        tracks: columns by name: `time_s`, `east_m`, `north_m`, `height_m` and others of `SERIES`.
-        path: the file to write.
-
     Raises:
         OSError: it cannot be written.
     """

@@ -52,12 +52,6 @@ def open_viewer(
 ) -> None:
     """Opens the recordings of runs in the viewer and waits until it is closed. Several are overlaid in one.
 
-    Args:
-        run_dirs: run folders, incomplete ones too. Alone: a recording, or the folder of a comparison, of which the
-            overlay is shown.
-        web: in a browser instead of a window; served until interrupted.
-        tell: is told the address for the browser.
-
     Raises:
         RunFolderError: a folder has no recording.
         InputError: a recording does not exist, or is to be overlaid.

@@ -112,14 +112,7 @@ def close_up(
     middle_m: FloatArray,
     half_m: tuple[float, float],
 ) -> None:
-    """Lines about a place, with a bar of a round length and no ticks.
-
-    Args:
-        axes: where to.
-        lines: (k, 2) points, colour, width and dashes of each.
-        middle_m: (2,) the place.
-        half_m: how far the picture reaches to the sides, and up and down.
-    """
+    """Lines about a place, with a bar of a round length and no ticks."""
     for points, ink, width, dashes in lines:
         axes.plot(*points.T / 1e3, color=ink, lw=width, ls=dashes, clip_on=True)
     (east, north), (wide, high) = middle_m / 1e3, np.array(half_m) / 1e3

@@ -18,7 +18,6 @@ from harness.files.whole_file import replace_text
 from harness.files.wording import printable
 from harness.report.chapters import entry, optimum_of, run_chapter
 from harness.report.page import rendered
-from harness.report.remarks import Remark, remarks
 from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
 from harness.scenario.scenario import Scenario, parse_scenario
 from harness.world.optimum import Optimum
@@ -54,11 +53,10 @@ def _written(run: Run, folder: Path) -> Path:
     command = shlex.join(["wayproof", *_found_again(arguments, folder)])
     legs, given = run.metrics["trackability"], "check" in run.metrics
     lost = [leg for leg in legs if not leg["trackable"]]
-    told = [
-        Remark(each["kind"], each["text"] + _beside(optimum, each["kind"]))
+    remarks = [
+        (each["kind"], each["text"] + _beside(optimum, each["kind"]))
         for each in run.metrics.get("findings", ())
     ]
-    speed_mps, clearance_m = scenario.aircraft.airspeed_mps or 0.0, scenario.planner.clearance_m or 0.0
     text = rendered(
         "run.html",
         chapter=run_chapter(scenario, flight, optimum),
@@ -69,7 +67,7 @@ def _written(run: Run, folder: Path) -> Path:
         findings={cause: text for cause, text in FINDINGS.items() if cause in {leg["cause"] for leg in lost}},
         exceeded=_exceeded(scenario, lost),
         checked=run.metrics if given else None,
-        remarks=[*told, *remarks(flight.row, clearance_m, speed_mps, given=given)],
+        remarks=remarks,
         aircraft=Path(scenario.aircraft.model).name,
         scenario_yaml=run.scenario_yaml,
         command=command,

@@ -245,15 +245,6 @@ def asked(
 ) -> PathCheck:
     """Puts together what a path is flown with.
 
-    Args:
-        given: the path.
-        sections: of a scenario: `aircraft`, `environment`, `planner`, `trackability`.
-        settings: keys to replace.
-        world: a scenario file, see `_Keys`.
-        altitude_m: above mean sea level; None: the path's, else the world's.
-        corner_m: see `PathCheck`.
-        name: of the scenario.
-
     Raises:
         InputError: they contradict each other; the fault names the key.
     """

@@ -100,13 +100,6 @@ def planned(
 ) -> PathPlan:
     """Makes of a path what is flown.
 
-    Args:
-        given: the path.
-        scenario: aircraft, air and thresholds, and the altitude of a path without one.
-        altitude_m: all of it is flown at this altitude; None: as the path says.
-        ground: height of the ground; None where it is not known.
-        corner_m: how far off corners may be passed; None: as the path says.
-
     Raises:
         InputError: it cannot be made into a path: altitudes above a ground that is not known, an airspeed at which
             the wind is too strong.
@@ -253,16 +246,7 @@ def fly_along(
     observers: Sequence[Observer] = (),
     progress: Progress | None = None,
 ) -> Flight:
-    """Flies a path to its end.
-
-    Args:
-        plan: the path, with its altitudes and airspeeds.
-        kind: the guidance law's.
-        loop: the parts of the flight; its sensor and planner are not asked, its mission does not end the flight. Used
-            up.
-        observers: look on.
-        progress: told of the flight every few simulated seconds.
-    """
+    """Flies a path to its end."""
     path = Path(plan.way.segments)
     limit_s = 2.0 * path.length_m / max(_slowest_mps(loop.model.state(), plan), 1.0) + 60.0
     guidance, route = loop.guidance, Route(path.segments)

@@ -87,16 +87,6 @@ def rolling(draw: Draw) -> Asked:
     return line, keys(**limit)
 
 
-def slow_servo(draw: Draw) -> Asked:
-    """In severe turbulence an elevator of 20 degrees a second is late, and altitude is lost; a fast one loses 1 m."""
-    rough = {
-        "environment__turbulence": "{intensity: severe}",
-        "aircraft__actuators__rate_limit_degps": f"{draw(15, 21):.1f}",
-    }
-    limits = {"trackability__cross_track_m": "60", "trackability__altitude_m": "4"}
-    return np.array([(0.0, 0.0), (5000.0, 0.0)]), keys(**rough, **limits)
-
-
 def climbing(draw: Draw) -> Asked:
     return slope(draw(8.0, 12.0), draw(200.0, 4500.0)), {}
 
@@ -145,7 +135,6 @@ FAMILIES: Mapping[str, tuple[Callable[[Draw], Asked], ...]] = {
     "wind drift": (windy, windy_at_a_corner),
     "bank limit": (disturbed,),
     "roll rate": (rolling,),
-    "actuator": (slow_servo,),
     "load factor": (heavy,),
     "speed or throttle saturation": (slow,),
     "climb too steep": (climbing, climbing_high_up, climbing_with_another),

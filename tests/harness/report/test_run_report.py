@@ -86,19 +86,6 @@ def test_a_leg_shows_the_limit_that_it_was_over(run: Path, tmp_path: Path) -> No
     assert '<td class="bad">11.0</td><td>0.1</td><td>\N{EN DASH}</td><td>1.4</td>' in page
 
 
-@pytest.mark.flights
-def test_a_near_miss_is_said_before_the_figures(run: Path, tmp_path: Path) -> None:
-    """Also where the goal was reached."""
-    assert "nearer to an obstacle than wanted" not in (
-        page_with(run, tmp_path / "fair", clearance_violation_s=0.0)
-    )
-    page = page_with(run, tmp_path / "near", min_clearance_m=5.49, clearance_violation_s=2.1)
-    said = "nearer to an obstacle than wanted</strong>: 5.49 m at the least; for 2.1 s nearer than the wanted 100.0 m"
-    assert page.index(said) < page.index("<table")
-    assert '<td class="bad">5.49</td>' in page
-    assert '<td class="bad">2.1</td>' in page
-
-
 def rewrite(file: Path, text: str) -> None:
     """Writes a file of a run folder anew, with its hash in the manifest: an edited file alone is refused."""
     file.write_text(text)
