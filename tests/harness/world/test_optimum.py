@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -155,19 +153,3 @@ def test_agrees_with_the_shared_worlds(family: str) -> None:
         assert found.length_m is None
     else:
         assert found.length_m == pytest.approx(world["optimum_m"], rel=1e-6, abs=ROUNDING_M)
-
-
-@pytest.mark.flights
-@pytest.mark.parametrize(("corners", "waves"), [(4000, 0), (16_000, 40)])
-def test_round_a_polygon_of_thousands_of_corners_in_seconds(corners: int, waves: int) -> None:
-    """One that is convex can be touched at every corner, a coast with bays at few. Both ways follow a convex hull."""
-    turn = np.linspace(0.0, math.tau, corners, endpoint=False)
-    radius = 20.0 + 4.0 * np.sin(waves * turn) + 0.1 * np.sin(25 * waves * turn)
-    ring = np.column_stack((radius * np.cos(turn), radius * np.sin(turn)))
-    begun = time.process_time()
-    found = way(Obstacle(Polygon(tuple(map(tuple, ring.tolist())))), clearance=2.0)
-    assert time.process_time() - begun < 6.0
-    grown = shapely.Polygon(ring).buffer(2.0, quad_segs=64)
-    hull = shapely.union_all([grown, *map(shapely.Point, (WEST, EAST))]).convex_hull.exterior
-    one = abs(hull.project(shapely.Point(WEST)) - hull.project(shapely.Point(EAST)))
-    assert found.length_m == pytest.approx(min(one, hull.length - one), rel=1e-5)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from harness.mapping.scan import RangeScan
 from harness.scenario.sections import Sensor
 from harness.world.range_sensor import RangeSensor
-from harness.world.world import Circle, Obstacle, Polygon, Surroundings, World
+from harness.world.world import Circle, Obstacle, Polygon, World
 from tests.examples import examples
 
 BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
@@ -222,36 +222,6 @@ def test_a_scan_does_not_depend_on_where_the_sensor_was_before(seed: int) -> Non
     for number in range(60):
         pose = (20.0 * number, 7.0 * number, 0.1 * number, 1.7 * number)
         assert bits(flown.scan(*pose)) == bits(sensor(world).scan(*pose))
-
-
-class CountingWorld(World):
-    """Counts how often, and about how many faces, the sensor asks."""
-
-    asked: int = 0
-    faces: int = 0
-
-    def surroundings(
-        self, east_m: float, north_m: float, radius_m: float, start_s: float, stop_s: float
-    ) -> Surroundings:
-        answer = super().surroundings(east_m, north_m, radius_m, start_s, stop_s)
-        faces = answer.faces(start_s)
-        self.asked += 1
-        self.faces = faces.circles_m.shape[1] + faces.edges_m.shape[1]
-        return answer
-
-
-def test_far_obstacles_are_not_touched_by_a_scan() -> None:
-    rng = np.random.default_rng(5)
-    near = [Obstacle(Circle((0.0, 500.0), 100.0)), Obstacle(square(500.0, 0.0, 100.0))]
-    far = [Obstacle(Circle(tuple(rng.uniform(5000.0, 90_000.0, 2)), 100.0)) for _ in range(5000)]
-    far += [Obstacle(square(east, north, 100.0)) for east, north in rng.uniform(5000.0, 90_000.0, (5000, 2))]
-    world = CountingWorld(near + far, BOUNDS)
-    source = sensor(world)
-    for number in range(60):
-        source.scan(1.5 * number, 0.0, 0.0, 0.5 * number)
-    assert (world.asked, world.faces) == (1, 5)
-    source.scan(260.0, 0.0, 0.0, 30.0)
-    assert world.asked == 2
 
 
 def test_a_scan_cannot_be_changed_and_keeps_no_array_of_others() -> None:

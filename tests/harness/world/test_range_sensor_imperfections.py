@@ -88,15 +88,6 @@ def test_each_imperfection_has_a_stream_of_its_own() -> None:
     assert np.abs(np.corrcoef(chances) - np.eye(3)).max() < 5 / math.sqrt(noisy.size)
 
 
-def test_draws_do_not_depend_on_what_is_seen() -> None:
-    half = World([Obstacle(Circle((700.0, 0.0), 500.0))], BOUNDS)
-    seen = np.isfinite(ranges(half, scans=5))
-    assert 500 < seen.sum() < 3000
-    some = ranges(half, scans=5, range_noise_m=5.0)[seen] - ranges(half, scans=5)[seen]
-    errors = ranges(ROOM, scans=5, range_noise_m=5.0)[seen] - 600.0
-    np.testing.assert_allclose(some, errors, rtol=0, atol=1e-9)
-
-
 def test_a_perfect_sensor_draws_nothing_and_repeats_itself() -> None:
     source = sensor(ROOM)
     streams = (source._noise, source._dropout, source._false_return)

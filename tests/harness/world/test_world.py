@@ -111,17 +111,6 @@ def test_clearance_of_a_polygon_with_an_edge_of_hardly_any_length(edge_m: float)
     assert nearly.clearance_at(0.0, 290.0, 0.0) == pytest.approx(-10.0)
 
 
-def test_inside_and_outside_are_told_on_lines_through_corners() -> None:
-    arrow = Obstacle(
-        Polygon(((0.0, 2.0), (2.0, 2.0), (2.0, 0.0), (5.0, 3.0), (2.0, 6.0), (2.0, 4.0), (0.0, 4.0)))
-    )
-    world = World([arrow], BOUNDS)
-    for east in np.arange(-1.0, 7.0, 0.5).tolist():
-        for north in np.arange(-1.0, 8.0, 0.5).tolist():
-            truth = true_distance(arrow, east, north, 0.0)
-            assert world.clearance_at(east, north, 0.0) == pytest.approx(truth, abs=1e-12)
-
-
 @settings(max_examples=examples(12))
 @given(seed=st.integers(0, 2**32), count=st.integers(0, 40), changing=st.booleans())
 def test_clearance_along_a_track_is_that_to_the_nearest_of_all_obstacles(
