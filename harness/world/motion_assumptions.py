@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from harness.scenario.scenario import Scenario
 from harness.world.obstacle import Circle, Obstacle
@@ -85,39 +86,29 @@ def _contacts(obstacles: Sequence[Obstacle], moving: list[int], until_s: float) 
     import shapely
 
     cores = np.array([_core(each) for each in obstacles], dtype=object)
-    radii = np.array([_radius_m(each) for each in obstacles])
+    radii = np.array([each.shape.radius_m if isinstance(each.shape, Circle) else 0.0 for each in obstacles])
+    times = [(max(each.interval_s[0], 0.0), min(each.interval_s[1], until_s)) for each in obstacles]
     standing = [number for number, each in enumerate(obstacles) if each.velocity_mps == (0.0, 0.0)]
     tree = shapely.STRtree(cores[standing])
     largest = radii[standing].max(initial=0.0)
     for place, one in enumerate(moving):
-        begin, end = _times(obstacles[one], until_s)
+        here, (begin, end) = obstacles[one], times[one]
         if begin > end:
             continue
-        swept = _swept(cores[one], obstacles[one].displacement_m(begin), obstacles[one].displacement_m(end))
+        swept = _swept(cores[one], here.displacement_m(begin), here.displacement_m(end))
         near = tree.query(swept, predicate="dwithin", distance=largest + radii[one])
-        others = [*moving[place + 1 :], *(standing[index] for index in np.sort(near))]
-        for other in others:
-            first = max(begin, _times(obstacles[other], until_s)[0])
-            last = min(end, _times(obstacles[other], until_s)[1])
+        for other in (*moving[place + 1 :], *(standing[index] for index in np.sort(near))):
+            first, last = max(begin, times[other][0]), min(end, times[other][1])
             if first > last:
                 continue
-            here, there = obstacles[one], obstacles[other]
-            way = [
-                tuple(np.subtract(here.displacement_m(time), there.displacement_m(time)))
-                for time in (first, last)
-            ]
+            there = obstacles[other]
+            way = [np.subtract(here.displacement_m(t), there.displacement_m(t)) for t in (first, last)]
             met = _swept(cores[one], way[0], way[1])
             if shapely.distance(met, cores[other]) <= radii[one] + radii[other]:
                 yield (
                     f"obstacles[{one}] and obstacles[{other}] touch or pass through each other; assumed is that "
                     "moving obstacles do not"
                 )
-
-
-def _times(obstacle: Obstacle, until_s: float) -> tuple[float, float]:
-    """First and last time of the mission at which it is there."""
-    first, last = obstacle.interval_s
-    return max(first, 0.0), min(last, until_s)
 
 
 def _core(obstacle: Obstacle) -> Shape:
@@ -130,12 +121,7 @@ def _core(obstacle: Obstacle) -> Shape:
     return shapely.Polygon(shape.vertices_m, shape.holes_m)
 
 
-def _radius_m(obstacle: Obstacle) -> float:
-    """What its core is widened by: the radius of its circle, 0 for a polygon."""
-    return obstacle.shape.radius_m if isinstance(obstacle.shape, Circle) else 0.0
-
-
-def _swept(core: Shape, begin_m: tuple[float, float], end_m: tuple[float, float]) -> Shape:
+def _swept(core: Shape, begin_m: ArrayLike, end_m: ArrayLike) -> Shape:
     """All that a core covers on its straight way from one displacement (east, north) to another."""
     import shapely
 

@@ -160,11 +160,6 @@ class Obstacle:
         """First and last time at which it is there, infinite if it always is."""
         return self.active_s or (-math.inf, math.inf)
 
-    def active(self, time_s: float) -> bool:
-        """Whether it is there at a time."""
-        start, stop = self.interval_s
-        return start <= time_s <= stop
-
     def displacement_m(self, time_s: float) -> tuple[float, float]:
         """(east, north) from `shape` to where it is at a time."""
         elapsed = time_s - self.epoch_s

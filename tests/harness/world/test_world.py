@@ -223,7 +223,7 @@ def test_surroundings_hold_every_face_within_the_radius(seed: int, radius: float
         circles = {tuple(circle) for circle in faces.circles_m.T.round(6)}
         edges = {tuple(edge) for edge in faces.edges_m.T.round(6)}
         for obstacle in obstacles:
-            if not obstacle.active(time):
+            if not obstacle.interval_s[0] <= time <= obstacle.interval_s[1]:
                 continue
             shift = np.array(obstacle.displacement_m(time))
             if isinstance(obstacle.shape, Circle):
