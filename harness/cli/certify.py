@@ -115,14 +115,7 @@ def certify(
 
     terms = Terms(probability, confidence)
     replaced = overrides(
-        settings,
-        planner=planner,
-        aircraft=aircraft,
-        guidance=guidance,
-        wind=wind,
-        turbulence=turbulence,
-        seed=seed,
-        conditions=conditions,
+        settings, planner, aircraft, guidance, wind, turbulence, seed=seed, conditions=conditions
     )
     try:
         drawn = distributions(vary or ())

@@ -119,10 +119,11 @@ def check(
         raise typer.BadParameter(f"is {corner_m:g}; must be at least 0, and finite", param_hint="--corner-m")
     replaced = overrides(
         settings,
-        aircraft=aircraft,
-        guidance=guidance,
-        wind=wind,
-        turbulence=turbulence,
+        None,
+        aircraft,
+        guidance,
+        wind,
+        turbulence,
         seed=seed,
         conditions=conditions,
         aircraft__airspeed_mps=airspeed_mps,

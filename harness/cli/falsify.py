@@ -98,14 +98,7 @@ def falsify(
 
     ranges = [range_of(text) for text in vary]
     fixed = overrides(
-        settings,
-        planner=planner,
-        aircraft=aircraft,
-        guidance=guidance,
-        wind=wind,
-        turbulence=turbulence,
-        seed=seed,
-        conditions=conditions,
+        settings, planner, aircraft, guidance, wind, turbulence, seed=seed, conditions=conditions
     )
 
     def loaded(replaced: Any) -> Scenario:

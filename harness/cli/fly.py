@@ -96,14 +96,7 @@ def fly(
         if needs_live and not live:
             raise typer.BadParameter(f"{option} goes with --live")
     given = overrides(
-        settings,
-        planner=planner,
-        aircraft=aircraft,
-        guidance=guidance,
-        wind=wind,
-        turbulence=turbulence,
-        seed=seed,
-        conditions=conditions,
+        settings, planner, aircraft, guidance, wind, turbulence, seed=seed, conditions=conditions
     )
     loaded, digest = _asked(scenario, results, run, given)
     origin = [] if results is None else [("from", str(results.resolve())), ("run", str(run))]

@@ -172,7 +172,6 @@ def _is_campaign(text: str) -> bool:
 
 def overrides(
     settings: Sequence[str] | None = None,
-    *,
     planner: str | None = None,
     aircraft: str | None = None,
     guidance: str | None = None,
@@ -180,16 +179,9 @@ def overrides(
     turbulence: str | None = None,
     **keys: Any,
 ) -> list[tuple[str, str]]:
-    """Key paths of a scenario and what options replace them with, those of --set last; a name is text.
+    """Key paths of a scenario and what options of these names replace them with, those of --set last; a name is text.
 
-    Args:
-        settings: of --set, KEY.PATH=VALUE each.
-        planner: and the others: of the options of these names; None: not given.
-        aircraft: likewise.
-        guidance: likewise.
-        wind: likewise.
-        turbulence: likewise.
-        **keys: further values by key path, its points written as two underscores.
+    `keys` are further values by key path, its points written as two underscores.
 
     Raises:
         typer.BadParameter: one cannot be used, or --set gives a key that another option gives with another value.

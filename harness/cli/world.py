@@ -6,9 +6,8 @@ import math
 import os
 import re
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,9 +18,6 @@ if TYPE_CHECKING:
     from harness.world_files.siting import Craft, Site
 
 Pair = tuple[float, float]
-
-LOWER_M: Final = 500.0
-"""Where the aircraft has no level flight, multiples of this altitude are tried below."""
 
 
 def world(
@@ -75,6 +71,8 @@ def world(
     For example: wayproof world davos.tif --altitude-m 2000 --out davos.yaml
     """
     from harness.files.input_file import InputError
+    from harness.files.strict_yaml import dump
+    from harness.files.whole_file import replace_text
     from harness.world_files.expansion import FileFault, FileSpec
     from harness.world_files.parts import WorldFileError
     from harness.world_files.siting import site
@@ -92,36 +90,37 @@ def world(
         for path in files
     ]
     try:
-        found = site(specs, altitude_m, craft, given, _tell)
+        found = site(specs, altitude_m, craft, given, lambda what: say(f"wayproof: {what}", err=True))
     except FileFault as fault:
         raise InputError(f"{files[fault.index]}: {fault}") from fault
     except WorldFileError as error:
         raise InputError(f"{' '.join(map(str, files))}: {error}") from error
     keys = _scenario(found, out, aircraft, altitude_m, clearance_m)
-    text = _written(keys, found, [str(each) for each in files], altitude_m)
+    names = ", ".join(each.name for each in files)
+    comment = [f"What {names} has at {altitude_m:g} m: made by `wayproof world`.", *_notes(found)]
+    text = "".join(f"# {line}\n" for line in comment) + dump(keys)
     _checked(text, out)
-    _write(out, text)
+    try:
+        replace_text(out, text)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror}); give the path of a file") from error
     _print(found, out)
     return 0
 
 
-def _tell(what: str) -> None:
-    say(f"wayproof: {what}", err=True)
-
-
 def _ends(start: str | None, goal: str | None) -> tuple[Pair, Pair] | None:
-    if (start is None) != (goal is None):
+    if start is not None and goal is not None:
+        return _pair(start, "--start"), _pair(goal, "--goal")
+    if start is not None or goal is not None:
         raise typer.BadParameter("--start and --goal belong together; give both or none of them")
-    return None if start is None or goal is None else (_pair(start, "--start"), _pair(goal, "--goal"))
+    return None
 
 
 def _pair(text: str, option: str) -> Pair:
-    match = re.fullmatch(r"\s*([-+\d.eE]+)\s*,\s*([-+\d.eE]+)\s*", text)
     try:
-        if match:
-            first, second = float(match[1]), float(match[2])
-            if abs(first) < 1e9 and abs(second) < 1e9:
-                return first, second
+        first, second = (float(part) for part in text.split(","))
+        if abs(first) < 1e9 and abs(second) < 1e9:
+            return first, second
     except ValueError:
         pass
     raise typer.BadParameter(f"{text[:40]!r} is not A,B; write two numbers, as 46.81,9.85", param_hint=option)
@@ -133,16 +132,16 @@ def _craft(name: str, clearance_m: float | None) -> Craft:
     from harness.scenario.scenario import scenario_of
     from harness.world_files.siting import Craft
 
-    keys: dict[str, Any] = {
-        "schema": "wayproof/scenario/1",
-        "name": "room",
-        "area": {"bounds_m": [-1.5e5, -1.5e5, 1.5e5, 1.5e5]},
-        "mission": {"start_m": [-1e5, 0.0], "goal_m": [1e5, 0.0]},
-        "aircraft": {"model": name},
-    }
-    if clearance_m is not None:
-        keys["planner"] = {"clearance_m": clearance_m}
-    empty = scenario_of(keys)
+    empty = scenario_of(
+        {
+            "schema": "wayproof/scenario/1",
+            "name": "room",
+            "area": {"bounds_m": [-1.5e5, -1.5e5, 1.5e5, 1.5e5]},
+            "mission": {"start_m": [-1e5, 0.0], "goal_m": [1e5, 0.0]},
+            "aircraft": {"model": name},
+            "planner": {} if clearance_m is None else {"clearance_m": clearance_m},
+        }
+    )
     return Craft(name, performance_of(empty).turn_radius_m, empty.planner.clearance_m)
 
 
@@ -150,28 +149,20 @@ def _scenario(
     found: Site, out: Path, aircraft: str, altitude_m: float, clearance_m: float | None
 ) -> dict[str, Any]:
     """The keys of the scenario file."""
-    name = re.sub(r"[^a-z0-9._-]+", "_", out.stem.lower())[:100].strip(".") or "world"
     area: dict[str, Any] = {"bounds_m": list(found.bounds_m)}
     if found.place is not None:
-        area["origin"] = {
-            "latitude_deg": found.place.latitude_deg,
-            "longitude_deg": found.place.longitude_deg,
-        }
-    keys: dict[str, Any] = {
+        place = found.place
+        area["origin"] = {"latitude_deg": place.latitude_deg, "longitude_deg": place.longitude_deg}
+    ends = {"start_m": list(found.start_m), "goal_m": list(found.goal_m)}
+    return {
         "schema": "wayproof/scenario/1",
-        "name": name,
+        "name": re.sub(r"[^a-z0-9._-]+", "_", out.stem.lower())[:100].strip(".") or "world",
         "area": area,
         "obstacles": [{"file": _file_keys(spec, out)} for spec in found.specs],
-        "mission": {
-            "start_m": list(found.start_m),
-            "goal_m": list(found.goal_m),
-            "altitude_m": float(altitude_m),
-        },
+        "mission": {**ends, "altitude_m": float(altitude_m)},
         "aircraft": {"model": aircraft},
+        **({} if clearance_m is None else {"planner": {"clearance_m": float(clearance_m)}}),
     }
-    if clearance_m is not None:
-        keys["planner"] = {"clearance_m": float(clearance_m)}
-    return keys
 
 
 def _file_keys(spec: Any, out: Path) -> dict[str, Any]:
@@ -187,20 +178,10 @@ def _file_keys(spec: Any, out: Path) -> dict[str, Any]:
     return keys
 
 
-def _written(keys: dict[str, Any], found: Site, files: Sequence[str], altitude_m: float) -> str:
-    from harness.files.strict_yaml import dump
-
-    names = ", ".join(Path(each).name for each in files)
-    lines = [f"What {names} has at {altitude_m:g} m: made by `wayproof world`."]
-    lines += _notes(found)
-    return "".join(f"# {line}\n" for line in lines) + dump(keys)
-
-
 def _notes(found: Site) -> list[str]:
-    notes = [*found.notes, *found.expanded.notes]
-    for source in found.expanded.sources:
-        notes += [f"{source.spec.path.name}: {note}" for note in source.notes]
-    return [note[:200] for note in notes]
+    """What was assumed or left out, of all and of each file."""
+    of_files = [f"{each.spec.path.name}: {note}" for each in found.expanded.sources for note in each.notes]
+    return [note[:200] for note in (*found.notes, *found.expanded.notes, *of_files)]
 
 
 def _checked(text: str, out: Path) -> None:
@@ -211,20 +192,8 @@ def _checked(text: str, out: Path) -> None:
     try:
         parse_scenario(text, str(out), folder=out.absolute().parent)
     except InputError as error:
-        first = str(error).splitlines()[0]
-        raise InputError(
-            re.sub(rf"^{re.escape(str(out))}:\d+: ", "wayproof: the scenario would not fly: ", first)
-        ) from error
-
-
-def _write(out: Path, text: str) -> None:
-    from harness.files.input_file import InputError
-    from harness.files.whole_file import replace_text
-
-    try:
-        replace_text(out, text)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror}); give the path of a file") from error
+        told = re.sub(rf"^{re.escape(str(out))}:\d+: ", "", str(error).splitlines()[0])
+        raise InputError(f"wayproof: the scenario would not fly: {told}") from error
 
 
 def _print(found: Site, out: Path) -> None:
@@ -233,17 +202,19 @@ def _print(found: Site, out: Path) -> None:
 
     xmin, ymin, xmax, ymax = found.bounds_m
     solid = [each for source in found.expanded.sources for each in source.polygons]
-    inside = sum(each.area for each in solid) / ((xmax - xmin) * (ymax - ymin))
+    inside = min(sum(each.area for each in solid) / ((xmax - xmin) * (ymax - ymin)), 1.0)
+    place = found.place
+    where = (
+        f"{place.latitude_deg:.5f}, {place.longitude_deg:.5f}"
+        if place
+        else "none: the files name no place on earth"
+    )
     rows = {
         "area": f"{(xmax - xmin) / 1e3:.4g} x {(ymax - ymin) / 1e3:.4g} km",
-        "origin": "none: the files name no place on earth"
-        if found.place is None
-        else f"{found.place.latitude_deg:.5f}, {found.place.longitude_deg:.5f}",
-        "obstacles": f"{counted(len(solid), 'polygon')}, {min(inside, 1.0):.0%} of the area",
+        "origin": where,
+        "obstacles": f"{counted(len(solid), 'polygon')}, {inside:.0%} of the area",
         "start to goal": f"{math.dist(found.start_m, found.goal_m) / 1e3:.4g} km",
         "ground": "from terrain" if found.expanded.ground is not None else "not known",
+        **{f"note {number}": plain(note) for number, note in enumerate(_notes(found), 1)},
     }
-    for number, note in enumerate(_notes(found), 1):
-        rows[f"note {number}"] = plain(note)
-    command = shlex.join(["wayproof", "fly", str(out)])
-    print_table(plain(f"{out}: fly it with `{command}`"), rows)
+    print_table(f"{out}: fly it with `{shlex.join(['wayproof', 'fly', str(out)])}`", rows)
