@@ -19,7 +19,7 @@ from aircraft.guidance.altitude import VerticalProfile
 from aircraft.guidance.mission_legs import MissionLeg, straight
 from aircraft.interface import Route
 from harness.files.input_file import InputError
-from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray, FlyBy
+from harness.run_files.given_path import PAST_RAD, SAME_PLACE_M, CutCorner, FloatArray, FlyBy
 from harness.run_files.mission.circle import (
     SAME_DIRECTION,
     SHORTEST_M,
@@ -56,7 +56,7 @@ ARC_RAD: Final = math.pi / 2
 SAMPLE_M: Final = 5.0
 """Points along circles are this close together, where a track is compared with them."""
 PAST_RADII: Final = 3.0
-"""A turn of more than a right angle goes past the next leg and is back on it after no more than so many radii."""
+"""A turn of more than `PAST_RAD` goes past the next leg and is back on it after no more than so many radii."""
 LEG_SHARE: Final = 0.5
 """Part of the leg before a waypoint that a turn onto a circle may take: the corner before needs the other."""
 
@@ -261,8 +261,9 @@ class _Build:
             return False
         angle = cmath.phase((touch - last.place) / heading)
         turn_m = self._flying.corner_radius_m(last._replace(airspeed_mps=self._mps), angle)
-        trim_m = turn_m * math.tan(0.5 * min(abs(angle), 0.5 * math.pi))
-        room_m = PAST_RADII * turn_m if abs(angle) > 0.5 * math.pi else trim_m
+        past = abs(angle) > PAST_RAD
+        trim_m = turn_m * (1.0 if past else math.tan(0.5 * abs(angle)))
+        room_m = PAST_RADII * turn_m if past else trim_m
         back_m = min(trim_m, LEG_SHARE * abs(last.place - before.place))
         if abs(touch - last.place) >= room_m or back_m <= 0.0:
             return False

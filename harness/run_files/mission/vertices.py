@@ -15,6 +15,7 @@ from aircraft.guidance.mission_legs import MissionLeg, straight
 from harness.run_files.given_path import (
     FLATTEST,
     LIMIT_SHARE,
+    PAST_RAD,
     SAME_PLACE_M,
     FloatArray,
     FlyBy,
@@ -70,7 +71,8 @@ class Flying:
         """Radius of the arc at a corner: with bank in hand, or less where that would pass too far off."""
         wide = self.turn_radius_m(vertex.airspeed_mps)
         least = wide if self.least_radius_m is None else self.least_radius_m(vertex.airspeed_mps)
-        off = 1.0 / math.cos(0.5 * min(abs(angle_rad), 0.5 * math.pi)) - 1.0
+        # A turn that goes past begins one radius before the corner, as at a right angle.
+        off = 1.0 / math.cos(0.5 * (abs(angle_rad) if abs(angle_rad) <= PAST_RAD else 0.5 * math.pi)) - 1.0
         most = LIMIT_SHARE * corner_limit_m(vertex.acceptance_m, self.corner_m) / max(off, FLATTEST)
         return max(min(wide, most), least)
 
