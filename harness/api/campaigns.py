@@ -54,12 +54,14 @@ def compare(
     given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [each if isinstance(each, Scenario) else load_scenario(each) for each in given]
     kinds = _named(planners, PLANNER, "planners")
-    chosen = [{"planner.kind": kind} for kind in kinds]
-    of_laws = ""
-    if guidance is not None:
-        laws = _named(guidance, GUIDANCE, "guidance")
-        chosen = [keys | {"guidance.kind": law} for keys in chosen for law in laws]
-        of_laws = f", guidance={laws}"
+    laws = None if guidance is None else _named(guidance, GUIDANCE, "guidance")
+    of_laws = "" if laws is None else f", guidance={laws}"
+    chosen = [
+        {"planner.kind": kind} | ({"guidance.kind": law} if law else {})
+        for kind in kinds
+        for law in laws or ("",)
+    ]
+    sources, law_sources = (tuple(filter(is_source, names)) for names in (planners, guidance or ()))
     with as_input_errors():
         compared = fly_and_compare(
             [each.with_(keys) for each in loaded for keys in chosen],
@@ -69,8 +71,8 @@ def compare(
                 kinematic=kinematic,
                 workers=workers or os.cpu_count() or 1,
                 command=in_python(f"wayproof.compare({[each.name for each in loaded]}, {kinds}{of_laws})"),
-                sources=tuple(each for each in planners if is_source(each)),
-                law_sources=tuple(each for each in guidance or () if is_source(each)),
+                sources=sources,
+                law_sources=law_sources,
             ),
         )
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))

@@ -58,11 +58,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
         figures = [_metrics(own) for own in chunks]
-        logs = ["/" + look.SUMMARY not in {chunk.entity_path for chunk in own} for own in chunks]
-        without = [
-            "log" if log else "none" if each else "unfinished"
-            for log, each in zip(logs, figures, strict=True)
-        ]
+        without = [_missing(own, each) for own, each in zip(chunks, figures, strict=True)]
         told = _of_other_worlds(
             names, [_properties(own).get(look.FRAME, {}).get("world", "") for own in chunks]
         )
@@ -70,6 +66,13 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
         return told
+
+
+def _missing(chunks: Sequence[rr.chunk.Chunk], figures: Mapping[str, Any]) -> str:
+    """What is said of a recording where it has no such figure."""
+    if f"/{look.SUMMARY}" not in {chunk.entity_path for chunk in chunks}:
+        return "log"
+    return "none" if figures else "unfinished"
 
 
 def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:

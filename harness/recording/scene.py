@@ -66,14 +66,7 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
             rec.log(f"{look.WORLD}/outlines", rims(scene, standing, look.OUTLINE, points), static=True)
         log_solids(rec, f"{look.WORLD}/{look.TRUE}", scene, standing, look.OBSTACLE)
     _log_aircraft(rec, scene.frame)
-    for entity, (name, colour, width) in look.SERIES_STYLE.items():
-        plot = entity.partition("/")[0]
-        if thin and (plot not in THIN_SERIES or entity in look.WHOLE_ONLY):
-            continue
-        if plot in scene.empty_series or (entity == look.BELIEVED_OFF and not scene.believes):
-            continue  # a layout is made by what there is
-        style = look.series_lines(name, colour, width)
-        rec.log(f"{look.SERIES}/{entity}", style, static=True)
+    _log_series_style(rec, scene, thin)
     if not thin:
         range_m = scene.mission.sensor_range_m
         sensing = lines_2d([circle((0.0, 0.0), range_m)], look.SENSING, 1.0, 20)
@@ -81,6 +74,17 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         page = rr.TextDocument(colours(scene), media_type=rr.MediaType.MARKDOWN)
         rec.log(look.COLOURS, page, static=True)
         log_summary(rec, scene, None)
+
+
+def _log_series_style(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
+    """Names and colours of the time series that the recording has: a layout is made by what there is."""
+    for entity, (name, colour, width) in look.SERIES_STYLE.items():
+        plot = entity.partition("/")[0]
+        too_much = thin and (plot not in THIN_SERIES or entity in look.WHOLE_ONLY)
+        nothing = plot in scene.empty_series or (entity == look.BELIEVED_OFF and not scene.believes)
+        if not too_much and not nothing:
+            style = look.series_lines(name, colour, width)
+            rec.log(f"{look.SERIES}/{entity}", style, static=True)
 
 
 def send_believed(rec: rr.RecordingStream, block: Track, piece_rows: int, last_m: FloatArray) -> FloatArray:

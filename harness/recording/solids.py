@@ -124,13 +124,13 @@ def log_solids(
             ),
             static=static,
         )
-    polygons = [
-        (each, *at) for each, at in zip(obstacles, heights, strict=True) if isinstance(each.shape, Polygon)
-    ]
-    mesh = _mesh([prism(each.shape, low, high) for each, low, high in polygons if high > low], colour)  # type: ignore[arg-type]
+    shapes = [(each.shape, *at) for each, at in zip(obstacles, heights, strict=True)]
+    mesh = _mesh(
+        [prism(each, *at) for each, *at in shapes if isinstance(each, Polygon) and at[1] > at[0]], colour
+    )
     if mesh is not None:
         rec.log(f"{entity}/polygons", mesh, static=static)
-    terrain = [each for each, low, high in polygons if high <= low]
+    terrain = [each for each, (low, high) in zip(obstacles, heights, strict=True) if high <= low]
     if terrain:
         rec.log(f"{entity}/terrain", rims(scene, terrain, colour), static=static)
 

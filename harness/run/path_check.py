@@ -250,12 +250,8 @@ def asked(
     """
     if world is not None and given.origin_deg is not None and origin_of(world) is None:
         raise InputError(f"{world}: area.origin: is missing; a path in degrees needs it")
-    own: dict[str, dict[str, Any]] = {key: dict(section) for key, section in sections.items()}
-    mission = own.setdefault("mission", {})
-    if altitude_m is not None:
-        mission["altitude_m"] = altitude_m
-    elif len(given.altitudes_m) and not given.above_ground:
-        mission["altitude_m"] = float(given.altitudes_m[0])
+    own = {key: dict(section) for key, section in sections.items()}
+    mission = own["mission"] = {**own.get("mission", {}), **_altitude(given, altitude_m)}
     if world is None and given.origin_deg is not None:
         latitude, longitude = given.origin_deg
         own["area"] = {"origin": {"latitude_deg": latitude, "longitude_deg": longitude}}
@@ -273,6 +269,13 @@ def asked(
         scenario = keys.scenario(line, files=level, ground=scenario.ground)
         files = () if level else keys.files(line)
     return PathCheck(given, scenario, plan, keys.has_bounds, corner_m, files)
+
+
+def _altitude(given: PathAsGiven, altitude_m: float | None) -> dict[str, float]:
+    """The key of the altitude, where it is asked for or the path has one."""
+    if altitude_m is None and len(given.altitudes_m) and not given.above_ground:
+        altitude_m = float(given.altitudes_m[0])
+    return {} if altitude_m is None else {"altitude_m": altitude_m}
 
 
 def about(points_m: FloatArray) -> FloatArray:

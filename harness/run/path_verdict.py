@@ -111,14 +111,31 @@ def verdict(
 ) -> tuple[bool, str]:
     """Whether a path can be flown as given, and a sentence that says so or why not."""
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
-    off = [corner for corner in told["corners"] if not corner["kept"]]
     faults = [_first(seen.contacts, "touches")] if seen.contacts else []
     for kind, verb in (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves")):
         crossed = [each for each in seen.crossings if each.kind == kind]
         faults += [_first(crossed, verb)] if crossed else []
     faults += [tallied(bad, "legs")] if bad else []
+    faults += _how_far(told, figures["altitude_error_m"]["max"])
+    if figures["outcome"] not in ("reached", "collision"):
+        faults.append(str(figures["reason"]))
+    if not faults and not figures["trackable"]:
+        faults.append("no leg was flown")
+    if faults:
+        return False, "no: " + "; ".join(faults)
+    used = told["limit_used"]
+    how = "as drawn" if told["drawn"] else "with its corners cut by no more than allowed"
+    wide_m = max((corner["allowed_cut_m"] for corner in told["corners"]), default=0.0)
+    corners = f", corners within {wide_m:.3g} m" if wide_m > tolerance_m else ""
+    most = max(used["off_path"] or 0.0, used["altitude"])
+    return True, f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most"
+
+
+def _how_far(told: Mapping[str, Any], high_m: float) -> list[str]:
+    """How far off the path, a corner and its altitude an aircraft was, where that was too far."""
     worst, used, enough_m = told["worst"], told["limit_used"], told["corner_m_that_would_do"]
-    noun = "waypoint" if told["drawn"] else "item"
+    off = [corner for corner in told["corners"] if not corner["kept"]]
+    noun, faults = "waypoint" if told["drawn"] else "item", []
     if worst["off_m"] > worst["allowed_m"]:
         where = "" if worst["waypoint"] is None else f" at {noun} {worst['waypoint']}"
         faults.append(f"{worst['off_m']:.3g} m off{where} where {worst['allowed_m']:.3g} m are allowed")
@@ -127,22 +144,11 @@ def verdict(
             "not reached" if off[0]["flown_cut_m"] is None else f"passed {off[0]['most_off_m']:.3g} m off"
         )
         faults.append(f"{noun} {off[0]['waypoint']} {reached}, {off[0]['allowed_cut_m']:.3g} m are allowed")
-    if used["altitude"] > 1.0:
-        high_m = figures["altitude_error_m"]["max"]
-        faults.append(f"{high_m:.3g} m off in altitude where {high_m / used['altitude']:.3g} m are allowed")
     if faults and enough_m is not None:
         faults.append(f"--corner-m {enough_m:g} would be yes")
-    if figures["outcome"] not in ("reached", "collision"):
-        faults.append(str(figures["reason"]))
-    if not faults and not figures["trackable"]:
-        faults.append("no leg was flown")
-    if faults:
-        return False, "no: " + "; ".join(faults)
-    how = "as drawn" if told["drawn"] else "with its corners cut by no more than allowed"
-    wide_m = max((corner["allowed_cut_m"] for corner in told["corners"]), default=0.0)
-    corners = f", corners within {wide_m:.3g} m" if wide_m > tolerance_m else ""
-    most = max(used["off_path"] or 0.0, used["altitude"])
-    return True, f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most"
+    if used["altitude"] > 1.0:
+        faults.append(f"{high_m:.3g} m off in altitude where {high_m / used['altitude']:.3g} m are allowed")
+    return faults
 
 
 def _first(found: Sequence[Breach], verb: str) -> str:

@@ -198,11 +198,6 @@ def test_a_campaign_without_recordings_says_how_to_get_some(
     assert "no such folder; give a run folder" in capsys.readouterr().err
 
 
-def test_headings_are_no_longer_than_a_browser_shows() -> None:
-    """It makes a column as wide as the name of the figure, not as its heading: `clearance / want...`."""
-    assert [name for name, heading in catalogs.COLUMNS.items() if len(heading) > len(name) + 1] == []
-
-
 def test_who_came_too_near_is_no_better_than_who_was_not_tracked() -> None:
     """Where navigation errs hardly any run is tracked, and a near miss would be lost below them all."""
     figures = [severity("reached", *each) for each in ((True, 0.14), (False, 0.9), (False, 1.2), (True, 1.0))]

@@ -28,11 +28,11 @@ from harness.analysis.metrics import metrics
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.flight.observer import Caution, ShieldState
-from harness.flight.record import BELIEVED_FIELDS, AcceptedPlan, Flight, Outcome, Track
+from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
 from harness.recording import viewer
 from harness.recording.blueprint import ERROR_COLOURS, Scene, apart
-from harness.recording.layout import layout_of, series_views
+from harness.recording.layout import series_views
 from harness.recording.log import RerunLog
 from harness.recording.overlay import runs_in, write_overlay
 from harness.recording.scene import quaternions, scale_bar_m
@@ -565,16 +565,6 @@ first.end()
         assert len(column(read(tmp_path / name), "/series/bank/flown", "scalars")) == 600
 
 
-def test_recording_is_silent(
-    tmp_path: Path,
-    make_track: Callable[..., Track],
-    make_plan: Callable[..., AcceptedPlan],
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    record(tmp_path / "a.rrd", make_track, make_plan)
-    assert capfd.readouterr() == ("", "")
-
-
 def test_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no folder"):
         RerunLog(tmp_path / "none" / "a.rrd", SCENE, "a")
@@ -621,36 +611,6 @@ def test_an_overlay_says_which_runs_are_of_other_worlds(
         (((page,),)) = (column(read(tmp_path / "over.rrd"), "/summary", "text")[-1],)
         assert str(page).startswith(f"**{told}**")
         assert write_overlay(paths[:2], ["first", "second"], tmp_path / "same.rrd") == ""
-
-
-@pytest.mark.flights
-def test_runs_with_events_at_once_are_overlaid_without_pandas(
-    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> None:
-    record(tmp_path / "a.rrd", make_track, make_plan, told=("goal reached", "first to arrive"))
-    (tmp_path / "pandas.py").write_text(
-        "raise ModuleNotFoundError('hidden: the first line of README brings none')"
-    )
-    script = f"""
-from pathlib import Path
-from harness.recording.overlay import write_overlay
-a, shown = Path({str(tmp_path / "a.rrd")!r}), Path({str(tmp_path / "b.rrd")!r})
-write_overlay([a, a], ["first", "second"], shown)
-"""
-    paths = os.pathsep.join([str(tmp_path), *sys.path])
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    told = [str(text) for (text,) in column(read(tmp_path / "b.rrd"), "/events", "text")]
-    assert [text for text in told if text.endswith("first to arrive")] == [
-        "first, t = 100 s: first to arrive",
-        "second, t = 100 s: first to arrive",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -806,63 +766,6 @@ def test_no_peak_of_a_curve_is_averaged_away(recording: tuple[Path, Flight]) -> 
     least_and_greatest = rr.components.AggregationPolicy.MinMax.value
     assert len(policies) > 8
     assert {entity: value for entity, value in policies.items() if value != [[least_and_greatest]]} == {}
-
-
-@pytest.mark.parametrize(("obstacles", "believes"), [(OBSTACLES, False), (OBSTACLES, True), ((), False)])
-def test_a_browser_has_the_plots_that_the_file_has(
-    obstacles: tuple[Obstacle, ...],
-    believes: bool,
-    tmp_path: Path,
-    make_track: Callable[..., Track],
-) -> None:
-    """Its layout is made by what the file holds: no plot is empty, no title names a line that is not there."""
-    scene, believed = replace(SCENE, obstacles=obstacles, believes=believes), {}
-    if believes:
-        believed = dict.fromkeys(BELIEVED_FIELDS, 1.0)
-    track = make_track(101, plan_index=-1, clearance_m=500.0 if obstacles else np.inf, **believed)
-    log = RerunLog(tmp_path / "flight.rrd", scene, "a")
-    log.on_block(track)
-    log.close()
-    layout = layout_of(scene.frame, {str(entity) for entity in read(tmp_path / "flight.rrd")})
-    names = _names(layout.root_container)
-    layout.let_go()
-    assert ("Navigation error, m" in names) == ("Cross-track, m; blue: believed" in names) == believes
-    assert any(name.startswith("Clearance") for name in names) == bool(obstacles)
-    assert {"Speed, m/s; blue: over ground", "Altitude error, m", "Throttle, %"} <= names
-
-
-def _names(part: Any) -> set[str]:
-    below = getattr(part, "contents", ())
-    return {str(part.name)}.union(*(_names(each) for each in below if not isinstance(each, str)))
-
-
-def test_labels_are_legible_in_a_dark_and_in_a_light_viewer(
-    tmp_path: Path, make_track: Callable[..., Track]
-) -> None:
-    """On our dark background a light viewer puts them on a grey of 121."""
-    for thin in (False, True):
-        path = tmp_path / f"{thin}.rrd"
-        log = RerunLog(path, SCENE, "a", thin=thin)
-        log.on_block(make_track(101, plan_index=-1))
-        flight = Flight(make_track(101, plan_index=-1), (), Outcome.COLLISION, "x", (), 10.0, 1.0)
-        log.close(metrics(flight, LIMITS))
-        entities = read(path)
-        for entity in ("ends", "end/label"):
-            packed = np.ravel(column(entities, f"/plan/{entity}", "colors")[-1]).tolist()
-            colours = [(number >> 24 & 255, number >> 16 & 255, number >> 8 & 255) for number in packed]
-            for box in (17, 121):
-                assert min(contrast(colour, (box,) * 3) for colour in colours) > 2.1, (entity, box)
-
-
-def contrast(colour: tuple[int, ...], ground: tuple[int, ...]) -> float:
-    """Ratio of the relative luminances of two colours, as WCAG 2 has it."""
-
-    def luminance(parts: tuple[int, ...]) -> float:
-        linear = [math.pow((part / 255 + 0.055) / 1.055, 2.4) for part in parts]
-        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-    low, high = sorted((luminance(colour), luminance(ground)))
-    return (high + 0.05) / (low + 0.05)
 
 
 def test_a_missing_driver_is_said(recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch) -> None:
