@@ -75,6 +75,8 @@ WELL_TRACKED_S = 0.01
 """Flying time; a cross-track error of that much flight is what a good autopilot stays within."""
 
 PACES = (1.0, 0.7, 0.5, 0.35)
+LAST_PACE = 0.25
+"""For an aircraft that is held at no other."""
 LEG_S = 10.0
 TURN_S = 20.0
 TURN_SHARE_TOLERANCE = 0.03
@@ -127,13 +129,15 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
         reason: str | None = None
         roll_lag_s, latency_s = _lag_s(files, "aileron"), files.latency_s
         pitch_pace = _pitch_pace(at, _lag_s(files, "elevator"), latency_s)
-        for pace in PACES:
+        for pace in (*PACES, LAST_PACE):
+            if pace == LAST_PACE and best is not None:
+                break
             placed = replace(gains(at, pace, pitch_pace).rounded(GAIN_DIGITS), **entry.gains)
             margin_deg = roll_margin_deg(at, placed, roll_lag_s, latency_s)
             if (roll_lag_s or latency_s) and margin_deg < NEEDED_DEG:
                 reason = _too_slow("aileron", roll_lag_s + latency_s, "roll", margin_deg)
                 continue
-            frame = _provisional(entry, files, cruise, at, placed)
+            frame = _provisional(entry, files, cruise, at, placed, pace)
             if reason := not_held(frame, cruise, REVERSALS):
                 continue
             if "turn_rate_share" not in entry.figures:
@@ -143,6 +147,8 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
                     continue
                 frame = replace(frame, turn_rate_share=share)
             error_m = weaving_error_m(frame, cruise)
+            if error_m == math.inf:
+                reason = "control is lost on a weave of turns"
             if error_m < least_m:
                 best, least_m = replace(frame, weave_error_m=error_m), error_m
             if error_m <= WELL_TRACKED_S * cruise:
@@ -183,12 +189,14 @@ def _too_slow(control: str, lag_s: float, loop: str, margin_deg: float) -> str:
 
 
 def _provisional(
-    entry: AirframeEntry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains
+    entry: AirframeEntry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains, pace: float
 ) -> Airframe:
     """The airframe before its limits are known."""
     roll_rate_dps = ROLL_COMMAND_SHARE * math.degrees(
         1.0 / max(abs(placed.aileron_p_forward), LEAST_AILERON_S)
     )
+    if any(servo.rate_limit_1ps is not None for _, servo in files.actuators):
+        roll_rate_dps *= pace  # the margins say nothing of a servo that cannot follow
     roll_rate_dps = float(math.floor(roll_rate_dps))
     slow = (GRAVITY_MPS2 * math.radians(roll_rate_dps) / (ROLL_LIMITED_S * cruise)) ** (1.0 / 3.0)
     roll_delay_s = round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _lag_s(files, "aileron"), 2)
