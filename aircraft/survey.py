@@ -195,8 +195,8 @@ def _provisional(
     roll_rate_dps = ROLL_COMMAND_SHARE * math.degrees(
         1.0 / max(abs(placed.aileron_p_forward), LEAST_AILERON_S)
     )
-    if any(servo.rate_limit_1ps is not None for _, servo in files.actuators):
-        roll_rate_dps *= pace  # the margins say nothing of a servo that cannot follow
+    if any((servo.rate_limit_1ps or math.inf) < placed.roll for _, servo in files.actuators):
+        roll_rate_dps *= pace  # a servo that takes longer to its stop than roll does cannot follow
     roll_rate_dps = float(math.floor(roll_rate_dps))
     slow = (GRAVITY_MPS2 * math.radians(roll_rate_dps) / (ROLL_LIMITED_S * cruise)) ** (1.0 / 3.0)
     roll_delay_s = round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _lag_s(files, "aileron"), 2)

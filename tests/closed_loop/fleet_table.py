@@ -165,8 +165,9 @@ def main(log: Path, names: list[str]) -> int:
                 file.write(json.dumps(known[key]._asdict()) + "\n")
     flights = list(known.values())
     hit = sum(each.outcome == "collision" for each in flights)
-    most = 1.0 - clopper_pearson(len(flights) - hit, len(flights), 0.95)[0]
-    print(f"{hit} of {len(flights)} flights hit something: less than {most:.2%} at 95 %")
+    count = sum(each.outcome != "refused" for each in flights)
+    most = 1.0 - clopper_pearson(count - hit, count, 0.95)[0]
+    print(f"{hit} of {count} flights hit an obstacle: less than {most:.2%} at 95 %")
     table("aircraft", 0, flights)
     table("air", 2, flights)
     for each in flights:
