@@ -12,6 +12,10 @@ SegmentRow = tuple[float, float, float, float, float, float]
 """One row of `Route.segments`."""
 
 
+WEAVE_DEG = (60.0, -30.0, 90.0, -60.0, -20.0, 20.0)
+"""Turns of `weave`."""
+
+
 def arc_point(row: SegmentRow, along_m: float) -> tuple[float, float, float, float]:
     """Point and unit tangent on a segment of constant curvature.
 
@@ -61,3 +65,14 @@ def route_point(route: Route, arc_length_m: float) -> tuple[float, float, float,
     row = (east, north, tangent_east, tangent_north, curvature, length)
     east, north, tangent_east, tangent_north = arc_point(row, along - over)
     return east + over * tangent_east, north + over * tangent_north, tangent_east, tangent_north
+
+
+def weave(radius_m: float) -> Route:
+    """Lines of one radius and arcs of some angles, left and right, from (0, 0) northwards."""
+    point, rows = (0.0, 0.0, 0.0, 1.0), []
+    for turn_deg in WEAVE_DEG:
+        for curvature, length in ((0.0, radius_m), (1.0 / radius_m, math.radians(turn_deg) * radius_m)):
+            bend = math.copysign(curvature, turn_deg)
+            rows.append((*point, bend, abs(length)))
+            point = arc_point(rows[-1], abs(length))
+    return Route(np.array(rows))

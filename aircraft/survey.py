@@ -28,7 +28,7 @@ from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.guidance.latency import as_it_was
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw, bandwidth_of_delay_margin
-from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState, Route
+from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState
 from aircraft.jsbsim_loading import (
     REFERENCE_ALTITUDE_M,
     linearised,
@@ -38,7 +38,7 @@ from aircraft.jsbsim_loading import (
 )
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
-from aircraft.route import arc_point
+from aircraft.route import weave
 from aircraft.start import Atmosphere, StartConditions
 
 SLOWEST_MPS, FASTEST_MPS = 8.0, 300.0
@@ -70,7 +70,6 @@ DELAY_MARGIN_S = 0.5
 DOUBLET = (10.0, -10.0, 0.0)
 REVERSALS = (30.0, -30.0, 15.0, 0.0)
 RESTED_SHARE = 0.7
-WEAVE_DEG = (60.0, -30.0, 90.0, -60.0, -20.0, 20.0)
 WELL_TRACKED_S = 0.01
 """Flying time; a cross-track error of that much flight is what a good autopilot stays within."""
 
@@ -300,17 +299,6 @@ def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET
         if drift := departure(model.state(), bank_deg, speed):
             return drift
     return None
-
-
-def weave(radius_m: float) -> Route:
-    """Lines of one radius and arcs of some angles, left and right, from (0, 0) northwards."""
-    point, rows = (0.0, 0.0, 0.0, 1.0), []
-    for turn_deg in WEAVE_DEG:
-        for curvature, length in ((0.0, radius_m), (1.0 / radius_m, math.radians(turn_deg) * radius_m)):
-            bend = math.copysign(curvature, turn_deg)
-            rows.append((*point, bend, abs(length)))
-            point = arc_point(rows[-1], abs(length))
-    return Route(np.array(rows))
 
 
 def weaving_error_m(frame: Airframe, speed: float) -> float:

@@ -18,8 +18,9 @@ from aircraft.guidance.latency import as_it_was
 from aircraft.interface import AircraftState, Route
 from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.model_files import AircraftError
+from aircraft.route import weave
 from aircraft.start import Atmosphere
-from aircraft.survey import in_flight, weave
+from aircraft.survey import in_flight
 
 WIND_SHARES = (0.0, 0.3, 0.6)
 """Winds that are flown, along the weave and against it, over the airspeed."""

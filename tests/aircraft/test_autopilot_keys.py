@@ -13,7 +13,8 @@ from aircraft.airframes import airframe
 from aircraft.guidance.latency import as_it_was
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw, bandwidth_of_delay_margin
 from aircraft.interface import AircraftState, FloatArray
-from aircraft.survey import in_flight, weave
+from aircraft.route import weave
+from aircraft.survey import in_flight
 
 
 def rolled(keys: AutopilotKeys, seconds: float = 3.0) -> FloatArray:
