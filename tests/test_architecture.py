@@ -63,11 +63,9 @@ ONLY_IN = {
     "matplotlib": ("harness/*figure*.py",),
     "jinja2": ("harness/report/page.py",),
     "scipy": (
-        "harness/campaign/sampling.py",
         "harness/campaign/paired.py",
         "harness/campaign/cell.py",
         "harness/certification/bounds.py",
-        "harness/certification/rare.py",
         "harness/world_files/free_room.py",
     ),
     "pyproj": (
@@ -296,7 +294,6 @@ def test_sources_are_named_for_what_they_do() -> None:
         ("planner/baselines/dubins_tree.py", "from ompl import base"),
         ("harness/a.py", "def f():\n    from ompl import base"),
         ("harness/a.py", "def f():\n    import jinja2"),
-        ("harness/campaign/sampling.py", "from scipy.stats import qmc"),
         ("harness/a.py", "def f():\n    import distributed"),
     ],
 )

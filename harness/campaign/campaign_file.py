@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field, Strict, ValidationError, model_validator
 
-from harness.campaign.sampling import Distribution, Sampler
+from harness.campaign.sampling import Distribution
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node, fault_line, node_of
 from harness.scenario.files_resolved import file_beside
@@ -79,10 +79,6 @@ class Campaign(Section):
     )
     random: dict[str, Distribution] = key(
         "What to draw, by key path of a scenario, anew for every case.", default_factory=dict
-    )
-    sampler: Sampler = key(
-        "How the draws of one combination are spread: each for itself, or evenly over all ranges together.",
-        default="independent",
     )
     draws: int = key("Draws of every combination.", default=1, ge=1, le=MAX_RUNS)
     recordings: Literal["all", "thin", "failures", "none"] = key(

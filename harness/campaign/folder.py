@@ -16,8 +16,8 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final
 
 from aircraft.airframes import airframe
-from harness.campaign.journal import JOURNAL, columns, read_journal, rows, sealed, time_rows
-from harness.campaign.results import INDEX, RESULTS, SCHEMA, TIMES, TIMINGS, table
+from harness.campaign.journal import JOURNAL, read_journal, sealed
+from harness.campaign.results import INDEX, METRICS, RESULTS, RUN, TIMES, TIMINGS, table
 from harness.campaign.runs import CampaignRuns
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
@@ -88,10 +88,12 @@ class CampaignFolder:
         over = read_journal(self.path).runs
         if first is not None:
             over = {run: each for run, each in over.items() if run < first}
-        about = {"schema": SCHEMA, "runs": len(self._runs), **self._runs.plain()}
-        metadata = json.dumps(about, allow_nan=False)
-        self._write_table(RESULTS, table(rows(over), columns(self._runs), metadata))
-        self._write_table(TIMINGS, table(time_rows(over), TIMES, metadata))
+        about = {"runs": len(self._runs), **self._runs.plain()}
+        columns = RUN | self._runs.varied | METRICS
+        rows = [{**each.row, "run": run} for run, each in over.items()]
+        times = [{**each.times, "run": run} for run, each in over.items()]
+        self._write_table(RESULTS, table(rows, columns, about))
+        self._write_table(TIMINGS, table(times, TIMES, about))
 
     def outcomes(self) -> dict[str, int]:
         """How many of the runs that are over ended how, the most frequent first."""
@@ -134,7 +136,10 @@ class CampaignFolder:
             raise RunFolderError(
                 f"{path} is of another campaign: {told}; change it back or choose another folder"
             )
-        journal.check(self._runs)
+        if beyond := [run for run in journal.runs if run >= len(self._runs)]:
+            raise RunFolderError(
+                f"{journal.path}: tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
+            )
         if before != now:
             replace_text(path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
         if journal.path.exists():

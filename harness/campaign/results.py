@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -84,64 +85,77 @@ def time_cells(metrics: Mapping[str, Any]) -> dict[str, Any]:
     return {each.path.removeprefix("timing."): each.value(metrics) for each in FIGURES if each.timed}
 
 
-def table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], metadata: str) -> pa.Table:
-    """Rows as a table.
+def table(
+    rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], about: Mapping[str, Any]
+) -> pa.Table:
+    """Rows as a table, by the number of the run.
 
     Args:
         rows: cells by column; those that are missing are null.
         columns: what each column holds: int, number, bool, text or json.
-        metadata: JSON text that goes with it.
+        about: what goes with it of its campaign, as JSON has it.
     """
     import pyarrow as pa
 
     types = {"int": pa.int64(), "number": pa.float64(), "bool": pa.bool_()}
-    schema = pa.schema(
-        [(name, types.get(kind, pa.string())) for name, kind in columns.items()],
-        metadata={"wayproof": metadata},
-    )
+    schema = pa.schema([(name, types.get(kind, pa.string())) for name, kind in columns.items()])
     ordered = sorted(rows, key=lambda row: row["run"])
     arrays = [pa.array([row.get(field.name) for row in ordered], field.type) for field in schema]
-    return pa.Table.from_arrays(arrays, schema=schema)
+    return sealed(pa.Table.from_arrays(arrays, schema=schema), about)
 
 
-def campaign_of(results: Path) -> dict[str, Any]:
-    """What `results.parquet` says of the campaign that it is of, as `CampaignFile.plain` gave it.
+def sealed(content: pa.Table, about: Mapping[str, Any]) -> pa.Table:
+    """A table with what it says of its campaign, and the SHA-256 of both in its metadata."""
+    told = {"schema": SCHEMA, **about, "sha256": _sha256(content, about)}
+    return content.replace_schema_metadata({"wayproof": json.dumps(told, allow_nan=False)})
+
+
+def _sha256(content: pa.Table, about: Mapping[str, Any]) -> str:
+    digest = sha256(json.dumps({**about, "schema": SCHEMA}, sort_keys=True).encode())
+    for name in content.column_names:
+        digest.update(json.dumps([name, content[name].to_pylist()]).encode())
+    return digest.hexdigest()
+
+
+def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
+    """Reads `results.parquet` or `timings.parquet`, and what it says of its campaign.
 
     Raises:
-        InputError: the file is something else.
+        InputError: it is something else, damaged, or other than it was written.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if not results.exists():
-        raise InputError(f"{results}: no such file")
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
     try:
-        schema = pq.read_schema(results)
-        found = json.loads((schema.metadata or {})[b"wayproof"])
-    except (OSError, pa.ArrowException, KeyError, ValueError, RecursionError) as error:
-        raise InputError(f"{results}: is not the {RESULTS} of a campaign; give one") from error
-    if not isinstance(found, dict) or found.get("schema") != SCHEMA or "digest" not in schema.names:
-        raise InputError(f"{results}: is not the {RESULTS} of a campaign; give one")
-    return found
+        about = json.loads((pq.read_schema(path).metadata or {})[b"wayproof"])
+        digest = about.pop("sha256") if about["schema"] == SCHEMA else None
+        campaign = about["campaign"]
+        if not isinstance(digest, str) or not isinstance(campaign, dict):
+            raise ValueError("of something else")
+    except (
+        OSError,
+        pa.ArrowException,
+        KeyError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        RecursionError,
+    ) as error:
+        raise InputError(f"{path}: is not the {RESULTS} of a campaign; give one") from error
+    try:
+        content = pq.read_table(path)
+    except (OSError, pa.ArrowException, ValueError) as error:
+        raise InputError(f"{path}: is damaged: {str(error).splitlines()[0]}") from error
+    if _sha256(content, about) != digest:
+        raise InputError(
+            f"{path}: is not as it was written: its sha256 is another; `wayproof sweep` with --resume makes it anew "
+            "from the journal"
+        )
+    return content, about
 
 
 def fly_again(results: Path, run: int) -> str:
     """The command line that flies a run of a campaign again."""
     return shlex.join(["wayproof", "fly", "--from", str(results), "--run", str(run)])
-
-
-def row_of(results: Path, run: int) -> dict[str, Any] | None:
-    """The row of a run; None if it is not there.
-
-    Raises:
-        InputError: the file is damaged.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        rows = pq.read_table(results, filters=[("run", "=", run)]).to_pylist()
-    except (OSError, pa.ArrowException, ValueError) as error:
-        text = str(error).splitlines()[0]
-        raise InputError(f"{results}: is damaged: {text}") from error
-    return dict(rows[0]) if rows else None

@@ -2,8 +2,7 @@
 
 Case `c` is draw `c // combinations` of combination `c % combinations`; run `r` flies case `r // pairs` with
 planner and aircraft `r % pairs`. A case's streams are children of the campaign's root seed
-(`numpy.random.SeedSequence`, spawn key (case, stream)). More draws leave the runs before them as they are, but
-for a Latin hypercube, whose slices depend on their number.
+(`numpy.random.SeedSequence`, spawn key (case, stream)). More draws leave the runs before them as they are.
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ import numpy as np
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.cells import PlannedRun, cell_of, entry_columns, kind_of
 from harness.campaign.flight import Job
-from harness.campaign.results import RESULTS, RUNS, campaign_of, fly_again, row_of
-from harness.campaign.sampling import FloatArray, design, takes_whole_numbers
+from harness.campaign.results import RESULTS, RUNS, fly_again, read_table
+from harness.campaign.sampling import takes_whole_numbers
 from harness.files.strict_yaml import (
     InputError,
     Loc,
@@ -39,11 +38,8 @@ from harness.scenario.overrides import overridden, with_key
 from harness.scenario.scenario import Scenario, packed, scenario_from, unpacked
 from harness.scenario.validation import KeyFaults, in_lines
 
-SEED, WORLD, DRAW, DESIGN = range(4)
-"""Random streams of a case; DESIGN is one of a combination."""
-
-MAX_DESIGNED: Final = 10_000_000
-"""Values that a design may have in all, which are kept: 80 MB."""
+SEED, WORLD, DRAW = range(3)
+"""Random streams of a case."""
 
 MOST_KEPT: Final = 100_000_000
 """Bytes of scenarios that are kept from the check on: to make one takes some six times as long as to unpack it."""
@@ -97,21 +93,11 @@ class CampaignRuns:
         self._combinations = math.prod(sizes)
         self._number = campaign.draws * self._combinations * len(self._pairs)
         self._sizes = sizes
-        self._designs: dict[int, FloatArray] = {}
         self._last_world: tuple[int, list[_Change]] = (-1, [])
         self._made: dict[int, bytes] = {}  # by `check`
         if self._number > MAX_RUNS:
             sentence = f"makes {self._number} runs with what is combined; must be at most {MAX_RUNS}"
             raise InputError(self._line(("draws",) if campaign.draws > 1 else ("grid",), sentence))
-        designed = 0 if campaign.sampler == "independent" else self.cases * len(campaign.random)
-        if designed > MAX_DESIGNED:
-            raise InputError(
-                self._line(
-                    ("draws",),
-                    f"is {campaign.draws}, so that {campaign.sampler} spreads {designed} values at once; must be at "
-                    f"most {MAX_DESIGNED} (or take sampler: independent)",
-                )
-            )
 
     def __len__(self) -> int:
         return self._number
@@ -334,20 +320,8 @@ class CampaignRuns:
 
     def _shares(self, place: _Place) -> list[float]:
         """A number in [0, 1) for each random key."""
-        campaign = self.campaign
-        if not campaign.random:
-            return []
-        if campaign.sampler == "independent":
-            rng = np.random.default_rng(self._stream(place.case, DRAW))
-            return list(rng.random(len(campaign.random)).tolist())
-        if place.combination not in self._designs:
-            self._designs[place.combination] = design(
-                campaign.sampler,
-                campaign.draws,
-                len(campaign.random),
-                self._seed(place.combination, DESIGN),
-            )
-        return list(self._designs[place.combination][place.draw].tolist())
+        rng = np.random.default_rng(self._stream(place.case, DRAW))
+        return list(rng.random(len(self.campaign.random)).tolist())
 
     def _at(self, loc: Loc) -> Node:
         node = self.file.root.at(loc)
@@ -393,8 +367,9 @@ def flown_run(
     Raises:
         InputError: the file is something else, or the campaign has no such run.
     """
-    runs = CampaignRuns(CampaignFile.from_plain(campaign_of(results), str(results)))
+    table, about = read_table(results)
+    runs = CampaignRuns(CampaignFile.from_plain(about, str(results)))
     if not 0 <= run < len(runs):
         raise InputError(f"{results}: has no run {run}; must be 0 to {len(runs) - 1}")
-    row = row_of(results, run)
-    return runs.scenario(run, overrides), row["digest"] if row else None
+    digests = dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True))
+    return runs.scenario(run, overrides), digests.get(run)

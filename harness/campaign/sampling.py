@@ -1,7 +1,6 @@
-"""Random values: what a campaign may draw a key from, and designs that spread the draws of several keys.
+"""Random values: what a campaign may draw a key from.
 
-Every value comes from a number in [0, 1) through the inverse of its distribution, so that any design over the
-unit cube serves every distribution.
+Every value comes from a number in [0, 1) through the inverse of its distribution.
 """
 
 from __future__ import annotations
@@ -9,21 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import cache
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, Strict, field_validator, model_validator
 
 from harness.files.strict_yaml import Loc
 from harness.scenario.scenario import scenario_schema
 from harness.scenario.sections import Section, key
-
-if TYPE_CHECKING:
-    from scipy.stats import qmc
-
-FloatArray = NDArray[np.float64]
-Sampler = Literal["independent", "latin_hypercube", "sobol"]
 
 LEAST: Final = 1e-12
 """Nearest to 0 and 1 that a normal distribution is asked for its inverse: 7 standard deviations off."""
@@ -115,33 +106,6 @@ class Distribution(Section):
         """Index of the choice that a number in [0, 1) stands for."""
         assert self.choice
         return min(int(share * len(self.choice)), len(self.choice) - 1)
-
-
-def design(sampler: Sampler, draws: int, keys: int, seed: int) -> FloatArray:
-    """(draws, keys) points of the unit cube that cover it evenly together.
-
-    A Latin hypercube (McKay, Beckman and Conover, Technometrics 21, 1979) has one draw in each of `draws`
-    slices of every key; a scrambled Sobol sequence (Owen, 1995) is even in all keys at once, best where the
-    number of draws is a power of two.
-
-    Args:
-        sampler: the kind; independent draws need no design.
-        draws: number of points.
-        keys: dimensions, at least 1.
-        seed: of the scrambling.
-    """
-    from scipy.stats import qmc
-
-    rng = np.random.default_rng(seed)
-    if sampler == "latin_hypercube":
-        return _points(qmc.LatinHypercube(keys, rng=rng), draws)
-    assert sampler == "sobol"
-    return _points(qmc.Sobol(keys, rng=rng), 1 << max(draws - 1, 0).bit_length())[:draws]
-
-
-def _points(engine: qmc.QMCEngine, number: int) -> FloatArray:
-    points: FloatArray = np.asarray(engine.random(number), dtype=np.float64)
-    return points
 
 
 def takes_whole_numbers(loc: Loc) -> bool:

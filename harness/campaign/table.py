@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.analysis.causes import is_allowed_for
-from harness.campaign.results import RESULTS, RUNS, TIMINGS
+from harness.campaign.results import RESULTS, RUNS, TIMINGS, read_table
 from harness.files.strict_yaml import InputError
 from harness.flight.record import FloatArray
 from harness.run_files.run_folder import RECORDING
@@ -113,27 +113,19 @@ def load_tables(folder: Path) -> tuple[pa.Table, pa.Table | None]:
     Raises:
         InputError: the folder holds no campaign, or a file of it cannot be read.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    path = folder / RESULTS
+    path, timings = folder / RESULTS, folder / TIMINGS
     if not path.is_file():
         raise InputError(f"wayproof: {folder} has no {RESULTS}: it is not the folder of a campaign")
-    try:
-        timings = folder / TIMINGS
-        results = pq.read_table(path)
-        for name, entries, first in (("planner", "planners", "kind"), ("aircraft", "aircraft", "model")):
-            results = _told_apart(results, name, about(results)["campaign"].get(entries, ()), first)
-        return results, pq.read_table(timings) if timings.is_file() else None
-    except (OSError, pa.ArrowException, AttributeError, RecursionError, TypeError, ValueError) as error:
-        text = str(error).splitlines()[0]
-        raise InputError(f"wayproof: the campaign in {folder} is damaged: {text}") from error
+    results, told = read_table(path)
+    for name, entries, first in (("planner", "planners", "kind"), ("aircraft", "aircraft", "model")):
+        results = _told_apart(results, name, told["campaign"].get(entries, ()), first)
+    return results, read_table(timings)[0] if timings.is_file() else None
 
 
 def about(results: pa.Table) -> dict[str, Any]:
-    """What the table says of its campaign (`campaign`, `scenarios`, `runs`), as far as it does."""
-    told: dict[str, Any] = json.loads((results.schema.metadata or {}).get(b"wayproof", b"{}"))
-    return {"campaign": {}, **told}
+    """What the table says of its campaign: `campaign`, `scenarios`, `runs`."""
+    told: dict[str, Any] = json.loads(results.schema.metadata[b"wayproof"])
+    return told
 
 
 def planned_runs(results: pa.Table) -> int | None:

@@ -52,7 +52,7 @@ CAMPAIGN_SNIPPETS: Final = (
     "{u_traps: {width_m: [1e6, 1e6]}}",
     "{maze: {cells: [60, 50]}}", "{maze: {cells: [300, 300]}}", "{maze: {cells: [1, 1]}}",
     "{maze: {wall_m: 1e6, corridor_m: 1e-9}}",
-    "latin_hypercube", "sobol", "independent", "1000000", "failures", "[aerosonde_forest, aerosonde_forest]",
+    "independent", "1000000", "failures", "[aerosonde_forest, aerosonde_forest]",
     "[/]", "[/dev]", "[.]", "[s.yaml]", "[/dev/zero]", "[no_such.yaml]", "['a\\0b']", "[" + "x/" * 3000 + "]",
 )
 KEYS: Final = (

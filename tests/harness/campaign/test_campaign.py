@@ -231,14 +231,6 @@ def test_more_draws_leave_the_runs_there_were_as_they_are(
     assert backwards[::-1] == all_of(few), "in any order"
 
 
-@pytest.mark.parametrize("sampler", ["latin_hypercube", "sobol"])
-def test_a_sampler_spreads_the_draws_of_each_combination(place: Path, sampler: str) -> None:
-    runs = runs_of(place, CAMPAIGN.replace("draws: 3", f"draws: 8\nsampler: {sampler}"))
-    first = [run for run in all_of(runs) if run.case % 4 == 2]
-    angles = {float(str(run.varied["environment.wind.from_deg"])) for run in first}
-    assert sorted(int(angle / 45) for angle in angles) == list(range(8))
-
-
 def test_worlds_take_the_place_of_the_scenarios_own(place: Path) -> None:
     text = """\
 schema: wayproof/campaign/1
@@ -437,15 +429,6 @@ def test_a_fault_of_the_scenario_itself_names_its_own_line_and_the_run(place: Pa
     (place / "ring.yaml").write_text(SCENARIO.format(name="ring").replace("range_m: 2500", "range_m: 0"))
     with pytest.raises(InputError, match=r"ring.yaml:8: sensor.range_m: is 0; .* \(run 0 of .*campaign.yaml"):
         runs_of(place).check()
-
-
-def test_a_design_of_too_many_values_is_refused_before_it_is_made(place: Path) -> None:
-    names = "".join(f"  random_{number}: {{uniform: [0, 1]}}\n" for number in range(11))
-    text = "worlds: [{circles: {}}]\nsampler: sobol\ndraws: 1000000\nrandom:\n" + names
-    with pytest.raises(
-        InputError, match=r"campaign.yaml:6: draws: .* 11000000 values at once; must be at most"
-    ):
-        runs_of(place, f"schema: wayproof/campaign/1\nname: small\nseed: 5\n{text}")
 
 
 def test_a_campaign_with_neither_scenarios_nor_worlds_is_refused(place: Path) -> None:

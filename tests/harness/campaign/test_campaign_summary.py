@@ -25,6 +25,7 @@ from harness.campaign.groups import BINS, MAX_NAMES, NONE, grouped
 from harness.campaign.paired import duels, mean_estimate
 from harness.campaign.questions import share_text
 from harness.campaign.report import PAGE, PLAIN, write_summary
+from harness.campaign.results import sealed
 from harness.campaign.summary import CURVE_POINTS, Summary, summarise
 from harness.cli.app import main
 from harness.cli.summary_table import print_summary
@@ -87,14 +88,15 @@ def campaign(
     folder.mkdir(exist_ok=True)
     names = [name for name in SCHEMA.names if not rows or name in rows[0]]
     schema = pa.schema([SCHEMA.field(name) for name in names])
-    pq.write_table(pa.Table.from_pylist(list(rows), schema), folder / "results.parquet")
+    about = {"campaign": {}, "scenarios": [], "runs": len(rows)}
+    pq.write_table(sealed(pa.Table.from_pylist(list(rows), schema), about), folder / "results.parquet")
     if times:
         columns = {
             f"compute_ms.{name}": values
             for name, values in zip(("p50", "p99", "max"), zip(*times, strict=True), strict=True)
         }
         table = pa.table({"run": [each["run"] for each in rows], **columns})
-        pq.write_table(table, folder / "timings.parquet")
+        pq.write_table(sealed(table, about), folder / "timings.parquet")
     return folder
 
 
@@ -269,7 +271,6 @@ def entries_campaign(folder: Path) -> Path:
     """Two planners of one kind on two aircraft of one model, told apart by the keys that they are given."""
     planners = [{"kind": "rolling_window", "clearance_m": 40}, {"kind": "rolling_window", "steps": 8}, "bug2"]
     about = {
-        "schema": "wayproof/results/1",
         "runs": 8,
         "campaign": {
             "planners": planners,
@@ -292,9 +293,9 @@ def entries_campaign(folder: Path) -> Path:
     first = [f for f in order if f.name != "outcome" and fields.index(f) < SCHEMA.names.index("outcome")]
     rest = [f for f in order if f not in first and f.name not in given]
     added = [f for f in order if f.name in given]
-    schema = pa.schema([*first, *added, *rest], metadata={"wayproof": json.dumps(about)})
+    schema = pa.schema([*first, *added, *rest])
     folder.mkdir()
-    pq.write_table(pa.Table.from_pylist(every, schema), folder / "results.parquet")
+    pq.write_table(sealed(pa.Table.from_pylist(every, schema), about), folder / "results.parquet")
     return folder
 
 
@@ -319,15 +320,21 @@ def test_a_table_that_says_nonsense_of_its_campaign_is_damaged(tmp_path: Path, a
     folder = campaign(tmp_path / "c", [row(0)])
     rows = pq.read_table(folder / "results.parquet").replace_schema_metadata({"wayproof": about})
     pq.write_table(rows, folder / "results.parquet")
-    with pytest.raises(InputError, match="is damaged"):
+    with pytest.raises(InputError, match="is not the results"):
         summarise(folder)
 
 
-def test_a_number_of_runs_that_is_none_is_not_known(tmp_path: Path) -> None:
-    folder = campaign(tmp_path / "c", [row(0)])
-    rows = pq.read_table(folder / "results.parquet").replace_schema_metadata({"wayproof": '{"runs": "x"}'})
-    pq.write_table(rows, folder / "results.parquet")
-    assert summarise(folder).missing == 0
+@pytest.mark.parametrize("name", ["results.parquet", "timings.parquet"])
+def test_an_edited_table_is_refused(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = campaign(tmp_path / "c", [row(0), row(1, "collision")], [(1.0, 4.0, 9.0)] * 2)
+    whole = pq.read_table(folder / name)
+    column = "outcome" if name == "results.parquet" else "compute_ms.max"
+    other = pa.array(["reached"] * 2 if column == "outcome" else [1.0, 1.0])
+    edited = whole.set_column(whole.column_names.index(column), column, other)
+    pq.write_table(edited.replace_schema_metadata(whole.schema.metadata), folder / name)
+    assert main(["report", str(folder)]) == 2
+    assert f"{folder / name}: is not as it was written: its sha256 is another" in capsys.readouterr().err
+    assert not (folder / PAGE).exists()
 
 
 def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -520,7 +527,7 @@ def test_a_run_folder_has_no_keys_and_damage_is_told(
     assert "stopped before the tables were written; `wayproof sweep` with --resume" in capsys.readouterr().err
     (tmp_path / "results.parquet").write_bytes(b"PAR1 torn")
     assert main(["report", str(tmp_path)]) == 2
-    assert f"the campaign in {tmp_path} is damaged" in capsys.readouterr().err
+    assert "results.parquet: is not the results.parquet of a campaign" in capsys.readouterr().err
     with pytest.raises(InputError, match="not the folder of a campaign"):
         summarise(tmp_path / "none")
 

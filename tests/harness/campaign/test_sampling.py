@@ -1,4 +1,4 @@
-"""Distributions and designs: limits kept, shares right, every slice of a Latin hypercube taken once."""
+"""Distributions: limits kept, shares right."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy import stats
 
-from harness.campaign.sampling import Distribution, Sampler, design
+from harness.campaign.sampling import Distribution
 
 shares = st.floats(0.0, 1.0, exclude_max=True)
-SEED = 3
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6), shares)
@@ -45,27 +44,6 @@ def test_whole_numbers_are_drawn_alike_the_ends_too() -> None:
 def test_choices_are_equally_likely() -> None:
     each = Distribution.model_validate({"choice": ["a", "b", "c"]})
     assert [each.chosen(share) for share in (0.0, 0.33, 0.34, 0.66, 0.67, 0.999)] == [0, 0, 1, 1, 2, 2]
-
-
-@pytest.mark.parametrize("draws", [1, 5, 16])
-def test_a_latin_hypercube_takes_every_slice_of_every_key_once(draws: int) -> None:
-    points = design("latin_hypercube", draws, 3, SEED)
-    assert points.shape == (draws, 3)
-    for column in (points * draws).astype(int).T:
-        assert sorted(column) == list(range(draws))
-
-
-def test_a_sobol_design_is_more_even_than_independent_draws() -> None:
-    points = design("sobol", 64, 2, SEED)
-    cells = {(int(8 * x), int(8 * y)) for x, y in points}
-    assert len(cells) == 64, "a (0, 6, 2) net has one point in each of 64 squares"
-    assert (design("sobol", 50, 2, SEED) == points[:50]).all(), "cut from the same sequence"
-
-
-@pytest.mark.parametrize("sampler", ["latin_hypercube", "sobol"])
-def test_a_design_is_a_function_of_its_seed(sampler: Sampler) -> None:
-    assert (design(sampler, 8, 2, 3) == design(sampler, 8, 2, 3)).all()
-    assert (design(sampler, 8, 2, 3) != design(sampler, 8, 2, 4)).any()
 
 
 @pytest.mark.parametrize(
