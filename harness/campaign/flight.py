@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import errno
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -94,23 +94,19 @@ def fly_job(job: Job) -> Answer:
         for source in job.laws:
             _imported(source, GUIDANCE)
         scenario = unpacked(job.packed) if job.path is None else job.path.scenario
-        metrics = _flown(job, scenario, job.path)
+        metrics = _flown(job, scenario)
         optimum_m = _optimum_m(scenario) if job.optimum else None
         cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
     except (WriteError, RunFolderError):
         raise
-    except MemoryError:
-        raise NoMemoryError from None
-    except PlannerError as error:  # whatever its constructor raised is its own
-        if isinstance(error.__cause__, MemoryError):
-            raise NoMemoryError from None
-        return failed(job.run, sentence(error), trace(error))
     except Exception as error:
-        if isinstance(error.__cause__, MemoryError):
+        if isinstance(error, MemoryError) or isinstance(error.__cause__, MemoryError):
             raise NoMemoryError from None
-        if (full := _full(error)) is not None:
+        # Whatever the constructor of a planner raised is its own, a full disk too.
+        if not isinstance(error, PlannerError) and (full := _full(error)) is not None:
             raise full from None
-        return failed(job.run, sentence(error), trace(error))
+        row = {"outcome": ERROR, "reason": sentence(error), "error": trace(error)}
+        return Answer(job.run, row, {})
     return Answer(job.run, cells, time_cells(metrics), holds(job.claim, metrics))
 
 
@@ -126,33 +122,28 @@ def _full(error: Exception) -> OSError | None:
     return cause if isinstance(cause, OSError) and cause.errno in FULL else None
 
 
-def failed(run: int, reason: str, error: str) -> Answer:
-    """The answer of a run that did not come to an end."""
-    return Answer(run, {"outcome": ERROR, "reason": reason, "error": error}, {})
-
-
-def _flown(job: Job, scenario: Scenario, check: PathCheck | None) -> dict[str, Any]:
-    kept = _kept(job, scenario) if check is None else _kept_path(job, check)
+def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
+    """The metrics of a flight, its run folder kept as the job says."""
     if job.recordings == "folders":
-        return kept(recording=False)
+        return _kept(job, scenario, recording=False)
     if job.recordings in ("all", "thin"):
         try:
-            return kept(thin=job.recordings == "thin")
+            return _kept(job, scenario, thin=job.recordings == "thin")
         finally:
             _give_memory_back()
-    found = _measured(scenario, check)
+    found = _measured(job, scenario)
     if job.recordings == "failures" and not holds(job.claim, found):
         # Failures are few: to fly them again costs less than to record every flight.
-        kept()
+        _kept(job, scenario)
     return found
 
 
-def _measured(scenario: Scenario, check: PathCheck | None) -> dict[str, Any]:
+def _measured(job: Job, scenario: Scenario) -> dict[str, Any]:
     """The metrics of a flight that leaves no run folder."""
-    if check is not None:
+    if job.path is not None:
         from harness.run.path_check import fly_check
 
-        return fly_check(check).metrics
+        return fly_check(job.path).metrics
     from harness.analysis.metrics import metrics
     from harness.flight.closed_loop import fly
     from harness.run.scenario_flight import flight_limits, make_loop
@@ -160,30 +151,24 @@ def _measured(scenario: Scenario, check: PathCheck | None) -> dict[str, Any]:
     return metrics(fly(make_loop(scenario)), flight_limits(scenario))
 
 
-def _kept(job: Job, scenario: Scenario) -> Callable[..., dict[str, Any]]:
-    """Flies a scenario into the job's run folder."""
+def _kept(job: Job, scenario: Scenario, *, recording: bool = True, thin: bool = False) -> dict[str, Any]:
+    """Flies into the job's run folder."""
+    if job.path is not None:
+        from harness.run.path_check import fly_check
+
+        return fly_check(job.path, job.folder, recording, command=job.again or None).metrics
     from harness.run.scenario_flight import fly_to_folder, kinematic_loop, make_loop
 
-    return partial(
-        fly_to_folder,
+    return fly_to_folder(
         scenario,
         job.folder,
-        recording=True,
+        recording=recording,
+        thin=thin,
         make=kinematic_loop if job.kinematic else make_loop,
         identity=job.identity or None,
         varied=job.varied,
         command=job.again or None,
     )
-
-
-def _kept_path(job: Job, check: PathCheck) -> Callable[..., dict[str, Any]]:
-    """Flies a given path into the job's run folder."""
-    from harness.run.path_check import fly_check
-
-    def flown(thin: bool = False) -> dict[str, Any]:
-        return fly_check(check, job.folder, True, command=job.again or None).metrics
-
-    return flown
 
 
 def _give_memory_back() -> None:

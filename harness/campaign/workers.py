@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import logging
 import multiprocessing
 import os
@@ -259,28 +260,16 @@ def _knock(address: str) -> None:
 
 
 def _is_open(address: str) -> bool:
-    """Whether an address leads beyond this machine, as far as it is one, without TLS."""
+    """Whether an address leads beyond this machine without TLS."""
     from distributed.comm.addressing import parse_address, parse_host_port
 
     try:
         scheme, place = parse_address(address)
-        if scheme in ("tls", "wss", "inproc"):
-            return False
         host, _ = parse_host_port(place, SCHEDULER_PORT)
-        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
-    except (OSError, ValueError):  # nobody is there: who knocks finds out
-        return False
-    return not all(_is_ours(family, place) for family, *_, place in found)
-
-
-def _is_ours(family: int, place: tuple[Any, ...]) -> bool:
-    """Whether an IP address is one of this machine: only those can be bound."""
-    try:
-        with socket.socket(family, socket.SOCK_STREAM) as own:
-            own.bind((place[0], 0, *place[2:]))
-    except OSError:
-        return False
-    return True
+        own = host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name, or no address at all
+        own = False
+    return not own and scheme not in ("tls", "wss", "inproc")
 
 
 class DaskWorkers:

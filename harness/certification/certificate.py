@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from harness.analysis.claims import Claim
-from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
+from harness.certification.bounds import Verdict
 from harness.certification.explained import Explained
 from harness.files.whole_file import replace_text
 
@@ -39,10 +38,9 @@ class Failure:
 
 @dataclass(frozen=True)
 class Certificate:
-    """How often a claim held, and what follows from it.
+    """How often a claim held, and what follows from it; what else it says is what was asked.
 
     Attributes:
-        claim: what was claimed of every day.
         runs: number of days that were flown and count.
         held: on how many of them the claim held.
         probability_lower: lower confidence bound of the probability that it holds on a day.
@@ -52,17 +50,11 @@ class Certificate:
         probability: what was claimed; None where nothing was.
         method: how the bounds were derived.
         most_runs: number of days that were allowed.
-        subject: name of the scenario, or of the path.
-        planner: kind of the planner; `given` for a path.
-        aircraft: its model.
-        conditions: as the scenario says, if it does.
-        seed: root seed of all days.
+        planner: its kind; `given` for a path.
         varied: what was drawn, by key path.
-        failures: days on which it did not hold, by how they ended.
+        failures: days on which it did not hold, by how they ended, the most frequent first.
         explained: how much of the failures each varied quantity explains.
         failing_runs: numbers of all days on which it did not hold.
-        command: what was called.
-        versions: of what flew.
     """
 
     claim: Claim
@@ -96,37 +88,6 @@ class Certificate:
         replace_text(folder / CERTIFICATE, json.dumps(self.plain(), indent=2, allow_nan=False) + "\n")
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """What a number of days says.
-
-    Attributes:
-        low: lower bound of the probability.
-        high: upper bound.
-        verdict: of the claim.
-        method: how they were derived.
-    """
-
-    low: float
-    high: float
-    verdict: Verdict
-    method: str
-
-
-def bounds(held: int, runs: int, confidence: float, probability: float | None) -> Bounds:
-    """Bounds and verdict: of a fixed number of days where no probability is claimed, else of a sequential test."""
-    if probability is None:
-        low, high = clopper_pearson(held, runs, confidence) if runs else (0.0, 1.0)
-        return Bounds(low, high, "undecided", "Clopper-Pearson, number of runs fixed beforehand")
-    low, high = sequential_bounds(held, runs, confidence)
-    return Bounds(
-        low,
-        high,
-        verdict(held, runs, probability, confidence),
-        "sequential mixture test, valid at every look",
-    )
-
-
 def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
     """Days that failed, by outcome and cause, the most frequent first.
 
@@ -137,7 +98,5 @@ def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
     for row in rows:
         cause = row.get("trackability.causes") or row.get("check.verdict") or ""
         alike.setdefault((str(row["outcome"]), str(cause)), []).append(int(row["run"]))
-    counts = Counter({key: len(runs) for key, runs in alike.items()})
-    return tuple(
-        Failure(*key, count, tuple(alike[key][:FIRST_FAILURES])) for key, count in counts.most_common()
-    )
+    ordered = sorted(alike.items(), key=lambda each: -len(each[1]))
+    return tuple(Failure(*key, len(runs), tuple(runs[:FIRST_FAILURES])) for key, runs in ordered)

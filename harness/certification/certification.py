@@ -17,13 +17,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from harness.campaign.flight import Answer
 from harness.campaign.folder import CampaignFolder
 from harness.campaign.journal import read_journal
 from harness.campaign.results import RUNS
-from harness.campaign.sweep import Progress, fly_missing, told_left
+from harness.campaign.sweep import fly_missing, told_left
 from harness.campaign.workers import Workers
-from harness.certification.bounds import verdict
-from harness.certification.certificate import Certificate, bounds, failures
+from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
+from harness.certification.certificate import Certificate, failures
 from harness.certification.days import Days, PathDays
 from harness.certification.explained import differing, explained
 from harness.files.input_file import InputError
@@ -110,13 +111,12 @@ def certify(
         for run, over in sorted(read_journal(out).runs.items()):
             tally.add(run, over.held)
 
-        def count(answer: Any) -> None:
+        def count(answer: Answer) -> None:
             tally.add(answer.run, answer.held)
             if progress is not None:
                 progress(tally)
 
-        report: Progress = count
-        left = fly_missing(days, folder, workers, report, lambda: tally.decided)
+        left = fly_missing(days, folder, workers, count, lambda: tally.decided)
         if left and not tally.decided:
             raise OSError(told_left(left))
         folder.write_tables(tally.runs)
@@ -136,7 +136,15 @@ def _leave_only(runs: Path, kept: set[int]) -> None:
 def _certificate(days: Days, out: Path, tally: Tally, terms: Terms, command: str | None) -> Certificate:
     over = [(run, each) for run, each in sorted(read_journal(out).runs.items()) if run < tally.runs]
     failing = [{**each.row, "run": run} for run, each in over if not each.held]
-    found = bounds(tally.held, tally.runs, terms.confidence, terms.probability)
+    counted = tally.held, tally.runs
+    if terms.probability is None:
+        said: Verdict = "undecided"
+        method = "Clopper-Pearson, number of runs fixed beforehand"
+        low, high = clopper_pearson(*counted, terms.confidence) if tally.runs else (0.0, 1.0)
+    else:
+        said = verdict(*counted, terms.probability, terms.confidence)
+        method = "sequential mixture test, valid at every look"
+        low, high = sequential_bounds(*counted, terms.confidence)
     first = days.flown(0)
     quantities: dict[str, list[Any]] = {}
     if failing:
@@ -146,12 +154,12 @@ def _certificate(days: Days, out: Path, tally: Tally, terms: Terms, command: str
         claim=days.claim,
         runs=tally.runs,
         held=tally.held,
-        probability_lower=found.low,
-        probability_upper=found.high,
+        probability_lower=low,
+        probability_upper=high,
         confidence=terms.confidence,
-        verdict=found.verdict,
+        verdict=said,
         probability=terms.probability,
-        method=found.method,
+        method=method,
         most_runs=len(days),
         subject=days.campaign.name,
         planner="given" if isinstance(days, PathDays) else first.planner.label,

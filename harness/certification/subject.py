@@ -38,26 +38,20 @@ def distributions(vary: Vary) -> dict[str, dict[str, Any]]:
     Raises:
         ValueError: one is none of these, or is there twice.
     """
-    if isinstance(vary, Mapping):
-        return dict(_distribution(key, value) for key, value in vary.items())
     found: dict[str, dict[str, Any]] = {}
-    for key, each in map(distribution_of, vary):
+    for each in vary.items() if isinstance(vary, Mapping) else vary:
+        if isinstance(each, str):
+            key, drawn = distribution_of(each)
+        elif isinstance(each[1], str):
+            key, drawn = distribution_of("=".join(each))
+        elif isinstance(each[1], Mapping):
+            key, drawn = each[0], dict(each[1])
+        else:
+            key, drawn = distribution_of(f"{each[0]}={':'.join(map(str, each[1]))}")
         if key in found:
             raise ValueError(f"{key} is varied twice; leave one out")
-        found[key] = each
+        found[key] = drawn
     return found
-
-
-def _distribution(key: str, value: Any) -> tuple[str, dict[str, Any]]:
-    if isinstance(value, str):
-        return distribution_of(f"{key}={value}")
-    if isinstance(value, Mapping):
-        return key, dict(value)
-    try:
-        low, high = (float(each) for each in value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{key}: {value!r} is not (low, high)") from None
-    return key, {"uniform": [low, high]}
 
 
 def is_path(subject: object) -> bool:
@@ -80,8 +74,7 @@ class Asked:
     """What is asked of many days.
 
     Attributes:
-        subject: a scenario, its file, or the name of one that comes with wayproof; or a path: a file that
-            `wayproof check` takes, or points (n, 2).
+        subject: a scenario, its file or shipped name; or a path: a file of `wayproof check`, or points (n, 2).
         settings: keys of the scenario to replace, as `load_scenario` takes them.
         vary: as `Days` takes it.
         claim: what is claimed of each day; None: `reached`, of a path `as-given`.
@@ -113,13 +106,13 @@ def days_of(asked: Asked, world: Path | None = None) -> Days:
     """
     if asked.claim is not None and asked.claim not in CLAIMS:
         raise InputError(f"wayproof: the claim {asked.claim!r} is none of {', '.join(CLAIMS)}")
-    if isinstance(asked.subject, Scenario) or (
-        isinstance(asked.subject, str | Path) and not is_path(asked.subject)
-    ):
-        if world is not None:
-            raise InputError("wayproof: a world goes with a path; a scenario is one already")
-        return _scenario_days(asked, asked.subject)
-    return _path_days(asked, asked.subject, world)
+    subject = asked.subject
+    if is_path(subject) and not isinstance(subject, Scenario):
+        return _path_days(asked, subject, world)
+    if world is not None:
+        raise InputError("wayproof: a world goes with a path; a scenario is one already")
+    assert isinstance(subject, Scenario | str | Path)
+    return _scenario_days(asked, subject)
 
 
 def _scenario_days(asked: Asked, subject: Scenario | str | Path) -> Days:

@@ -1,8 +1,8 @@
 """Planners side by side: flies every one on every scenario, writes tables, figures, overlays and a report.
 
-The folder of a comparison holds `comparison.csv`, `comparison.md`, `comparison.json` and `report.html`, and
-for each scenario a folder with its figures, `overlay.rrd` and a run folder for each planner. The index
-`comparison.json` is written first and last and says whether the comparison is complete.
+The folder of a comparison holds `comparison.csv`, `comparison.json` and `report.html`, and for each scenario a folder
+with its figures, `overlay.rrd` and a run folder for each planner. The index `comparison.json` is written first and last
+and says whether the comparison is complete.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from harness.analysis.metric import ERROR
-from harness.analysis.rows import COMPARED, Row, to_csv, to_markdown
+from harness.analysis.rows import COMPARED, Row, to_csv
 from harness.campaign.flight import Answer, Job
 from harness.campaign.paired import TESTED, Duel, duels
 from harness.campaign.sweep import fly_jobs
@@ -30,15 +30,13 @@ from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
 from harness.report.chapters import ReportedFlight, chapter, entry, optimum_of
+from harness.report.page import report_html
 from harness.run_files.run_folder import OVERLAY, RECORDING, REPORT, load_run
 from harness.scenario.scenario import Scenario, packed
 from harness.world.optimum import Optimum
 
-if TYPE_CHECKING:
-    from harness.report.page import Chapter
-
 SCHEMA = "wayproof/comparison/1"
-INDEX, CSV, MARKDOWN = "comparison.json", "comparison.csv", "comparison.md"
+INDEX, CSV = "comparison.json", "comparison.csv"
 
 
 @dataclass(frozen=True)
@@ -139,16 +137,13 @@ def fly_and_compare(
         )
         for number, each in enumerate(scenarios)
     ]
-    begun = Comparison(setup.command or _called(), _now(), {}, setup.kinematic, ())
+    command = setup.command or shlex.join(["wayproof", *sys.argv[1:]])
+    begun = Comparison(command, datetime.now(UTC).isoformat(timespec="seconds"), {}, setup.kinematic, ())
     lock = _claim(out, begun)
     try:
         return _compared(jobs, scenarios, planners, out, begun, setup.workers, progress)
     finally:
         lock.release()
-
-
-def _called() -> str:
-    return shlex.join(["wayproof", *sys.argv[1:]])
 
 
 def _compared(
@@ -174,8 +169,9 @@ def _compared(
 
     with local_workers(min(workers, len(jobs))) as flyers:
         fly_jobs(iter(jobs), flyers, over)
-    by_name = _by_name(scenarios)
-    optima = {name: optimum_of(own[0]) for name, own in by_name.items()}
+    first = {each.name: each for each in reversed(scenarios)}
+    names = list(dict.fromkeys(each.name for each in scenarios))
+    optima = {name: optimum_of(first[name]) for name in names}
     laws = _laws(scenarios)
     entries = [
         _entry(each, jobs[number], planners[number], reasons.get(number), optima[each.name], laws[number])
@@ -186,25 +182,20 @@ def _compared(
     versions = {name: version for name, version in named.items() if version}
     done = replace(begun, versions=versions, rows=tuple(each.row for each in entries))
     chapters = []
-    for name, own in by_name.items():
+    for name in names:
         flights = [each for each in entries if each.row.scenario == name]
         if (out / name).is_symlink():  # of a folder that somebody sent
             (out / name).unlink()
         (out / name).mkdir(exist_ok=True)
         _overlay(out / name, flights)
-        chapters.append(chapter(out / name, own[0], flights, optima[name]))
+        chapters.append(chapter(out / name, first[name], flights, optima[name]))
     replace_text(out / CSV, to_csv(done.rows))
-    replace_text(out / MARKDOWN, _markdown(done))
-    replace_text(out / REPORT, _report(done, chapters))
+    page = report_html(
+        chapters, done.command, done.versions, done.started_utc, done.kinematic, _duels(done.rows)
+    )
+    replace_text(out / REPORT, page)
     _write_index(out, done, complete=True)
     return done
-
-
-def _by_name(scenarios: Sequence[Scenario]) -> dict[str, list[Scenario]]:
-    groups: dict[str, list[Scenario]] = {}
-    for each in scenarios:
-        groups.setdefault(each.name, []).append(each)
-    return groups
 
 
 def _laws(scenarios: Sequence[Scenario]) -> list[str]:
@@ -223,7 +214,7 @@ def _check(scenarios: Sequence[Scenario], names: Sequence[str]) -> None:
                 f"wayproof: {each.planner.kind} is to fly {each.name} twice{under}; leave one out or rename the "
                 "scenario"
             )
-        if each.name in (INDEX, CSV, MARKDOWN, REPORT):
+        if each.name in (INDEX, CSV, REPORT):
             raise InputError(
                 f"wayproof: a scenario is called {each.name}, as a file of the comparison; rename it"
             )
@@ -257,7 +248,7 @@ def _claim(out: Path, begun: Comparison) -> FolderLock:
                 f"{out} is not empty and not a comparison: choose another folder or empty it first"
             )
         _write_index(out, begun, complete=False)
-        for name in (CSV, MARKDOWN, REPORT):
+        for name in (CSV, REPORT):
             (out / name).unlink(missing_ok=True)
         return lock
     except OSError as error:
@@ -293,25 +284,6 @@ def _overlay(folder: Path, entries: Sequence[ReportedFlight]) -> None:
         )
 
 
-def _markdown(comparison: Comparison) -> str:
-    versions = ", ".join(f"{name} {version}" for name, version in comparison.versions.items())
-    repeat = f"## How to repeat it\n\n    {comparison.command}\n\n{versions}\n"
-    return f"# Planners side by side\n\n{to_markdown(comparison.rows)}\n{repeat}"
-
-
-def _report(comparison: Comparison, chapters: Sequence[Chapter]) -> str:
-    from harness.report.page import report_html
-
-    return report_html(
-        chapters,
-        comparison.command,
-        comparison.versions,
-        comparison.started_utc,
-        comparison.kinematic,
-        _duels(comparison.rows),
-    )
-
-
 def _duels(rows: Sequence[Row]) -> tuple[Duel, ...]:
     """Planners in pairs over the scenarios; none with a single scenario, of which the table says it all."""
     if len({row.scenario for row in rows}) < 2:
@@ -321,7 +293,3 @@ def _duels(rows: Sequence[Row]) -> tuple[Duel, ...]:
     }
     reached = [row.outcome == "reached" for row in rows]
     return duels([row.label for row in rows], [(row.scenario,) for row in rows], reached, figures)
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")

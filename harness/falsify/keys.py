@@ -7,8 +7,9 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
+from harness.campaign.sampling import takes_whole_numbers
 from harness.falsify.search import Point
 from harness.files.strict_yaml import InputError, as_spelt, loc_of
 from harness.scenario.scenario import Scenario
@@ -85,9 +86,11 @@ def vary_of(
             raise InputError(
                 f"command line: --vary {key}: both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}"
             )
-    first = load([(key, number_text(mild)) for key, mild, _ in given])
+    load([(key, number_text(mild)) for key, mild, _ in given])
     vary = tuple(
-        Vary(key, mild, hard, _is_whole(first, key), _decimals(abs(hard - mild) * tolerance / 100.0))
+        Vary(
+            key, mild, hard, takes_whole_numbers(loc_of(key)), _decimals(abs(hard - mild) * tolerance / 100.0)
+        )
         for key, mild, hard in given
     )
     diagonal = [(step / 8,) * len(vary) for step in range(9)]
@@ -110,13 +113,6 @@ def _spelt(option: str, key: str) -> str:
         return as_spelt(key)
     except ValueError as error:
         raise InputError(f"command line: {option}: {error}") from error
-
-
-def _is_whole(scenario: Scenario, key: str) -> bool:
-    value: Any = scenario.model_dump(by_alias=True)
-    for step in loc_of(key):
-        value = value[step]
-    return isinstance(value, int)
 
 
 def number_text(value: float) -> str:

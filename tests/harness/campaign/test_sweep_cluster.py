@@ -183,12 +183,7 @@ def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
             f"wayproof: {address} leads beyond this machine without encryption"
         )
         assert "no Dask scheduler answers" in said("--scheduler", address, "--unencrypted")
-    for address in (
-        "tls://192.0.2.1:8786",
-        "tcp://localhost:1",
-        "tcp://127.0.0.1:1",
-        f"tcp://{socket.gethostname()}:1",
-    ):
+    for address in ("tls://192.0.2.1:8786", "tcp://localhost:1", "tcp://127.0.0.1:1"):
         assert "no Dask scheduler answers" in said("--scheduler", address)
     assert "--unencrypted goes with --scheduler" in said("--unencrypted")
 

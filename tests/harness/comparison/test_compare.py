@@ -143,7 +143,7 @@ def files(folder: Path) -> set[str]:
 
 @pytest.mark.flights
 def test_writes_tables_figures_overlay_report_and_a_run_folder_each(flown: Path) -> None:
-    assert files(flown) == {"comparison.csv", "comparison.json", "comparison.md", "report.html", "ring"}
+    assert files(flown) == {"comparison.csv", "comparison.json", "report.html", "ring"}
     drawn = {
         f"{name}.{kind}"
         for name in ("map", "profiles", "path-rolling_window", "path-corner")
@@ -340,7 +340,7 @@ def test_bad_input_ends_with_2_before_anything_is_flown(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", ["comparison.json", "comparison.csv", "comparison.md", "report.html"])
+@pytest.mark.parametrize("name", ["comparison.json", "comparison.csv", "report.html"])
 def test_a_scenario_with_the_name_of_a_file_of_ours_is_refused(
     place: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
