@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from harness.analysis.band import BAND, write_band
 from harness.campaign.flight import Answer
 from harness.campaign.folder import CampaignFolder
 from harness.campaign.journal import read_journal
@@ -29,6 +30,7 @@ from harness.certification.days import Days, PathDays
 from harness.certification.explained import differing, explained
 from harness.files.input_file import InputError
 from harness.files.versions import versions
+from harness.run_files.run_folder import TRACK
 
 MOST_RUNS: Final = 1000
 CONFIDENCE: Final = 0.95
@@ -121,6 +123,9 @@ def certify(
             raise OSError(told_left(left))
         folder.write_tables(tally.runs)
         certificate = _certificate(days, out, tally, terms, command)
+        if days.band and not (out / BAND).exists():
+            kept = (out / RUNS / str(run) for run in range(tally.runs))
+            write_band(out, [each for each in kept if (each / TRACK).is_file()])
         _leave_only(out / RUNS, set(certificate.failing_runs))
         certificate.write(out)
     return certificate

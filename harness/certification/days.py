@@ -87,6 +87,7 @@ class Days(CampaignRuns):
         seed: int,
         most: int,
         sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
+        band: bool = False,
     ) -> None:
         """Makes the days; nothing is flown.
 
@@ -97,10 +98,12 @@ class Days(CampaignRuns):
             seed: root seed of all draws.
             most: number of days that may be flown.
             sources: planners and guidance laws, as `CampaignRuns` takes them.
+            band: whether `band.json` is made of the tracks of all days.
 
         Raises:
             InputError: a key or a distribution is none.
         """
+        self.band = band
         plain = {
             "schema": "wayproof/campaign/1",
             "name": base.name,
@@ -108,7 +111,7 @@ class Days(CampaignRuns):
             "scenarios": [base.file],
             "random": {key: dict(each) for key, each in vary.items()},
             "draws": most,
-            "recordings": "failures",
+            "recordings": "all" if band else "failures",
             "optimum": False,
         }
         root = node_of(plain, COMMAND_LINE)

@@ -161,9 +161,24 @@ def check(
 
         content = f"{path.read_bytes().hex()} {differs} {replaced} {world and world.read_text()}"
         again = ["wayproof", "check", str(path), "--aircraft", aircraft]
-        drawn = PathDays(on_day, content, again, {}, claim="as-given", seed=check.scenario.seed, most=days)
+        drawn = PathDays(
+            on_day, content, again, {}, claim="as-given", seed=check.scenario.seed, most=days, band=True
+        )
         fly_path_days(drawn, folder / "days", silent=quiet or as_json)
+        _show_band(folder)
     return 0 if flown.ok else FAILED
+
+
+def _show_band(folder: Path) -> None:
+    """Puts the band in which 95 % of the days fly into the recording of the check."""
+    from harness.analysis.band import read_band
+    from harness.run_files.run_folder import RECORDING
+
+    band = read_band(folder / "days")
+    if band is not None and (folder / RECORDING).is_file():
+        from harness.recording.band import add_band
+
+        add_band(folder / RECORDING, *band[1:])
 
 
 def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> CheckedPath:

@@ -41,7 +41,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         RunFolderError: a recording cannot be read.
         OSError: the overlay cannot be written.
     """
-    chunks = [_chunks(recording) for recording in recordings]
+    chunks = [chunks_of(recording) for recording in recordings]
     runs = [f"runs/{place}/" for place in range(len(recordings))]
     title = ", ".join(names)
     with recording_stream(f"overlay: {title}") as rec:
@@ -50,7 +50,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             for own, run, place in zip(chunks, runs, range(len(runs)), strict=True)
             for renamed in _renamed(own, run, place, str(place))
         }
-        file = RecordingFile(rec, path, layout_of(_frame(chunks[0], recordings[0]), entities, runs))
+        file = RecordingFile(rec, path, layout_of(frame_of(chunks[0], recordings[0]), entities, runs))
         rec.send_recording_name(title)
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
@@ -90,10 +90,10 @@ def send_recording(recording: Path, address: str) -> None:
     Raises:
         RunFolderError: the recording cannot be read.
     """
-    chunks = _chunks(recording)
+    chunks = chunks_of(recording)
     entities = {chunk.entity_path for chunk in chunks}
     with recording_stream(str(recording)) as rec:
-        layout = layout_of(_frame(chunks, recording), entities, runs_in(entities))
+        layout = layout_of(frame_of(chunks, recording), entities, runs_in(entities))
         rec.connect_grpc(address, default_blueprint=layout)
         layout.let_go()
         rec.send_chunks(chunks)
@@ -107,7 +107,8 @@ def runs_in(entities: Collection[str]) -> list[str]:
     return [f"runs/{place}/" for place in sorted(places)] or [""]
 
 
-def _chunks(recording: Path) -> list[rr.chunk.Chunk]:
+def chunks_of(recording: Path) -> list[rr.chunk.Chunk]:
+    """The content of a recording, an incomplete one too; RunFolderError where it cannot be read."""
     try:
         with warnings.catch_warnings():
             # A recording of a killed run has no footer; it is read all the same.
@@ -130,7 +131,8 @@ def _properties(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]:
     }
 
 
-def _frame(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
+def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
+    """What its views are framed on."""
     kept = _properties(chunks).get(look.FRAME)
     if kept is None:
         raise RunFolderError(f"{recording} is not a recording of a flight")

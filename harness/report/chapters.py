@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import numpy as np
+
+from harness.analysis.band import read_band
 from harness.analysis.metric import number
 from harness.analysis.rows import Row, row_of
 from harness.files.errors import RunFolderError
@@ -111,10 +114,17 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     folder = flight.run.folder
     metrics = flight.run.metrics
     if "check" in metrics:
+        from harness.report.figure_style import colour
         from harness.report.path_figure import path_figure
 
         path = path_figure(scene, drawn, flight.run.plans[0].waypoints_m, metrics)
         caption = f"The path of {scene.name} as given, and the track that was flown over it; enlarged: the worst place."
+        if (band := read_band(folder / "days")) is not None:
+            days, left_m, right_m = band
+            for axes in path.axes[:2]:
+                ring_km = np.concatenate((left_m, right_m[::-1])) / 1e3
+                axes.fill(*ring_km.T, color=colour(0), alpha=0.3, lw=0, zorder=4)
+            caption += f" Blue area: where 95 % of {days} days fly."
     else:
         from harness.report.planner_figure import planner_figure
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
 from harness.cli.app import main
 from harness.cli.flight_rows import flight_rows, verdict_rows
@@ -369,3 +370,13 @@ def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
     certificate = json.loads((tmp_path / "run" / "days" / "certificate.json").read_text())
     assert (certificate["runs"], certificate["held"]) == (3, 3)
     assert certificate["probability_lower"] == pytest.approx(0.05 ** (1 / 3), rel=1e-4)
+    tracks = (tmp_path / "run" / "days" / "band.json").read_text()
+    edges = {side: np.array(json.loads(tracks)[f"{side}_m"]) for side in ("left", "right")}
+    assert (edges["left"][:, 1] >= edges["right"][:, 1]).all(), "the path leads east"
+    assert (abs(edges["left"] - edges["right"]) < 20.0).all(), "each day is as given: within 10 m"
+    drawn = {
+        chunk.entity_path for chunk in RrdReader(str(tmp_path / "run" / "flight.rrd")).stream().to_chunks()
+    }
+    assert {"/plan/band", "/world/band", "/plan/whole_track"} <= drawn
+    assert main(["report", str(tmp_path / "run")]) == 0
+    assert "where 95 % of 3 days fly" in (tmp_path / "run" / "report.html").read_text()

@@ -1,0 +1,82 @@
+"""The band in which days fly a path: at each place along it, how far to its sides 95 % of them are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from harness.files.input_file import read_index
+from harness.files.whole_file import replace_text
+from harness.flight.record import FloatArray
+
+BAND: Final = "band.json"
+SCHEMA: Final = "wayproof/band/1"
+SHARE: Final = 0.95
+STATIONS: Final = 400
+"""The band has at most this many places along the path."""
+STEP_M: Final = 5.0
+"""They are at least this far apart."""
+
+
+def band_of(tracks: Sequence[FloatArray], share: float = SHARE) -> tuple[FloatArray, FloatArray]:
+    """Left and right edge of the band, (n, 2) each, east and north in metres.
+
+    At each place the offsets are those from the median position, across its direction; the edges are their percentiles
+    (1 - share) / 2 and (1 + share) / 2. Days that ended before a place do not count there.
+
+    Args:
+        tracks: of each day (k, 3): distance along the path (NaN before the first plan), east and north.
+        share: of the days that lie between the edges at each place.
+    """
+    known = [track[np.isfinite(track[:, 0])] for track in tracks]
+    length_m = float(np.median([track[:, 0].max() for track in known]))
+    stations_m = np.linspace(0.0, length_m, max(3, min(STATIONS, int(length_m / STEP_M))))
+    places = np.stack([_at(track, stations_m) for track in known])
+    middle = np.nanmedian(places, axis=0)
+    ahead = np.gradient(middle, axis=0)
+    ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    left = np.column_stack((-ahead[:, 1], ahead[:, 0]))
+    off_m = ((places - middle) * left).sum(axis=2)
+    low_m, high_m = np.nanpercentile(off_m, (50 * (1 - share), 50 * (1 + share)), axis=0)
+    return middle + high_m[:, None] * left, middle + low_m[:, None] * left
+
+
+def _at(track: FloatArray, stations_m: FloatArray) -> FloatArray:
+    """(n, 2) positions of a day at distances along the path; NaN beyond where it ended."""
+    along_m = np.maximum.accumulate(track[:, 0])
+    beyond = stations_m > along_m[-1]
+    columns = [np.where(beyond, np.nan, np.interp(stations_m, along_m, track[:, axis])) for axis in (1, 2)]
+    found: FloatArray = np.column_stack(columns)
+    return found
+
+
+def write_band(folder: Path, runs: Sequence[Path]) -> None:
+    """Writes `band.json` into the folder of some days, from the tracks in their run folders."""
+    import pyarrow.parquet as pq
+
+    if not runs:
+        return
+    columns = ("arc_length_m", "east_m", "north_m")
+    tables = [pq.read_table(run / "track.parquet", columns=list(columns)) for run in runs]
+    tracks = [np.column_stack([table[name].to_numpy() for name in columns]) for table in tables]
+    left, right = band_of([track for track in tracks if np.isfinite(track[:, 0]).any()])
+    told = {
+        "schema": SCHEMA,
+        "share": SHARE,
+        "days": len(runs),
+        "left_m": left.tolist(),
+        "right_m": right.tolist(),
+    }
+    replace_text(folder / BAND, json.dumps(told, allow_nan=False) + "\n")
+
+
+def read_band(folder: Path) -> tuple[int, FloatArray, FloatArray] | None:
+    """Number of days, left and right edge, from the folder of some days; None where there is no band."""
+    told = read_index(folder / BAND, SCHEMA)
+    if told is None:
+        return None
+    return int(told["days"]), np.array(told["left_m"]), np.array(told["right_m"])

@@ -1,0 +1,45 @@
+"""How much of the failures each quantity explains, on planted systems whose shares are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from harness.certification.explained import differing, explained
+
+RATES = np.array([0.05, 0.1, 0.3, 0.55])
+
+
+def test_the_share_is_the_variance_between_groups_over_that_of_failing() -> None:
+    """Each quartile of the wind fails at a rate of its own: Var(rate) / (mean (1 - mean))."""
+    rng = np.random.default_rng(4)
+    wind, noise, course = (
+        rng.uniform(0.0, 10.0, 40_000),
+        rng.normal(size=40_000),
+        rng.uniform(0.0, 360.0, 40_000),
+    )
+    failed = rng.random(40_000) < RATES[np.searchsorted(np.quantile(wind, (0.25, 0.5, 0.75)), wind)]
+    mean = RATES.mean()
+    quantities = {"noise": noise.tolist(), "wind": wind.tolist(), "wind.from_deg": course.tolist()}
+    first, *others = explained(failed, quantities)
+    assert first.key == "wind"
+    assert first.share == pytest.approx(RATES.var() / (mean * (1.0 - mean)), abs=0.01)
+    assert first.failed / first.runs == pytest.approx(RATES[-1], abs=0.02)
+    assert all(each.share < 0.001 for each in others)
+
+
+def test_a_direction_explains_failures_on_both_sides_of_north() -> None:
+    rng = np.random.default_rng(5)
+    course = rng.uniform(0.0, 360.0, 20_000)
+    failed = (course > 315.0) | (course < 45.0)
+    (one,) = explained(failed, {"wind.from_deg": course.tolist()})
+    assert one.worst == "N, -45 to 45"
+    assert one.share == pytest.approx(1.0)
+
+
+def test_what_conditions_draw_is_found_though_no_key_names_it() -> None:
+    days = [
+        {"environment": {"wind": {"speed_mps": speed, "from_deg": 270.0}}, "seed": seed}
+        for seed, speed in enumerate((1.0, 2.0))
+    ]
+    assert differing(days) == {"environment.wind.speed_mps": [1.0, 2.0]}
