@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import numpy as np
-
 from harness.analysis.band import read_band
 from harness.analysis.metric import number
 from harness.analysis.rows import Row, row_of
