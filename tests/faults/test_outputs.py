@@ -72,7 +72,7 @@ def test_a_pipe_in_the_place_of_an_output_is_refused_at_once(
     assert main(["report", str(sent)]) == 2
     assert "report.csv: is a pipe or a device, not a file" in capsys.readouterr().err
     os.mkfifo(tmp_path / "pipe")
-    assert main(["export", str(sent), "--format", "csv", "--out", str(tmp_path / "pipe")]) == 2
+    assert main(["export", str(sent), "--format", "kml", "--out", str(tmp_path / "pipe")]) == 2
     assert "pipe: is a pipe or a device, not a file" in capsys.readouterr().err
 
 
@@ -83,7 +83,7 @@ def test_an_edited_file_of_a_run_is_named_with_its_sha256(
     text = (sent / name).read_text()
     (sent / name).write_text(text.replace("timeout", "reached").replace("radius_m: ", "radius_m: 1"))
     assert (sent / name).read_text() != text
-    for command in (["report"], ["export", "--format", "csv"], ["view", "--web"]):
+    for command in (["report"], ["export", "--format", "kml"], ["view", "--web"]):
         assert main([*command, str(sent)]) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert f"{name} is not what was written: its sha256 is not that in manifest.json" in line
@@ -92,13 +92,13 @@ def test_an_edited_file_of_a_run_is_named_with_its_sha256(
 def test_an_export_that_finds_no_room_leaves_the_file_as_it_was(
     sent: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = tmp_path / "way.csv"
+    out = tmp_path / "way.kml"
     out.write_text("the one before")
     with full_disk(100):
-        assert main(["export", str(sent), "--format", "csv", "--out", str(out)]) == 2
-    assert "way.csv" in capsys.readouterr().err
+        assert main(["export", str(sent), "--format", "kml", "--out", str(out)]) == 2
+    assert "way.kml" in capsys.readouterr().err
     assert out.read_text() == "the one before"
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["run", "way.csv"]
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["run", "way.kml"]
 
 
 def test_a_run_that_finds_no_room_at_its_start_leaves_nothing(
