@@ -91,21 +91,14 @@ class DubinsTree:
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while nothing seen blocks it; grows a tree where something does."""
         fresh, gone = self._memory.take_in(request.seen), self._memory.cleared
-        changed = len(fresh) > 0 or gone != self._gone
-        self._gone = gone
-        path = request.flown.path if request.flown else None
+        changed, self._gone = len(fresh) > 0 or gone != self._gone, gone
         keep = self._mission.clearance_m + CURVE_SHARE * self._margin_m
         if request.flown is not self._flown:
             self._flown, self._breach_m, self._searched_at_m = request.flown, math.inf, 0.0
+        why = self._serves(request, fresh, changed, keep)
+        if why:
+            return Plan(PlanStatus.KEPT, why)
         arc_length_m = request.arc_length_m
-        rolled = arc_length_m - self._searched_at_m >= self._mission.sensor_range_m / ROLLS
-        if path is not None and path.loiter and not (changed or rolled):
-            return Plan(PlanStatus.KEPT, "holding; nothing new is known")
-        if path is not None and not path.loiter and path.length_m > arc_length_m:
-            room = self._room(fresh, Pose(*path.segments[0, :4].tolist()), keep)
-            self._breach_m = min(self._breach_m, first_breach(path, fresh, room, arc_length_m))
-            if math.isinf(self._breach_m) or not (rolled or self._breach_m - arc_length_m < self._urgent_m):
-                return Plan(PlanStatus.KEPT, "nothing near blocks the plan in effect")
         self._searched_at_m = arc_length_m
         pose, prefix = branch_off(request, self._mission)
         poses, ways = self._ways(pose, self._terrain(pose, keep))
@@ -122,6 +115,19 @@ class DubinsTree:
             Path(np.array([*prefix, *segments])),
             partial(PlanPicture, guide, seen_m, candidates=(np.array([each[:2] for each in poses]),)),
         )
+
+    def _serves(self, request: PlanRequest, fresh: FloatArray, changed: bool, keep: float) -> str:
+        """Why the plan in effect is flown on; empty where a tree is to be grown."""
+        path, arc_length_m = request.flown.path if request.flown else None, request.arc_length_m
+        rolled = arc_length_m - self._searched_at_m >= self._mission.sensor_range_m / ROLLS
+        if path is not None and path.loiter:
+            return "" if changed or rolled else "holding; nothing new is known"
+        if path is None or path.length_m <= arc_length_m:
+            return ""
+        room = self._room(fresh, Pose(*path.segments[0, :4].tolist()), keep)
+        self._breach_m = min(self._breach_m, first_breach(path, fresh, room, arc_length_m))
+        near = rolled or self._breach_m - arc_length_m < self._urgent_m
+        return "" if near and math.isfinite(self._breach_m) else "nothing near blocks the plan in effect"
 
     def _room(self, points: FloatArray, pose: Pose, keep: float) -> FloatArray:
         room = [

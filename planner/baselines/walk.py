@@ -157,15 +157,7 @@ class Walker(ABC, Generic[WalkState]):
         left = path.length_m - arc_length_m
         if isinstance(end, Enclosed) and left < SAME_PLACE * self.keep_m:
             return self._ended(request, end, taken_back)
-        if len(fresh):
-            breach = first_breach(path, fresh, self._breach_keep_m, arc_length_m)
-            self.breach_m = min(self.breach_m, breach)
-        ends_early = not isinstance(end, Enclosed) and math.dist(end_of(path)[:2], self.goal) > 1.0
-        must = (
-            taken_back
-            or self.breach_m - arc_length_m < self._near_m
-            or (ends_early and left < max(self._near_m, 0.5 * self.horizon_m))
-        )
+        must = taken_back or self._ends_soon(path, arc_length_m, fresh)
         if not must and arc_length_m < self._look_at_m:
             return Plan(PlanStatus.KEPT, "the walk goes on")
         place = pose_at(path, arc_length_m)[:2]
@@ -176,6 +168,16 @@ class Walker(ABC, Generic[WalkState]):
             self._look_at_m = arc_length_m + self.look_again_m()
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
         return self._found(legs, request, place)
+
+    def _ends_soon(self, path: Path, arc_length_m: float, fresh: FloatArray) -> bool:
+        """Whether the walk comes too near to (k, 2) new edge points or those before, or ends, not far ahead."""
+        if len(fresh):
+            breach = first_breach(path, fresh, self._breach_keep_m, arc_length_m)
+            self.breach_m = min(self.breach_m, breach)
+        enclosed = isinstance(self.legs[-1].state, Enclosed)
+        ends_early = not enclosed and math.dist(end_of(path)[:2], self.goal) > 1.0
+        ends = ends_early and path.length_m - arc_length_m < max(self._near_m, 0.5 * self.horizon_m)
+        return ends or self.breach_m - arc_length_m < self._near_m
 
     def _begun(self, request: PlanRequest) -> Plan:
         """A walk from the beginning of the algorithm."""

@@ -192,7 +192,8 @@ class Shield:
         from_m = 0.0 if new else _nearest_m(inner, pose[:2], adopted.certified_m)
         track = self._flyable(request, prefix, pose, curvature, inner, from_m, new)
         if track is None:
-            self._not_taken(request.position_m, "the path ends behind the aircraft", new)
+            if new:
+                self._refuse(request.position_m, "the path ends behind the aircraft")
             return None
         way = track.path
         keeps = np.minimum(
@@ -207,21 +208,12 @@ class Shield:
         gets_on = found is not None and self._gets_on(found, track, adopted, new)
         if not gets_on:
             certified, found = found, self._to_goal(certifier, request, way, cut_m)
-            if (
-                found is None
-                and certified is not None
-                and effective is not None
-                and not effective.holds(here_m)
-            ):
+            if found is None and certified is not None and self._leads_on(here_m):
                 return None  # the plan in effect leads as far
         if found is None or room_m(found.path, self._threats) < mission.clearance_m:
-            free_m = min(certifier.seen_free_to_m(way, request.seen), cut_m)
-            why = (
-                f"the path comes too near to something or leaves the area {free_m:.0f} m ahead"
-                if cut_m <= free_m
-                else f"no turn off the path that gets on has been seen to be free within {free_m:.0f} m"
-            )
-            self._not_taken(place_on(way, free_m)[0][:2], why, new)
+            if new:
+                free_m = min(certifier.seen_free_to_m(way, request.seen), cut_m)
+                self._refuse(place_on(way, free_m)[0][:2], why_not(free_m, cut_m))
             return None
         if not new and effective is not None and self._monitor.broken:
             return None
@@ -236,6 +228,10 @@ class Shield:
         )
         self._proposed = Adopted(adopted.plan, adopted.own, track.station_m(found.loiter_entry_m))
         return CommittedPlan(plan, found.path, course, found.loiter_entry_m)
+
+    def _leads_on(self, here_m: float) -> bool:
+        """Whether the aircraft is on the certified part of a plan, before its turn."""
+        return self._monitor.plan is not None and not self._monitor.plan.holds(here_m)
 
     def _start(self, request: PlanRequest, here_m: float) -> tuple[list[Segment], Pose, float]:
         """What of the plan in effect is flown in any case, and the pose and curvature where a new one leaves it."""
@@ -296,10 +292,6 @@ class Shield:
         flown = Path(np.array(between(way, 0.0, over_m + mission.tracking_error_m) or way.segments))
         return certifier.certify_up_to(over_m, flown, request.seen, mission.bounds_m)
 
-    def _not_taken(self, place: Point, reason: str, new: bool) -> None:
-        if new:
-            self._refuse(place, reason)
-
     def _backup(self, request: PlanRequest, here_m: float, answer: Plan) -> Plan:
         """What is flown where the planner has nothing that is certified: the plan in effect, or an escape."""
         effective, time_s = self._monitor.plan, request.time_s
@@ -343,6 +335,13 @@ class Shield:
         if math.dist(place, here) > 2.0 * mission.clearance_m and math.dist(place, mission.goal_m) > beside_m:
             self._places.add(place, request.seen)
             self._shown_s = request.time_s
+
+
+def why_not(free_m: float, cut_m: float) -> str:
+    """Why a path is refused that is free up to one arc length and cut at another."""
+    if cut_m <= free_m:
+        return f"the path comes too near to something or leaves the area {free_m:.0f} m ahead"
+    return f"no turn off the path that gets on has been seen to be free within {free_m:.0f} m"
 
 
 def first_exit_m(path: Path, bounds_m: tuple[float, float, float, float]) -> float:
