@@ -51,10 +51,8 @@ class Compiled(Generic[P, R]):
     def __init__(self, function: Callable[P, R], arguments: tuple[str, ...]) -> None:
         self._function, self._arguments = function, arguments
         self._code: Callable[..., R] = self._compile_first
-        self.anew = False
-        """It was compiled by this process, not loaded."""
-        self.kept = True
-        """What was compiled is on disk."""
+        self.anew, self.kept = False, True
+        """It was compiled by this process, not loaded; what was compiled is on disk."""
         self.size = len(function.__code__.co_code)
         """Length of its byte code, bytes: compiling takes about as long."""
         functools.update_wrapper(self, function)

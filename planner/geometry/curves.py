@@ -192,21 +192,13 @@ def fillet(
         longer_turn: begin with the longer of the two turns towards the first corner.
         first_radius_m: radius of that turn.
     """
-    radius_m = first_radius_m or limits.radius_m
-    ways = turns_onto(start, nodes[0], radius_m)[longer_turn:]
-    segments: list[Segment] = []
-    if ways and ways[0][0][4] * start_curvature < 0.0:
-        if limits.roll_m > SHORTEST_M:
-            segments.append((*start, 0.0, limits.roll_m))
-            start = along(segments[0], limits.roll_m)
-        ways = turns_onto(start, nodes[0], radius_m)[longer_turn:]
-    if not ways:
+    segments = _first_turn(
+        start, nodes[0], limits, start_curvature, longer_turn, first_radius_m or limits.radius_m
+    )
+    if segments is None:
         return None
-    first = ways[0]
-    last_turn = 0.0 if segments else start_curvature
-    segments += [segment for segment in first if segment[4]]
     corner = along(segments[-1], segments[-1][5]) if segments else start
-    last_turn = segments[-1][4] if segments and segments[-1][4] else last_turn
+    last_turn = segments[-1][4] if segments else start_curvature
     used = 0.0  # how much of the present leg the corner before it has taken
     for i, node in enumerate(nodes):
         leg = math.dist(corner[:2], node)
@@ -241,6 +233,20 @@ def fillet(
         corner = Pose(node[0], node[1], ux, uy)
         used = trim
     return Path(np.array(segments)) if segments else None
+
+
+def _first_turn(
+    start: Pose, node: Point, limits: Limits, start_curvature: float, longer_turn: bool, radius_m: float
+) -> list[Segment] | None:
+    """The turn towards the first corner, after a straight to roll where the other way is turned before."""
+    segments: list[Segment] = []
+    ways = turns_onto(start, node, radius_m)[longer_turn:]
+    if ways and ways[0][0][4] * start_curvature < 0.0:
+        if limits.roll_m > SHORTEST_M:
+            segments.append((*start, 0.0, limits.roll_m))
+            start = along(segments[0], limits.roll_m)
+        ways = turns_onto(start, node, radius_m)[longer_turn:]
+    return [*segments, *(segment for segment in ways[0] if segment[4])] if ways else None
 
 
 def onward(path: Path, arc_length_m: float, length_m: float) -> list[Segment]:

@@ -43,16 +43,11 @@ def close_cells(
 def spread_wave(
     levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int
 ) -> None:
-    """Lets the wave go on, by so many cells and to the end of a level.
+    """Lets the wave go on, by `most` cells and to the end of a level.
 
-    Args:
-        levels: of each cell.
-        open_: whether the wave may go there, and has not.
-        order: cells in the order in which it came there.
-        state: the level; from which one in that order on cells have yet to go on to what touches them at a corner;
-            where the last level begins; where it ends.
-        rows: cells side by side.
-        most: how many.
+    `levels`, `open_` (the wave may go there, and has not) are of each cell; `order` are cells as the wave came to them.
+    `state` is the level, the first in that order that has yet to go on to what touches it at a corner, where the last
+    level begins, and where it ends.
     """
     level, cornered, begin, end = state
     enough = end + most

@@ -109,14 +109,29 @@ def search_candidates(
             # Whatever lies towards the goal, not only what comes first; and on round what it hugs.
             beside += np.unique(labels).tolist()
             beside += [] if candidate.last is None else [candidate.last.obstacle]
-        for edge in window.sector_edges(here, beside, outer_m):
-            if not wide and _leads_away(candidate, edge):
-                continue
-            child = _step(candidate, edge, goal, outer_m)
-            if child is not None and _inside(child.nodes[-1], bounds_m):
-                count += 1
-                cost = child.cost_m if to_go is None else child.flown_m + to_go(child.nodes[-1])
-                heapq.heappush(queue, (cost, count, depth + 1, child))
+        edges = (
+            edge
+            for edge in window.sector_edges(here, beside, outer_m)
+            if wide or not _leads_away(candidate, edge)
+        )
+        for child in _steps(candidate, edges, goal, bounds_m, outer_m):
+            count += 1
+            cost = child.cost_m if to_go is None else child.flown_m + to_go(child.nodes[-1])
+            heapq.heappush(queue, (cost, count, depth + 1, child))
+
+
+def _steps(
+    candidate: Candidate,
+    edges: Iterable[SectorEdge],
+    goal: Point,
+    bounds_m: tuple[float, float, float, float],
+    outer_m: float,
+) -> Iterator[Candidate]:
+    """The steps along some edges that lead anywhere in the area."""
+    for edge in edges:
+        child = _step(candidate, edge, goal, outer_m)
+        if child is not None and _inside(child.nodes[-1], bounds_m):
+            yield child
 
 
 def _leads_away(candidate: Candidate, edge: SectorEdge) -> bool:

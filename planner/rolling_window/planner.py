@@ -1,14 +1,8 @@
 """The rolling-window planner of the paper, made safe and convergent: a state machine over a committed plan.
 
-In every rolling step: take the planning window about the track point where the new plan begins; search N steps deep
-among the free sectors for the n best candidates (`multi_step_search`); shorten each under the minimum turn radius
-(`route_optimisation`); the shortest of the n is the course (`local_planning`). Of the course that part is put into
-effect (`commitment`) which ends in a turn seen to be free, or in the goal circle (`certificate`), and flown until the
-window rolls on. A search that takes long goes on while the plan in effect is flown (`anytime_search`). Where something
-moves or has just appeared, no plan is flown that would meet it, and one that would is left (`escape`, `evasion`).
-
-What is done about the plan in effect is one of five states (`PlanningState`). Each is entered by one method, which
-gives the answer: `_follow`, `_loiter`, `_escape`, `_give_up`, `_prove`.
+A course is searched N steps deep among the free sectors (`multi_step_search`, `local_planning`). Of it that part is put
+into effect (`commitment`) which ends in a turn seen to be free, or in the goal circle, and flown until the window rolls
+on. What is done about the plan in effect is one of five states (`PlanningState`), each entered by one method.
 
 Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there is a
 way, the course is a shortest one through what is known. Each course is flown until something seen contradicts it.

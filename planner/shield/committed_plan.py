@@ -19,10 +19,10 @@ COMPARED_TOGETHER = 16
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-UNHURRIED, CUT, GRAZED = 0.0625, 0.02, 0.005
-"""The next search begins after a share of the distance to what is wrong with the plan. `UNHURRIED` is that share in
+REPLAN_SHARE, CUT, GRAZED = 0.0625, 0.02, 0.005
+"""The next search begins after a share of the distance to what is wrong with the plan. `REPLAN_SHARE` is that share in
 general. `CUT`, which is smaller, holds where the course is cut: what cuts it may be a dead end. A course that the last
-search made longer by less than the share `GRAZED` is only grazed, and `UNHURRIED` holds for it too."""
+search made longer by less than the share `GRAZED` is only grazed, and `REPLAN_SHARE` holds for it too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,5 +191,5 @@ class PlanMonitor:
             return False
         if self.cut_m < math.inf:
             grazed = self.lengthened_m < GRAZED * wrong
-            return since_m >= max(limits.lead_m, (UNHURRIED if grazed else CUT) * wrong)
-        return since_m >= max(limits.lead_m if near else limits.step_m, UNHURRIED * wrong)
+            return since_m >= max(limits.lead_m, (REPLAN_SHARE if grazed else CUT) * wrong)
+        return since_m >= max(limits.lead_m if near else limits.step_m, REPLAN_SHARE * wrong)

@@ -45,7 +45,7 @@ GOES_ON = "the plan in effect goes on to its end, nearer to something than wante
 IN_THE_WAY = "something is in the way; turning away"
 
 
-BLIND = 0.9
+UNSEEN_SHARE = 0.9
 """Share of the clearance. The aircraft flies straight on from the start for this distance before anything ahead has
 to be seen free: a sensor that loses returns needs several scans, and the start is clear of obstacles by the
 clearance."""
@@ -118,7 +118,7 @@ class Escapes:
             raise NoWayToBegin(NO_ROOM)
         pieces = math.ceil(onward_m / (0.25 * self._room.holds.radius_m))
         if not request.seen.seen_free(places_along(ahead, onward_m, pieces)).any():
-            if math.dist(self._began_m, request.position_m) > BLIND * self._mission.clearance_m:
+            if math.dist(self._began_m, request.position_m) > UNSEEN_SHARE * self._mission.clearance_m:
                 raise NoWayToBegin(NOT_SEEN)
             return Escape(Plan(PlanStatus.NO_PATH, NOT_SEEN))
         hidden_too: Path | None = None
