@@ -9,7 +9,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -22,6 +22,10 @@ from harness.scenario.parts import with_own_keys
 from harness.scenario.resolving import resolve
 from harness.scenario.shipped import scenario_path
 from harness.scenario.validation import KeyFault, KeyFaults, fault_error, faults
+
+
+PIECE: Final = 1000
+"""More obstacles are written in pieces of so many: on the way each takes some 3 KB."""
 
 
 class Scenario(ScenarioKeys):
@@ -121,7 +125,14 @@ def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = 
 
 def dump_scenario(scenario: Scenario) -> str:
     """The YAML text of a scenario, all defaults written out; it loads back to an equal one, bit for bit."""
-    return strict_yaml.dump(scenario.model_dump(by_alias=True, exclude_none=True))
+    plain = scenario.model_dump(by_alias=True, exclude_none=True)
+    every = plain["obstacles"]
+    if len(every) <= PIECE:
+        return strict_yaml.dump(plain)
+    at = list(plain).index("obstacles")
+    before, after = dict(list(plain.items())[:at]), dict(list(plain.items())[at + 1 :])
+    first, *more = (every[begin : begin + PIECE] for begin in range(0, len(every), PIECE))
+    return "".join(map(strict_yaml.dump, (before, {"obstacles": first}, *more, after)))
 
 
 def packed(scenario: Scenario) -> bytes:

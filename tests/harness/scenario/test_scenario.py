@@ -234,6 +234,14 @@ def test_dumped_text_stays_text(name: str) -> None:
     assert yaml.safe_load(text)["name"] == name
 
 
+def test_many_obstacles_are_written_as_few_are() -> None:
+    circles = [{"circle": {"center_m": [5e3 + i, 3e4], "radius_m": 1.5}} for i in range(2100)]
+    scenario = scenario_from({**yaml.safe_load(LEAST), "obstacles": circles})
+    text = dump_scenario(scenario)
+    assert text == strict_yaml.dump(scenario.model_dump(by_alias=True, exclude_none=True))
+    assert yaml.safe_load(text)["obstacles"] == circles
+
+
 finite = st.floats(-1e6, 1e6, allow_nan=False).filter(lambda x: x == 0 or abs(x) > 1e-300)
 away = st.tuples(finite, finite).filter(
     lambda center: min(math.dist(center, (1000, 1000)), math.dist(center, (31000, 1000))) > 2000
