@@ -32,7 +32,10 @@ from harness.cli.options import (
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
+    from harness.analysis.metric import Metric
     from harness.analysis.rows import Row
+    from harness.comparison.comparison import Comparison, Setup
+    from harness.scenario.scenario import Scenario
 
 LEGEND: Final = (
     "ratio: length over the optimum; clear: least clearance; κ·R: tightest planned turn, above 1 too tight; "
@@ -76,10 +79,7 @@ def compare(
 
     2 bad input or usage, nothing flown
     """
-    from harness.cli.terminal import step_bar
-    from harness.comparison.comparison import INDEX, SCHEMA, Setup, fly_and_compare
-    from harness.files.errors import WriteError
-    from harness.run_files.run_folder import OVERLAY
+    from harness.comparison.comparison import Setup
     from harness.scenario.sections import SHIELDED
 
     kinds = [kind.strip() for kind in planners.split(",")]
@@ -95,8 +95,32 @@ def compare(
         workers=workers or os.cpu_count() or 1,
         sources=sources(*kinds),
         law_sources=sources(*laws),
-        shielded=tuple(kind.endswith(SHIELDED) for _ in scenarios for kind in kinds for _ in laws),
+        shielded=tuple(kind.endswith(SHIELDED) for kind in kinds for _ in laws) * len(scenarios),
     )
+    comparison = _fly(loaded, out, setup)
+    if as_json:
+        print_json(comparison.plain())
+    else:
+        print_comparison(comparison.rows)
+        say(f"report: {out / 'report.html'}")
+        _print_view([out / each.name for each in loaded])
+    return 0 if comparison.all_reached else FAILED
+
+
+def _print_view(folders: Sequence[Path]) -> None:
+    """How to see the first overlay, if there is one."""
+    from harness.run_files.run_folder import OVERLAY
+
+    for overlay in [each / OVERLAY for each in folders if (each / OVERLAY).is_file()][:1]:
+        say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
+
+
+def _fly(loaded: Sequence[Scenario], out: Path, setup: Setup) -> Comparison:
+    """Flies into a folder, with progress on standard error."""
+    from harness.cli.terminal import step_bar
+    from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
+    from harness.files.errors import WriteError
+
     over = 0
     try:
         with faults_told(marked_incomplete("comparison", out, INDEX, SCHEMA)), step_bar() as bar:
@@ -106,18 +130,27 @@ def compare(
                 over += 1
                 bar(over, len(loaded), told)
 
-            comparison = fly_and_compare(loaded, out, setup, report)
+            return fly_and_compare(loaded, out, setup, report)
     except OSError as error:
         raise WriteError.of("the comparison", out, error) from error
-    if as_json:
-        print_json(comparison.plain())
-    else:
-        print_comparison(comparison.rows)
-        say(f"report: {out / 'report.html'}")
-        overlays = [out / each.name / OVERLAY for each in loaded]
-        for overlay in [each for each in overlays if each.is_file()][:1]:
-            say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
-    return 0 if comparison.all_reached else FAILED
+
+
+def _shown() -> list[Metric]:
+    """The figures that fit 80 columns."""
+    from harness.analysis.registry import METRICS
+    from harness.analysis.rows import ON_TERMINAL
+
+    return [next(figure for figure in METRICS if figure.short == short) for short in ON_TERMINAL]
+
+
+def _cells(row: Row, by_law: bool) -> list[str]:
+    """The name of a row, its outcome and its figures."""
+    from harness.analysis.rows import DASH
+    from harness.cli.terminal import coloured, plain
+
+    name = row.guidance if by_law else "\n ".join(filter(None, (row.planner, row.guidance)))
+    figures = [plain(row.text(figure)) or DASH for figure in _shown()[1:]]
+    return [plain(name), coloured(row.outcome), *figures]
 
 
 def print_comparison(rows: Sequence[Row]) -> None:
@@ -127,24 +160,14 @@ def print_comparison(rows: Sequence[Row]) -> None:
     title.
     """
     from harness.analysis.metric import ERROR
-    from harness.analysis.registry import METRICS
-    from harness.analysis.rows import DASH, ON_TERMINAL
-    from harness.cli.terminal import coloured, plain, print_line, print_table
+    from harness.cli.terminal import print_line, print_table
 
-    shown = [next(figure for figure in METRICS if figure.short == short) for short in ON_TERMINAL]
     for name in dict.fromkeys(row.scenario for row in rows):
         own = [row for row in rows if row.scenario == name]
         by_law = all(row.guidance for row in own) and len({row.planner for row in own}) == 1
-        lines = [
-            [
-                plain(row.guidance if by_law else "\n ".join(filter(None, (row.planner, row.guidance)))),
-                coloured(row.outcome),
-                *(plain(row.text(figure)) or DASH for figure in shown[1:]),
-            ]
-            for row in own
-        ]
+        lines = [_cells(row, by_law) for row in own]
         title = f"{name}, {own[0].planner}" if by_law else name
-        heads = ("guidance" if by_law else "planner", *(figure.short for figure in shown))
+        heads = ("guidance" if by_law else "planner", *(figure.short for figure in _shown()))
         print_table(title, lines, heads)
     print_line(LEGEND, style="dim")
     for row in rows:

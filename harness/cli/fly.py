@@ -88,13 +88,7 @@ def fly(
 
     3 the planner proved the goal unreachable and the aircraft is safe
     """
-    if view and no_recording:
-        raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
-    if speed is not None and not 0.0 < speed <= 1e6:
-        raise typer.BadParameter(f"--speed is {speed:g}; must be above 0 and at most 1e6")
-    for option, needs_live in (("--speed", speed is not None), ("--web", web)):
-        if needs_live and not live:
-            raise typer.BadParameter(f"{option} goes with --live")
+    _check_usage(view and no_recording, live, speed, web)
     given = overrides(
         settings, planner, aircraft, guidance, wind, turbulence, seed=seed, conditions=conditions
     )
@@ -118,6 +112,17 @@ def fly(
     if view:
         open_viewer([folder])
     return FAILED if otherwise else FLY_STATUS.get(metrics["outcome"], FAILED)
+
+
+def _check_usage(views_nothing: bool, live: bool, speed: float | None, web: bool) -> None:
+    """Refuses options that make no sense together."""
+    if views_nothing:
+        raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
+    if speed is not None and not 0.0 < speed <= 1e6:
+        raise typer.BadParameter(f"--speed is {speed:g}; must be above 0 and at most 1e6")
+    for option, needs_live in (("--speed", speed is not None), ("--web", web)):
+        if needs_live and not live:
+            raise typer.BadParameter(f"{option} goes with --live")
 
 
 def _asked(

@@ -200,14 +200,19 @@ def overrides(
     }
     options = [(name, json.dumps(value)) for name, value in given.items() if value is not None]
     found = [_setting(text) for text in settings or ()]
-    for name, value in found:
+    _check_alone(found, options)
+    return [*options, *found]
+
+
+def _check_alone(settings: Sequence[tuple[str, str]], options: Sequence[tuple[str, str]]) -> None:
+    """Refuses a setting of a key that another option gives with another value."""
+    for name, value in settings:
         for key, other in options:
             if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
                 raise typer.BadParameter(
                     f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
                     param_hint="--set",
                 )
-    return [*options, *found]
 
 
 def _wind(text: str) -> dict[str, float]:

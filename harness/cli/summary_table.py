@@ -59,23 +59,11 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         summary: the answers.
         all_tables: every table, not the first alone.
     """
-    total = summary.total
-    runs = (
-        f"{total.runs} of {counted(summary.planned or 0, 'run')}"
-        if summary.missing
-        else counted(total.runs, "run")
-    )
-    ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
-    print_line(plain(f"{summary.name}: {runs}" + (f": {ended}" if ended else "")))
-    if summary.never:
-        print_line(plain(summary.never))
-    if summary.missing:
-        are, them = ("is missing", "it") if summary.missing == 1 else ("are missing", "them")
-        print_line(f"[bold yellow]not complete[/]: {summary.missing} {are}, --resume flies {them}")
-    if not total.runs:
+    _print_counts(summary)
+    if not summary.total.runs:
         return
     heads = ("", "runs", *(question.short for question in QUESTIONS))
-    whole = ("all runs", *_cells(total))
+    whole = ("all runs", *_cells(summary.total))
     for table in summary.tables if all_tables else summary.tables[:1]:
         keys = [table.rows.key, *([table.columns.key] if table.columns else [])]
         print_table(" x ".join(keys), [*_lines(table), whole], heads)
@@ -91,6 +79,24 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
             f"{first} against {second} in {counted(duel.pairs, 'pair')} of flights ({duel.only_first} reached by "
             f"{first} alone, {duel.only_second} by {second} alone): {told or 'no figure differs at 5 %'}",
         )
+    _print_worst(summary)
+
+
+def _print_counts(summary: Summary) -> None:
+    """How many runs there are, how they ended, and what is missing."""
+    total = summary.total.runs
+    runs = f"{total} of {counted(summary.planned or 0, 'run')}" if summary.missing else counted(total, "run")
+    ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
+    print_line(plain(f"{summary.name}: {runs}" + (f": {ended}" if ended else "")))
+    if summary.never:
+        print_line(plain(summary.never))
+    if summary.missing:
+        are, them = ("is missing", "it") if summary.missing == 1 else ("are missing", "them")
+        print_line(f"[bold yellow]not complete[/]: {summary.missing} {are}, --resume flies {them}")
+
+
+def _print_worst(summary: Summary) -> None:
+    """The runs that failed, and how to fly and to see one again."""
     failed = [run for run in summary.worst if run.outcome != "reached"]
     for run in failed[:SHOWN_WORST]:
         near = "" if run.min_clearance_m is None else f", least clearance {number(run.min_clearance_m)} m"

@@ -105,14 +105,11 @@ def sweep(
 
     130 interrupted; --resume goes on
     """
-    if scheduler and workers:
-        raise typer.BadParameter("--workers goes with this machine, --scheduler with a cluster; give one")
-    if unencrypted and not scheduler:
-        raise typer.BadParameter("--unencrypted goes with --scheduler")
+    _check_usage(scheduler, workers, unencrypted)
     from harness.campaign.report import write_summary
     from harness.campaign.summary import summarise
     from harness.campaign.workers import dask_workers, local_workers
-    from harness.cli.summary_table import print_runs, print_summary
+    from harness.cli.summary_table import print_summary
     from harness.scenario.shipped import campaign_path
 
     named = [each.strip() for each in planners.split(",")] if planners else []
@@ -121,12 +118,7 @@ def sweep(
     )
     runs = checked(campaign_path(campaign), named, replaced, sources(guidance))
     if dry_run:
-        if as_json:
-            from dataclasses import asdict
-
-            print_json([asdict(runs.run(number)) for number in range(len(runs))])
-        else:
-            print_runs(runs)
+        _print_runs(runs, as_json)
         return 0
     folder = out or Path("runs") / runs.campaign.name
     local = partial(local_workers, workers or os.cpu_count() or 1)
@@ -141,6 +133,24 @@ def sweep(
         say(f"results: {folder / 'results.parquet'}")
         say(f"summary: {page}")
     return FAILED if "error" in told or not whole else 0
+
+
+def _check_usage(scheduler: str | None, workers: int | None, unencrypted: bool) -> None:
+    if scheduler and workers:
+        raise typer.BadParameter("--workers goes with this machine, --scheduler with a cluster; give one")
+    if unencrypted and not scheduler:
+        raise typer.BadParameter("--unencrypted goes with --scheduler")
+
+
+def _print_runs(runs: CampaignRuns, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from harness.cli.summary_table import print_runs
+
+    if as_json:
+        print_json([asdict(runs.run(number)) for number in range(len(runs))])
+    else:
+        print_runs(runs)
 
 
 def _warn(text: str) -> None:

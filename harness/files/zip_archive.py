@@ -104,26 +104,29 @@ def _base(name: str) -> str:
     return name.rpartition("/")[2]
 
 
+def _is_a(name: str, endings: tuple[str, ...]) -> bool:
+    return name.endswith(endings) and not name.startswith(FORKS[0]) and not _base(name).startswith(FORKS[1])
+
+
 def _chosen(names: Sequence[str], endings: tuple[str, ...], main: str = "") -> tuple[str, int]:
     """The file that is meant of those in an archive, and how many more have such an ending."""
-    held = [
-        name
-        for name in names
-        if name.lower().endswith(endings)
-        and not name.lower().startswith(FORKS[0])
-        and not _base(name).startswith(FORKS[1])
-    ]
+    held = [name for name in names if _is_a(name.lower(), endings)]
     kind = " or ".join(endings)
     if not held:
         raise InputError(f"is a ZIP archive without a {kind} file")
     depth = min(name.count("/") for name in held)
     near = [name for name in held if name.count("/") == depth] if main else held
-    called = [name for name in near if main and _base(name).lower() == main]
+    called = [name for name in near if _base(name).lower() == main]
     if len(near) > 1 and len(called) != 1:
-        told = ", ".join(printable(name)[:60] for name in near[:TOLD]) + (", ..." if len(near) > TOLD else "")
-        wanted = f"one, or one called {main}" if main else "one"
-        raise InputError(
-            f"is a ZIP archive with {counted(len(near), f'{kind} file')} ({told}); must have {wanted}: unpack it and "
-            "give the file that is meant"
-        )
+        raise InputError(_several(near, kind, main))
     return (called or near)[0], len(held) - 1
+
+
+def _several(near: Sequence[str], kind: str, main: str) -> str:
+    """Says that it cannot be told which file is meant."""
+    told = ", ".join(printable(name)[:60] for name in near[:TOLD]) + (", ..." if len(near) > TOLD else "")
+    wanted = f"one, or one called {main}" if main else "one"
+    return (
+        f"is a ZIP archive with {counted(len(near), f'{kind} file')} ({told}); must have {wanted}: unpack it and give "
+        "the file that is meant"
+    )

@@ -23,7 +23,6 @@ from harness.scenario.resolving import resolve
 from harness.scenario.shipped import scenario_path
 from harness.scenario.validation import KeyFault, KeyFaults, fault_error, faults
 
-
 PIECE: Final = 1000
 """More obstacles are written in pieces of so many: on the way each takes some 3 KB."""
 

@@ -46,6 +46,12 @@ def test_typical_winds_have_the_mean_of_the_land_and_deviations_their_sigma() ->
         assert values.std() == pytest.approx(sigma, rel=0.25)
 
 
+def test_what_is_drawn_can_be_read_back_however_large_its_sigma() -> None:
+    for day in drawn("ideal", 12, "uncertainty: {thrust: 0.4, centre_of_gravity_m: 0.02}"):
+        assert abs(section(day, "aircraft.deviation.thrust")) <= 0.5
+        assert parse_scenario(wayproof.dump_scenario(day)) == day
+
+
 @pytest.mark.parametrize(("day", "most"), [("typical", 0.35), ("rough", 0.5)])
 def test_no_wind_at_the_mission_is_stronger_than_its_share_of_the_airspeed(day: str, most: float) -> None:
     profile = math.log(200 / 0.04572) / math.log(10 / 0.04572)  # MIL-F-8785C
