@@ -205,9 +205,12 @@ class Escapes:
             return self._away(request, best.path, best.reason)
         if certain and not self._began_hidden:
             raise CertificateBroken(request.time_s)
-        threats = threats or self._near(request)
-        more_than_m = threats.room_m(left) + CLEARER * self._room.path_keeps_m
         ways = ways or list(rolled_out(prefix, self._room.limits))
+        return self._clearest(request, threats or self._near(request), left, ways)
+
+    def _clearest(self, request: PlanRequest, threats: Threats, left: Path, ways: Sequence[Path]) -> Escape:
+        """The way with the most room where none has enough; what is left of the plan in effect, if that has as much."""
+        more_than_m = threats.room_m(left) + CLEARER * self._room.path_keeps_m
         clear = clearest(ways, self._mission.bounds_m, threats, more_than_m)
         if clear is not None:
             return self._away(request, clear, IN_THE_WAY)

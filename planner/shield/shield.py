@@ -179,13 +179,15 @@ class Shield:
         effective = self._monitor.plan
         if self._adopted is None or not request.scanned or effective is None or effective.course.to_goal:
             return None
+        if self._monitor.broken:
+            return None
         return self._committed(request, here_m, self._adopted, new=False)
 
     def _committed(
         self, request: PlanRequest, here_m: float, adopted: Adopted, *, new: bool
     ) -> CommittedPlan | None:
         """As much of an inner path as is certified and gets on."""
-        effective, mission = self._monitor.plan, self._mission
+        mission = self._mission
         inner = adopted.plan.path
         assert inner is not None
         prefix, pose, curvature = self._start(request, here_m)
@@ -214,8 +216,6 @@ class Shield:
             if new:
                 free_m = min(certifier.seen_free_to_m(way, request.seen), cut_m)
                 self._refuse(place_on(way, free_m)[0][:2], why_not(free_m, cut_m))
-            return None
-        if not new and effective is not None and self._monitor.broken:
             return None
         self._refused = None if new else self._refused
         plan = replace(adopted.plan, path=found.path, status=PlanStatus.FOUND)
