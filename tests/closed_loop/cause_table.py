@@ -87,6 +87,14 @@ def rolling(draw: Draw) -> Asked:
     return line, keys(**limit)
 
 
+def slow_servo(draw: Draw) -> Asked:
+    """In severe turbulence an elevator of some 20 degrees a second is late: 20 m are lost, 1 m with a fast one."""
+    slow, rough = f"{draw(19.0, 24.0):.1f}", "{intensity: severe}"
+    limits = {"trackability__cross_track_m": "60", "trackability__altitude_m": "4"}
+    servo = {"environment__turbulence": rough, "aircraft__actuators__rate_limit_degps": slow}
+    return np.array([(0.0, 0.0), (4000.0, 0.0)]), keys(**servo, **limits)
+
+
 def climbing(draw: Draw) -> Asked:
     return slope(draw(8.0, 12.0), draw(200.0, 4500.0)), {}
 
@@ -135,6 +143,7 @@ FAMILIES: Mapping[str, tuple[Callable[[Draw], Asked], ...]] = {
     "wind drift": (windy, windy_at_a_corner),
     "bank limit": (disturbed,),
     "roll rate": (rolling,),
+    "actuator": (slow_servo,),
     "load factor": (heavy,),
     "speed or throttle saturation": (slow,),
     "climb too steep": (climbing, climbing_high_up, climbing_with_another),
