@@ -100,19 +100,6 @@ def test_killed_while_flying_leaves_an_incomplete_run_and_a_readable_recording(t
     assert not (out / "flight.rrd").exists()
 
 
-@pytest.mark.flights
-def test_interrupted_says_so_and_leaves_an_incomplete_run(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    process = start(tmp_path, "fly", "paper_circles", "--out", str(out), "--no-recording", "--quiet")
-    wait_for(out / "scenario.yaml", process)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert err.splitlines() == [f"wayproof: interrupted; the run in {out} is marked incomplete"]
-    with pytest.raises(RunFolderError, match="incomplete"):
-        load_run(out)
-
-
 def test_a_folder_with_other_things_is_refused_and_left_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -121,15 +108,6 @@ def test_a_folder_with_other_things_is_refused_and_left_alone(
     assert "not empty and not a run folder" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
-
-
-def test_an_aircraft_that_cannot_be_trimmed_is_bad_input(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    keys = ("--aircraft", "c172p", "--set", "aircraft.airspeed_mps=60", "--set", "mission.altitude_m=9000")
-    assert main(["fly", "paper_circles", *keys, "--out", str(tmp_path / "run")]) == 2
-    assert "c172p cannot be trimmed for level flight at 60 m/s, 9000 m" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_second_run_replaces_the_first(tmp_path: Path) -> None:

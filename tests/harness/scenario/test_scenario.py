@@ -122,12 +122,6 @@ def test_planners_keep_a_share_of_the_turn_radius_at_the_least(wanted_m: float) 
     assert mission.clearance_m == LEAST_CLEARANCE * mission.turn_radius_m
 
 
-def test_the_planners_config_is_complete_and_resolved() -> None:
-    scenario = parse_scenario(WITH_PLANNER)
-    config = planner_kinds()["rolling_window"].config
-    assert config(**scenario.planner.own) == config(candidates=9).resolved(mission_of(scenario))
-
-
 def test_numbers_are_those_of_yaml_1_2() -> None:
     text = LEAST.replace("[31000, 1000]", "[31e3, +1.0E3]").replace("40000, 40000]", "4.e4, 0x9c40]")
     assert parse_scenario(text) == parse_scenario(LEAST)
@@ -589,13 +583,6 @@ def test_reading_a_file_flies_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "clearance_m" not in keys.planner.model_dump(exclude_none=True)
     with pytest.raises(AssertionError, match="flown"):
         resolve(keys)
-
-
-def test_resolving_leaves_what_was_read_as_it_is() -> None:
-    keys = ScenarioKeys.model_validate(strict_yaml.parse(LEAST, "least").plain())
-    complete = resolve(keys)
-    assert "clearance_m" not in keys.planner.model_dump(exclude_none=True)
-    assert complete.planner.clearance_m == parse_scenario(LEAST).planner.clearance_m
 
 
 @pytest.mark.parametrize("altitude_m", [7300, 9000, 20000])
