@@ -37,12 +37,6 @@ def with_autopilot(
 
     The other files of the model are linked, so that references from the model resolve as before.
 
-    Args:
-        model: the model's XML file, <folder>/<name>.xml.
-        actuators: controls, and what moves each.
-        deviation: by how much the flown aircraft differs.
-        latency: age of the attitude, airspeed, height and climb that the autopilot works with, in s and in steps.
-
     Yields:
         A folder that holds <name>/<name>.xml, gone when the context ends.
 

@@ -44,12 +44,6 @@ def envelope_card(
 ) -> dict[str, Any]:
     """The card of an aircraft, flown unless that has been done before.
 
-    Args:
-        name: a name or folder that `airframe` knows.
-        airspeeds_mps: true airspeeds to look at; default: cruise.
-        winds_mps: winds in which paths are tracked, besides calm air; default: 30 % of each airspeed.
-        report: told what is done, of how much, and what is at hand.
-
     Returns:
         `aircraft`, `mass_kg`, `airspeed_range_mps`, `cruise_mps`, `bank_limit_deg`, `roll_rate_dps`, `verified`,
         `laws`: the `gain` and `delay_s` that each law bears on a straight line (see `aircraft.guidance.margins`), and
