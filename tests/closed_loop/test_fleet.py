@@ -20,7 +20,7 @@ def test_every_aircraft_reaches_the_goal_at_the_clearance(name: str, law: str) -
 
 
 def test_a_range_that_is_too_short_is_refused_with_the_one_that_is_needed() -> None:
-    flight = flown("T38", "preview", "calm", seed=1, range_radii=2.5)
+    flight = flown("T38", "preview", "calm", seed=1, range_radii=2.2)
     assert (flight.outcome, flight.good) == ("refused", False)
     assert re.search(r"must be at least \d+, to see room for a safe turn ahead", flight.reason)
 
