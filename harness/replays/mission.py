@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -12,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from aircraft.frames import LocalPlane
 from harness.files.input_file import MAX_JSON_BYTES, InputError, read_text
 from harness.flight.record import FloatArray
-from harness.replays.logs import logged_mission
+from harness.replays.logs import Command, logged_mission
 from harness.run_files.mission.commands import FLOWN, JUMP, WAYPOINT, name_of
 from harness.run_files.path_files import read_path
 
@@ -107,32 +108,41 @@ def mission_of_log(path: Path) -> tuple[FlownMission, str]:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     commands, parameters = logged_mission(path) if path.suffix.lower() == ".bin" else ([], {})
-    jump = next((each for each in commands[::-1] if each.command == JUMP and each.first < each.number), None)
-    if jump is None:
-        raise InputError(f"{path}: its mission is not known; give --mission FILE")
-    lap = [each for each in commands if jump.first <= each.number < jump.number and each.command in FLOWN]
-    for each in lap:
-        if each.command != WAYPOINT:
-            told = f"item {each.number} of its mission, {name_of(each.command)}, is no corner"
-            raise InputError(f"{path}: {told}; give --mission FILE with the corners")
-    if len(lap) < 2:
-        raise InputError(
-            f"{path}: its mission has fewer than 2 waypoints before its jump; give --mission FILE"
-        )
-    known = [value for value in (lap[0].acceptance_m, parameters.get("WP_RADIUS", 0.0)) if value > 0.0]
+    lap = _lap(commands, path)
+    radius = lap[0].acceptance_m or parameters.get("WP_RADIUS", 0.0)
     origin = Origin(latitude_deg=lap[0].latitude_deg, longitude_deg=lap[0].longitude_deg)
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
     found = FlownMission(
         np.array([plane.plane(each.latitude_deg, each.longitude_deg) for each in lap]),
-        known[0] if known else None,
-        next((parameters[name] * unit for name, unit in CRUISE.items() if name in parameters), None),
-        bank_limit_deg=next(
-            (parameters[name] * unit for name, unit in BANK.items() if name in parameters), None
-        ),
+        radius if radius > 0.0 else None,
+        _of(parameters, CRUISE),
+        bank_limit_deg=_of(parameters, BANK),
         origin=origin,
     )
-    radius = f"{known[0]:g} m" if known else "by the rule of the law"
-    return found, f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {radius}"
+    told = f"{radius:g} m" if radius > 0.0 else "by the rule of the law"
+    return found, f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {told}"
+
+
+def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
+    """The waypoints from the target of a mission's last jump back to that jump."""
+    jump = next((each for each in commands[::-1] if each.command == JUMP and each.first < each.number), None)
+    if jump is None:
+        raise InputError(f"{path}: its mission is not known; give --mission FILE")
+    lap = [each for each in commands if jump.first <= each.number < jump.number and each.command in FLOWN]
+    other = next((each for each in lap if each.command != WAYPOINT), None)
+    if other is not None:
+        told = f"item {other.number} of its mission, {name_of(other.command)}, is no corner"
+        raise InputError(f"{path}: {told}; give --mission FILE with the corners")
+    if len(lap) < 2:
+        raise InputError(
+            f"{path}: its mission has fewer than 2 waypoints before its jump; give --mission FILE"
+        )
+    return lap
+
+
+def _of(parameters: Mapping[str, float], names: Mapping[str, float]) -> float | None:
+    """The first of some parameters that is there, in its unit."""
+    return next((parameters[name] * unit for name, unit in names.items() if name in parameters), None)
 
 
 def _of_json(text: str, source: str) -> FlownMission:

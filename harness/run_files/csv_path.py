@@ -12,7 +12,7 @@ LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))
 """Columns of a place in the local plane."""
 DEGREES: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), ("lat", "lon"))
 """Columns of a place in degrees."""
-ALTITUDES: Final = ("altitude_m", "up_m", "z_m")
+ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")
 """Columns of an altitude above mean sea level."""
 ABOVE_GROUND: Final = "altitude_agl_m"
 """Column of an altitude above ground."""
@@ -28,17 +28,8 @@ def read_csv(text: str, source: str) -> PathAsRead:
     filled = _filled(text, source)
     line, header = filled[0] if filled else (1, [])
     header = [name.strip().lower() for name in header]
-    names = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
-    if names is None:
-        raise InputError(
-            f"{source}:{line}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
-            "latitude_deg,longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas"
-        )
-    heights = [name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]
+    names, heights = _columns(header, f"{source}:{line}")
     wanted = (*names, *heights)
-    for name in wanted:
-        if header.count(name) > 1:
-            raise InputError(f"{source}:{line}: {name}: stands {header.count(name)} times; must stand once")
     found = [_numbers(row, header, wanted, f"{source}:{number}") for number, row in filled[1:]]
     return PathAsRead(
         names in LOCAL,
@@ -47,6 +38,21 @@ def read_csv(text: str, source: str) -> PathAsRead:
         above_ground=heights == [ABOVE_GROUND],
         notes=_passed_over([name for name in header if name not in wanted]),
     )
+
+
+def _columns(header: list[str], where: str) -> tuple[tuple[str, str], list[str]]:
+    """The columns of the place, and that of the altitude where there is one."""
+    names = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
+    if names is None:
+        raise InputError(
+            f"{where}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
+            "latitude_deg,longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas"
+        )
+    heights = [name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]
+    for name in (*names, *heights):
+        if header.count(name) > 1:
+            raise InputError(f"{where}: {name}: stands {header.count(name)} times; must stand once")
+    return names, heights
 
 
 def _filled(text: str, source: str) -> list[tuple[int, list[str]]]:

@@ -27,7 +27,6 @@ class ExportedPath:
     Attributes:
         name: of the run's scenario.
         what: "flown" or "planned".
-        points_m: (n, 2) east, north in the local plane.
         degrees: (n, 2) geodetic latitude and longitude, rounded for a file.
         altitude_m: (n,) above mean sea level.
         time_s: (n,) simulated time at which the aircraft was there, or followed the plan there.
@@ -36,7 +35,6 @@ class ExportedPath:
 
     name: str
     what: str
-    points_m: FloatArray
     degrees: FloatArray
     altitude_m: FloatArray
     time_s: FloatArray
@@ -74,7 +72,6 @@ def path_of(run: Run, scenario: Scenario, what: str, tolerance_m: float) -> Expo
     return ExportedPath(
         name=scenario.name,
         what=what,
-        points_m=places[kept, :2],
         degrees=geodetic(scenario, places[kept, :2]),
         altitude_m=places[kept, 2].round(3),
         time_s=track.time_s[rows[kept]],

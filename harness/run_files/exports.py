@@ -64,7 +64,7 @@ def exported(run: Run, form: str, what: str, tolerance_m: float) -> Exported:
     """
     scenario = scenario_of_run(run)
     path = path_of(run, scenario, what, tolerance_m)
-    if len(path.points_m) < 2:
+    if len(path.degrees) < 2:
         raise RunFolderError(f"the run in {run.folder} has no {what} path: it is too short")
     return Exported(FORMATS[form](path, scenario).encode(), tuple(_notes(run, scenario, form)))
 
