@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final
 
 from aircraft.airframes import airframe
-from harness.campaign.journal import JOURNAL, read_journal, sealed
+from harness.campaign.journal import JOURNAL, Journal, read_journal, sealed
 from harness.campaign.results import INDEX, METRICS, RESULTS, RUN, TIMES, TIMINGS, table
 from harness.campaign.runs import CampaignRuns
 from harness.files.errors import RunFolderError
@@ -127,24 +127,30 @@ class CampaignFolder:
         self._stack.callback(FolderLock(path, LOCK).release)
         now, before = self._about(), _index(path)
         journal = read_journal(path)
-        has_any = bool(journal.runs) or _has_rows(path / RESULTS)
-        if has_any and not resume:
-            held = counted(len(journal.runs), "run") if journal.runs else RESULTS
-            raise RunFolderError(f"{path} holds {held}: go on with --resume, or choose another folder")
-        if has_any and before is not None and (changes := list(_changes(before, now))):
-            told = "; ".join(changes[:MAX_TOLD]) + ("; and more" if len(changes) > MAX_TOLD else "")
-            raise RunFolderError(
-                f"{path} is of another campaign: {told}; change it back or choose another folder"
-            )
-        if beyond := [run for run in journal.runs if run >= len(self._runs)]:
-            raise RunFolderError(
-                f"{journal.path}: tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
-            )
+        self._check(journal, before, now, resume=resume)
         if before != now:
             replace_text(path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
         if journal.path.exists():
             os.truncate(journal.path, journal.end)
         return set(journal.runs)
+
+    def _check(
+        self, journal: Journal, before: dict[str, Any] | None, now: dict[str, Any], *, resume: bool
+    ) -> None:
+        """Refuses results without `resume`, and those of another campaign."""
+        has_any = bool(journal.runs) or _has_rows(self.path / RESULTS)
+        if has_any and not resume:
+            held = counted(len(journal.runs), "run") if journal.runs else RESULTS
+            raise RunFolderError(f"{self.path} holds {held}: go on with --resume, or choose another folder")
+        if has_any and before is not None and (changes := list(_changes(before, now))):
+            told = "; ".join(changes[:MAX_TOLD]) + ("; and more" if len(changes) > MAX_TOLD else "")
+            raise RunFolderError(
+                f"{self.path} is of another campaign: {told}; change it back or choose another folder"
+            )
+        if beyond := [run for run in journal.runs if run >= len(self._runs)]:
+            raise RunFolderError(
+                f"{journal.path}: tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
+            )
 
     def _about(self) -> dict[str, Any]:
         """The content of `campaign.json`, as it is read back."""

@@ -66,18 +66,23 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
         drawn: they were drawn at random: numbers are grouped where there are more than `BINS`.
     """
     given = [value for value in values if value is not None]
-    numeric = bool(given) and all(
+    if not _are_numbers(given):
+        labels, numeric = _names(given), False
+    elif len(set(given)) > (BINS if drawn else MAX_NUMBERS):
+        return _sectors(key, values) if is_direction(key) else _quantiles(key, values)
+    else:
+        different, numeric = sorted(set(given)), not is_direction(key)
+        labels = dict(zip(different, _numbers(different), strict=True))
+    texts = [NONE if value is None else labels[_hashable(value)] for value in values]
+    order = tuple(dict.fromkeys([*labels.values(), *(NONE for text in texts if text == NONE)]))
+    places = {text: place for place, text in enumerate(order)}
+    return Axis(key, order, numeric=numeric), np.array([places[text] for text in texts], dtype=np.int64)
+
+
+def _are_numbers(given: Sequence[Any]) -> bool:
+    return bool(given) and all(
         isinstance(value, int | float) and not isinstance(value, bool) for value in given
     )
-    if numeric and len(set(given)) > (BINS if drawn else MAX_NUMBERS):
-        return _sectors(key, values) if is_direction(key) else _quantiles(key, values)
-    different = sorted(set(given)) if numeric else ()
-    labels = dict(zip(different, _numbers(different), strict=True)) if numeric else _names(given)
-    texts = [NONE if value is None else labels[_hashable(value)] for value in values]
-    order = tuple(dict.fromkeys([*labels.values(), *(text for text in texts if text == NONE)]))
-    places = {text: place for place, text in enumerate(order)}
-    index = np.array([places[text] for text in texts], dtype=np.int64)
-    return Axis(key, order, numeric=numeric and not is_direction(key)), index
 
 
 def _numbers(values: Sequence[float], digits: int = 6) -> list[str]:
