@@ -111,11 +111,7 @@ def verdict(
 ) -> tuple[bool, str]:
     """Whether a path can be flown as given, and a sentence that says so or why not."""
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
-    faults = [_first(seen.contacts, "touches")] if seen.contacts else []
-    for kind, verb in (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves")):
-        crossed = [each for each in seen.crossings if each.kind == kind]
-        faults += [_first(crossed, verb)] if crossed else []
-    faults += [tallied(bad, "legs")] if bad else []
+    faults = _touched(seen) + ([tallied(bad, "legs")] if bad else [])
     faults += _how_far(told, figures["altitude_error_m"]["max"])
     if figures["outcome"] not in ("reached", "collision"):
         faults.append(str(figures["reason"]))
@@ -129,6 +125,15 @@ def verdict(
     corners = f", corners within {wide_m:.3g} m" if wide_m > tolerance_m else ""
     most = max(used["off_path"] or 0.0, used["altitude"])
     return True, f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most"
+
+
+def _touched(seen: Kept) -> list[str]:
+    """What was touched, entered and left, the first of each kind."""
+    faults = [_first(seen.contacts, "touches")] if seen.contacts else []
+    for kind, verb in (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves")):
+        crossed = [each for each in seen.crossings if each.kind == kind]
+        faults += [_first(crossed, verb)] if crossed else []
+    return faults
 
 
 def _how_far(told: Mapping[str, Any], high_m: float) -> list[str]:
