@@ -34,6 +34,7 @@ from planner.interface import (
     PlanRequest,
     PlanStatus,
 )
+from planner.nearest_edge import distance_to_edges
 from planner.plan_checks import checked_plan
 from planner.registry import PlannerKind
 
@@ -69,6 +70,7 @@ class GivenMap:
     last_removal_revision = 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, points_m: FloatArray) -> None:
         self._points = points_m

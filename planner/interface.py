@@ -96,6 +96,9 @@ class MapView(Protocol):
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""
 
+    def distance_m(self, points_m: FloatArray) -> FloatArray:
+        """(k,) distance of each of (k, 2) points to the nearest edge point, moving ones as last seen; +inf: none."""
+
 
 @dataclass(frozen=True)
 class Mission:

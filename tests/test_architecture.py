@@ -153,7 +153,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("memory", "world_stability"),
         ("geometry",),
         ("kernels",),
-        ("compiled", "keys", "plan_checks"),
+        ("compiled", "keys", "nearest_edge", "plan_checks"),
         ("interface", "kernel_cache"),
     ),
 }

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
-
-import numpy as np
+from typing import NoReturn
 
 from planner.interface import BoolArray, FloatArray, MapView, MovingEdges
-
-if TYPE_CHECKING:
-    import shapely
 
 
 class ReadOnlyMap:
@@ -21,14 +16,12 @@ class ReadOnlyMap:
         seen: the map itself.
     """
 
-    __slots__ = ("_nearest", "_seen")
+    __slots__ = ("_seen",)
 
     _seen: MapView
-    _nearest: NearestEdge
 
     def __init__(self, seen: MapView) -> None:
         object.__setattr__(self, "_seen", seen)
-        object.__setattr__(self, "_nearest", NearestEdge(seen))
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise AttributeError(f"{name[:100]} of the map cannot be set: a planner may only read what was seen")
@@ -75,32 +68,4 @@ class ReadOnlyMap:
 
     def distance_m(self, points_m: FloatArray) -> FloatArray:
         """(k,) distance of each of (k, 2) points to the nearest edge point, moving ones as last seen; +inf: none."""
-        return self._nearest.distance_m(points_m)
-
-
-class NearestEdge:
-    """Distances to the edge points of a map; its search tree is built anew when the map has changed.
-
-    Args:
-        seen: the map.
-    """
-
-    def __init__(self, seen: MapView) -> None:
-        self._seen = seen
-        self._tree: shapely.STRtree | None = None
-        self._built_for: tuple[int, tuple[MovingEdges, ...]] = -1, ()
-
-    def distance_m(self, points_m: FloatArray) -> FloatArray:
-        """(k,) distance of each of (k, 2) points to the nearest edge point; +inf where there is none."""
-        import shapely
-
-        now = self._seen.revision, self._seen.moving
-        if self._tree is None or now != self._built_for:
-            edges = [self._seen.edges_since(-1), *(each.points_m for each in self._seen.moving)]
-            self._tree, self._built_for = shapely.STRtree(shapely.points(np.concatenate(edges))), now
-        points = shapely.points(np.asarray(points_m, dtype=np.float64).reshape(-1, 2))
-        found_m = np.full(len(points), np.inf)
-        if len(self._tree):
-            (rows, _), distances_m = self._tree.query_nearest(points, all_matches=False, return_distance=True)
-            found_m[rows] = distances_m
-        return found_m
+        return self._seen.distance_m(points_m)

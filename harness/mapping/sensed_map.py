@@ -14,6 +14,7 @@ from harness.mapping.reflection_map import ReflectionMap
 from harness.mapping.scan import RangeScan
 from harness.mapping.smoothed_scan import ERR, smoothed
 from planner.interface import BoolArray, FloatArray, MovingEdges
+from planner.nearest_edge import NearestEdge
 
 NOISY = 0.1
 """Ranges that err by more than this share of the clearance are weighed. What moves is then told by medians."""
@@ -82,6 +83,7 @@ class SensedMap:
         self.revision = self._edges.revision
         """Grows with every change of the set of edge points."""
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
+        self._nearest = NearestEdge(self)
 
     def _begin(self, revision: int) -> None:
         """Makes everything empty."""
@@ -125,6 +127,10 @@ class SensedMap:
             points = self._edges.edges_since(revision)
             self._asked = (revision, self.revision, points)
         return points
+
+    def distance_m(self, points_m: FloatArray) -> FloatArray:
+        """(k,) distance of each of (k, 2) points to the nearest edge point, moving ones as last seen; +inf: none."""
+        return self._nearest.distance_m(points_m)
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, MapView
+from planner.nearest_edge import distance_to_edges
 
 
 class RefusedPlaces:
@@ -50,3 +51,6 @@ class _SeenWith:
         known = sum(at + i < revision for i, (at, _) in enumerate(self._places))
         fresh = np.array([place for _, place in self._places[known:]]).reshape(-1, 2)
         return np.concatenate((fresh, self._seen.edges_since(revision - known)))
+
+    def distance_m(self, points_m: FloatArray) -> FloatArray:
+        return distance_to_edges(cast(MapView, self), points_m)

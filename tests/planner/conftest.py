@@ -8,6 +8,7 @@ import pytest
 
 from planner.geometry.curves import Segment
 from planner.interface import BoolArray, FloatArray, MapView, MovingEdges, Path
+from planner.nearest_edge import distance_to_edges
 
 MakePoints = Callable[..., FloatArray]
 
@@ -39,6 +40,7 @@ class Known:
     spacing_m, revision, last_removal_revision = 50.0, 1, 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, points: FloatArray) -> None:
         self._points = points

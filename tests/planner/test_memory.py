@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from planner.interface import BoolArray, FloatArray, MovingEdges
 from planner.memory import ObstacleMemory
+from planner.nearest_edge import distance_to_edges
 from tests.examples import examples
 
 CLEARANCE = 100.0
@@ -24,6 +25,7 @@ class Batches:
     spacing_m = CLEARANCE / 4.0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self) -> None:
         self.revision = 0

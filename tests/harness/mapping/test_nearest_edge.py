@@ -21,7 +21,7 @@ class Asking:
         points = np.concatenate(
             [request.seen.edges_since(-1), *(each.points_m for each in request.seen.moving)]
         )
-        self.asked.append((points, request.seen.distance_m(PROBES)))  # type: ignore[attr-defined]
+        self.asked.append((points, request.seen.distance_m(PROBES)))
         if request.flown is not None:
             return Plan(PlanStatus.KEPT, "on the line")
         line = np.array([request.position_m, self.goal_m])

@@ -30,6 +30,7 @@ from planner.interface import (
     PlanRequest,
     PlanStatus,
 )
+from planner.nearest_edge import distance_to_edges
 from planner.world_stability import SETTLED_S
 from tests.longer import longer
 
@@ -66,6 +67,7 @@ class Range:
     last_removal_revision = 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, points: FloatArray, range_m: float) -> None:
         self._points, self._range = points, range_m

@@ -15,6 +15,7 @@ from planner.baselines.dubins_tree import ROLLS, DubinsTree, DubinsTreeConfig, d
 from planner.geometry.curves import Pose, along
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
+from planner.nearest_edge import distance_to_edges
 
 MakePoints = Callable[..., FloatArray]
 
@@ -45,6 +46,7 @@ class Seen:
     last_removal_revision = 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, points: FloatArray) -> None:
         self._points = self.fresh = points

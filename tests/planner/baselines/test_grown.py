@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import length_of
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges
+from planner.nearest_edge import distance_to_edges
 
 MISSION = Mission(
     (9000.0, 9000.0), 50.0, (0.0, 0.0, 10_000.0, 10_000.0), 200.0, 100.0, 25.0, 1.0, 3.0, 3000.0
@@ -26,6 +27,7 @@ class Seen:
     spacing_m = 50.0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, points: FloatArray) -> None:
         self.points, self.revision, self.last_removal_revision = points, 1, 0

@@ -11,6 +11,7 @@ import shapely
 from planner.baselines.vfh_plus import VfhPlus, VfhPlusConfig
 from planner.geometry.curves import pose_at
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanRequest, PlanStatus
+from planner.nearest_edge import distance_to_edges
 
 MakePoints = Callable[..., FloatArray]
 
@@ -32,6 +33,7 @@ class Seen:
     spacing_m = 50.0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, points: FloatArray) -> None:
         self._points, self.revision, self.last_removal_revision = points, 1, 0

@@ -13,6 +13,7 @@ from planner.geometry.course import Course
 from planner.geometry.curves import Pose
 from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdges
 from planner.memory import ObstacleMemory
+from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.local_planning import LocalPlanning, Start
 
@@ -120,6 +121,7 @@ class Growing:
     spacing_m, last_removal_revision = 50.0, 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, *scans: FloatArray) -> None:
         self._scans, self.revision = scans, 1

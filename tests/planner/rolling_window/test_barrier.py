@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from planner.geometry.curves import Point
 from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdges
 from planner.memory import ObstacleMemory
+from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.barrier import PROVED_AT_ONCE, THIN, Barrier, Proof
 from tests.examples import examples
 
@@ -184,6 +185,7 @@ class TakingBack:
     spacing_m, revision, last_removal_revision = 50.0, 1, 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, first: FloatArray, left: FloatArray, new: FloatArray) -> None:
         self._first, self._left, self._new = first, left, new

@@ -17,6 +17,7 @@ from planner.geometry.curves import Point
 from planner.geometry.terrain import WorkCount
 from planner.interface import FloatArray, MovingEdges
 from planner.memory import ObstacleMemory
+from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, search_candidates
 from planner.rolling_window.window import Window
@@ -34,6 +35,7 @@ class _Still:
     spacing_m, revision, last_removal_revision = SPACING, 1, 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, points: FloatArray) -> None:
         self._points = points

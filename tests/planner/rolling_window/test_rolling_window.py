@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from planner.geometry.curves import end_of, pose_at, sample
 from planner.geometry.path_samples import poses_at
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
+from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.config import RollingWindowConfig
 from planner.rolling_window.planner import RollingWindow
 from tests.examples import examples
@@ -43,6 +44,7 @@ class Seen:
     last_removal_revision = 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, truth: FloatArray, range_m: float = MISSION.sensor_range_m) -> None:
         self.revision = 0

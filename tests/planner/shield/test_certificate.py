@@ -16,6 +16,7 @@ from planner.geometry.curves import Limits, along, between, end_of, pose_at, sam
 from planner.geometry.path_samples import poses_at
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path
+from planner.nearest_edge import distance_to_edges
 from planner.shield.certificate import Certified, Certifier, disc_radius_m
 from tests.examples import examples
 
@@ -40,6 +41,7 @@ class FreeDiscs:
     spacing_m, revision, last_removal_revision = SPACING, 0, 0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self, discs: FloatArray) -> None:
         self._discs = discs

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from planner.interface import BoolArray, FloatArray, MovingEdges
 from planner.memory import ObstacleMemory
+from planner.nearest_edge import distance_to_edges
 from planner.shield.refused_places import RefusedPlaces
 
 
@@ -17,6 +19,7 @@ class Growing:
     spacing_m = 10.0
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
+    distance_m = distance_to_edges
 
     def __init__(self) -> None:
         self.edges: list[tuple[int, float]] = []
@@ -47,5 +50,7 @@ def test_every_edge_and_every_refused_place_is_remembered_once() -> None:
         memory.take_in(refused.on(seen))
         expected = sorted([(east, 0.0) for _, east in seen.edges] + shown)
         assert sorted(map(tuple, memory.points_m.tolist())) == expected
+        off = np.hypot(*(np.array(expected) - (50.0, 390.0)).T)
+        assert refused.on(seen).distance_m(np.array([[50.0, 390.0]]))[0] == pytest.approx(off.min())
     assert len(refused) == 3
     assert refused.on(seen).spacing_m == seen.spacing_m
