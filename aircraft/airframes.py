@@ -36,32 +36,14 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
     Raises:
         AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
     """
-    try:
-        found = model_files(name)
-    except AircraftError as error:
-        known = ", ".join(aircraft_names())
-        raise AircraftError(f"{error}; known are: {known}, or a folder with a JSBSim model") from None
-    entry = _table().get(name) or AirframeEntry(found.name, f"JSBSim model of {found.model.parent}")
-    if real := (entry.actuators if actuators is None else actuators).real:
-        found = replace(found, actuators=_of_commands(found, real))
-
-    found = replace(found, latency_s=autopilot.latency_s)
-    entry = replace(
-        entry,
-        figures={**entry.figures, **autopilot.figures()},
-        gains={**entry.gains, **autopilot.gains()},
-        autopilot=autopilot,
-    )
+    entry, found = _as_flown(name, actuators, autopilot)
 
     def surveyed() -> dict[str, Any]:
         from aircraft.survey import survey
 
         return survey(entry, found)
 
-    digest = found.digest()
-    if autopilot != DERIVED:
-        digest = sha256((digest + repr(autopilot)).encode()).hexdigest()
-    return cached(_title(found), digest, surveyed, partial(_of_survey, entry, found))
+    return cached(_title(found), _survey_digest(entry, found), surveyed, partial(_of_survey, entry, found))
 
 
 def is_surveyed(name: str) -> bool:
@@ -70,8 +52,35 @@ def is_surveyed(name: str) -> bool:
     Raises:
         AircraftError: there is none.
     """
-    found = model_files(name)
-    return is_kept(_title(found), found.digest())
+    entry, found = _as_flown(name, None, DERIVED)
+    return is_kept(_title(found), _survey_digest(entry, found))
+
+
+def _as_flown(
+    name: str, actuators: Actuators | None, autopilot: AutopilotKeys
+) -> tuple[AirframeEntry, ModelFiles]:
+    """What is known of an airframe before it flies, and its model with the servos; see `airframe`."""
+    try:
+        found = model_files(name)
+    except AircraftError as error:
+        known = ", ".join(aircraft_names())
+        raise AircraftError(f"{error}; known are: {known}, or a folder with a JSBSim model") from None
+    entry = _table().get(name) or AirframeEntry(found.name, f"JSBSim model of {found.model.parent}")
+    if real := (entry.actuators if actuators is None else actuators).real:
+        found = replace(found, actuators=_of_commands(found, real))
+    entry = replace(
+        entry,
+        figures={**entry.figures, **autopilot.figures()},
+        gains={**entry.gains, **autopilot.gains()},
+        autopilot=autopilot,
+    )
+    return entry, replace(found, latency_s=autopilot.latency_s)
+
+
+def _survey_digest(entry: AirframeEntry, found: ModelFiles) -> str:
+    """SHA-256 of all that a survey depends on: the model's files, and what is known of it before it flies."""
+    known = (entry.cruise_mps, sorted(entry.figures.items()), sorted(entry.gains.items()), entry.autopilot)
+    return sha256((found.digest() + repr(known)).encode()).hexdigest()
 
 
 def _title(found: ModelFiles) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from copy import deepcopy
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from hashlib import sha256
 from inspect import getsourcefile
 from pathlib import Path
@@ -58,11 +58,12 @@ def law_card(
         return measured(frame, kind.kind, limits.airspeed_mps, made, waypoints)
 
     legs = f"waypoints {acceptance_radius_m!r}" if waypoints else ""
-    known = (frame.name, frame.files, kind, keys, legs, limits.airspeed_mps)
+    flies = repr(replace(frame, files=None))  # type: ignore[arg-type]  # the files count by their content
+    known = (flies, frame.files, kind, keys, legs, limits.airspeed_mps)
     if known not in _kept and installed_kinds().get(kind.kind) != kind:
         _kept[known] = _card(flown())  # nothing tells what it depends on
     if known not in _kept:
-        what = (frame.files.digest(), kind.kind, keys, repr(limits.airspeed_mps), _source(kind), legs)
+        what = (frame.files.digest(), flies, kind.kind, keys, repr(limits.airspeed_mps), _source(kind), legs)
         digest = sha256("\0".join(what).encode()).hexdigest()
         _kept[known] = cached(f"{frame.name}-{kind.kind}-law", digest, flown, _card)
     return _kept[known]

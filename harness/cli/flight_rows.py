@@ -14,6 +14,15 @@ SHOWN: Final = 6
 MOST_ITEMS: Final = 12
 """Most items of a mission that are listed one by one."""
 
+OF_HEIGHT_OR_SPEED: Final = (
+    "climb too steep",
+    "descent too steep",
+    "speed or throttle saturation",
+    "control saturation",
+    "stall",
+)
+"""Causes at which a leg's errors of altitude and airspeed are told beside its cross-track error."""
+
 
 def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     """Name and value of each row of the table of a flight."""
@@ -90,8 +99,10 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         rows[f"  leg {leg['number']}{to}"] = (
             f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {_metres(leg['max_deviation_m'])} off"
         )
-        if leg["cause"] in ("climb too steep", "descent too steep"):
+        if leg["cause"] in OF_HEIGHT_OR_SPEED:
             rows[f"  leg {leg['number']}{to}"] += f", {_metres(leg['max_altitude_error_m'])} in altitude"
+            if (slow_mps := leg["max_airspeed_error_mps"]) is not None:
+                rows[f"  leg {leg['number']}{to}"] += f", {slow_mps:.2g} m/s in airspeed"
     for corner in _listed(sorted(check["corners"], key=lambda each: each["kept"]), "corners cut", rows):
         side = "left" if corner["turn_deg"] > 0 else "right"
         rows[f"  {point} {corner['waypoint']}"] = (

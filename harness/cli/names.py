@@ -131,10 +131,10 @@ def _print_aircraft() -> None:
     say(folded(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "tested"), "what"))
     for name in names:
         fault = faults.get(name)
-        say(f"{name:10} cannot be flown: {fault}" if fault else _aircraftfolded(name))
+        say(f"{name:10} cannot be flown: {fault}" if fault else _aircraft_row(name))
 
 
-def _aircraftfolded(name: str) -> str:
+def _aircraft_row(name: str) -> str:
     from aircraft.airframes import AircraftError, airframe
     from aircraft.envelope import performance
 

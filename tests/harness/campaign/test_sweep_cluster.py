@@ -206,6 +206,7 @@ def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.Captur
             "campaign.yaml",
             "--scheduler",
             "tcp://no-such-host:8786",
+            "--unencrypted",
             "--out",
             "nowhere",
         ],
@@ -219,7 +220,7 @@ def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.Captur
     for options, said in (
         (["--scheduler", address, "--workers", "2"], "--workers goes with this machine"),
         (["--scheduler", "foo"], "--scheduler foo: is no address; give it as tcp://HOST:PORT"),
-        (["--scheduler", "nonsense://x"], "no Dask scheduler answers at nonsense://x"),
+        (["--scheduler", "nonsense://x", "--unencrypted"], "no Dask scheduler answers at nonsense://x"),
     ):
         assert main(["sweep", str(place / "campaign.yaml"), "--out", str(out), *options]) == 2
         assert said in capsys.readouterr().err

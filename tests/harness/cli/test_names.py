@@ -85,6 +85,7 @@ def test_new_aircraft_are_flown_once_and_kept(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(airframes, "aircraft_names", lambda: ("aerosonde", "SGS"))
+    airframes.airframe.cache_clear()
     assert main(["list", "aircraft"]) == 0
     assert capfd.readouterr().err.startswith("2 aircraft are flown for the figures")
     assert airframes.is_surveyed("aerosonde")
