@@ -12,8 +12,6 @@ from aircraft import airframes
 from aircraft.law_cards import cards
 from aircraft.model_files import model_files
 
-SHORT = {"mission.time_limit_s": 20}
-
 
 @pytest.fixture
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -27,9 +25,9 @@ def _forget() -> None:
 
 
 def _digest(**changes: object) -> str:
-    """Of a short flight in a process that has only the cache of files to go by."""
+    """Of a flight in a process that has only the cache of files to go by."""
     _forget()
-    return wayproof.fly(wayproof.load_scenario("aerosonde_forest").with_({**SHORT, **changes})).digest
+    return wayproof.fly(wayproof.load_scenario("aerosonde_forest").with_(changes)).digest
 
 
 @pytest.mark.flights
