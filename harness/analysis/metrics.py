@@ -96,9 +96,9 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
 
 def _believed_off_m(track: Track) -> FloatArray:
     """How far off the plan guidance believed to be, in the rows flown under one."""
-    off = track.cross_track_m if track.believed_cross_track_m is None else track.believed_cross_track_m
-    believed: FloatArray = off[track.plan_index >= 0]
-    return believed
+    off = track.believed_cross_track_m if track.has_beliefs else track.cross_track_m
+    assert off is not None
+    return off[track.plan_index >= 0]
 
 
 def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:

@@ -129,10 +129,10 @@ def verdict(
 
 def _touched(seen: Kept) -> list[str]:
     """What was touched, entered and left, the first of each kind."""
-    faults = [_first(seen.contacts, "touches")] if seen.contacts else []
+    faults = [_deepest(seen.contacts, "touches")] if seen.contacts else []
     for kind, verb in (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves")):
         crossed = [each for each in seen.crossings if each.kind == kind]
-        faults += [_first(crossed, verb)] if crossed else []
+        faults += [_deepest(crossed, verb)] if crossed else []
     return faults
 
 
@@ -156,11 +156,11 @@ def _how_far(told: Mapping[str, Any], high_m: float) -> list[str]:
     return faults
 
 
-def _first(found: Sequence[Breach], verb: str) -> str:
-    """The first of some breaches, and how many more there are."""
-    first = found[0]
+def _deepest(found: Sequence[Breach], verb: str) -> str:
+    """The deepest of some breaches, and how many more there are."""
+    deepest = max(found, key=lambda each: each.depth_m)
     more = f", {len(found) - 1} more" if len(found) > 1 else ""
-    return f"{verb} {first.name} at {first.start_s:.0f} s, by {first.depth_m:.3g} m{more}"
+    return f"{verb} {deepest.name} at {deepest.start_s:.0f} s, by {deepest.depth_m:.3g} m{more}"
 
 
 def _worst(track: Track, off_m: FloatArray, allowed: FloatArray, corners: Sequence[Corner]) -> dict[str, Any]:

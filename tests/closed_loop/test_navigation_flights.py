@@ -53,7 +53,16 @@ def test_perfect_navigation_changes_no_bit(small_world: SmallWorld) -> None:
     flight = fly(loop)
     assert digest(flight.track) == digest(fly(without).track)
     assert not flight.track.has_beliefs
-    assert not {"navigation_error_m", "navigation_margin_m"} & set(metrics(flight, flight_limits(scenario)))
+    figures = metrics(flight, flight_limits(scenario))
+    assert not {"navigation_error_m", "navigation_margin_m"} & set(figures)
+    off_m = np.abs(flight.track.cross_track_m[flight.track.plan_index >= 0])
+    by_hand = {
+        "rms": np.sqrt(np.nanmean(off_m**2)),
+        "p95": np.nanpercentile(off_m, 95),
+        "max": np.nanmax(off_m),
+    }
+    for error in ("total_system_error_m", "flight_technical_error_m"):
+        assert figures[error] == pytest.approx(by_hand), "believed is true"
 
 
 @pytest.mark.flights
