@@ -17,8 +17,8 @@ class ImprovedBugConfig:
 
     planning_window_m: float | None = key(
         None,
-        "radius r1 of the planning window; no track point lies further from where the plan "
-        "begins; default: the sensor range, which is the most",
+        "radius r1 of the planning window; no track point lies further from the aircraft; "
+        "default: the sensor range, which is the most",
         "m",
         above=0.0,
     )

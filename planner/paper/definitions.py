@@ -1,4 +1,4 @@
-"""Section 2.2, the cost of a track, and section 2.3, Definitions 1 and 2."""
+"""Section 2.2, the cost of a track and obstacles on it, and section 2.3, Definitions 1 and 2."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ def guide_vector(position_m: Point, goal_m: Point) -> tuple[float, float]:
 
 
 def crosses(a: Point, b: Point, points_m: FloatArray, keep_m: float) -> bool:
-    """Whether the line from a to b comes nearer than `keep_m` to a point, and does not only lead away from it."""
+    """Sections 2.2 and 3.2: whether the line from a to b crosses an obstacle.
+
+    It does where it comes nearer than `keep_m` to a sensed edge point and does not only lead away from it.
+    """
     ux, uy = b[0] - a[0], b[1] - a[1]
     dx, dy = points_m[:, 0] - a[0], points_m[:, 1] - a[1]
     share = np.clip((dx * ux + dy * uy) / max(ux * ux + uy * uy, 1e-12), 0.0, 1.0)

@@ -96,7 +96,10 @@ def multi_step_search(window: Window, start_m: Point, course_rad: float) -> list
 
 
 def next_steps(window: Window, track: Track) -> Iterator[Track]:
-    """The step along the guide vector if nothing is in the way, else a step in each of the selected sectors."""
+    """Section 3.2, Figure 1: (b) the step along the guide vector, or (a) a step in each of the selected sectors.
+
+    A step to the goal is at most S_0 long. Where a step leads out of the window, the track itself is kept, as ended.
+    """
     if track.ended:
         yield track
         return
@@ -124,7 +127,10 @@ def next_steps(window: Window, track: Track) -> Iterator[Track]:
 def directions(
     window: Window, track: Track, guide_m: float, guide_rad: float, most_rad: float
 ) -> Iterator[int]:
-    """The Delta of each step to be tried from the end of a track, the change of course at most `most_rad`."""
+    """Section 3.2, Figure 1: Delta of equation (1) for each step to be tried from the end of a track.
+
+    The change of course is at most `most_rad`.
+    """
     here, config, course = track.nodes[-1], window.config, track.course_rad
     unit_rad, step_m = config.unit_rad, config.resolved_step_m
     if not crosses(here, along_guide(window, here, guide_m, guide_rad), window.points_m, window.keep_m):

@@ -23,9 +23,10 @@ class Route:
 
 
 def cancel_nodes(nodes: tuple[Point, ...], before_m: Point, window: Window) -> tuple[Point, ...]:
-    """From w_si on to the furthest w_sk with a free connection, what is between cancelled, until w_si is w_sn.
+    """Section 3.2, route optimisation: from w_si to the furthest w_sk with a free connection, until w_si is w_sn.
 
-    A connection counts where the turn onto it keeps the minimum turn radius; w_s1 is come to from `before_m`.
+    The track points between the two are cancelled. A connection counts where the turn onto it keeps the minimum turn
+    radius; w_s1 is come to from `before_m`.
     """
     kept, i = [nodes[0]], 0
     while i < len(nodes) - 1:
@@ -41,9 +42,10 @@ def cancel_nodes(nodes: tuple[Point, ...], before_m: Point, window: Window) -> t
 
 
 def turn_fits(before_m: Point, corner_m: Point, after_m: Point, radius_m: float, *, first: bool) -> bool:
-    """Whether the corner between two legs can be rounded at a radius: R tan(phi / 2) of each leg.
+    """Section 3.2, the minimum turning radius: whether the corner between two legs can be rounded at a radius R.
 
-    A leg between two corners has half of its length for each, the leg before the first corner all of it.
+    The arc takes R tan(phi / 2) of each leg. A leg between two corners has half of its length for each, the leg before
+    the first corner all of it.
     """
     length_in, course_in = guide_vector(before_m, corner_m)
     length_out, course_out = guide_vector(corner_m, after_m)
@@ -64,7 +66,10 @@ def flyable(nodes: tuple[Point, ...], start: Pose, window: Window) -> Route | No
 
 
 def optimise(track: Track, start: Pose, window: Window) -> Route | None:
-    """One of the n candidates optimised; as it was searched where its optimised curve cannot be flown."""
+    """Section 3.2, route optimisation of one of the n candidates.
+
+    It stays as it was searched where its optimised curve cannot be flown. None: neither can.
+    """
     if window.config.route_optimisation:
         route = flyable(cancel_nodes(track.nodes, start[:2], window), start, window)
         if route is not None:
@@ -73,5 +78,5 @@ def optimise(track: Track, start: Pose, window: Window) -> Route | None:
 
 
 def shortest(routes: Iterable[Route], goal_m: Point) -> list[Route]:
-    """The optimised candidates, the shortest first: the result of the plan. What is left to the goal counts."""
+    """Section 3.2, route optimisation: the candidates, the shortest first, what is left to the goal included."""
     return sorted(routes, key=lambda route: track_cost_m(route.nodes) + math.dist(route.nodes[-1], goal_m))

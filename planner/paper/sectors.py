@@ -64,7 +64,10 @@ def fan_shaped_sectors(points_m: FloatArray, keep_m: float, node_m: Point) -> li
 
 
 def clip(sector: Sector, course_rad: float, most_rad: float) -> list[Sector]:
-    """The parts of a sector that a step can turn to: no further than `most_rad` off the course on arrival."""
+    """Section 3.2, (1): the parts of a sector that a step of equation (1) can turn to.
+
+    They are no further than `most_rad` off the course on arrival.
+    """
     parts = []
     shift = math.tau * math.ceil((course_rad - most_rad - sector.left) / math.tau)
     while sector.right + shift <= course_rad + most_rad:
@@ -77,7 +80,7 @@ def clip(sector: Sector, course_rad: float, most_rad: float) -> list[Sector]:
 
 
 def off_guide(sector: Sector, guide_rad: float) -> float:
-    """The least angle theta between a direction of a sector and the guide vector."""
+    """Equation (4): the least angle theta between a direction of a sector and the guide vector."""
     if (guide_rad - sector.right) % math.tau <= sector.left - sector.right:
         return 0.0
     return min(abs(signed(sector.right - guide_rad)), abs(signed(sector.left - guide_rad)))

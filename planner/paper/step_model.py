@@ -26,9 +26,9 @@ def step(
 
 
 def most_units(step_m: float, turn_radius_m: float, unit_rad: float) -> int:
-    """The largest Delta, so that the corner between two steps can be rounded at the turn radius R.
+    """Section 2.1: the largest Delta of equation (1), so that the aircraft can turn from one step to the next.
 
-    An arc of radius R that turns by phi begins R tan(phi / 2) before the corner. It has half of the step for that:
-    phi <= 2 atan(S_0 / 2R).
+    The corner between the two is rounded at the turn radius R. An arc that turns by phi begins R tan(phi / 2) before
+    the corner. It has half of the step for that: phi <= 2 atan(S_0 / 2R).
     """
     return math.floor(2.0 * math.atan(step_m / (2.0 * turn_radius_m)) / unit_rad)
