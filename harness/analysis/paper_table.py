@@ -29,10 +29,13 @@ LATEX: Final = str.maketrans(
 """What LaTeX takes for something else, or its fonts lack, as it takes it."""
 
 
-def paper_table(heads: Sequence[str], rows: Sequence[Sequence[str]], of: Format) -> str:
+def paper_table(
+    heads: Sequence[str], rows: Sequence[Sequence[str]], of: Format, legend: Sequence[str] = ()
+) -> str:
     """A table with one line of headings; the first column is aligned left, numbers right.
 
-    LaTeX's is a `tabular` with the rules of the package booktabs.
+    LaTeX's is a `tabular` with the rules of the package booktabs; comments before it say so, and have the legend.
+    In Markdown the legend is a list behind the table. CSV has none: its readers know no comments.
     """
     if of == "csv":
         text = io.StringIO()
@@ -41,9 +44,12 @@ def paper_table(heads: Sequence[str], rows: Sequence[Sequence[str]], of: Format)
     if of == "markdown":
         rule = ["---", *("---:" for _ in heads[1:])]
         cells = [[*map(escaped, heads)], rule, *([*map(escaped, row)] for row in rows)]
-        return "".join(f"| {' | '.join(row)} |\n" for row in cells)
+        told = "".join(f"- {escaped(each)}\n" for each in legend)
+        return "".join(f"| {' | '.join(row)} |\n" for row in cells) + (told and f"\n{told}")
     first, *others = (" & ".join(printable(cell).translate(LATEX) for cell in row) for row in (heads, *rows))
     lines = [
+        r"% \usepackage{booktabs}",
+        *(f"% {printable(each)}" for each in legend),
         f"\\begin{{tabular}}{{l{'r' * (len(heads) - 1)}}}",
         "\\toprule",
         f"{first} \\\\",

@@ -124,9 +124,19 @@ def shown_figures(rows: Sequence[Row]) -> list[Metric]:
 
 def rows_for_paper(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of the table for a paper: a line a flight, the figures of `ON_TERMINAL`."""
-    shown = [next(each for each in METRICS if each.short == short) for short in ON_TERMINAL]
+    shown = _on_terminal()
     heads = ["scenario", "planner", *(each.short for each in shown)]
     return heads, [[row.scenario, row.label, *(row.text(each) or DASH for each in shown)] for row in rows]
+
+
+def legend() -> list[str]:
+    """What each of those figures is, with its unit."""
+    shown = [each for each in _on_terminal() if each.title != each.short]
+    return [f"{each.short}: {each.title}{f', in {each.unit}' if each.unit else ''}." for each in shown]
+
+
+def _on_terminal() -> list[Metric]:
+    return [next(each for each in METRICS if each.short == short) for short in ON_TERMINAL]
 
 
 def to_csv(rows: Sequence[Row]) -> str:

@@ -106,6 +106,11 @@ QUESTIONS = (
 """In the order in which they are shown."""
 
 
+def legend() -> list[str]:
+    """What each column of a table for a paper is."""
+    return [f"{each.short}: {each.title} ({each.note.partition('; full shade')[0]})." for each in QUESTIONS]
+
+
 def shade(question: Question, cell: Cell) -> str:
     """The shade of a cell, as a number for a style sheet; empty where there is no answer."""
     bad = question.shade(cell)

@@ -174,7 +174,9 @@ def _print_table(folder: Path, by: Sequence[str] | None, table: Format, out: Pat
     """The table of a campaign or a comparison for a paper."""
     from harness.analysis.paper_table import paper_table
     from harness.analysis.rows import rows_for_paper as compared
+    from harness.analysis.rows import legend as compared_legend
     from harness.campaign.report import rows_for_paper
+    from harness.campaign.questions import legend
     from harness.campaign.results import RESULTS
     from harness.campaign.summary import summarise
     from harness.comparison.comparison import read_rows
@@ -182,16 +184,16 @@ def _print_table(folder: Path, by: Sequence[str] | None, table: Format, out: Pat
     from harness.files.whole_file import replace_text
 
     if (folder / RESULTS).is_file():
-        text = paper_table(*rows_for_paper(summarise(folder, by=_keys(by))), table)
+        text = paper_table(*rows_for_paper(summarise(folder, by=_keys(by))), table, legend())
     else:
-        text = paper_table(*compared(read_rows(folder)), table)
+        text = paper_table(*compared(read_rows(folder)), table, compared_legend())
     if out is None:
         say(text.removesuffix("\n"))
         return
     try:
         replace_text(out, text)
     except OSError as error:
-        raise WriteError.of("the table", out, error) from error
+        raise WriteError(f"cannot write the table {out} ({error.strerror or error})") from error
     say(f"table: {out}")
 
 

@@ -24,7 +24,8 @@ CELL: Final = 28
 
 SHOWN_WORST: Final = 5
 LEGEND: Final = (
-    "reached, below the wanted clearance, tracks: 95 % interval; length: median/p95; plan: p99/max"
+    "reached, below the wanted clearance, tracks: 95 % interval; "
+    "length over the optimum: median/p95; plan: p99/max"
 )
 
 
@@ -72,12 +73,13 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     print_line(LEGEND, style="dim")
     for duel in summary.duels:
         first, second = plain(duel.first), plain(duel.second)
-        told = "; ".join(
+        figures = "; ".join(
             f"{plain(each.figure)} {each.difference.text()}" for each in duel.figures if _differs(each)
         )
+        told = f"figures that differ at 5 %: {figures}" if figures else "no figure differs at 5 %"
         print_line(
             f"{first} against {second} in {counted(duel.pairs, 'pair')} of flights ({duel.only_first} reached by "
-            f"{first} alone, {duel.only_second} by {second} alone): {told or 'no figure differs at 5 %'}",
+            f"{first} alone, {duel.only_second} by {second} alone): {told}",
         )
     _print_worst(summary)
 

@@ -621,7 +621,11 @@ def test_a_table_for_a_paper_has_the_groups_and_all_runs(
     elif form == "latex":
         assert r"planner & runs & reached \%" in text
         assert "bug2 & 12 & 83.3 (55--95) & 1.21/1.21" in text
-        assert text.startswith(r"\begin{tabular}{lrrrrrrr}")
+        comments, _, table = text.partition("\n\\begin{tabular}{lrrrrrrr}\n\\toprule\n")
+        assert table
+        assert comments.startswith("% \\usepackage{booktabs}\n")
+        assert all(line.startswith("% ") for line in comments.splitlines())
+        assert "% plan ms: Planner time (Milliseconds: largest p99 of a run/longest search)." in comments
         assert text.count(r"\\") == 4
     else:
         assert f"| {' | '.join(heads)} |" in text
@@ -629,6 +633,10 @@ def test_a_table_for_a_paper_has_the_groups_and_all_runs(
     assert not (folder / PAGE).exists(), "the table alone"
     assert main([*words, "--out", str(tmp_path / "table.txt")]) == 0
     assert (tmp_path / "table.txt").read_text() == text
+    assert main([*words, "--out", str(tmp_path / "table.txt" / "beneath.txt")]) == 1
+    told = capsys.readouterr().err
+    assert "cannot write the table" in told
+    assert "incomplete" not in told
 
 
 def test_a_key_drawn_at_random_is_always_grouped() -> None:
