@@ -29,7 +29,8 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     compute, timing = metrics["compute_ms"], metrics["timing"]
     lengths = [legible(metrics[name]) for name in ("flown_length_m", "planned_length_m")]
     rows = {
-        "outcome": f"{coloured(metrics['outcome'])}: {plain(metrics['reason'])}",
+        "outcome": f"{coloured(metrics['outcome'])}: {plain(metrics['reason'])}"
+        + ("; traceback: `error` in metrics.json" if metrics.get("error") else ""),
         "length flown": f"{lengths[0]} m, planned {lengths[1]} m",
         "flight time": f"{legible(metrics['flight_time_s'])} s",
         "least clearance": f"{legible(metrics['min_clearance_m'])} m, below the wanted one for "

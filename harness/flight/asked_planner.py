@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from typing import NamedTuple
+from pathlib import Path
+from traceback import walk_tb
+from typing import Final, NamedTuple
 
 from harness.files.crash import sentence, trace
 from harness.files.printing import PrintingAside
@@ -12,6 +14,9 @@ from harness.mapping.read_only_map import ReadOnlyMap
 from planner.interface import MapView, Mission, Plan, Planner, PlanRequest
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport
+
+ASKING: Final = (__name__, "planner.plan_checks", "planner.shield.")
+"""Modules that call a planner."""
 
 
 class PlannerFailedError(RuntimeError):
@@ -86,4 +91,16 @@ class AskedPlanner:
             raise PlannerFailedError(str(error), trace(error)) from None
         except BaseException as error:  # whatever it is, it is no more than a plan that failed
             with PrintingAside():
-                raise PlannerFailedError(f"the planner raised {sentence(error)}", trace(error)) from None
+                told = f"the planner raised {sentence(error)}{_where(error)}"
+                raise PlannerFailedError(told, trace(error)) from None
+
+
+def _where(error: BaseException) -> str:
+    """File and line of the innermost call in the planner's own file, as ` (bug.py:5)`; empty where none is known."""
+    calls = [
+        (frame.f_code.co_filename, line)
+        for frame, line in walk_tb(error.__traceback__)
+        if not frame.f_globals.get("__name__", "").startswith(ASKING)
+    ]
+    lines = [line for file, line in calls if file == calls[0][0]]
+    return f" ({Path(calls[0][0]).name}:{lines[-1]})" if lines else ""

@@ -160,7 +160,9 @@ def test_an_error_that_exits_when_it_is_told_is_a_planner_that_failed(place: Pat
     assert status == 1
     run = load_run(place / "run")
     assert run.metrics["outcome"] == "planner_failed"
-    assert run.metrics["reason"] == "the planner raised Unspeakable: it cannot be told what"
+    assert (
+        run.metrics["reason"] == "the planner raised Unspeakable: it cannot be told what (own_plugin.py:50)"
+    )
 
 
 @pytest.mark.flights
