@@ -15,10 +15,12 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node, fault_line, node_of
 from harness.scenario.files_resolved import file_beside
 from harness.scenario.generators import WorldSpec
+from harness.scenario.given import is_source
 from harness.scenario.resolving import model_or_folder
 from harness.scenario.sections import AircraftSpec, PlannerSpec, Section, key
 from harness.scenario.shipped import shipped_scenarios
 from harness.scenario.validation import NAME_PATTERN, KeyFault, input_error, shown
+from planner.registry import planner_kinds
 
 SCHEMA: Final = "wayproof/campaign/1"
 MAX_RUNS: Final = 1_000_000
@@ -212,6 +214,11 @@ def load_campaign(
     source, root = str(path), _with_options(strict_yaml.read(path), planners, settings)
     root = _with_folders(_with_world_files(root, path.parent), path.parent)
     campaign = _validated(root, source)
+    for index, each in enumerate(campaign.planners):
+        if is_source(each.kind) and each.kind not in planner_kinds():
+            name = each.kind[:80]
+            told = f"is {name!r}, which no file may name: give `wayproof sweep` --planners {name},..."
+            raise _fault(source, root, ("planners", index), f"{told}, which replaces all of `planners`")
     if not campaign.scenarios:
         line = root.line_of(("worlds",))
         node = Node({"schema": Node("wayproof/scenario/1", line), "name": Node(campaign.name, line)}, line)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 from harness.analysis.metric import ERROR as ERROR  # the same word for the same thing
 from harness.analysis.registry import METRICS as FIGURES
 from harness.files.strict_yaml import InputError
+from harness.scenario.given import own_words
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -117,6 +118,10 @@ def _sha256(content: pa.Table, about: Mapping[str, Any]) -> str:
     return digest.hexdigest()
 
 
+LAW: Final = "guidance.kind"
+"""Key of a scenario that names the guidance law."""
+
+
 def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     """Reads `results.parquet` or `timings.parquet`, and what it says of its campaign.
 
@@ -156,6 +161,7 @@ def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     return content, about
 
 
-def fly_again(results: Path, run: int) -> str:
-    """The command line that flies a run of a campaign again."""
-    return shlex.join(["wayproof", "fly", "--from", str(results), "--run", str(run)])
+def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:
+    """The command line that flies a run of a campaign again; a planner or a law that is code of one's own is named."""
+    words = ["wayproof", "fly", "--from", str(results), "--run", str(run)]
+    return shlex.join([*words, *own_words(planner, law)])

@@ -19,7 +19,7 @@ import numpy as np
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.cells import PlannedRun, cell_of, entry_columns, kind_of
 from harness.campaign.flight import Job
-from harness.campaign.results import RESULTS, RUNS, fly_again, read_table
+from harness.campaign.results import LAW, RESULTS, RUNS, fly_again, read_table
 from harness.campaign.sampling import takes_whole_numbers
 from harness.files.strict_yaml import (
     InputError,
@@ -219,7 +219,8 @@ class CampaignRuns:
 
     def again(self, number: int, folder: Path) -> str:
         """The command that flies run `number` again."""
-        return fly_again(folder / RESULTS, number)
+        law = self.campaign.set_.get(LAW, "")
+        return fly_again(folder / RESULTS, number, self.run(number).planner, law)
 
     def plain(self) -> dict[str, Any]:
         """All that says what is flown, as JSON."""
@@ -362,7 +363,8 @@ def flown_run(
     Args:
         results: a campaign's `results.parquet`; it holds the campaign, no other file is needed.
         run: number of the run; it may still be missing in the table.
-        overrides: keys to replace besides, as `load_scenario` takes them.
+        overrides: keys to replace besides, as `load_scenario` takes them; where they change what is flown, there is
+            no digest.
 
     Raises:
         InputError: the file is something else, or the campaign has no such run.
@@ -372,4 +374,23 @@ def flown_run(
     if not 0 <= run < len(runs):
         raise InputError(f"{results}: has no run {run}; must be 0 to {len(runs) - 1}")
     digests = dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True))
-    return runs.scenario(run, overrides), digests.get(run)
+    asked = runs.scenario(run, overrides)
+    return asked, digests.get(run) if not overrides or _is_flown(runs, run, asked) else None
+
+
+def again_from(folder: Path, run: int) -> str:
+    """The command that flies a run again, from the folder of its campaign."""
+    results = folder / RESULTS
+    if results.is_file():
+        runs = CampaignRuns(CampaignFile.from_plain(read_table(results)[1], str(results)))
+        if run < len(runs):
+            return runs.again(run, folder)
+    return fly_again(results, run)
+
+
+def _is_flown(runs: CampaignRuns, run: int, asked: Scenario) -> bool:
+    """Whether a scenario is what the campaign flew in a run."""
+    try:
+        return packed(runs.scenario(run)) == packed(asked)
+    except InputError:  # its planner is not here; another one was given
+        return False

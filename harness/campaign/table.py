@@ -97,6 +97,10 @@ class Runs:
         ratio: FloatArray = self.numbers("min_clearance_m") / np.where(wanted_m > 0.0, wanted_m, np.nan)
         return ratio
 
+    def planner(self, row: int) -> str:
+        """The planner of a run, without the keys that tell its entries apart."""
+        return self.texts("planner")[row].partition(", ")[0]
+
     def name(self, row: int) -> str:
         """World, planner and aircraft of a run."""
         world, scenario = self.texts("world")[row], self.texts("scenario")[row]

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from harness.analysis.metric import severity
-from harness.campaign.results import RESULTS, RUNS, fly_again
-from harness.campaign.table import NAMED, Runs, allowed_for
+from harness.campaign.results import LAW, RESULTS, RUNS, fly_again
+from harness.campaign.table import NAMED, Runs, about, allowed_for
 from harness.run_files.run_folder import RECORDING, REPORT
 
 WORST: Final = 10
@@ -97,6 +97,7 @@ def worst_runs(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun,
     order = sorted(range(len(runs)), key=lambda row: (-severity(outcomes[row]), near[row], runs.run[row]))
     failed = int((~runs.reached).sum())
     varied = {key: runs.values(key) for key in keys if key not in NAMED}
+    law = (about(runs.results)["campaign"].get("set") or {}).get(LAW, "")
     found = []
     for row in order[: min(failed, WORST) if failed else CLOSEST]:
         number = int(runs.run[row])
@@ -116,7 +117,7 @@ def worst_runs(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun,
                 recording=recording,
                 report=(folder / kept / REPORT).is_file(),
                 view=shlex.join(["wayproof", "view", str(folder / kept)]) if recording else "",
-                command=fly_again(folder / RESULTS, number),
+                command=fly_again(folder / RESULTS, number, runs.planner(row), law),
             )
         )
     return tuple(found)

@@ -95,6 +95,7 @@ def falsify(
     from harness.falsify.breaking_point import FALSIFIED, INDEX
     from harness.falsify.breaking_point import falsify as search
     from harness.falsify.keys import vary_of
+    from harness.scenario.given import own_words
 
     ranges = [range_of(text) for text in vary]
     fixed = overrides(
@@ -139,7 +140,8 @@ def falsify(
     elif not quiet:
         print_table(f"{found.scenario}: {found.planner}, {found.aircraft}", breaking_rows(found))
         if found.found is not None:
-            say(f"again: {shlex.join(['wayproof', 'fly', str(folder / FALSIFIED)])}")
+            words = ["wayproof", "fly", str(folder / FALSIFIED), *own_words(planner, guidance)]
+            say(f"again: {shlex.join(words)}")
         say(last_line(found))
     return 0
 

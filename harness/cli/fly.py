@@ -97,7 +97,7 @@ def fly(
     folder = out or _default_folder(loaded, told_apart([*given, *origin]))
     with _viewer(web, speed) if live else nullcontext((None, lambda: None)) as (onlookers, wait):
         metrics = _fly(loaded, folder, onlookers, recording=not no_recording, silent=quiet)
-        otherwise = bool(digest) and not given and metrics["digest"] != digest
+        otherwise = bool(digest) and metrics["digest"] != digest
         if otherwise:
             say(
                 f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what the planner or the "
@@ -107,7 +107,7 @@ def fly(
         if as_json:
             print_json(metrics)
         elif not quiet:
-            _print_flight(loaded, metrics, folder, bool(digest) and not given and not otherwise)
+            _print_flight(loaded, metrics, folder, bool(digest) and not otherwise)
         wait()
     if view:
         open_viewer([folder])
@@ -128,7 +128,7 @@ def _check_usage(views_nothing: bool, live: bool, speed: float | None, web: bool
 def _asked(
     scenario: str | None, results: Path | None, run: int | None, given: list[tuple[str, str]]
 ) -> tuple[Scenario, str | None]:
-    """What to fly, and the digest that a campaign's results have of it."""
+    """What to fly, and the digest that a campaign's results have of just that."""
     if (scenario is None) == (results is None):
         raise typer.BadParameter("give either a SCENARIO or --from with --run")
     if results is None or run is None:

@@ -257,6 +257,9 @@ def law_kind(text: str) -> str:
 def _kind(text: str, part: LoopPart, option: str) -> str:
     from harness.scenario.given import registered
 
+    if text.endswith(".py") and text not in part.kinds():
+        told = f"is {text}; must be one of {', '.join(part.kinds())}, or FILE.py:NAME as {text}:NAME"
+        raise typer.BadParameter(told, param_hint=option)
     try:
         return registered(text, part)
     except ValueError as error:

@@ -60,13 +60,14 @@ def view(
 
 def _refuse_if_not_kept(run: Path) -> None:
     """Raises InputError where a run of a campaign is meant of which no folder was kept."""
-    from harness.campaign.results import INDEX, RESULTS, RUNS, fly_again
+    from harness.campaign.results import INDEX, RUNS
+    from harness.campaign.runs import again_from
     from harness.files.input_file import InputError
 
     folder = run.resolve().parent.parent
     is_run = run.resolve().parent.name == RUNS and run.name.isdecimal() and (folder / INDEX).is_file()
     if is_run and not run.exists():
-        again = fly_again(folder / RESULTS, int(run.name))
+        again = again_from(folder, int(run.name))
         raise InputError(
             f"{run}: no run folder was kept; `{again}` flies the run again with a recording, `recordings: thin` in the "
             "campaign's file keeps one of every run"
@@ -173,10 +174,10 @@ def _keys(by: Sequence[str] | None) -> list[list[str]] | None:
 def _print_table(folder: Path, by: Sequence[str] | None, table: Format, out: Path | None) -> None:
     """The table of a campaign or a comparison for a paper."""
     from harness.analysis.paper_table import paper_table
-    from harness.analysis.rows import rows_for_paper as compared
     from harness.analysis.rows import legend as compared_legend
-    from harness.campaign.report import rows_for_paper
+    from harness.analysis.rows import rows_for_paper as compared
     from harness.campaign.questions import legend
+    from harness.campaign.report import rows_for_paper
     from harness.campaign.results import RESULTS
     from harness.campaign.summary import summarise
     from harness.comparison.comparison import read_rows

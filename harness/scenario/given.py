@@ -73,6 +73,12 @@ def is_source(name: str) -> bool:
     return ":" in name
 
 
+def own_words(planner: str | None, law: str | None) -> list[str]:
+    """Words of a command that name a planner and a guidance law that no file may name."""
+    parts = {"--planner": planner, "--guidance": law}
+    return [word for option, name in parts.items() if name and is_source(name) for word in (option, name)]
+
+
 def registered(given: object, part: LoopPart = PLANNER) -> str:
     """Registers what was given, unless it has been; returns the name by which scenarios of this process know it.
 

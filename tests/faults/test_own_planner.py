@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from harness.cli.app import main
 from harness.files.errors import RunFolderError
 from harness.run_files.run_folder import load_run
 from tests.faults.command import ROOT, TIMEOUT_S, wait_until
@@ -81,6 +83,18 @@ TALKS, HANGS, EXITS, GONE = (
 )
 UNRESOLVED = PlannerKind("unresolved", "for a test", ExitsOnResolving, RollingWindow)
 '''
+RAISES = """\
+from planner.interface import Plan, PlanStatus
+
+class Bug:
+    def plan(self, request):
+        return self.later(request.time_s)
+
+    def later(self, time_s):
+        if time_s > 3.0:
+            raise ValueError("oops")
+        return Plan(PlanStatus.NO_PATH, "not yet")
+"""
 KINDS = ("talks", "hangs", "exits", "gone", "unresolved")
 SCENARIO = """\
 schema: wayproof/scenario/1
@@ -193,6 +207,37 @@ def test_a_sweep_survives_a_planner_that_ends_its_process(place: Path) -> None:
     status, out, err = ran(place, "sweep", "campaign.yaml", "--workers", "1", "--out", "out", "--json")
     assert status == 1, err
     assert json.loads(out)["outcomes"] == {"error": 1, "reached": 1}
+
+
+@pytest.mark.flights
+def test_a_run_of_a_campaign_with_an_own_planner_flies_again_as_it_is_told(place: Path) -> None:
+    (place / "bug.py").write_text(RAISES)
+    status, out, err = ran(place, "sweep", "campaign.yaml", "--planners", "bug.py:Bug+shield", "--out", "out")
+    assert status == 0, err
+    (again,) = [line for line in out.splitlines() if line.startswith("again: ")]
+    command = "wayproof fly --from out/results.parquet --run 0 --planner bug.py:Bug+shield"
+    assert again == f"again: {command}"
+    page = re.sub("<[^>]*>", "", (place / "out" / "summary.html").read_text())
+    assert f"Flown again: {command}\n" in page
+    status, out, err = ran(place, *command.split()[1:], "--no-recording", "--out", "run")
+    assert status == 1, err
+    assert "digest: as the campaign flew it" in out
+    assert load_run(place / "run").metrics["reason"] == "the planner raised ValueError: oops (bug.py:9)"
+    (place / "bug.py").write_text(RAISES.replace("ValueError", "1 / 0 #").replace("> 3.0", "> 6.0"))
+    status, _, err = ran(place, *command.split()[1:], "--no-recording", "--quiet", "--out", "run")
+    assert status == 1
+    assert "run 0 was flown otherwise" in err
+
+
+def test_a_campaign_and_a_command_say_how_an_own_planner_is_named(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("gone", "'other.py:Bug'"))
+    assert main(["sweep", str(place / "campaign.yaml"), "--dry-run"]) == 2
+    assert "planners[0]: is 'other.py:Bug', which no file may name: give" in (told := capsys.readouterr().err)
+    assert "--planners other.py:Bug,..., which replaces all of `planners`" in told
+    assert main(["fly", str(place / "short.yaml"), "--planner", "other.py"]) == 2
+    assert "or FILE.py:NAME as other.py:NAME" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.flights
