@@ -22,6 +22,7 @@ from aircraft.guidance.registry import installed_kinds
 from aircraft.interface import GRAVITY_MPS2
 from aircraft.start import Atmosphere
 from harness.bench.tracking import ALTITUDE_M, course, fly_course
+from planner.kernel_cache import seal
 
 BANKS_DEG: Final = (10.0, 20.0, 30.0, 40.0, 45.0)
 SETTLING_S: Final = 10.0
@@ -53,6 +54,7 @@ def envelope_card(
     Raises:
         AircraftError: there is no such aircraft, or it cannot fly at one of the airspeeds or in one of the winds.
     """
+    seal()
     frame = airframe(name)
     speeds = tuple(airspeeds_mps) or (frame.cruise_mps,)
     for speed in speeds:

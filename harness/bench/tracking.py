@@ -27,6 +27,7 @@ from aircraft.start import Atmosphere, StartConditions
 from harness.flight.navigation import Navigator
 from harness.flight.state_estimator import PerfectEstimator, StateEstimator
 from harness.scenario.navigation import Navigation
+from planner.kernel_cache import seal
 
 ALTITUDE_M: Final = 300.0
 COURSE_RAD: Final = 0.3
@@ -212,6 +213,7 @@ def tracked(
 
     `actuators` are its servos, None: those of the airframe table.
     """
+    seal()
     frame = airframe(name, actuators)
     speed = airspeed_mps or frame.cruise_mps
     worst = Tracking(0.0, 0.0, 0.0, 0.0)

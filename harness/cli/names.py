@@ -13,7 +13,7 @@ from harness.cli.options import completing
 from harness.cli.standard_output import folded, say
 
 LISTED: Final = ("planners", "aircraft", "guidance", "scenarios", "worlds", "campaigns", "metrics")
-_AIRCRAFT_ROW: Final = "{:10} {:>7} {:>10} {:>6} {:>6} {:8} "
+_AIRCRAFT_ROW: Final = "{:13} {:>7} {:>10} {:>6} {:>6} {:6} "
 _WIDTH: Final = 80
 
 
@@ -29,8 +29,8 @@ def list_names(
 ) -> int:
     """Prints the names that a scenario or a command can use; for planners and guidance laws also their keys.
 
-    `list aircraft` first measures, in flight, each aircraft that is new to this machine: some seconds each. The figures
-    are kept.
+    `list aircraft` first measures, in flight, each aircraft that is new to this machine: about a minute for all. The
+    figures are kept.
 
     For example: wayproof list planners
     """
@@ -115,10 +115,12 @@ def _print_aircraft() -> None:
     """A row for each of the fleet; columns are those of `_AIRCRAFT_ROW`."""
     from aircraft.airframes import AircraftError, aircraft_names, airframe, is_surveyed
     from harness.cli.terminal import step_bar
+    from planner.kernel_cache import seal
 
     names = aircraft_names()
     new, faults = [name for name in names if not is_surveyed(name)], {}
     if new:
+        seal()
         many = f"{len(new)} aircraft are" if len(new) > 1 else f"{new[0]} is"
         say(f"{many} flown for the figures, once; some seconds each", err=True)
         with step_bar() as report:
@@ -131,7 +133,7 @@ def _print_aircraft() -> None:
     say(folded(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "tested"), "what"))
     for name in names:
         fault = faults.get(name)
-        say(f"{name:10} cannot be flown: {fault}" if fault else _aircraft_row(name))
+        say(f"{name:13} cannot be flown: {fault}" if fault else _aircraft_row(name))
 
 
 def _aircraft_row(name: str) -> str:
@@ -142,7 +144,7 @@ def _aircraft_row(name: str) -> str:
         frame = airframe(name)
         radius_m = performance(frame, frame.cruise_mps).turn_radius_m
     except AircraftError as error:
-        return f"{name:10} cannot be flown: {error}"
+        return f"{name:13} cannot be flown: {error}"
     low, high = frame.airspeed_range_mps
     figures = (f"{frame.mass_kg:.0f}", f"{low:g}-{high:g}", f"{frame.cruise_mps:g}", f"{radius_m:.0f}")
     return folded(_AIRCRAFT_ROW.format(name, *figures, "yes" if frame.verified else "no"), frame.summary)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -43,3 +44,29 @@ def test_a_damaged_kernel_is_compiled_anew(ending: str, place: float, tmp_path: 
     assert result == "42.0 0"
     assert "is damaged, or of an older version: compiled anew" in line
     assert called(tmp_path) == ("42.0 1", [])
+
+
+LIST = """
+from aircraft import airframes
+airframes.aircraft_names = lambda: ("aerosonde",)
+from harness.cli.app import main
+main(["list", "aircraft"])
+"""
+
+
+@pytest.mark.flights
+def test_what_a_survey_compiles_is_sealed(tmp_path: Path) -> None:
+    """As first command on a machine; each file ends in the SHA-256 of what stands before that."""
+    keys = {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path)}
+    for flown in (True, False):
+        done = subprocess.run(
+            [sys.executable, "-c", LIST],
+            env={**os.environ, **keys},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert ("flown for the figures" in done.stderr) == flown
+    files = [file.read_bytes() for file in tmp_path.rglob("*.nbc")]
+    assert files
+    assert all(sha256(data[:-32]).digest() == data[-32:] for data in files)

@@ -76,7 +76,7 @@ def test_aircraft_are_listed_with_their_figures(
     assert heading.split()[0] == "name"
     assert aerosonde.split()[:6] == ["aerosonde", "11", "17.4-32.3", "25", "110", "yes"]
     assert cessna.split()[:2] == ["c172p", "853"]
-    assert glider.startswith("SGS        cannot be flown: SGS cannot be trimmed for level flight")
+    assert glider.startswith("SGS           cannot be flown: SGS cannot be trimmed for level flight")
 
 
 @pytest.mark.flights
