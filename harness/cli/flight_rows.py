@@ -87,10 +87,13 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     legs, check = metrics["trackability"], metrics["check"]
     point = "item" if check["items"] else "waypoint"
     style, (word, _, why) = "bold green" if check["ok"] else "bold red", check["verdict"].partition(":")
+    lengths = [f"{metrics['planned_length_m']:,.0f} m"]
+    if "given_length_m" in check:  # in runs made since it is kept
+        lengths = [f"{check['given_length_m']:,.0f} m", f"rounded {lengths[0]}"]
     rows = {
         "flown as given": f"[{style}]{word}[/]:{plain(why)}",
         "outcome": plain(f"{metrics['outcome']}: {metrics['reason']}"),
-        "path": f"{check['points']} points, {metrics['planned_length_m']:,.0f} m, {counted(len(legs), 'leg')}",
+        "path": f"{check['points']} points, {', '.join(lengths)}, {counted(len(legs), 'leg')}",
     }
     _add_contacts(metrics, rows)
     _add_deviations(metrics, rows)

@@ -81,6 +81,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         "verdict": "",
         "drawn": check.given.drawn,
         "points": len(check.given.points_m),
+        "given_length_m": float(np.hypot(*np.diff(_line(check.plan), axis=0).T).sum()),
         "worst": worst,
         "limit_used": {
             "off_path": worst["off_m"] / worst["allowed_m"] if worst["allowed_m"] else None,

@@ -43,6 +43,7 @@ def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
     assert folder == f"run folder: {out}"
     assert "no: turn radius too tight" in said.out
     assert "waypoint 2" in said.out
+    assert " path                  4 points, 4,060 m, rounded " in said.out
     run = load_run(out)
     assert (out / "flight.rrd").stat().st_size > 10_000
     assert run.metrics["trackable"] is False
