@@ -243,21 +243,22 @@ def _stream(seed: int, number: int) -> np.random.Generator:
 def told(scenario: ScenarioKeys) -> str:
     """What kind of day a scenario is flown on, with its air and navigation, for the first lines of a summary."""
     air, navigation = scenario.environment, scenario.navigation
-    said = [_wind_told(air.wind) if air.wind and air.wind.fastest_mps else "calm"]
+    windy = bool(air.wind and air.wind.fastest_mps)
+    other = [_wind_told(air.wind)] if air.wind and windy else []
     if air.turbulence and air.turbulence.intensity != "none":
-        said.append(f"{air.turbulence.intensity} turbulence")
+        other.append(f"{air.turbulence.intensity} turbulence")
     if air.vertical_gusts:
-        said.append("gusts")
-    latency_s = navigation.latency_s
-    said.append(
-        "state known exactly"
-        if navigation.kind == "perfect" and not latency_s
-        else f"{navigation.kind} navigation"
-    )
-    if latency_s:
-        said.append(f"state {latency_s:g} s old")
+        other.append("gusts")
+    exact = navigation.kind == "perfect" and not navigation.latency_s
+    if not exact:
+        other.append(f"{navigation.kind} navigation")
+    if navigation.latency_s:
+        other.append(f"state {navigation.latency_s:g} s old")
     if scenario.aircraft.deviation and any(scenario.aircraft.deviation.model_dump().values()):
-        said.append("aircraft other than its model")
+        other.append("aircraft other than its model")
+    if scenario.conditions == "ideal" and other:
+        return f"ideal, but for what the scenario sets: {', '.join(other)}"
+    said = [*([] if windy else ["calm"]), *other, *(["state known exactly"] if exact else [])]
     return f"{scenario.conditions}: {', '.join(said)}"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import wayproof
+from harness.scenario.conditions import told
 from harness.scenario.scenario import parse_scenario
 
 BASE = """
@@ -80,6 +81,15 @@ def test_what_the_file_says_stays_and_ideal_adds_nothing() -> None:
     assert given.navigation.position_sigma_m == 0.017
     assert section(given, "aircraft.actuators.lag_s") == 0.2
     assert (deviation.mass, deviation.drag) == (0.0, 0.3)
+
+
+def test_an_ideal_day_is_told_with_what_the_scenario_adds_to_it() -> None:
+    air = "environment: {wind: {speed_mps: 6, from_deg: 270}, turbulence: {intensity: moderate}}"
+    (calm,), (given,) = drawn("ideal", 1), drawn("ideal", 1, air)
+    assert told(calm) == "ideal: calm, state known exactly"
+    assert told(given) == (
+        "ideal, but for what the scenario sets: wind 6 m/s from 270 deg, moderate turbulence"
+    )
 
 
 def test_a_run_folders_scenario_has_the_day_resolved_and_flies_again_alike(tmp_path: Path) -> None:
