@@ -138,7 +138,10 @@ def _block_distances(points: FloatArray, line: FloatArray, window_m: float) -> F
 
 
 def _along(line: FloatArray, spacing_m: float) -> FloatArray:
-    """(k, 3) points along a line at least so close together, its vertices among them."""
+    """(k, 3) points along a line, its vertices among them.
+
+    They are no further apart than `spacing_m`, or than 1 / `MOST_SAMPLES` of the length where that is more.
+    """
     length = np.hypot(*np.diff(line[:, :2], axis=0).T)
     spacing = max(spacing_m, float(length.sum()) / MOST_SAMPLES)
     pieces = np.maximum(np.ceil(length / spacing), 1.0).astype(np.intp)

@@ -34,7 +34,7 @@ LOOK_EVERY_S = 3.0
 LOOK_EVERY = 0.6
 """What has come in is looked for that often, or as often as the fastest moves on by this share of the clearance."""
 NO_STEP = 0.25
-"""Share of the clearance: returns of neighbouring rays that lie nearer to each other are of one thing."""
+"""Share of the clearance: returns nearer to each other than this count as returns of one thing."""
 OWN = 0.1
 """Share of the clearance: what was met so near to where something was, was it."""
 OFF = 3.0

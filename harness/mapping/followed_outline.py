@@ -18,7 +18,7 @@ LEAST_MPS = 0.5
 """What is slower than this stands still."""
 MOST_MPS = 30.0
 SURE = 8.0
-"""In standard errors of the velocity."""
+"""A speed is known to be above or below a limit when it is so many of its standard errors away from it."""
 VAGUE_MPS = 1.5
 """With a velocity that errs more than this it is not told where a thing will be."""
 FAR = 5.0

@@ -142,7 +142,11 @@ def _sweep(arrival: _Arrival, leaves_at: FloatArray) -> FloatArray:
 
 
 def _free_sweep(arrival: _Arrival, blocked: FloatArray) -> float:
-    """How far round the rim is free from an arrival on; one just inside a blocked arc may turn back only."""
+    """Angle (rad) by which a path may turn about a disc from its arrival on, in its sense, before a blocked arc begins.
+
+    `blocked` is (k, 2): where each arc begins, and its width. Rounding may put an arrival just inside of an arc. In the
+    half where the arc begins it then turns no further; in the other half it leaves the arc.
+    """
     first, width = blocked.T
     entry = first if arrival.side > 0 else first + width
     into = (arrival.side * (arrival.angle - entry)) % math.tau

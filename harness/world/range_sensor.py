@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from harness.scenario.sections import Sensor
 
 
-# The neighbour list reaches this part of the range further, and this far into the future.
 _SKIN = 0.25
+"""The list of obstacles near the aircraft reaches this share of the sensor's range further than the range."""
 _HORIZON_S = 30.0
+"""The list holds what comes near within this time; then it is made anew."""
 
 
 class _Unread(RangeScan):
