@@ -26,7 +26,7 @@ from harness.files.errors import WriteError
 from harness.files.versions import versions
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.navigation import Navigator, pose_error_m
-from harness.flight.observer import Observer, Progress
+from harness.flight.observer import Caution, Observer, Progress
 from harness.flight.record import AcceptedPlan, Flight, Track
 from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import SensedMap
@@ -214,6 +214,7 @@ def fly_to_folder(
             figures = measured_by(flight, flight_limits(scenario, planned=pilot is None))
             if log is not None:
                 log.close(figures, run_properties(scenario, figures), varied)
+            folder.log_events(so_far.events)
             folder.finish(flight.track, flight.plans, figures)
     except OSError as error:
         raise WriteError.of("the run", out, error) from error
@@ -221,11 +222,17 @@ def fly_to_folder(
 
 
 class _SoFar(Observer):
-    """An observer that keeps what has been flown, for a flight that is broken off."""
+    """An observer that keeps the events, and what has been flown for a flight that is broken off."""
 
     def __init__(self) -> None:
         self._blocks: list[Track] = []
         self._plans: list[AcceptedPlan] = []
+        self.events: list[tuple[float, str, str]] = []
+        """Simulated time (s), level and sentence of each event."""
+
+    def on_event(self, time_s: float, text: str) -> None:
+        """Keeps an event."""
+        self.events.append((time_s, "warning" if isinstance(text, Caution) else "info", str(text)))
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
         """Keeps a plan."""
@@ -238,6 +245,7 @@ class _SoFar(Observer):
     def leave_in(self, folder: RunFolder) -> None:
         """Writes what there is into a folder that stays marked incomplete."""
         if self._blocks:
+            folder.log_events(self.events)
             folder.leave(Track.joined(self._blocks), self._plans)
 
 

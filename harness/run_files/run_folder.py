@@ -7,7 +7,9 @@ folder that cannot be taken for a complete run. One process at a time writes to 
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
 import os
 import platform
@@ -25,6 +27,7 @@ from harness.files.folder_lock import FolderLock
 from harness.files.input_file import MAX_JSON_BYTES, read_index, read_text
 from harness.files.versions import FLOWN_WITH, versions
 from harness.files.whole_file import PARTIAL, replace_text, replacing
+from harness.files.wording import printable
 from harness.flight.record import AcceptedPlan, Track
 from harness.run_files.run_tables import PlanRow, plan_rows, plans_table, track_of, track_table
 
@@ -36,6 +39,7 @@ MANIFEST = "manifest.json"
 TRACK = "track.parquet"
 PLANS = "plans.parquet"
 METRICS = "metrics.json"
+EVENTS = "events.csv"
 RECORDING = "flight.rrd"
 OVERLAY: Final = "overlay.rrd"
 """What a comparison writes for each of its scenarios: the recordings of its runs in one."""
@@ -48,7 +52,7 @@ REPORT_FILES = (
 MAX_BYTES = 64_000_000
 """Largest size of a scenario or JSON file in the folder that is read."""
 
-HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, RECORDING)
+HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)
 """Files whose SHA-256 the manifest of a complete run has."""
 
 SCHEMA = "wayproof/run/1"
@@ -133,7 +137,7 @@ class RunFolder:
             with ExitStack() as undo:
                 undo.callback(_take_back, path, made)
                 replace_text(path / MANIFEST, _json(manifest))
-                for name in (METRICS, PLANS, TRACK, SCENARIO, RECORDING, *REPORT_FILES):
+                for name in (METRICS, PLANS, TRACK, EVENTS, SCENARIO, RECORDING, *REPORT_FILES):
                     (path / name).unlink(missing_ok=True)
                     (path / (name + PARTIAL)).unlink(missing_ok=True)
                 replace_text(path / SCENARIO, scenario_yaml)
@@ -163,6 +167,16 @@ class RunFolder:
         replace_text(self.path / METRICS, text)
         sums = {name: _sha256(self.path / name) for name in HASHED if (self.path / name).exists()}
         replace_text(self.path / MANIFEST, _json({**self._manifest, "complete": True, "sha256": sums}))
+
+    def log_events(self, events: Sequence[tuple[float, str, str]]) -> None:
+        """Writes the log of events as text: a row each of simulated time (s), level and sentence."""
+        text = io.StringIO()
+        rows = (
+            ("time_s", "level", "text"),
+            *((f"{at:g}", level, printable(said)) for at, level, said in events),
+        )
+        csv.writer(text, lineterminator="\n").writerows(rows)
+        replace_text(self.path / EVENTS, text.getvalue())
 
     def leave(self, track: Track, plans: Sequence[AcceptedPlan]) -> None:
         """Writes track and plans, of a flight that was broken off perhaps: the run stays marked incomplete."""
@@ -216,6 +230,8 @@ def load_run(path: Path) -> Run:
     try:
         for name in (TRACK, PLANS, METRICS, SCENARIO):
             _check(path / name, manifest)
+        if EVENTS in manifest.get("sha256", {}):
+            _check(path / EVENTS, manifest)
         return Run(
             folder=path,
             scenario_yaml=read_text(path / SCENARIO, MAX_BYTES, "a scenario, in YAML"),

@@ -1,0 +1,35 @@
+"""The log of events that a run folder keeps as text."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+import wayproof
+from planner.interface import Mission, Plan, PlanRequest, PlanStatus
+from wayproof import InputError
+
+
+class Refusing:
+    """Never has a plan, and says why in letters that a terminal would obey."""
+
+    def __init__(self, mission: Mission) -> None:
+        self.goal_m = mission.goal_m
+
+    def plan(self, request: PlanRequest) -> Plan:
+        return Plan(PlanStatus.NO_PATH, "no way,\x1b[2J at all")
+
+
+def test_a_folder_has_its_events_as_text(tmp_path: Path) -> None:
+    scenario = wayproof.load_scenario("aerosonde_forest").with_({"mission.time_limit_s": 5})
+    run = wayproof.fly(scenario, planner=Refusing, out=tmp_path / "run")
+    with (tmp_path / "run" / "events.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["level"] for row in rows] == ["warning", "warning"]
+    assert rows[0] == {"time_s": "0", "level": "warning", "text": "no way,\\x1b[2J at all"}
+    assert (float(rows[1]["time_s"]), rows[1]["text"].partition(":")[0]) == (5.0, run.outcome)
+    (tmp_path / "run" / "events.csv").write_text("time_s,level,text\n")
+    with pytest.raises(InputError, match="its sha256 is not that in manifest"):
+        wayproof.load_run(tmp_path / "run")
