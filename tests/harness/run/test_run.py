@@ -86,6 +86,7 @@ def test_the_folder_holds_the_run_that_is_returned(tmp_path: Path) -> None:
     assert run_read.metrics == metrics
     assert metrics["outcome"] == "timeout"
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == [
+        "events.csv",
         "flight.rrd",
         "manifest.json",
         "metrics.json",
