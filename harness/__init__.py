@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from harness.files.input_file import InputError
     from harness.flight.stepped import Status
     from harness.scenario.scenario import Scenario, dump_scenario, load_scenario
-    from planner.interface import MapView, Mission, Path, Plan, Planner, PlanRequest, PlanStatus
+    from planner.interface import MapView, Mission, Path, Plan, Planner, PlanPicture, PlanRequest, PlanStatus
     from planner.registry import PlannerKind
 
 __all__ = [
@@ -42,6 +42,7 @@ __all__ = [
     "Mission",
     "Path",
     "Plan",
+    "PlanPicture",
     "PlanRequest",
     "PlanStatus",
     "Planner",
@@ -80,7 +81,16 @@ _HOMES = {
     "harness.files.input_file": ("InputError",),
     "harness.flight.stepped": ("Status",),
     "harness.scenario.scenario": ("Scenario", "dump_scenario", "load_scenario"),
-    "planner.interface": ("MapView", "Mission", "Path", "Plan", "PlanRequest", "PlanStatus", "Planner"),
+    "planner.interface": (
+        "MapView",
+        "Mission",
+        "Path",
+        "Plan",
+        "PlanPicture",
+        "PlanRequest",
+        "PlanStatus",
+        "Planner",
+    ),
     "planner.registry": ("PlannerKind",),
 }
 """The names of the front door, by the module in which each is made."""
