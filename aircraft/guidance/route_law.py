@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLimits, GuidanceOutput
 from aircraft.guidance.progress import PathPoint, RouteProgress
 from aircraft.interface import AircraftState, Route
 
 
-class RouteLaw:
+class RouteLaw(ABC):
     """Keeps the place on the route, and the roll command within the limits. Implements `GuidanceLaw`.
 
     A law is a subclass that decides in `wanted`.
@@ -33,9 +35,9 @@ class RouteLaw:
         """Takes a new route; the roll command goes on from where it is."""
         self._progress = RouteProgress(route, arc_length_m)
 
+    @abstractmethod
     def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """Roll (rad) and true airspeed (m/s; NaN: the mission's) that the law asks for, without limits."""
-        raise NotImplementedError
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Decides the roll command for the next update interval."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +45,7 @@ class EdgeGrid:
         return EdgeGrid(cell, complex(xmin - border, ymin - border), columns, rows)
 
 
-class EdgePoints:
+class EdgePoints(ABC):
     """Points by slot, in the order in which they came, and the revision of the set of those that are edges.
 
     Args:
@@ -71,9 +72,9 @@ class EdgePoints:
         """Edge points of one wall are about this far apart."""
         return self._cell
 
+    @abstractmethod
     def _are_edges(self, slots: IntArray) -> BoolArray:
         """(k,) which slots hold an edge."""
-        raise NotImplementedError
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after `revision`, in the order in which they did."""

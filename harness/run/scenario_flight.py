@@ -235,8 +235,9 @@ class _SoFar(Observer):
         self.events.append((time_s, "warning" if isinstance(text, Caution) else "info", str(text)))
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        """Keeps a plan."""
+        """Keeps a plan, and its reason as an event."""
         self._plans.append(accepted)
+        self.events.append((accepted.time_s, "info", f"plan {accepted.plan_index}: {accepted.plan.reason}"))
 
     def on_block(self, block: Track) -> None:
         """Keeps rows of the track."""

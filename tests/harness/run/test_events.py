@@ -22,6 +22,15 @@ class Refusing:
         return Plan(PlanStatus.NO_PATH, "no way,\x1b[2J at all")
 
 
+def test_each_plan_is_an_event_with_its_reason(tmp_path: Path) -> None:
+    scenario = wayproof.load_scenario("aerosonde_forest").with_({"mission.time_limit_s": 20})
+    plans = wayproof.fly(scenario, out=tmp_path / "run").plans
+    told = (tmp_path / "run" / "events.csv").read_text()
+    assert plans.num_rows > 0
+    for index, reason in zip(plans["plan_index"].to_pylist(), plans["reason"].to_pylist(), strict=True):
+        assert f"plan {index}: {reason}" in told.replace('"', "")
+
+
 def test_a_folder_has_its_events_as_text(tmp_path: Path) -> None:
     scenario = wayproof.load_scenario("aerosonde_forest").with_({"mission.time_limit_s": 5})
     run = wayproof.fly(scenario, planner=Refusing, out=tmp_path / "run")
