@@ -56,6 +56,9 @@ LEAD_S = 1.0
 PROGRESS = 0.25
 """A part of a path gets on if it gains at least this share of the hold radius along the planner's path."""
 
+HOLD_WITHIN = 1.0
+"""A path of a planner that begins its full turn within so many turn radii only asks to circle."""
+
 GOES_ON = "the certified plan in effect goes on"
 
 
@@ -213,7 +216,7 @@ class Shield:
             if found is None and certified is not None and self._leads_on(here_m):
                 return None  # the plan in effect leads as far
         if found is None or room_m(found.path, self._threats) < mission.clearance_m:
-            if new:
+            if new and not self._both_hold(inner, here_m):
                 free_m = min(certifier.seen_free_to_m(way, request.seen), cut_m)
                 self._refuse(place_on(way, free_m)[0][:2], why_not(free_m, cut_m))
             return None
@@ -228,6 +231,13 @@ class Shield:
         )
         self._proposed = Adopted(adopted.plan, adopted.own, track.station_m(found.loiter_entry_m))
         return CommittedPlan(plan, found.path, course, found.loiter_entry_m)
+
+    def _both_hold(self, inner: Path, here_m: float) -> bool:
+        """Whether a planner that has no way on asks to circle here while the aircraft is in a certified turn anyway."""
+        effective = self._monitor.plan
+        if not inner.loiter or effective is None or not effective.holds(here_m):
+            return False
+        return inner.length_m <= (math.tau + HOLD_WITHIN) * self._room.limits.radius_m
 
     def _leads_on(self, here_m: float) -> bool:
         """Whether the aircraft is on the certified part of a plan, before its turn."""

@@ -72,3 +72,35 @@ def test_a_refused_planner_is_told_where_and_why(known: Known) -> None:
     assert "too near to something" in refused.reason
     assert math.hypot(*refused.place_m) < 300.0
     assert shield.report.refused_plans == 2
+
+
+@pytest.mark.parametrize(("straight_m", "refused"), [(0.0, 0), (300.0, 1)])
+def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
+    known: Known, straight_m: float, refused: int
+) -> None:
+    """One that wants to circle somewhere else is: a wall stands in the way there."""
+    wall = np.array([(x, y) for x in (3200.0, 3300.0) for y in np.arange(-700.0, 701.0, 20.0)])
+    inner = Once((0.0, 0.0), (3100.0, 0.0))
+    shield = Shield(inner, MISSION)
+    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), known(wall))
+    flown = shield.plan(request)
+    assert flown.path is not None
+    assert flown.path.loiter
+    entry_m = flown.path.length_m - math.tau * 100.0
+    east, north, ux, uy = (float(each) for each in flown.path.segments[-1, :4])
+    other_way = -float(np.sign(flown.path.segments[-1, 4])) / 100.0
+    x, y = east + straight_m * ux, north + straight_m * uy
+    ahead = [(east, north, ux, uy, 0.0, straight_m)] if straight_m else []
+    circle = np.array([*ahead, (x, y, ux, uy, other_way, math.tau * 100.0)])
+    wish = Plan(
+        PlanStatus.FOUND, "no way; holding", np.array([(east, north), (x, y)]), Path(circle, loiter=True)
+    )
+    inner.plan = lambda _: wish  # type: ignore[method-assign,assignment]
+    told = shield.plan(
+        request._replace(
+            time_s=60.0, position_m=(east, north), direction=(ux, uy), flown=flown, arc_length_m=entry_m + 1.0
+        )
+    )
+    assert told.status is PlanStatus.NO_PATH
+    assert shield.report.refused_plans == refused
+    assert ("holding" in told.reason) is (refused == 0)
