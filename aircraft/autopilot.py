@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from aircraft.interface import FloatArray
 
 GRAVITY_FPS2 = 32.174
-FREQUENCIES_RADPS = np.logspace(-1.0, 2.5, 4000)
+S = 1j * np.logspace(-1.0, 2.5, 4000)
+"""The Laplace variable at the frequencies (rad/s) that loops are looked at."""
 NEEDED_DEG = 45.0
 """The least phase margin that loops keep behind servos; a margin of 45 degrees is what is usually asked of aircraft
 (MIL-F-9490D, 3.1.3.6.1, for modes of less than 1 Hz and up)."""
@@ -185,7 +186,7 @@ def derivatives(
     )
 
 
-def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
+def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0, climb_pace: float = 1.0) -> Gains:
     """Places the loops.
 
     Roll: the roll mode goes to lambda = max(1.4 |Lp|, 10) 1/s and roll to min(4, lambda/4). Yaw: the Dutch
@@ -195,7 +196,8 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
     Throttle: 1.5 rad/s on airspeed, less where that would ask for more than 0.05 per ft/s.
 
     `pace` is the share of the feedback in roll and yaw, `pitch_pace` in pitch, climb and altitude, for aircraft whose
-    actuators or control laws, which the derivatives do not show, take a part of the phase.
+    actuators or control laws, which the derivatives do not show, take a part of the phase; `climb_pace` is that in
+    climb and altitude alone, for those that know their climb late.
 
     Raises:
         ValueError: if a control has no authority or the wrong sign, or the short period is not oscillatory.
@@ -249,10 +251,10 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
         rudder_r=rudder_r,
         rudder_p_forward=rudder_p_forward,
         rudder_r_forward=rudder_r_forward,
-        altitude=0.23 * pitch,
+        altitude=climb_pace * 0.23 * pitch,
         climb_limit_fps=0.08 * speed,
-        climb=2.4,
-        climb_integral=0.29 * pitch,
+        climb=climb_pace * 2.4,
+        climb_integral=climb_pace * 0.29 * pitch,
         pitch=pitch,
         pitch_bank_forward=alpha_per_load - at.alpha_rad,
         alpha=at.alpha_rad,
@@ -272,33 +274,47 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
 
 def roll_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
     """The lesser phase margin of the roll rate and the roll loop, behind the aileron's lag, with an old roll."""
-    s = 1j * FREQUENCIES_RADPS
-    plant = at.lda / (s - at.lp) / (1.0 + lag_s * s)
-    inner = (gains.aileron_p + gains.aileron_p_integral / s) * plant
-    return _margin_deg(inner, gains.aileron_p_forward * plant, gains.roll, latency_s)
+    plant = at.lda / (S - at.lp) / (1.0 + lag_s * S)
+    inner = (gains.aileron_p + gains.aileron_p_integral / S) * plant
+    attitude = gains.roll / S * (gains.aileron_p_forward * plant + inner) / (1.0 + inner)
+    return _least_margin_deg(inner, attitude * _as_known(latency_s))
 
 
 def pitch_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
     """The same of the pitch rate loop and of the pitch loop, behind the elevator's lag, with an old pitch."""
-    s = 1j * FREQUENCIES_RADPS
-    short_period = s * s - (at.mq + at.za) * s + at.mq * at.za - at.ma
-    plant = -at.mde * (s - at.za) / short_period / (1.0 + lag_s * s)
-    inner = (gains.elevator_q + gains.elevator_q_integral / s) * plant
-    return _margin_deg(inner, gains.elevator_q_forward * plant, gains.pitch, latency_s)
+    inner, attitude = _pitch_loops(at, gains, lag_s)
+    return _least_margin_deg(inner, attitude * _as_known(latency_s))
 
 
-def _margin_deg(inner: ComplexArray, forward: Any, outer: float, latency_s: float) -> float:
-    """The lesser margin of a rate loop and of the attitude loop around it, which has a feed-forward of the rate."""
-    rate = (forward + inner) / (1.0 + inner)
-    old = 1j * FREQUENCIES_RADPS * latency_s  # the angle of then, and what the rate of now makes of it since
-    attitude = outer / (1j * FREQUENCIES_RADPS) * rate * (np.exp(-old) + old)
-    return min(_phase_margin_deg(inner), _phase_margin_deg(attitude))
+def climb_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float) -> float:
+    """The same of the climb and of the altitude loop around the pitch loop, with an old climb and height."""
+    _, attitude = _pitch_loops(at, gains, lag_s)
+    path = attitude / (1.0 + attitude * _as_known(latency_s)) / (1.0 - S / at.za)
+    late = np.exp(-S * latency_s)
+    feedback = gains.climb + gains.climb_integral / S
+    climb = feedback * path * late
+    return _least_margin_deg(climb, gains.altitude / S * late * (1.0 + feedback) * path / (1.0 + climb))
 
 
-def _phase_margin_deg(loop: ComplexArray) -> float:
-    """Distance of an open loop's phase from -180 degrees where its gain is 1; infinite where it never is."""
-    above = np.abs(loop) >= 1.0
-    crossings = np.flatnonzero(above[1:] != above[:-1])
-    phase_deg = np.degrees(np.unwrap(np.angle(loop)))
-    margins = 180.0 + phase_deg[crossings]
-    return float(margins.min()) if len(margins) else math.inf
+def _pitch_loops(at: Derivatives, gains: Gains, lag_s: float) -> tuple[ComplexArray, ComplexArray]:
+    """The open loops of pitch rate and of pitch, which has a feed-forward of the rate."""
+    short_period = S * S - (at.mq + at.za) * S + at.mq * at.za - at.ma
+    plant = -at.mde * (S - at.za) / short_period / (1.0 + lag_s * S)
+    inner = (gains.elevator_q + gains.elevator_q_integral / S) * plant
+    return inner, gains.pitch / S * (gains.elevator_q_forward * plant + inner) / (1.0 + inner)
+
+
+def _as_known(latency_s: float) -> ComplexArray:
+    """An attitude as the autopilot knows it: the angle of then, and what the rate of now makes of it since."""
+    known: ComplexArray = np.exp(-S * latency_s) + S * latency_s
+    return known
+
+
+def _least_margin_deg(*loops: ComplexArray) -> float:
+    """Least distance of open loops' phase from -180 degrees where their gain is 1; infinite where it never is."""
+    least = math.inf
+    for loop in loops:
+        above = np.abs(loop) >= 1.0
+        phase_deg = np.degrees(np.unwrap(np.angle(loop)))
+        least = min(least, 180.0 + float(phase_deg[:-1].min(where=above[1:] != above[:-1], initial=math.inf)))
+    return least

@@ -17,8 +17,8 @@ from aircraft.deviation import AS_MODELLED, Deviation, deviate
 
 THROTTLE = "fcs/throttle-cmd-norm"
 ESTIMATED = {
-    "attitude/phi-rad": "velocities/p-rad_sec",
-    "attitude/theta-rad": "velocities/q-rad_sec",
+    "attitude/phi-rad": "velocities/phidot-rad_sec",
+    "attitude/theta-rad": "velocities/thetadot-rad_sec",
     "velocities/vtrue-fps": None,
     "velocities/h-dot-fps": None,
     "position/h-sl-ft": None,

@@ -19,6 +19,7 @@ from aircraft.autopilot import (
     NEEDED_DEG,
     Derivatives,
     Gains,
+    climb_margin_deg,
     gains,
     pitch_margin_deg,
     roll_margin_deg,
@@ -76,6 +77,7 @@ WELL_TRACKED_S = 0.01
 PACES = (1.0, 0.7, 0.5, 0.35)
 LAST_PACE = 0.25
 """For an aircraft that is held at no other."""
+CLIMB_PACES = (*PACES, LAST_PACE, 0.18, 0.12)
 LEG_S = 10.0
 TURN_S = 20.0
 TURN_SHARE_TOLERANCE = 0.03
@@ -127,11 +129,11 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
         at = linearised(trimmed(files, cruise))
         reason: str | None = None
         roll_lag_s, latency_s = _lag_s(files, "aileron"), files.latency_s
-        pitch_pace = _pitch_pace(at, _lag_s(files, "elevator"), latency_s)
+        pitch_paces = _pitch_paces(at, _lag_s(files, "elevator"), latency_s)
         for pace in (*PACES, LAST_PACE):
             if pace == LAST_PACE and best is not None:
                 break
-            placed = replace(gains(at, pace, pitch_pace).rounded(GAIN_DIGITS), **entry.gains)
+            placed = replace(gains(at, pace, *pitch_paces).rounded(GAIN_DIGITS), **entry.gains)
             margin_deg = roll_margin_deg(at, placed, roll_lag_s, latency_s)
             if (roll_lag_s or latency_s) and margin_deg < NEEDED_DEG:
                 reason = _too_slow("aileron", roll_lag_s + latency_s, "roll", margin_deg)
@@ -157,7 +159,8 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
     except ValueError as error:
         reason = str(error)
     if best is None:
-        raise AircraftError(f"{files.name} cannot be held at {cruise:g} m/s: {reason}")
+        late = f" on a state {files.latency_s:g} s old" if files.latency_s else ""
+        raise AircraftError(f"{files.name} cannot be held at {cruise:g} m/s{late}: {reason}")
     return best
 
 
@@ -166,18 +169,23 @@ def _lag_s(files: ModelFiles, control: str) -> float:
     return servos[control].lag_s if control in servos else 0.0
 
 
-def _pitch_pace(at: Derivatives, lag_s: float, latency_s: float) -> float:
-    """The fastest pace in pitch whose loops keep their margin behind the elevator's servo and an old pitch angle.
+def _pitch_paces(at: Derivatives, lag_s: float, latency_s: float) -> tuple[float, float]:
+    """The fastest paces in pitch, and in climb and altitude, whose loops keep their margin; in climb else the last.
 
     Raises:
-        ValueError: they keep it at none.
+        ValueError: they keep it in pitch at none.
     """
     late = lag_s or latency_s
     for pace in PACES if late else PACES[:1]:
         margin_deg = pitch_margin_deg(at, gains(at, 1.0, pace), lag_s, latency_s)
         if not late or margin_deg >= NEEDED_DEG:
-            return pace
-    raise ValueError(_too_slow("elevator", lag_s + latency_s, "pitch", margin_deg))
+            break
+    else:
+        raise ValueError(_too_slow("elevator", lag_s + latency_s, "pitch", margin_deg))
+    for climb_pace in CLIMB_PACES if latency_s else PACES[:1]:
+        if climb_margin_deg(at, gains(at, 1.0, pace, climb_pace), lag_s, latency_s) >= NEEDED_DEG:
+            break
+    return pace, climb_pace
 
 
 def _too_slow(control: str, lag_s: float, loop: str, margin_deg: float) -> str:

@@ -54,10 +54,11 @@ def measured(frame: Airframe, kind: str, speed_mps: float, make: Make, waypoints
             if error_m is not None:
                 break
         else:
-            wind = f" in a wind of {share:.0%} of the airspeed" if share else ""
+            how = f" in a wind of {share:.0%} of the airspeed" if share else ""
+            how += f" on a state {frame.files.latency_s:g} s old" if frame.files.latency_s else ""
             tracked = WAYPOINTS_TRACKED_SHARE if waypoints else TRACKED_SHARE
             raise AircraftError(
-                f"the guidance law {kind} does not track with {frame.name}{wind}: on turns of {factors[-1]:g} times "
+                f"the guidance law {kind} does not track with {frame.name}{how}: on turns of {factors[-1]:g} times "
                 f"the radius that the aircraft needs it is off by more than {tracked:.0%} of the radius, or its bank "
                 "is cut"
             )

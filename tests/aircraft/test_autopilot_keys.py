@@ -54,12 +54,25 @@ def test_the_autopilot_reads_a_state_of_the_latency() -> None:
     assert old[100:] == pytest.approx(now[88:-12], abs=1e-9)
 
 
-@pytest.mark.parametrize("latency_s", [0.12, 0.22])
-def test_preview_tracks_turns_on_an_old_state(latency_s: float) -> None:
+def test_the_pitch_of_now_is_known_in_a_steady_turn() -> None:
+    """Turning at 45 degrees of bank, gyros show a pitch rate of g / V sin 45 = 16 deg/s, and pitch stays as it is."""
+    model = in_flight(airframe("aerosonde", None, AutopilotKeys(latency_s=0.2)), 25.0)
+    model.command(math.radians(45.0), 300.0, 25.0)
+    model.advance(120 * 10)
+    believed_rad, true_rad = model._fdm["wayproof/measured/theta-rad-now"], model.state().pitch_rad
+    assert math.degrees(model._fdm["velocities/q-rad_sec"]) > 12.0
+    assert math.degrees(believed_rad - true_rad) == pytest.approx(0.0, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("name", "latency_s"),
+    [("aerosonde", 0.12), ("aerosonde", 0.22), ("ultrastick25e", 0.22), ("aerosonde", 0.5)],
+)
+def test_preview_tracks_turns_on_an_old_state(name: str, latency_s: float) -> None:
     """Untold of 0.3 s it was 16 m off; here it flies the turns of 110 m with the age that it is told."""
-    frame = airframe("aerosonde", None, AutopilotKeys(latency_s=latency_s))
-    limits = frame.guidance_limits(25.0)
-    law, model = PreviewLaw(PreviewConfig().resolved(limits), limits), in_flight(frame, 25.0)
+    frame = airframe(name, None, AutopilotKeys(latency_s=latency_s))
+    limits = frame.guidance_limits()
+    law, model = PreviewLaw(PreviewConfig().resolved(limits), limits), in_flight(frame, limits.airspeed_mps)
     law.follow(weave(110.0))
     past: deque[AircraftState] = deque()
     worst = 0.0
@@ -68,7 +81,7 @@ def test_preview_tracks_turns_on_an_old_state(latency_s: float) -> None:
         if output.past_end:
             break
         worst = max(worst, abs(output.cross_track_m))
-        model.command(output.roll_command_rad, 300.0, 25.0)
+        model.command(output.roll_command_rad, 300.0, limits.airspeed_mps)
         model.advance(6)
         assert model.fault() is None
     assert worst < 2.0
