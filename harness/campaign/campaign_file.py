@@ -17,7 +17,7 @@ from harness.scenario.files_resolved import file_beside
 from harness.scenario.generators import WorldSpec
 from harness.scenario.given import is_source
 from harness.scenario.resolving import model_or_folder
-from harness.scenario.sections import AircraftSpec, PlannerSpec, Section, key
+from harness.scenario.sections import AircraftSpec, PlannerSpec, Section
 from harness.scenario.shipped import shipped_scenarios
 from harness.scenario.validation import NAME_PATTERN, KeyFault, input_error, shown
 from planner.registry import planner_kinds
@@ -54,41 +54,41 @@ class Campaign(Section):
     `set` there.
     """
 
-    schema_: Literal["wayproof/campaign/1"] = key("Format and version.", alias="schema")
-    name: str = key("Names the folder.", pattern=NAME_PATTERN, max_length=100)
-    seed: int = key("Root seed; every case's seed and draws derive from it.", ge=0, le=2**53)
-    scenarios: Annotated[tuple[str, ...], Strict(False)] = key(
-        "What is flown: scenario files or folders of them, from the campaign file on, or names that `wayproof "
-        "list scenarios` prints. Default: none, the worlds are flown with every default.",
-        default=(),
-    )
-    worlds: Annotated[tuple[WorldSpec, ...], Strict(False)] = key(
-        "Generators; each makes area.bounds_m, obstacles, mission.start_m and mission.goal_m in place of the "
-        "scenario's. Default: the scenarios' own worlds.",
-        default=(),
-    )
+    schema_: Literal["wayproof/campaign/1"] = Field(alias="schema")
+    """Format and version."""
+    name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=100)]
+    """Names the folder."""
+    seed: Annotated[int, Field(ge=0, le=2**53)]
+    """Root seed; every case's seed and draws derive from it."""
+    scenarios: Annotated[tuple[str, ...], Strict(False)] = ()
+    """What is flown: scenario files or folders of them, from the campaign file on, or names that `wayproof list
+    scenarios` prints. Default: none, the worlds are flown with every default."""
+    worlds: Annotated[tuple[WorldSpec, ...], Strict(False)] = ()
+    """Generators; each makes area.bounds_m, obstacles, mission.start_m and mission.goal_m in place of the scenario's.
+    Default: the scenarios' own worlds."""
     planners: Annotated[
         tuple[Annotated[PlannerSpec, _named("kind")], ...],
         Strict(False),
-    ] = key("Kinds, or a kind with keys of `planner`. Default: the scenario's own planner.", default=())
+    ] = ()
+    """Kinds, or a kind with keys of `planner`. Default: the scenario's own planner."""
     aircraft: Annotated[
         tuple[Annotated[AircraftSpec, _named("model")], ...],
         Strict(False),
-    ] = key("Models, or a model with keys of `aircraft`. Default: the scenario's own.", default=())
-    set_: Keys = key("Values by key path of a scenario, for every run.", default_factory=dict, alias="set")
-    grid: dict[str, Values] = key(
-        "Lists of values by key path of a scenario; every combination is flown.", default_factory=dict
-    )
-    random: dict[str, Distribution] = key(
-        "What to draw, by key path of a scenario, anew for every case.", default_factory=dict
-    )
-    draws: int = key("Draws of every combination.", default=1, ge=1, le=MAX_RUNS)
-    recordings: Literal["all", "thin", "failures", "none"] = key(
-        "Of which runs a run folder is kept; thin: of all, their recordings with no more than track, plans and "
-        "obstacles; failures are those that do not reach the goal.",
-        default="none",
-    )
-    optimum: bool = key("Whether to compute the shortest path of every run's world.", default=True)
+    ] = ()
+    """Models, or a model with keys of `aircraft`. Default: the scenario's own."""
+    set_: Keys = Field(default_factory=dict, alias="set")
+    """Values by key path of a scenario, for every run."""
+    grid: dict[str, Values] = Field(default_factory=dict)
+    """Lists of values by key path of a scenario; every combination is flown."""
+    random: dict[str, Distribution] = Field(default_factory=dict)
+    """What to draw, by key path of a scenario, anew for every case."""
+    draws: Annotated[int, Field(ge=1, le=MAX_RUNS)] = 1
+    """Draws of every combination."""
+    recordings: Literal["all", "thin", "failures", "none"] = "none"
+    """Of which runs a run folder is kept; thin: of all, their recordings with no more than track, plans and obstacles;
+    failures are those that do not reach the goal."""
+    optimum: bool = True
+    """Whether to compute the shortest path of every run's world."""
 
     @model_validator(mode="after")
     def _can_be_flown(self) -> Campaign:

@@ -14,7 +14,7 @@ from pydantic import ConfigDict, Field, Strict, field_validator, model_validator
 
 from harness.files.strict_yaml import Loc
 from harness.scenario.scenario import scenario_schema
-from harness.scenario.sections import Section, key
+from harness.scenario.sections import Section
 
 LEAST: Final = 1e-12
 """Nearest to 0 and 1 that a normal distribution is asked for its inverse: 7 standard deviations off."""
@@ -25,10 +25,14 @@ Number = Annotated[float, Field(ge=-1e12, le=1e12)]
 class Normal(Section):
     """A Gaussian, cut off where limits are given: what lies beyond them is not drawn."""
 
-    mean: Number = key("Mean, before it is cut off.")
-    sigma: Number = key("Standard deviation, before it is cut off.", gt=0)
-    least: Number | None = key("Nothing below this is drawn. Default: no limit.", default=None)
-    most: Number | None = key("Nothing above this is drawn. Default: no limit.", default=None)
+    mean: Number
+    """Mean, before it is cut off."""
+    sigma: Annotated[Number, Field(gt=0)]
+    """Standard deviation, before it is cut off."""
+    least: Number | None = None
+    """Nothing below this is drawn. Default: no limit."""
+    most: Number | None = None
+    """Nothing above this is drawn. Default: no limit."""
 
     @model_validator(mode="after")
     def _leaves_something(self) -> Normal:
@@ -52,14 +56,12 @@ class Distribution(Section):
         json_schema_extra={"oneOf": [{"required": [name]} for name in ("uniform", "normal", "choice")]}
     )
 
-    uniform: Annotated[tuple[Number, Number], Strict(False)] | None = key(
-        "Evenly between two numbers; of a key that takes whole ones alone, both ends are drawn as often as the others.",
-        default=None,
-    )
-    normal: Normal | None = key("A Gaussian.", default=None)
-    choice: Annotated[tuple[Any, ...], Strict(False)] | None = key(
-        "One of these values, of any kind, each as likely as the others.", default=None, min_length=1
-    )
+    uniform: Annotated[tuple[Number, Number], Strict(False)] | None = None
+    """Evenly between two numbers; of a key that takes whole ones alone, both ends are drawn as often as the others."""
+    normal: Normal | None = None
+    """A Gaussian."""
+    choice: Annotated[tuple[Any, ...] | None, Strict(False), Field(min_length=1)] = None
+    """One of these values, of any kind, each as likely as the others."""
 
     @field_validator("uniform")
     @classmethod

@@ -44,10 +44,10 @@ def check_start_and_goal(
 
     Args:
         area: gives the bounds.
-        obstacles: all of them; `names` has what messages call each.
+        obstacles: all of them.
         mission: start and goal.
         clearance_m: wanted distance from obstacle edges.
-        names: of the obstacles.
+        names: what messages call each obstacle.
 
     Raises:
         KeyFault: one of them does not.
@@ -86,25 +86,23 @@ COURSE_STEP_DEG: Final = 5
 
 
 def check_start_leads_in(area: Area, mission: MissionSpec, turn_radius_m: float) -> None:
-    """The flight does not begin by leaving the area: straight on, or a turn to one side, keeps within it.
-
-    Args:
-        area: the area.
-        mission: start and course.
-        turn_radius_m: the tightest turn over the ground.
+    """The flight does not begin by leaving the area: straight on, or a tightest turn to one side, keeps within it.
 
     Raises:
-        KeyFault: it begins so; the sentence has the courses that would do.
+        KeyFault: it begins so; the sentence has a course that would do.
     """
     if _stays_inside(area, mission.start_m, mission.course_deg, turn_radius_m):
         return
     courses = range(0, 360, COURSE_STEP_DEG)
-    good = [each for each in courses if _stays_inside(area, mission.start_m, float(each), turn_radius_m)]
-    told = f"such as {_ranges(good)}" if good else "and no course would do: start farther from the border"
+    good = (each for each in courses if _stays_inside(area, mission.start_m, float(each), turn_radius_m))
+    course = next(good, None)
+    told = (
+        "none would do: start farther from the border" if course is None else f"must be another, as {course}"
+    )
     raise KeyFault(
         ("mission", "course_deg"),
         f"is {mission.course_deg:.0f}, which leads out of area.bounds_m at once: no turn of {turn_radius_m:.0f} m from "
-        f"start_m {list(mission.start_m)} stays inside; must be another, {told}",
+        f"start_m {list(mission.start_m)} stays inside; {told}",
     )
 
 
@@ -128,21 +126,6 @@ def _stays_inside(area: Area, start: Point, course_deg: float, radius_m: float) 
             ):
                 return True
     return False
-
-
-def _ranges(courses: Sequence[int]) -> str:
-    """Courses in steps as ranges, over north too."""
-    parts: list[list[int]] = []
-    for course in courses:
-        if parts and course - parts[-1][-1] == COURSE_STEP_DEG:
-            parts[-1].append(course)
-        else:
-            parts.append([course])
-    if len(parts) > 1 and parts[0][0] == 0 and parts[-1][-1] == 360 - COURSE_STEP_DEG:
-        parts[0] = parts.pop() + parts[0]
-    return " or ".join(
-        f"{part[0]} to {part[-1]} deg" if len(part) > 1 else f"{part[0]} deg" for part in parts
-    )
 
 
 def _is_far(obstacle: Obstacle, point: Point, distance_m: float) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
 
-from harness.scenario.sections import MAX_COORDINATE_M, Point, Section, Time, key
+from harness.scenario.sections import MAX_COORDINATE_M, Point, Section, Time
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
@@ -23,17 +23,21 @@ STEP_M = 0.1
 class GroundSpec(Section):
     """The true height of the ground on a grid, bilinear in between; wayproof writes it from terrain files."""
 
-    corner_m: Point = key("South-western node: east, north.")
-    spacing_m: Annotated[tuple[Spacing, Spacing], Strict(False)] = key("From node to node: east, north.")
-    rows: int = key("Nodes from south to north.", ge=1, le=100_000)
-    columns: int = key("Nodes from west to east.", ge=1, le=100_000)
-    lowest_m: float = key("Height of the number 0, above mean sea level.", ge=-12_000, le=9000)
-    step_m: float = key("Height from a number to the next.", STEP_M, gt=0, le=10)
-    heights: str = key(
-        "Heights: base64 of zlib of 16-bit little-endian numbers, row by row from the south, each the difference to "
-        "its neighbour in the west; the number 65535 is a height that is not known.",
-        min_length=1,
-    )
+    corner_m: Point
+    """South-western node: east, north."""
+    spacing_m: Annotated[tuple[Spacing, Spacing], Strict(False)]
+    """From node to node: east, north."""
+    rows: Annotated[int, Field(ge=1, le=100_000)]
+    """Nodes from south to north."""
+    columns: Annotated[int, Field(ge=1, le=100_000)]
+    """Nodes from west to east."""
+    lowest_m: Annotated[float, Field(ge=-12_000, le=9000)]
+    """Height of the number 0, above mean sea level."""
+    step_m: Annotated[float, Field(gt=0, le=10)] = STEP_M
+    """Height from a number to the next."""
+    heights: Annotated[str, Field(min_length=1)]
+    """Heights: base64 of zlib of 16-bit little-endian numbers, row by row from the south, each the difference to its
+    neighbour in the west; the number 65535 is a height that is not known."""
 
     @model_validator(mode="after")
     def _can_be_unpacked(self) -> GroundSpec:
@@ -75,13 +79,16 @@ class GroundSpec(Section):
 class SourceSpec(Section):
     """A file that obstacles or ground were made of; wayproof writes it, and does not read it again."""
 
-    path: str = key("The file, as the scenario named it.", min_length=1, max_length=1000)
-    kind: str = key("Its kind.", min_length=1, max_length=40)
-    sha256: str = key("SHA-256 of its bytes.", pattern="^[0-9a-f]{64}$")
-    polygons: int = key("How many obstacles were made of it.", ge=0)
-    notes: Annotated[tuple[Note, ...], Strict(False)] = key(
-        "What was assumed or passed over. Default: nothing.", default=()
-    )
+    path: Annotated[str, Field(min_length=1, max_length=1000)]
+    """The file, as the scenario named it."""
+    kind: Annotated[str, Field(min_length=1, max_length=40)]
+    """Its kind."""
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    """SHA-256 of its bytes."""
+    polygons: Annotated[int, Field(ge=0)]
+    """How many obstacles were made of it."""
+    notes: Annotated[tuple[Note, ...], Strict(False)] = ()
+    """What was assumed or passed over. Default: nothing."""
 
 
 WindSpeed = Annotated[float, Field(ge=0, le=200)]
@@ -92,21 +99,16 @@ Change = Annotated[tuple[Time, WindSpeed, Direction], Strict(False)]
 class Wind(Section):
     """Wind, the same everywhere at one height and time; steady unless changes are given."""
 
-    speed_mps: float = key("Wind speed; must be below 0.9 of the airspeed.", 0.0, ge=0, le=200)
-    from_deg: float = key("Direction it blows from.", 270.0, ge=0, le=360)
-    measured_at_m: float | None = key(
-        "Height over ground of these speeds; above and below, the wind has the logarithmic profile of MIL-F-8785C. "
-        "Default: the wind is the same at all heights.",
-        None,
-        ge=1,
-        le=300,
-    )
-    changes: Annotated[tuple[Change, ...], Strict(False)] = key(
-        "Later winds: time in s, speed in m/s, direction in degrees, each; the wind goes over linearly from one to the "
-        "next, and stays after the last.",
-        (),
-        max_length=10_000,
-    )
+    speed_mps: Annotated[float, Field(ge=0, le=200)] = 0.0
+    """Wind speed; must be below 0.9 of the airspeed."""
+    from_deg: Annotated[float, Field(ge=0, le=360)] = 270.0
+    """Direction it blows from."""
+    measured_at_m: Annotated[float | None, Field(ge=1, le=300)] = None
+    """Height over ground of these speeds; above and below, the wind has the logarithmic profile of MIL-F-8785C.
+    Default: the wind is the same at all heights."""
+    changes: Annotated[tuple[Change, ...], Strict(False), Field(max_length=10_000)] = ()
+    """Later winds: time in s, speed in m/s, direction in degrees, each; the wind goes over linearly from one to the
+    next, and stays after the last."""
 
     @model_validator(mode="after")
     def _times_rise(self) -> Wind:
@@ -127,10 +129,14 @@ class Wind(Section):
 class VerticalGustsSpec(Section):
     """Discrete vertical gusts on top of the wind: upwards and downwards in turn, 1 - cosine each."""
 
-    speed_mps: float = key("Speed of a gust at its strongest.", gt=0, le=50)
-    duration_s: float = key("How long one lasts (its length over the airspeed).", gt=0, le=1e4)
-    every_s: float = key("Time from the beginning of one to that of the next.", gt=0, le=1e7)
-    start_s: float = key("When the first begins.", 60.0, ge=0, le=1e7)
+    speed_mps: Annotated[float, Field(gt=0, le=50)]
+    """Speed of a gust at its strongest."""
+    duration_s: Annotated[float, Field(gt=0, le=1e4)]
+    """How long one lasts (its length over the airspeed)."""
+    every_s: Annotated[float, Field(gt=0, le=1e7)]
+    """Time from the beginning of one to that of the next."""
+    start_s: Annotated[float, Field(ge=0, le=1e7)] = 60.0
+    """When the first begins."""
 
     @model_validator(mode="after")
     def _one_after_the_other(self) -> VerticalGustsSpec:
@@ -144,23 +150,21 @@ class VerticalGustsSpec(Section):
 class Turbulence(Section):
     """Continuous gusts on top of the wind."""
 
-    model: Literal["tustin", "milspec"] = key(
-        "Dryden gusts: Tustin's discretisation, or MIL-F-8785C as JSBSim has it; over true ground they are one.",
-        "tustin",
-    )
-    intensity: Literal["none", "light", "moderate", "severe"] = key("How strong.", "moderate")
+    model: Literal["tustin", "milspec"] = "tustin"
+    """Dryden gusts: Tustin's discretisation, or MIL-F-8785C as JSBSim has it; over true ground they are one."""
+    intensity: Literal["none", "light", "moderate", "severe"] = "moderate"
+    """How strong."""
 
 
 class Environment(Section):
     """The air."""
 
-    wind: Wind | None = key("Wind. Default: that of the conditions; calm for ideal.", None)
-    vertical_gusts: VerticalGustsSpec | None = key(
-        "Vertical gusts. Default: those of the conditions; none for ideal.", default=None
-    )
-    turbulence: Turbulence | None = key(
-        "Continuous gusts. Default: those of the conditions; smooth air for ideal.", default=None
-    )
+    wind: Wind | None = None
+    """Wind. Default: that of the conditions; calm for ideal."""
+    vertical_gusts: VerticalGustsSpec | None = None
+    """Vertical gusts. Default: those of the conditions; none for ideal."""
+    turbulence: Turbulence | None = None
+    """Continuous gusts. Default: those of the conditions; smooth air for ideal."""
 
     @property
     def gusts(self) -> str | None:

@@ -5,64 +5,65 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from harness.scenario.environment import GroundSpec, SourceSpec
+from harness.scenario.keys import ScenarioKeys
 from harness.scenario.obstacles import Obstacle, Polygon, WorldFile
 from harness.scenario.sections import Area, Geodetic, Point
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
-    from harness.world_files.expansion import Expanded, FileSpec
+    from harness.world_files.expansion import FileSpec
+
+Ring = tuple[Point, ...]
 
 
-class Resolved(NamedTuple):
-    """What became of the obstacles of a scenario."""
-
-    obstacles: tuple[Obstacle, ...]
-    names: tuple[str, ...]
-    """Of each obstacle, for messages."""
-    ground: GroundSpec | None
-    sources: tuple[SourceSpec, ...]
-
-
-def resolved(
-    obstacles: Sequence[Obstacle],
-    area: Area,
-    ground: GroundSpec | None,
-    altitude_m: float,
-    folder: Path | None,
-) -> Resolved:
-    """Obstacles with every file of them expanded; without a file, nothing is changed.
+def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[ScenarioKeys, Sequence[str]]:
+    """A scenario whose files are made into obstacles and ground, and what messages call each obstacle.
 
     Args:
-        obstacles: as the scenario has them.
-        area: gives the bounds and the origin of the plane.
-        ground: of the scenario, where it has one already.
-        altitude_m: of the mission.
+        keys: its mission in metres.
         folder: of the scenario file; paths are looked for there first.
 
     Raises:
         KeyFault: a file cannot be used.
     """
-    at = [index for index, each in enumerate(obstacles) if each.file is not None]
+    at = [index for index, each in enumerate(keys.obstacles) if each.file is not None]
     if not at:
-        return Resolved(tuple(obstacles), tuple(f"obstacles[{i}]" for i in range(len(obstacles))), ground, ())
+        return keys, [f"obstacles[{index}]" for index in range(len(keys.obstacles))]
     from harness.world_files.bounded import uncollected
     from harness.world_files.expansion import FileFault, expanded
     from harness.world_files.plane import Place
 
-    place = Place(area.origin.latitude_deg, area.origin.longitude_deg)
-    specs = [spec_of(file, folder) for each in obstacles if (file := each.file)]
-    known = None if ground is None else ground.field()
+    origin = keys.area.origin
+    specs = [spec_of(file, folder) for each in keys.obstacles if (file := each.file)]
+    known = None if keys.ground is None else keys.ground.field()
+    every: list[Obstacle] = []
+    names: list[str] = []
+    told = list(keys.sources or ())
     with uncollected():
         try:
-            found = expanded(specs, place, area.bounds_m, altitude_m, ground=known)
+            place = Place(origin.latitude_deg, origin.longitude_deg)
+            found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
         except FileFault as fault:
-            raise KeyFault(
-                ("obstacles", at[fault.index], "file"), f"{specs[fault.index].path.name} {fault}"
-            ) from fault
-        return _joined(obstacles, found, ground)
+            name = specs[fault.index].path.name
+            raise KeyFault(("obstacles", at[fault.index], "file"), f"{name} {fault}") from fault
+        sources = iter(found.sources)
+        for index, each in enumerate(keys.obstacles):
+            if each.file is None:
+                every.append(each)
+                names.append(f"obstacles[{index}]")
+                continue
+            source = next(sources)
+            rows = zip(_rings_of(source.polygons), source.heights_m, strict=True)
+            parts = [_obstacle_of(rings, heights_m, each.active_s) for rings, heights_m in rows]
+            every += parts
+            names += [f"what obstacles[{index}] has of {source.spec.path.name}"] * len(parts)
+            whence = {"path": each.file.path, "kind": source.kind, "sha256": source.sha256}
+            told.append(SourceSpec(**whence, polygons=len(parts), notes=source.notes))
+    ground = GroundSpec.of(found.ground) if found.ground else keys.ground
+    return keys.updated(obstacles=tuple(every), ground=ground, sources=tuple(told)), names
 
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:
@@ -90,41 +91,7 @@ def file_beside(text: str, folder: Path) -> Path | None:
         return None
 
 
-def _joined(obstacles: Sequence[Obstacle], found: Expanded, ground: GroundSpec | None) -> Resolved:
-    sources = iter(found.sources)
-    every: list[Obstacle] = []
-    names: list[str] = []
-    told: list[SourceSpec] = []
-    for index, each in enumerate(obstacles):
-        if each.file is None:
-            every.append(each)
-            names.append(f"obstacles[{index}]")
-            continue
-        source = next(sources)
-        parts = [
-            obstacle_of(rings, heights_m, each)
-            for rings, heights_m in zip(rings_of(source.polygons), source.heights_m, strict=True)
-        ]
-        every += parts
-        names += [f"what obstacles[{index}] has of {source.spec.path.name}"] * len(parts)
-        told.append(
-            SourceSpec(
-                path=each.file.path,
-                kind=source.kind,
-                sha256=source.sha256,
-                polygons=len(parts),
-                notes=source.notes,
-            )
-        )
-    return Resolved(
-        tuple(every), tuple(names), GroundSpec.of(found.ground) if found.ground else ground, tuple(told)
-    )
-
-
-Ring = tuple[Point, ...]
-
-
-def rings_of(polygons: Sequence[object]) -> list[list[Ring]]:
+def _rings_of(polygons: Sequence[object]) -> list[list[Ring]]:
     """Corners of each polygon of shapely: of its outline, then of its holes; no corner twice."""
     import numpy as np
     import shapely
@@ -139,23 +106,13 @@ def rings_of(polygons: Sequence[object]) -> list[list[Ring]]:
     return found
 
 
-def obstacle_of(rings: Sequence[Ring], heights_m: tuple[float, float], like: Obstacle) -> Obstacle:
-    """A valid polygon between two heights as an obstacle.
-
-    Args:
-        rings: its outline, then its holes.
-        heights_m: bottom and top.
-        like: the obstacle that names the file.
-    """
+def _obstacle_of(
+    rings: Sequence[Ring], heights_m: tuple[float, float], active_s: tuple[float, float] | None
+) -> Obstacle:
+    """A valid polygon, its outline and then its holes, between two heights as an obstacle."""
     polygon = Polygon.model_construct(vertices_m=rings[0], holes_m=tuple(rings[1:]) or None)
-    return Obstacle.model_construct(
-        circle=None,
-        polygon=polygon,
-        file=None,
-        velocity_mps=None,
-        active_s=like.active_s,
-        heights_m=heights_m,
-    )
+    rest = {"circle": None, "file": None, "velocity_mps": None}
+    return Obstacle.model_construct(polygon=polygon, active_s=active_s, heights_m=heights_m, **rest)
 
 
 def plane_point(place: Geodetic, area: Area) -> Point:

@@ -27,10 +27,9 @@ Kind = PlannerKind | GuidanceKind
 
 
 class LoopPart(NamedTuple):
-    """A part of the loop that may be given.
+    """A part of the loop that may be given: its noun, the methods that it has to have, what a factory may be told.
 
-    Its noun with an article, the methods that an object has to have, the name of what a factory may take, the type of
-    its kinds, those that this process knows by name, and what makes one more known.
+    And the type of its kinds, those that this process knows by name, and what makes one more known.
     """
 
     noun: str
@@ -82,9 +81,7 @@ def own_words(planner: str | None, law: str | None) -> list[str]:
 def registered(given: object, part: LoopPart = PLANNER) -> str:
     """Registers what was given, unless it has been; returns the name by which scenarios of this process know it.
 
-    Args:
-        given: what the module says; or a kind, or FILE.py:NAME or MODULE:NAME, as text.
-        part: which part it is.
+    As text it is a kind that is known, or FILE.py:NAME or MODULE:NAME.
 
     Raises:
         ValueError: it is none of these, or what it names cannot be imported; one sentence.
@@ -130,19 +127,19 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
     Raises:
         ValueError: it is not what this module says.
     """
-    kind: Kind
     if isinstance(given, PlannerKind | GuidanceKind) and type(given) is part.kind:
         return given
+    made: Callable[[Any, Any], Any] = lambda _keys, _told: given  # noqa: E731
     if isinstance(given, type) or (callable(given) and not _is_part(given, part)):
-        kind = part.kind(_name(given), _summary(given, part), NoKeys, _maker(given, part))
-        return kind
-    if _is_part(given, part):
-        kind = part.kind(_name(type(given)), _summary(given, part), NoKeys, lambda _keys, _told: given)
-        return kind
-    raise ValueError(
-        f"{part.noun} must be a kind, a class, a function or an object with the method "
-        f"{' and '.join(part.methods)}; this is a {type(given).__name__}"
-    )
+        made = _maker(given, part)
+    elif not _is_part(given, part):
+        raise ValueError(
+            f"{part.noun} must be a kind, a class, a function or an object with the method "
+            f"{' and '.join(part.methods)}; this is a {type(given).__name__}"
+        )
+    summary = (inspect.getdoc(given) or f"{part.noun} given in Python").splitlines()[0]
+    kind: Kind = part.kind(_name(given), summary, NoKeys, made)
+    return kind
 
 
 def _is_part(given: object, part: LoopPart) -> bool:
@@ -153,10 +150,6 @@ def _name(given: Any) -> str:
     name: str = getattr(given, "__qualname__", type(given).__qualname__).replace("<locals>.", "")
     module = getattr(given, "__module__", "__main__")
     return name if module == "__main__" else f"{module}:{name}"
-
-
-def _summary(given: object, part: LoopPart) -> str:
-    return (inspect.getdoc(given) or f"{part.noun} given in Python").splitlines()[0]
 
 
 def _maker(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import ConfigDict, FailFast, Strict, field_validator
+from pydantic import ConfigDict, FailFast, Field, Strict, field_validator
 
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import STEP_RATE_HZ
@@ -12,6 +12,7 @@ from harness.scenario.environment import Environment, GroundSpec, SourceSpec
 from harness.scenario.navigation import Navigation
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.sections import (
+    DERIVED,
     AircraftSpec,
     Area,
     GuidanceSpec,
@@ -21,7 +22,6 @@ from harness.scenario.sections import (
     Section,
     Sensor,
     UncertaintySpec,
-    key,
 )
 from harness.scenario.validation import NAME_PATTERN, KeyFault
 
@@ -29,24 +29,16 @@ from harness.scenario.validation import NAME_PATTERN, KeyFault
 class TrackabilitySpec(Section):
     """What a leg of the flight may be off before it counts as not trackable."""
 
-    cross_track_m: Length = key(
-        "Distance of the true position from the plan; what the planner keeps for navigation errors comes on top.",
-        derived="a tenth of planner.clearance_m where the file gives that, else 10 m",
-    )
-    altitude_m: Length = key("Distance from mission.altitude_m.", derived="10 m")
-    airspeed_mps: float = key(
-        "Error of the true airspeed, averaged over 20 s.",
-        derived="a tenth of aircraft.airspeed_mps",
-        gt=0,
-        le=1000,
-    )
-    load_factor: float = key(
-        "Load factor, averaged over 1 s.",
-        derived="the limit manoeuvring load factor of 14 CFR 23.337 (amendment 23-48) for the aircraft's mass, "
-        "2.1 + 24000 / (weight in lb + 10000) and at most 3.8",
-        gt=1,
-        le=20,
-    )
+    cross_track_m: Length = DERIVED
+    """Distance of the true position from the plan; what the planner keeps for navigation errors comes on top. Default:
+    a tenth of planner.clearance_m where the file gives that, else 10 m."""
+    altitude_m: Length = DERIVED
+    """Distance from mission.altitude_m. Default: 10 m."""
+    airspeed_mps: Annotated[float, Field(gt=0, le=1000)] = DERIVED
+    """Error of the true airspeed, averaged over 20 s. Default: a tenth of aircraft.airspeed_mps."""
+    load_factor: Annotated[float, Field(gt=1, le=20)] = DERIVED
+    """Load factor, averaged over 1 s. Default: the limit manoeuvring load factor of 14 CFR 23.337 (amendment 23-48) for
+    the aircraft's mass, 2.1 + 24000 / (weight in lb + 10000) and at most 3.8."""
 
 
 RATES_HZ: Final = (STEP_RATE_HZ, 120)
@@ -60,13 +52,9 @@ from that with 480 steps a second."""
 class Simulation(Section):
     """How finely the flight is integrated."""
 
-    rate_hz: int = key(
-        f"Integration steps per simulated second, a multiple of {UPDATE_RATE_HZ}, the guidance rate; every other rate "
-        "must divide it.",
-        derived=f"{RATES_HZ[0]}, or {RATES_HZ[1]} where sensor.rate_hz does not divide {RATES_HZ[0]}",
-        ge=SLOWEST_HZ,
-        le=1200,
-    )
+    rate_hz: Annotated[int, Field(ge=SLOWEST_HZ, le=1200)] = DERIVED
+    """Integration steps per simulated second, a multiple of 10, the guidance rate; every other rate must divide it.
+    Default: 60, or 120 where sensor.rate_hz does not divide 60."""
 
     @field_validator("rate_hz")
     @classmethod
@@ -87,39 +75,43 @@ class ScenarioKeys(Section):
 
     model_config = ConfigDict(title="Scenario")
 
-    schema_: Literal["wayproof/scenario/1"] = key("Format and version.", alias="schema")
-    name: str = key("Names the run folder.", pattern=NAME_PATTERN, max_length=100)
-    seed: int = key("Root seed; every random stream derives from it.", 1, ge=0, le=2**53)
-    area: Area = key("The area of operations.")
-    obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = key(
-        "Unknown to the planner until sensed.", default=()
-    )
-    ground: GroundSpec | None = key(
-        "The true ground. Default: that of terrain files among the obstacles.", default=None
-    )
-    sources: Annotated[tuple[SourceSpec, ...], Strict(False)] | None = key(
-        "Files that obstacles and ground were made of. Default: none.", default=None
-    )
-    mission: MissionSpec = key("From where to where.")
-    aircraft: AircraftSpec = key("What flies.", default_factory=AircraftSpec)
-    sensor: Sensor = key("What it senses with.", default_factory=Sensor)
-    planner: PlannerSpec = key("What plans.", default_factory=PlannerSpec)
-    guidance: GuidanceSpec = key("What steers along the plan.", default_factory=GuidanceSpec)
-    navigation: Navigation = key("What it believes of its state.", default_factory=Navigation)
-    conditions: Literal["ideal", "typical", "rough"] = key(
-        "What kind of day it is: fills what is left out of navigation, aircraft.actuators, environment, uncertainty. "
-        "typical: an ordinary day of a small aircraft; rough: the worst on which one would fly.",
-        "ideal",
-    )
-    uncertainty: UncertaintySpec | None = key(
-        "By how much the flown aircraft differs from its model, 1 sigma. Default: that of the conditions.",
-        None,
-    )
-    simulation: Simulation = key("How finely it is integrated.", default_factory=Simulation)
-    environment: Environment = key("The air.", default_factory=Environment)
-    trackability: TrackabilitySpec = key(
-        "What a leg may be off before it counts as not trackable.", default_factory=TrackabilitySpec
-    )
+    schema_: Literal["wayproof/scenario/1"] = Field(alias="schema")
+    """Format and version."""
+    name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=100)]
+    """Names the run folder."""
+    seed: Annotated[int, Field(ge=0, le=2**53)] = 1
+    """Root seed; every random stream derives from it."""
+    area: Area
+    """The area of operations."""
+    obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = ()
+    """Unknown to the planner until sensed."""
+    ground: GroundSpec | None = None
+    """The true ground. Default: that of terrain files among the obstacles."""
+    sources: Annotated[tuple[SourceSpec, ...], Strict(False)] | None = None
+    """Files that obstacles and ground were made of. Default: none."""
+    mission: MissionSpec
+    """From where to where."""
+    aircraft: AircraftSpec = AircraftSpec()
+    """What flies."""
+    sensor: Sensor = Sensor()
+    """What it senses with."""
+    planner: PlannerSpec = PlannerSpec()
+    """What plans."""
+    guidance: GuidanceSpec = GuidanceSpec()
+    """What steers along the plan."""
+    navigation: Navigation = Navigation()
+    """What it believes of its state."""
+    conditions: Literal["ideal", "typical", "rough"] = "ideal"
+    """What kind of day it is: fills what is left out of navigation, aircraft.actuators, environment, uncertainty.
+    typical: an ordinary day of a small aircraft; rough: the worst on which one would fly."""
+    uncertainty: UncertaintySpec | None = None
+    """By how much the flown aircraft differs from its model, 1 sigma. Default: that of the conditions."""
+    simulation: Simulation = Simulation()
+    """How finely it is integrated."""
+    environment: Environment = Environment()
+    """The air."""
+    trackability: TrackabilitySpec = TrackabilitySpec()
+    """What a leg may be off before it counts as not trackable."""
 
     @property
     def given(self) -> dict[str, Any]:

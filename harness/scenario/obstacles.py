@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, FailFast, Field, Strict, field_validator, model_validator
 
-from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity, key
+from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity
 
 Height = Annotated[float, Field(ge=-1000, le=30_000)]
 Shift = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -16,8 +16,10 @@ Shift = Annotated[float, Field(ge=-1e9, le=1e9)]
 class Circle(Section):
     """A disc."""
 
-    center_m: Point = key("Centre: east, north.")
-    radius_m: float = key("Radius.", gt=0, le=MAX_COORDINATE_M)
+    center_m: Point
+    """Centre: east, north."""
+    radius_m: Annotated[float, Field(gt=0, le=MAX_COORDINATE_M)]
+    """Radius."""
 
 
 Ring = Annotated[tuple[Point, ...], Strict(False)]
@@ -27,14 +29,11 @@ Rings = Annotated[tuple[Ring, ...], Strict(False)]
 class Polygon(Section):
     """A simple polygon, convex or not, its vertices in either direction; kept without repeated vertices."""
 
-    vertices_m: Annotated[tuple[Point, ...], Strict(False), FailFast()] = key(
-        "Vertices in order round the shape: east, north. One that repeats the vertex before it, or the first at the "
-        "end, is dropped.",
-        min_length=3,
-    )
-    holes_m: Rings | None = key(
-        "Rings inside the shape, in either direction, within which it is free. Default: none.", None
-    )
+    vertices_m: Annotated[tuple[Point, ...], Strict(False), FailFast(), Field(min_length=3)]
+    """Vertices in order round the shape: east, north. One that repeats the vertex before it, or the first at the end,
+    is dropped."""
+    holes_m: Rings | None = None
+    """Rings inside the shape, in either direction, within which it is free. Default: none."""
 
     @field_validator("vertices_m")
     @classmethod
@@ -97,52 +96,30 @@ KindName = Literal[
 class WorldFile(Section):
     """What of a file of terrain, buildings, airspace, fences or occupancy is solid at the mission's altitude."""
 
-    path: str = key(
-        "The file, from the scenario's folder or from here; package:path lies in an installed Python package.",
-        min_length=1,
-        max_length=1000,
-    )
-    kind: KindName | None = key("Its kind. Default: told from the file.", None)
-    vertical_clearance_m: float = key(
-        "A part is an obstacle where it reaches into the band of so much below and above mission.altitude_m.",
-        10.0,
-        ge=0,
-        le=10_000,
-    )
-    metres_per_cell: float | None = key(
-        "Side of a cell of an occupancy map, or of a grid that names no place on earth. Default: as the file says, "
-        "else 1 m.",
-        None,
-        gt=0,
-        le=MAX_COORDINATE_M,
-    )
-    shift_m: Annotated[tuple[Shift, Shift], Strict(False)] = key(
-        "East and north, added to the metres of a file that names no place on earth.", (0.0, 0.0)
-    )
-    crs: str | None = key(
-        "Coordinate reference system of a file that names none, as EPSG:28992. Default: as the file says.",
-        None,
-        min_length=1,
-        max_length=200,
-    )
-    tolerance_m: float | None = key(
-        "Notches of outlines up to so deep are filled. Default: a cell of a raster, else 0.1 m.",
-        None,
-        ge=0,
-        le=10_000,
-    )
-    nodata: Literal["solid", "free"] = key("What cells of terrain without a height are.", "solid")
-    unknown: Literal["occupied", "free"] = key("What unknown cells of an occupancy map are.", "free")
-    default_height_m: float = key(
-        "Height of a building that gives neither height nor levels.", 6.0, ge=0, le=1000
-    )
-    ground_m: float | None = key(
-        "Height above mean sea level of flat ground, for heights above ground where no terrain is known. Default: "
-        "0 below buildings; zones with limits above ground are refused.",
-        None,
-        ge=-1000,
-        le=9000,
-    )
+    path: Annotated[str, Field(min_length=1, max_length=1000)]
+    """The file, from the scenario's folder or from here; package:path lies in an installed Python package."""
+    kind: KindName | None = None
+    """Its kind. Default: told from the file."""
+    vertical_clearance_m: Annotated[float, Field(ge=0, le=10_000)] = 10.0
+    """A part is an obstacle where it reaches into the band of so much below and above mission.altitude_m."""
+    metres_per_cell: Annotated[float | None, Field(gt=0, le=MAX_COORDINATE_M)] = None
+    """Side of a cell of an occupancy map, or of a grid that names no place on earth. Default: as the file says, else 1
+    m."""
+    shift_m: Annotated[tuple[Shift, Shift], Strict(False)] = (0.0, 0.0)
+    """East and north, added to the metres of a file that names no place on earth."""
+    crs: Annotated[str | None, Field(min_length=1, max_length=200)] = None
+    """Coordinate reference system of a file that names none, as EPSG:28992. Default: as the file says."""
+    tolerance_m: Annotated[float | None, Field(ge=0, le=10_000)] = None
+    """Notches of outlines up to so deep are filled. Default: a cell of a raster, else 0.1 m."""
+    nodata: Literal["solid", "free"] = "solid"
+    """What cells of terrain without a height are."""
+    unknown: Literal["occupied", "free"] = "free"
+    """What unknown cells of an occupancy map are."""
+    default_height_m: Annotated[float, Field(ge=0, le=1000)] = 6.0
+    """Height of a building that gives neither height nor levels."""
+    ground_m: Annotated[float | None, Field(ge=-1000, le=9000)] = None
+    """Height above mean sea level of flat ground, for heights above ground where no terrain is known. Default: 0 below
+    buildings; zones with limits above ground are refused."""
 
 
 class Obstacle(Section):
@@ -152,22 +129,20 @@ class Obstacle(Section):
         json_schema_extra={"oneOf": [{"required": [shape]} for shape in ("circle", "polygon", "file")]}
     )
 
-    circle: Circle | None = key("Its shape, if it is round.", None)
-    polygon: Polygon | None = key("Its shape, if it has corners.", None)
-    file: WorldFile | None = key("A file: what of it is solid at the mission's altitude.", None)
-    velocity_mps: Velocity | None = key(
-        "Moves in a straight line: east, north; as its shape says at active_s[0]. Default: it stands still.",
-        None,
-    )
-    active_s: Interval | None = key(
-        "Pops up at the first time and is gone after the second. Default: there for the whole flight.", None
-    )
+    circle: Circle | None = None
+    """Its shape, if it is round."""
+    polygon: Polygon | None = None
+    """Its shape, if it has corners."""
+    file: WorldFile | None = None
+    """A file: what of it is solid at the mission's altitude."""
+    velocity_mps: Velocity | None = None
+    """Moves in a straight line: east, north; as its shape says at active_s[0]. Default: it stands still."""
+    active_s: Interval | None = None
+    """Pops up at the first time and is gone after the second. Default: there for the whole flight."""
 
-    heights_m: Annotated[tuple[Height, Height], Strict(False)] | None = key(
-        "Bottom and top above mean sea level, for drawings; the aircraft flies at one altitude, at which it is there. "
-        "Twice the same: terrain, cut at that height. Default: a column without end.",
-        None,
-    )
+    heights_m: Annotated[tuple[Height, Height], Strict(False)] | None = None
+    """Bottom and top above mean sea level, for drawings; the aircraft flies at one altitude, at which it is there.
+    Twice the same: terrain, cut at that height. Default: a column without end."""
 
     @model_validator(mode="after")
     def _has_one_shape(self) -> Obstacle:

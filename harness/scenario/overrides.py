@@ -50,23 +50,16 @@ def with_key(root: Node, loc: Loc, new: Node) -> Node:
 
 
 class Given(NamedTuple):
-    """What a scenario was made of, before any default was derived or any file expanded.
-
-    Attributes:
-        sections: the keys that were given, by their attributes; sections without the defaults that follow from others.
-        folder: of the scenario file; None where there was none.
-    """
+    """What a scenario was made of, before any default was derived or any file expanded."""
 
     sections: Mapping[str, Any]
+    """The keys that were given, by their attributes; sections without the defaults that follow from others."""
     folder: Path | None
+    """Of the scenario file; None where there was none."""
 
 
 def changed(given: Given, keys: Mapping[str, Any]) -> Node:
-    """The keys that a scenario was given, and no default, with some changed.
-
-    Args:
-        given: what it was made of.
-        keys: values by key path; None takes a key away.
+    """The keys that a scenario was given, and no default, with some changed; None takes a key away.
 
     Raises:
         InputError: it is no mapping, or one is not a key path, or leads nowhere.

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
 
-from pydantic import ValidationError, create_model
+from pydantic import Field, ValidationError, create_model
 
 import aircraft.guidance.registry
 import planner.registry
@@ -16,7 +17,7 @@ from harness.files.crash import PlannerError, sentence
 from harness.files.printing import PrintingAside
 from harness.scenario.craft import airframe_of, limits_of
 from harness.scenario.given import Kind, is_source
-from harness.scenario.sections import AircraftSpec, GuidanceSpec, PartSpec, PlannerSpec, Section, key
+from harness.scenario.sections import AircraftSpec, GuidanceSpec, PartSpec, PlannerSpec, Section
 from harness.scenario.validation import KeyFault, first_fault, unknown_key
 from planner.compiled import compile_all
 from planner.kernel_cache import seal
@@ -32,13 +33,9 @@ AnyKind = TypeVar("AnyKind", PlannerKind, GuidanceKind)
 
 
 def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False) -> PlannerSpec:
-    """The planner's section with its own keys checked and every default filled in.
+    """The planner's section with its own keys checked and every default filled in from what it is told.
 
-    Args:
-        spec: the section.
-        mission: what the planner is told.
-        as_flown: the section is of a run folder, where every default stands already; a planner that was given by a
-            source file, or in Python, need not be here.
+    That of a run folder (`as_flown`) is complete: a planner given by a source file, or in Python, need not be here.
 
     Raises:
         KeyFault: there is no such planner or key, or the keys contradict each other or the mission.
@@ -104,10 +101,6 @@ def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
 
 def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     """How the law tracks with the aircraft, flown unless that is known; None: as the aircraft's survey says.
-
-    Args:
-        spec: a section that `resolved_guidance` returned.
-        aircraft: what flies, its airspeed filled in.
 
     Raises:
         KeyFault: the law does not track with this aircraft, or raised an exception.
@@ -182,27 +175,21 @@ def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[
     return {name: getattr(config, name) for name in known}
 
 
-_sections: dict[type[Any], type[Section]] = {}
+_BOUNDS = (("ge", "minimum"), ("le", "maximum"), ("gt", "above"))
 
 
+@cache
 def _keys_section(kind: Kind) -> type[Section]:
     """The own keys of a kind as a section."""
-    if kind.config not in _sections:
-        hints = get_type_hints(kind.config)
-        bounds = {"ge": "minimum", "le": "maximum", "gt": "above"}
-        keys: dict[str, Any] = {
-            field.name: (
-                hints[field.name],
-                key(
-                    f"{field.metadata['doc']}.",
-                    field.default,
-                    **{bound: field.metadata.get(name) for bound, name in bounds.items()},
-                ),
-            )
-            for field in fields(kind.config)
-        }
-        _sections[kind.config] = create_model(f"{kind.kind} keys", __base__=Section, **keys)
-    return _sections[kind.config]
+    hints = get_type_hints(kind.config)
+    keys: dict[str, Any] = {}
+    for each in fields(kind.config):
+        told = each.metadata
+        unit = {"unit": told["unit"]} if "unit" in told else None
+        described: dict[str, Any] = {name: told.get(key) for name, key in _BOUNDS}
+        described |= {"default": each.default, "description": f"{told['doc']}.", "json_schema_extra": unit}
+        keys[each.name] = (hints[each.name], Field(**described))
+    return create_model(f"{kind.kind} keys", __base__=Section, **keys)
 
 
 def with_own_keys(schema: dict[str, Any]) -> dict[str, Any]:
@@ -219,8 +206,6 @@ def with_own_keys(schema: dict[str, Any]) -> dict[str, Any]:
 
 def _choice(shared: dict[str, Any], kind: Kind) -> dict[str, Any]:
     own = _keys_section(kind).model_json_schema()["properties"]
-    for field in fields(kind.config):
-        own[field.name] |= {"unit": field.metadata["unit"]} if "unit" in field.metadata else {}
     named = {**shared["properties"]["kind"], "const": kind.kind}
     usual = kind.kind == named["default"]
     if not usual:

@@ -24,12 +24,8 @@ MAX_WIND_FRACTION: Final = 0.9
 def performance_of(scenario: ScenarioKeys) -> Performance:
     """What the scenario's aircraft can do at its airspeed under its guidance, in its wind and turbulence.
 
-    Args:
-        scenario: its airspeed and the keys of its guidance law filled in.
-
     Raises:
-        KeyFault: there is no such aircraft, it cannot hold the airspeed, the wind is too strong for it, or the guidance
-            law does not track with it.
+        KeyFault: it cannot hold the airspeed, its wind is too strong, or the guidance law does not track with it.
     """
     from aircraft.airframes import AircraftError
     from aircraft.envelope import performance
@@ -60,27 +56,20 @@ def wind_mps_of(scenario: ScenarioKeys) -> float:
     return wind.fastest_mps * profile_share(scenario.mission.altitude_m, wind.measured_at_m)
 
 
-def mission_of(scenario: ScenarioKeys) -> Mission:
-    """What a planner is told before the flight.
+def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -> Mission:
+    """What a planner is told before the flight; what the aircraft can do is looked up unless it is given.
 
-    The clearance is that of `planner.clearance_m` and, on top, the margin for the error of the believed position. It is
-    no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size. The same margin is kept
-    from the border of the area, as far as start and goal lie within it. The tracking error is kept as well,
-    but from a side that start or goal is near to.
-
-    Args:
-        scenario: all but the own keys of its planner filled in.
+    The clearance is `planner.clearance_m` and, on top, the margin for the error of the believed position. It is no less
+    than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size. The same margin is kept from
+    the border of the area, as far as start and goal lie within it. The tracking error is kept as well, but from a side
+    that start or goal is near to.
 
     Raises:
         KeyFault: as `performance_of` has it.
     """
-    return mission_with(scenario, performance_of(scenario))
-
-
-def mission_with(scenario: ScenarioKeys, performance: Performance) -> Mission:
-    """The same as `mission_of`, where it is known what the aircraft can do."""
     from planner.interface import Mission
 
+    performance = performance or performance_of(scenario)
     margin_m, radius_m = scenario.navigation.margin_m or 0.0, performance.turn_radius_m
     clearance_m = max(scenario.planner.clearance_m + margin_m, LEAST_CLEARANCE * radius_m)
     return Mission(

@@ -15,12 +15,11 @@ from aircraft.interface import GRAVITY_MPS2
 from harness.scenario.checks import check_local_plane, check_start_and_goal, check_start_leads_in
 from harness.scenario.conditions import with_day, with_servos
 from harness.scenario.craft import airframe_of, limits_of
-from harness.scenario.files_resolved import plane_point
-from harness.scenario.files_resolved import resolved as files_expanded
+from harness.scenario.files_resolved import plane_point, with_files_expanded
 from harness.scenario.keys import ScenarioKeys, step_rate_hz
 from harness.scenario.navigation import planning_margin_m
 from harness.scenario.parts import is_here, resolved_guidance, resolved_planner
-from harness.scenario.performance import LEAST_CLEARANCE, mission_with, performance_of, wind_mps_of
+from harness.scenario.performance import LEAST_CLEARANCE, mission_of, performance_of, wind_mps_of
 from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec
 from harness.scenario.start import check_level_flight
 from harness.scenario.validation import KeyFault
@@ -40,11 +39,7 @@ def resolve(
 ) -> ScenarioKeys:
     """The same flight with every default filled in and every file of obstacles expanded.
 
-    Args:
-        keys: as they were read.
-        folder: where the folder of an aircraft, and files of obstacles, are sought first.
-        ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
-        as_flown: the keys are of a run folder, as `parts` takes it.
+    The arguments are those of `scenario.validated`.
 
     Raises:
         KeyFault: keys contradict each other, or the aircraft cannot do what they ask for.
@@ -102,11 +97,11 @@ def resolve(
     check_local_plane(scenario.area)
     if not as_flown:
         check_level_flight(scenario)
-    scenario, names = _with_files_expanded(scenario, folder)
+    scenario, names = with_files_expanded(scenario, folder)
     if ends_checked:
         check_start_and_goal(scenario.area, scenario.obstacles, mission, planner.clearance_m, names)
         check_start_leads_in(scenario.area, mission, _tightest_m(aircraft, wind_mps))
-    told = mission_with(scenario, performance)
+    told = mission_of(scenario, performance)
     return scenario.updated(planner=resolved_planner(planner, told, as_flown))
 
 
@@ -123,16 +118,6 @@ def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
     ends = {name: getattr(mission, name) for name in ("start", "goal")}
     given = {f"{name}_m": plane_point(place, area) for name, place in ends.items() if place}
     return mission.model_copy(update={"start": None, "goal": None, **given}) if given else mission
-
-
-def _with_files_expanded(scenario: ScenarioKeys, folder: Path | None) -> tuple[ScenarioKeys, tuple[str, ...]]:
-    """A scenario whose files are made into obstacles and ground, and what messages call each obstacle."""
-    altitude_m = scenario.mission.altitude_m
-    found = files_expanded(scenario.obstacles, scenario.area, scenario.ground, altitude_m, folder)
-    if found.sources:
-        sources = (*(scenario.sources or ()), *found.sources)
-        scenario = scenario.updated(obstacles=found.obstacles, ground=found.ground, sources=sources)
-    return scenario, found.names
 
 
 def model_or_folder(model: str, folder: Path | None) -> str:

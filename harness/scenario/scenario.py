@@ -55,8 +55,8 @@ class Scenario(ScenarioKeys):
         `planner.kind` drops the own keys of the planner before. This scenario stays as it is.
 
         Args:
-            keys: values by key path, as `{"seed": 3, "planner.clearance_m": 400, "obstacles[0].circle.radius_m": 50}`;
-                plain values, numpy's, or sections. None stands for the default.
+            keys: values by key path, as `{"seed": 3, "obstacles[0].circle.radius_m": 50}`; plain values, numpy's, or
+                sections. None stands for the default.
 
         Raises:
             InputError: the changed scenario is none that can be flown; the fault names the key.
@@ -80,8 +80,7 @@ def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -
     Args:
         path: the file, or the name of a scenario that comes with wayproof, such as `paper_circles`.
         overrides: keys to replace before anything is checked, as (`"sensor.range_m"`, `"5000"`): key path and
-            value as YAML; `obstacles[0].circle.radius_m` reaches into a list. A new `planner.kind` drops
-            the own keys of the planner that the file names.
+            value as YAML; `obstacles[0].circle.radius_m` reaches into a list.
 
     Raises:
         InputError: the file cannot be read or is not a scenario; a line of its text names file, line and key.
@@ -93,14 +92,10 @@ def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -
 def parse_scenario(
     text: str, source: str = "scenario", as_flown: bool = False, folder: Path | None = None
 ) -> Scenario:
-    """Reads a scenario from YAML text.
+    """Reads a scenario from YAML text; faults call it `source`, and files are looked for in `folder` first.
 
-    Args:
-        text: YAML.
-        source: what faults name it.
-        as_flown: it is that of a run folder: start and goal were checked, if a planner was to keep clear of obstacles,
-            and a planner or guidance law that was given by a source file, or in Python, need not be here.
-        folder: files that it names are looked for there first.
+    One of a run folder (`as_flown`) is complete: start and goal are not checked again, and a planner or guidance law
+    that was given by a source file, or in Python, need not be here.
 
     Raises:
         InputError: it is not a scenario.
@@ -108,18 +103,10 @@ def parse_scenario(
     return validated(strict_yaml.parse(text, source), source, folder, not as_flown, as_flown)
 
 
-def node_of_keys(keys: Mapping[str, Any]) -> Node:
-    """Keys that a command has put together, as if they had been read; their faults name the command line.
-
-    Raises:
-        InputError: a value cannot be written in a scenario.
-    """
-    return strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
-
-
 def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-    """A scenario from plain keys that a command has put together; the rest is as `load_scenario` has it."""
-    return validated(overridden(node_of_keys(keys), overrides), "command line")
+    """A scenario from plain keys that a command has put together; their faults name the command line."""
+    root = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
+    return validated(overridden(root, overrides), "command line")
 
 
 def dump_scenario(scenario: Scenario) -> str:
@@ -160,7 +147,7 @@ def validated(
         source: what faults name it.
         folder: where the folder of an aircraft, and files of obstacles, are sought first.
         ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
-        as_flown: as `parse_scenario` takes it.
+        as_flown: it is of a run folder, as `parse_scenario` takes it.
 
     Raises:
         InputError: it is not a scenario.

@@ -6,6 +6,10 @@ courses and wind directions are degrees clockwise from north.
 
 from __future__ import annotations
 
+import ast
+import inspect
+import itertools
+from functools import cache
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
@@ -23,30 +27,15 @@ _UNITS: Final = {
 """Unit of a key by the last part of its name."""
 
 
-def key(doc: str, default: Any = ..., *, derived: str | None = None, **bounds: Any) -> Any:
-    """One key of the format; its unit is told by its name.
-
-    Args:
-        doc: what it means, a sentence for the JSON Schema.
-        default: its default; none makes the key required.
-        derived: instead of a default, how it follows from other keys (filled in by `resolving.resolve`).
-        **bounds: `default_factory`, `gt`, `ge`, `le`, `pattern` and the like, as pydantic's `Field` has them.
-    """
-
-    def describe(schema: dict[str, Any]) -> None:
-        schema.pop("title", None)
-        if derived:
-            del schema["default"]
-
-    if derived:
-        doc, default = f"{doc} Default: {derived}.", None
-    if "default_factory" not in bounds:
-        bounds["default"] = default
-    return Field(description=doc, json_schema_extra=describe, **bounds)
+DERIVED: Final[Any] = None
+"""The default of a key that follows from others, as its docstring says; `resolving.resolve` fills it in."""
 
 
 class Section(BaseModel):
-    """A mapping of the file: frozen, no unknown key, no conversion of types, finite numbers only."""
+    """A mapping of the file: frozen, no unknown key, no conversion of types, finite numbers only.
+
+    The docstring below a key is its description in the JSON Schema; its unit is told by its name.
+    """
 
     model_config = ConfigDict(
         frozen=True, strict=True, extra="forbid", allow_inf_nan=False, protected_namespaces=()
@@ -59,14 +48,36 @@ class Section(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: Any, handler: Any) -> Any:
-        """The JSON Schema, with the unit of every number."""
+        """The JSON Schema, with what each key means and the unit of every number."""
         schema = handler(core_schema)
+        meanings = {name: told for each in reversed(cls.__mro__) for name, told in _docstrings(each).items()}
         for name, own in handler.resolve_ref_schema(schema).get("properties", {}).items():
+            own.pop("title", None)
+            own.setdefault("description", meanings.get(name) or meanings.get(f"{name}_"))
+            if own.get("default", 0) is None or isinstance(own.get("default"), dict):
+                del own["default"]
             kinds = {each.get("type") for each in own.get("anyOf", [own])}
             unit = _UNITS.get(name.rpartition("_")[2], "1" if kinds & {"number", "integer"} else None)
             if unit and not kinds & {None, "string", "object"}:
-                own["unit"] = unit
+                own.setdefault("unit", unit)
         return schema
+
+
+@cache
+def _docstrings(section: type) -> dict[str, str]:
+    """The docstrings below the attributes of a section, by attribute; none of one that has no source text."""
+    try:
+        (tree,) = ast.parse(inspect.getsource(section)).body
+    except (OSError, TypeError):
+        return {}
+    assert isinstance(tree, ast.ClassDef)
+    return {
+        above.target.id: " ".join(below.value.value.split())
+        for above, below in itertools.pairwise(tree.body)
+        if isinstance(above, ast.AnnAssign) and isinstance(above.target, ast.Name)
+        if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+        if isinstance(below.value.value, str)
+    }
 
 
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
@@ -86,15 +97,19 @@ PitchLimit = Annotated[float, Field(ge=-90, le=90)]
 class Origin(Section):
     """Where ENU (0, 0) lies on the WGS84 ellipsoid."""
 
-    latitude_deg: Latitude = key("Geodetic latitude.", 47.0)
-    longitude_deg: Longitude = key("Longitude.", 8.0)
+    latitude_deg: Latitude = 47.0
+    """Geodetic latitude."""
+    longitude_deg: Longitude = 8.0
+    """Longitude."""
 
 
 class Area(Section):
     """The area of operations, known to the planner."""
 
-    bounds_m: Bounds = key("xmin, ymin, xmax, ymax of the area; the aircraft must not leave it.")
-    origin: Origin = key("Where ENU (0, 0) lies.", default_factory=Origin)
+    bounds_m: Bounds
+    """xmin, ymin, xmax, ymax of the area; the aircraft must not leave it."""
+    origin: Origin = Origin()
+    """Where ENU (0, 0) lies."""
 
     @field_validator("bounds_m")
     @classmethod
@@ -110,8 +125,10 @@ class Area(Section):
 class Geodetic(Section):
     """A place on the WGS84 ellipsoid."""
 
-    latitude_deg: Latitude = key("Geodetic latitude.")
-    longitude_deg: Longitude = key("Longitude.")
+    latitude_deg: Latitude
+    """Geodetic latitude."""
+    longitude_deg: Longitude
+    """Longitude."""
 
 
 class MissionSpec(Section):
@@ -123,23 +140,23 @@ class MissionSpec(Section):
         }
     )
 
-    start: Geodetic | None = key("Start by latitude and longitude, in place of start_m.", None)
-    start_m: Point = key("Start: east, north.", derived="where start lies")
-    course_deg: float = key("Course over the ground at the start.", derived="towards the goal", ge=0, le=360)
-    goal: Geodetic | None = key("Goal by latitude and longitude, in place of goal_m.", None)
-    goal_m: Point = key("Goal: east, north.", derived="where goal lies")
-    goal_radius_m: Length = key(
-        "Reached = the aircraft is inside this circle.", derived="the planned turn radius, rounded up to 10 m"
-    )
-    altitude_m: float = key(
-        "Above mean sea level, held throughout.", 300.0, ge=ALTITUDES_M[0], le=ALTITUDES_M[1]
-    )
-    time_limit_s: float = key(
-        "Simulated time after which the flight ends.",
-        derived="ten times the straight line at airspeed less wind and one minute, rounded up to a minute",
-        gt=0,
-        le=1e7,
-    )
+    start: Geodetic | None = None
+    """Start by latitude and longitude, in place of start_m."""
+    start_m: Point = DERIVED
+    """Start: east, north. Default: where start lies."""
+    course_deg: Annotated[float, Field(ge=0, le=360)] = DERIVED
+    """Course over the ground at the start. Default: towards the goal."""
+    goal: Geodetic | None = None
+    """Goal by latitude and longitude, in place of goal_m."""
+    goal_m: Point = DERIVED
+    """Goal: east, north. Default: where goal lies."""
+    goal_radius_m: Length = DERIVED
+    """Reached = the aircraft is inside this circle. Default: the planned turn radius, rounded up to 10 m."""
+    altitude_m: Annotated[float, Field(ge=ALTITUDES_M[0], le=ALTITUDES_M[1])] = 300.0
+    """Above mean sea level, held throughout."""
+    time_limit_s: Annotated[float, Field(gt=0, le=1e7)] = DERIVED
+    """Simulated time after which the flight ends. Default: ten times the straight line at airspeed less wind and one
+    minute, rounded up to a minute."""
 
     @model_validator(mode="after")
     def _has_each_end_once(self) -> MissionSpec:
@@ -155,42 +172,30 @@ class MissionSpec(Section):
 class ActuatorsSpec(Section):
     """Servos of the surfaces and the throttle, all alike; 60 degrees of a servo's arm are full throttle."""
 
-    lag_s: float = key("Time constant of the lag of a surface behind its command.", 0.0, ge=0, le=10)
-    rate_limit_degps: float | None = key(
-        "Fastest motion of a surface. Default: no limit.", None, gt=0, le=100_000
-    )
-    deadband_deg: float = key(
-        "Width of the band about the trim in which a command moves nothing.", 0.0, ge=0, le=90
-    )
+    lag_s: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """Time constant of the lag of a surface behind its command."""
+    rate_limit_degps: Annotated[float | None, Field(gt=0, le=100_000)] = None
+    """Fastest motion of a surface. Default: no limit."""
+    deadband_deg: Annotated[float, Field(ge=0, le=90)] = 0.0
+    """Width of the band about the trim in which a command moves nothing."""
 
 
 class AutopilotSpec(Section):
     """What the autopilot may do, where that is other than the aircraft's card has it."""
 
-    bank_limit_deg: float | None = key(
-        "Largest bank that guidance may command. Default: that of the aircraft's card.", None, ge=5, le=70
-    )
-    roll_rate_limit_degps: float | None = key(
-        "Fastest roll that is commanded. Default: that of the aircraft's card.", None, gt=0, le=720
-    )
-    roll_time_constant_s: float | None = key(
-        "Time constant of roll behind its command. Default: that of the aircraft's card.", None, ge=0.05, le=5
-    )
-    pitch_limits_deg: Annotated[tuple[PitchLimit, PitchLimit], Strict(False)] = key(
-        "Least and largest pitch that is commanded.", (-30.0, 30.0)
-    )
-    least_airspeed_mps: float | None = key(
-        "Below this true airspeed height goes before speed. Default: 0.97 of the lowest of level flight.",
-        None,
-        gt=0,
-        le=1000,
-    )
-    state_latency_s: float = key(
-        "Age of attitude, airspeed and height that the autopilot works with; it and guidance are tuned for it.",
-        derived="navigation.latency_s",
-        ge=0,
-        le=2,
-    )
+    bank_limit_deg: Annotated[float | None, Field(ge=5, le=70)] = None
+    """Largest bank that guidance may command. Default: that of the aircraft's card."""
+    roll_rate_limit_degps: Annotated[float | None, Field(gt=0, le=720)] = None
+    """Fastest roll that is commanded. Default: that of the aircraft's card."""
+    roll_time_constant_s: Annotated[float | None, Field(ge=0.05, le=5)] = None
+    """Time constant of roll behind its command. Default: that of the aircraft's card."""
+    pitch_limits_deg: Annotated[tuple[PitchLimit, PitchLimit], Strict(False)] = (-30.0, 30.0)
+    """Least and largest pitch that is commanded."""
+    least_airspeed_mps: Annotated[float | None, Field(gt=0, le=1000)] = None
+    """Below this true airspeed height goes before speed. Default: 0.97 of the lowest of level flight."""
+    state_latency_s: Annotated[float, Field(ge=0, le=2)] = DERIVED
+    """Age of attitude, airspeed and height that the autopilot works with; it and guidance are tuned for it. Default:
+    navigation.latency_s."""
 
     @model_validator(mode="after")
     def _pitch_in_order(self) -> AutopilotSpec:
@@ -209,23 +214,28 @@ MOST_SHIFT_M: Final = 10.0
 """The centre of gravity lies no further from that of the model."""
 
 
-def _deviation(what: str, most: float = MOST_SHARE) -> Any:
-    return key(f"{what}.", derived="that of the conditions, 0 for ideal", ge=-most, le=most)
+Deviation = Annotated[float, Field(ge=-MOST_SHARE, le=MOST_SHARE)]
 
 
 class DeviationSpec(Section):
     """By how much the flown aircraft is other than its model; guidance and autopilot stay tuned for the model."""
 
-    mass: float = _deviation("Mass and inertias, as a share of the empty weight")
-    thrust: float = _deviation("Thrust, as a share")
-    drag: float = _deviation("Drag, as a share")
-    lift_slope: float = _deviation("Change of the lift with the angle of attack, as a share")
-    elevator: float = _deviation("Effect of the elevator, as a share")
-    aileron: float = _deviation("Effect of the ailerons, as a share")
-    rudder: float = _deviation("Effect of the rudder, as a share")
-    centre_of_gravity_m: float = _deviation(
-        "How far the centre of gravity lies behind that of the model", MOST_SHIFT_M
-    )
+    mass: Deviation = DERIVED
+    """Mass and inertias, as a share of the empty weight. Default: that of the conditions, 0 for ideal."""
+    thrust: Deviation = DERIVED
+    """Thrust, as a share. Default: that of the conditions, 0 for ideal."""
+    drag: Deviation = DERIVED
+    """Drag, as a share. Default: that of the conditions, 0 for ideal."""
+    lift_slope: Deviation = DERIVED
+    """Change of the lift with the angle of attack, as a share. Default: that of the conditions, 0 for ideal."""
+    elevator: Deviation = DERIVED
+    """Effect of the elevator, as a share. Default: that of the conditions, 0 for ideal."""
+    aileron: Deviation = DERIVED
+    """Effect of the ailerons, as a share. Default: that of the conditions, 0 for ideal."""
+    rudder: Deviation = DERIVED
+    """Effect of the rudder, as a share. Default: that of the conditions, 0 for ideal."""
+    centre_of_gravity_m: Annotated[float, Field(ge=-MOST_SHIFT_M, le=MOST_SHIFT_M)] = DERIVED
+    """How far the centre of gravity lies behind that of the model. Default: that of the conditions, 0 for ideal."""
 
 
 class UncertaintySpec(DeviationSpec):
@@ -242,56 +252,43 @@ class UncertaintySpec(DeviationSpec):
 class AircraftSpec(Section):
     """What flies, and how fast."""
 
-    model: str = key(
-        "A name that `wayproof list aircraft` prints, or a folder.",
-        "aerosonde",
-        min_length=1,
-        max_length=1000,
-    )
-    airspeed_mps: float = key(
-        "True airspeed, held throughout; must lie in the aircraft's range.",
-        derived="the aircraft's cruising speed",
-        gt=0,
-        le=1000,
-    )
-    actuators: ActuatorsSpec | None = key(
-        "Servos behind the autopilot. Default: those of the aircraft, else of the conditions, or none.", None
-    )
-    autopilot: AutopilotSpec | None = key(
-        "What the autopilot may do. Default: as the aircraft's card has it.", None
-    )
-    deviation: DeviationSpec | None = key(
-        "How the flown aircraft differs from its model. Default: drawn with the uncertainty, else not at all.",
-        None,
-    )
+    model: Annotated[str, Field(min_length=1, max_length=1000)] = "aerosonde"
+    """A name that `wayproof list aircraft` prints, or a folder."""
+    airspeed_mps: Annotated[float, Field(gt=0, le=1000)] = DERIVED
+    """True airspeed, held throughout; must lie in the aircraft's range. Default: the aircraft's cruising speed."""
+    actuators: ActuatorsSpec | None = None
+    """Servos behind the autopilot. Default: those of the aircraft, else of the conditions, or none."""
+    autopilot: AutopilotSpec | None = None
+    """What the autopilot may do. Default: as the aircraft's card has it."""
+    deviation: DeviationSpec | None = None
+    """How the flown aircraft differs from its model. Default: drawn with the uncertainty, else not at all."""
 
 
 class Sensor(Section):
     """A planar range sensor: each of its beams returns the distance to the nearest obstacle edge within it."""
 
-    beam_deg: float = key(
-        "Width of each beam. Beams that touch leave no room for anything between two; 0: pencil rays.",
-        derived="field_of_view_deg / rays, so that beams touch",
-        ge=0,
-        le=120,
-    )
-    least_width_m: Length = key(
-        "Width of the narrowest obstacle that there is. It counts where beams do not touch: space is taken to be seen "
-        "free only as far as nothing so wide can hide between two of them.",
-        derived="planner.clearance_m",
-    )
-    range_m: Length = key(
-        "Largest distance a beam sees.", derived="ten times the planned turn radius, rounded up to 100 m"
-    )
-    field_of_view_deg: float = key("Centred on the nose.", 360.0, gt=0, le=360)
-    rays: int = key("Beams, their axes spread evenly over the field of view.", 720, ge=3, le=100_000)
-    rate_hz: float = key("Scans per simulated second; must divide simulation.rate_hz.", 2.0, ge=0.01, le=1200)
-    range_noise_m: float = key(
-        "1 sigma of additive Gaussian noise on every range.", 0.0, ge=0, le=MAX_COORDINATE_M
-    )
-    dropout: Share = key("Probability that a beam returns nothing.", 0.0)
-    false_return: Share = key("Probability that a beam returns a random range.", 0.0)
-    latency_s: float = key("A scan becomes available this much later.", 0.0, ge=0, le=60)
+    beam_deg: Annotated[float, Field(ge=0, le=120)] = DERIVED
+    """Width of each beam. Beams that touch leave no room for anything between two; 0: pencil rays. Default:
+    field_of_view_deg / rays, so that beams touch."""
+    least_width_m: Length = DERIVED
+    """Width of the narrowest obstacle that there is. It counts where beams do not touch: space is taken to be seen free
+    only as far as nothing so wide can hide between two of them. Default: planner.clearance_m."""
+    range_m: Length = DERIVED
+    """Largest distance a beam sees. Default: ten times the planned turn radius, rounded up to 100 m."""
+    field_of_view_deg: Annotated[float, Field(gt=0, le=360)] = 360.0
+    """Centred on the nose."""
+    rays: Annotated[int, Field(ge=3, le=100_000)] = 720
+    """Beams, their axes spread evenly over the field of view."""
+    rate_hz: Annotated[float, Field(ge=0.01, le=1200)] = 2.0
+    """Scans per simulated second; must divide simulation.rate_hz."""
+    range_noise_m: Annotated[float, Field(ge=0, le=MAX_COORDINATE_M)] = 0.0
+    """1 sigma of additive Gaussian noise on every range."""
+    dropout: Share = 0.0
+    """Probability that a beam returns nothing."""
+    false_return: Share = 0.0
+    """Probability that a beam returns a random range."""
+    latency_s: Annotated[float, Field(ge=0, le=60)] = 0.0
+    """A scan becomes available this much later."""
 
 
 class PartSpec(Section):
@@ -311,20 +308,16 @@ class PartSpec(Section):
 class PlannerSpec(PartSpec):
     """Which planner, and what it has to keep; the planner's own keys stand beside these."""
 
-    kind: str = key("A name that `wayproof list planners` prints.", "rolling_window")
-    clearance_m: float = key(
-        "Wanted distance from every obstacle edge; the boundary must only not be crossed. Planners keep a fiftieth of "
-        "the turn radius at the least.",
-        derived="the planned turn radius, rounded up to 10 m",
-        ge=0,
-        le=MAX_COORDINATE_M,
-    )
-    compute_latency_s: float = key("A plan takes effect this much after the scan it used.", 0.0, ge=0, le=60)
-    shield: Literal["none", "loiter"] = key(
-        "loiter: a path is flown only as far as a turn from there has been seen to be free; none: as the planner gives "
-        "it. A kind with +shield at its end means loiter.",
-        derived="loiter for rolling_window, none for every other kind",
-    )
+    kind: str = "rolling_window"
+    """A name that `wayproof list planners` prints."""
+    clearance_m: Annotated[float, Field(ge=0, le=MAX_COORDINATE_M)] = DERIVED
+    """Wanted distance from every obstacle edge; the boundary must only not be crossed. Planners keep a fiftieth of the
+    turn radius at the least. Default: the planned turn radius, rounded up to 10 m."""
+    compute_latency_s: Annotated[float, Field(ge=0, le=60)] = 0.0
+    """A plan takes effect this much after the scan it used."""
+    shield: Literal["none", "loiter"] = DERIVED
+    """loiter: a path is flown only as far as a turn from there has been seen to be free; none: as the planner gives it.
+    A kind with +shield at its end means loiter. Default: loiter for rolling_window, none for every other kind."""
 
     @model_validator(mode="before")
     @classmethod
@@ -346,15 +339,10 @@ class PlannerSpec(PartSpec):
 class GuidanceSpec(PartSpec):
     """Which guidance law flies the plan; the law's own keys stand beside these."""
 
-    kind: str = key("A name that `wayproof list guidance` prints.", "preview")
-    follow: Literal["path", "waypoints"] = key(
-        "path: the law follows the plan's lines and arcs; waypoints: straight legs between the corners of the plan, as "
-        "a mission on an autopilot.",
-        "path",
-    )
-    acceptance_radius_m: float | None = key(
-        "A waypoint counts as reached from here, with follow: waypoints. Default: by the rule of the law's autopilot.",
-        None,
-        gt=0,
-        le=100_000,
-    )
+    kind: str = "preview"
+    """A name that `wayproof list guidance` prints."""
+    follow: Literal["path", "waypoints"] = "path"
+    """path: the law follows the plan's lines and arcs; waypoints: straight legs between the corners of the plan, as a
+    mission on an autopilot."""
+    acceptance_radius_m: Annotated[float | None, Field(gt=0, le=100_000)] = None
+    """A waypoint counts as reached from here, with follow: waypoints. Default: by the rule of the law's autopilot."""

@@ -33,9 +33,6 @@ def start_conditions(scenario: ScenarioKeys) -> StartConditions:
     """Where and how a scenario's flight begins: a hair inside the area where the start lies on its boundary.
 
     A given path may begin outside the area; then the flight does, too.
-
-    Args:
-        scenario: its course and airspeed filled in.
     """
     course_deg, airspeed_mps = scenario.mission.course_deg, scenario.aircraft.airspeed_mps
     assert course_deg is not None
@@ -56,12 +53,7 @@ def steady_wind_mps(scenario: ScenarioKeys) -> tuple[float, float]:
 
 
 def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
-    """The air of a scenario.
-
-    Args:
-        scenario: its environment filled in.
-        seed: of the turbulence.
-    """
+    """The air of a scenario, its turbulence from a seed."""
     air = scenario.environment
     wind, vertical = air.wind, air.vertical_gusts
     changes = wind.changes if wind else ()
@@ -84,9 +76,6 @@ def towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
 
 def check_level_flight(scenario: ScenarioKeys) -> None:
     """Trims the aircraft as the flight would, unless its survey shows that it flies level.
-
-    Args:
-        scenario: its course and airspeed filled in; it can hold that near the sea.
 
     Raises:
         KeyFault: it cannot fly level at the altitude.

@@ -48,10 +48,6 @@ CAMPAIGN_SNIPPETS: Final = (
     "{circles: {density_1pkm2: 40, gap_m: 0, radius_m: [0.1, 1000]}}", "{circles: {size_m: [1, 1e6]}}",
     "{circles: {size_m: [1e6, 1e6], density_1pkm2: 0.001, radius_m: [1e-300, 1]}}", "{circles: {room_m: 1e6}}",
     "{forest: {density_1pkm2: 50, trunks: [999, 1000]}}", "{forest: {trunks: [0, 1001]}}",
-    "{u_traps: {density_1pkm2: 1e5, gap_m: 0}}", "{u_traps: {wall_m: 1e6}}",
-    "{u_traps: {width_m: [1e6, 1e6]}}",
-    "{maze: {cells: [60, 50]}}", "{maze: {cells: [300, 300]}}", "{maze: {cells: [1, 1]}}",
-    "{maze: {wall_m: 1e6, corridor_m: 1e-9}}",
     "independent", "1000000", "failures", "[aerosonde_forest, aerosonde_forest]",
     "[/]", "[/dev]", "[.]", "[s.yaml]", "[/dev/zero]", "[no_such.yaml]", "['a\\0b']", "[" + "x/" * 3000 + "]",
 )

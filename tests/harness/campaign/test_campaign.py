@@ -256,9 +256,7 @@ draws: 2
 
 
 def test_worlds_need_no_scenario(place: Path) -> None:
-    runs = runs_of(
-        place, "schema: wayproof/campaign/1\nname: small\nseed: 5\nworlds: [{maze: {cells: [2, 2]}}]\n"
-    )
+    runs = runs_of(place, "schema: wayproof/campaign/1\nname: small\nseed: 5\nworlds: [{circles: {}}]\n")
     assert runs.run(0).scenario == runs.scenario(0).name == "small"
     assert (runs.run(0).planner, runs.run(0).aircraft) == ("rolling_window", "aerosonde")
     assert (runs.scenario(0).planner.kind, runs.scenario(0).aircraft.model) == ("rolling_window", "aerosonde")
@@ -387,9 +385,9 @@ def line_of(begin: str) -> int:
         ("{kind: bug2,", "{kind: bug2, stepps: 3,", "planners[1].stepps: unknown key"),
         ("model: c172p,", "model: nosuch,", "aircraft[1].model: unknown aircraft 'nosuch'"),
         ("airspeed_mps: 50}", "airspeed_mps: 500}", "aircraft[1].airspeed_mps: "),
-        ("draws: 3", "worlds: [{maze: {cells: [2, 2]}, forest: {}}]", "worlds[0]: has forest and maze of"),
+        ("draws: 3", "worlds: [{circles: {}, forest: {}}]", "worlds[0]: has circles and forest of"),
         ("draws: 3", "worlds: [{}]", "worlds[0]: has none of circles"),
-        ("draws: 3", "worlds: [{maze: {}}, {maze: {}}]", "worlds[1]: is called maze as another"),
+        ("draws: 3", "worlds: [{forest: {}}, {forest: {}}]", "worlds[1]: is called forest as another"),
         (
             "draws: 3",
             "worlds: [{forest: {room_m: 20, gap_m: 0, density_1pkm2: 90}}]",
@@ -497,7 +495,7 @@ def test_editors_find_the_campaign_schema_and_one_shipped_campaign_has_every_key
     whole = load_campaign(shipped_campaigns()["everything"]).campaign
     assert whole.model_fields_set == set(type(whole).model_fields)
     generators = {world.generator for world in whole.worlds}
-    assert len(generators) == 4
+    assert len(generators) == 2
     assert {name for each in whole.random.values() for name in each.model_fields_set} == {
         "uniform",
         "normal",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -331,16 +332,10 @@ def test_names_a_file_that_cannot_be_read(
 
 
 @pytest.mark.parametrize(
-    ("start", "course", "told"),
-    [
-        ("[0, 5000]", 270, "such as 0 to 180 deg"),
-        ("[0, 0]", 225, "such as 0 to 90 deg"),
-        ("[5000, 10000]", 0, "such as 90 to 270 deg"),
-        ("[30, 5000]", 270, "such as "),
-    ],
+    ("start", "course"), [("[0, 5000]", 270), ("[0, 0]", 225), ("[5000, 10000]", 0), ("[30, 5000]", 270)]
 )
-def test_a_mission_that_begins_by_leaving_is_refused_with_courses_that_would_do(
-    start: str, course: float, told: str
+def test_a_mission_that_begins_by_leaving_is_refused_with_a_course_that_would_do(
+    start: str, course: float
 ) -> None:
     text = (
         "schema: wayproof/scenario/1\nname: border\narea: {{bounds_m: [0, 0, 10000, 10000]}}\n"
@@ -348,8 +343,9 @@ def test_a_mission_that_begins_by_leaving_is_refused_with_courses_that_would_do(
     )
     with pytest.raises(InputError) as caught:
         parse_scenario(text.format(course), "border.yaml")
-    said = str(caught.value)
-    assert said.startswith("border.yaml:4: mission.course_deg: ")
-    assert told in said
-    assert parse_scenario(text.format(135 if course == 0 else 45))  # a course that was told
+    told = re.fullmatch(
+        r"border.yaml:4: mission.course_deg: .*; must be another, as (\d+)", str(caught.value)
+    )
+    assert told
+    assert parse_scenario(text.format(told[1]))
     assert parse_scenario(text.format(course).replace(start, "[5000, 2000]"))
