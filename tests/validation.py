@@ -22,6 +22,7 @@ from harness.replays.replay import Replay, replay
 from harness.replays.replay_figure import replay_figure
 from harness.replays.wind import fit_wind
 from harness.report.figure_style import svg
+from tests.aircraft.check_cases import rows as check_case_rows
 
 HERE = Path(__file__).parents[1] / "aircraft"
 GRAVITY_MPS2 = 9.80665
@@ -61,6 +62,7 @@ def main(flown: Path) -> None:
         fast=told["flown"]["airspeed_p95_mps"],
         high=told["flown"]["height_error_p95_m"],
         proto="\n".join(_proto(flown)),
+        nasa="\n".join(check_case_rows()),
     )
     (HERE / "VALIDATION.md").write_text(text, encoding="utf-8")
 
