@@ -43,9 +43,11 @@ NAVIGATION = "navigation_error"
 THROTTLE, PLAN_DELAY = "throttle", "plan_delay"
 """Below SERIES: throttle in per cent, how late plans took effect."""
 SENSED = "sensed"
-"""Below WORLD and PLAN: places on edges, each when it was sensed first; shown up to the cursor as well."""
+"""Below WORLD and PLAN: places that the sensor has shown, each once; drawn up to the cursor as well."""
 TRUE = "true_obstacles"
-"""Below WORLD: the standing obstacles as solids from the start on; hidden but in overlays and thin recordings."""
+"""Below WORLD: the standing obstacles as solids."""
+TRACKED, MET = "tracked", "met"
+"""Below PLAN: what the map takes to move (below that `velocity`, the arrows), and where the plan expects to meet it."""
 
 PLANNER_LANE, BANK_LANE, TRACKING_LANE, SHIELD_LANE = "planner", "saturation", "tracking", "shield"
 """Lanes of the state timeline, below STATES; shown in the order of their names."""
@@ -60,7 +62,7 @@ EDGE: Colour = (214, 218, 226)
 MOVING: Colour = (176, 116, 92)
 MOVES: Colour = (255, 150, 96)
 """Colour of obstacles that the map takes to move."""
-MET: Colour = (196, 124, 232)
+MET_DOTS: Colour = (196, 124, 232)
 MOVING_DIM: Colour = (96, 68, 56)
 GOAL: Colour = (52, 160, 92)
 START_LIGHT: Colour = (222, 230, 244)

@@ -24,7 +24,6 @@ from harness.recording.blueprint import (
     SUMMARY,
     THROTTLE,
     TIMELINE,
-    TRUE,
     WORLD,
     Frame,
 )
@@ -169,12 +168,9 @@ def flight_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial3DView:
         middle[1] + away * math.cos(elevation) * math.sin(azimuth),
         middle[2] + away * math.sin(elevation),
     )
-    contents = [f"/{WORLD}/**"]
-    if len(trails) == 1:
-        contents.append(f"- /{WORLD}/{TRUE}/**")
     return rrb.Spatial3DView(
         origin=WORLD,
-        contents=contents,
+        contents=[f"/{WORLD}/**"],
         name="3-D flight",
         background=list(BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),

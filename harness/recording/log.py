@@ -24,25 +24,20 @@ from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, RunningViewer, Sink, recording_stream
 from harness.recording.layout import NOT_THIN, blueprint
-from harness.recording.moving import Changing, Tracked, log_tracked_style
-from harness.recording.plans import log_plan_style, send_plans
+from harness.recording.moving import Changing, Tracked
+from harness.recording.plans import send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
 from harness.recording.scene import (
     lines_2d,
     log_end,
-    log_obstacle,
     log_scene,
     log_summary,
-    log_trail_style,
     quaternions,
-    send_believed,
 )
-from harness.recording.sensed import NewEdges, Sensed, returns_m
+from harness.recording.sensed import Sensed, returns_m
 from harness.recording.series import curves, send_curves, send_levels, thin_curves, thin_rows
-from harness.recording.solids import strips_2d, strips_3d
+from harness.recording.solids import strips_3d
 from harness.recording.states import (
-    AT_LIMIT,
-    FREE,
     TRACKABLE,
     Change,
     Nearness,
@@ -54,6 +49,8 @@ from harness.recording.states import (
     send_events,
     tracking_changes,
 )
+from harness.recording.styles import log_styles
+from harness.recording.trail import Trail
 
 if TYPE_CHECKING:
     from harness.mapping.scan import RangeScan
@@ -106,7 +103,7 @@ class RerunLog:
         span_m = scene.frame.span_m
         self._chord_error_m = THIN_CHORD_ERROR * scene.mission.turn_radius_m if thin else 1e-5 * span_m
         self._scan_period_s = max(SCAN_SHARE * span_m / scene.mission.speed_mps, LEAST_PERIOD_S)
-        self._piece_rows = min(max(round(10 * PIECE_SHARE * span_m / scene.mission.speed_mps), 10), 100)
+        piece_rows = min(max(round(10 * PIECE_SHARE * span_m / scene.mission.speed_mps), 10), 100)
         self._scan: RangeScan | None = None
         self._scan_drawn_s = -math.inf
         self._scans: list[RangeScan] = []
@@ -114,21 +111,17 @@ class RerunLog:
         self._events: list[tuple[float, str, look.Colour]] = []
         self._shield: list[Change] = []  # what it flies, from when on
         self._shield_states: dict[str, look.Colour] = {}
-        self._sensed = Sensed(scene.obstacles, CELL_SHARE * span_m)
+        self._sensed = Sensed(CELL_SHARE * span_m)
         self._told_s = -math.inf
         self._states = States(math.degrees(scene.limits.bank_limit_rad))
-        self._last_point: FloatArray = np.zeros((0, 3))
-        self._believed_point: FloatArray = np.zeros((0, 3))
+        self._trails = [Trail(entity, piece_rows) for entity in (look.FLOWN, look.BELIEVED)]
         self._whole: list[FloatArray] = []
         self._last: Track | None = None
         self._known_to_move, self._tracked = moving, Tracked()
         self._changing = Changing(scene)
         self._nearness = Nearness(scene.limits.clearance_m)
         log_scene(self._rec, scene, thin)
-        log_plan_style(self._rec, thin)
-        if not thin:
-            log_tracked_style(self._rec)
-            self._log_style()
+        log_styles(self._rec, scene, thin)
         self.flush()
 
     def _opened(self, into: Path | str) -> Sink:
@@ -177,7 +170,16 @@ class RerunLog:
             return
         self._send_happened()
         self._send_aircraft(block, position, np.arange(len(block)), MARKER_STEP_ROWS)
-        self._send_trail(block, position)
+        off_m = np.nan_to_num(np.abs(block.cross_track_m))
+        limit_m = self._scene.limits.cross_track_threshold_m
+        self._whole.append(
+            self._trails[0].send(
+                self._rec,
+                block.time_s,
+                position,
+                lambda starts: look.error_colours(np.maximum.reduceat(off_m, starts) / limit_m),
+            )
+        )
         self._changing.send(self._rec, block.time_s)
         for lane, changes in self._states.changes(block).items():
             send_changes(self._rec, lane, changes)
@@ -192,7 +194,17 @@ class RerunLog:
             drawn.pop(f"{empty}/flown", None)
         send_curves(self._rec, drawn, block.time_s)
         if block.has_beliefs:
-            self._believed_point = send_believed(self._rec, block, self._piece_rows, self._believed_point)
+            self._send_believed(block)
+
+    def _send_believed(self, block: Track) -> None:
+        """Shows where the aircraft believed to be, and how far off that was."""
+        assert block.believed_cross_track_m is not None
+        shade = np.array(look.CHOSEN, dtype=np.uint8)
+        self._trails[1].send(
+            self._rec, block.time_s, block.believed_m, lambda starts: np.tile(shade, (len(starts), 1))
+        )
+        errors = {f"{look.NAVIGATION}/flown": block.navigation_error_m}
+        send_curves(self._rec, errors | {look.BELIEVED_OFF: block.believed_cross_track_m}, block.time_s)
 
     def _send_thin(self, block: Track, position_m: FloatArray) -> None:
         """Draws few rows of the track, and the plans meanwhile; events are told at the end."""
@@ -259,25 +271,6 @@ class RerunLog:
         self._scan_drawn_s = scan.time_s
         self._scans.append(scan)
 
-    def _log_style(self) -> None:
-        log_trail_style(self._rec)
-        for entity, style in (
-            (
-                f"{look.PLAN}/scan",
-                rr.Points2D.from_fields(colors=[look.HIT], radii=rr.Radius.ui_points(1.5), draw_order=25),
-            ),
-            (
-                f"{look.PLAN}/{look.SENSED}",
-                rr.Points2D.from_fields(colors=[look.EDGE], radii=rr.Radius.ui_points(1.25), draw_order=12),
-            ),
-            (
-                f"{look.WORLD}/{look.SENSED}",
-                rr.LineStrips3D.from_fields(colors=[look.EDGE], radii=rr.Radius.ui_points(0.75)),
-            ),
-        ):
-            self._rec.log(entity, style, static=True)
-        log_colours(self._rec, look.BANK_LANE, {FREE: look.CALM, AT_LIMIT: look.HIT})
-
     def _send_happened(self) -> None:
         """Sends scans, plans and events since the last time."""
         scans, plans = self._scans, self._plans
@@ -285,41 +278,23 @@ class RerunLog:
         self._tracked.send(self._rec)
         send_plans(self._rec, plans, self._scene.held_m, self._chord_error_m, self._thin)
         if scans:
-            points = [returns_m(scan) for scan in scans]
-            self._rec.send_columns(
-                f"{look.PLAN}/scan",
-                [look.time_column(np.array([scan.time_s for scan in scans]))],
-                rr.Points2D.columns(positions=np.concatenate(points)).partition(
-                    [len(each) for each in points]
-                ),
-            )
-            self._send_new_edges(scans, self._sensed.take(scans, points))
+            self._send_scans(scans)
         events, self._events = self._events, []
         self._told_s = send_events(self._rec, events, self._told_s)
 
-    def _send_new_edges(self, scans: list[RangeScan], new: NewEdges) -> None:
-        """Shows obstacles from their first sight on, and the parts of them that were sensed."""
-        for index, (number, away_m) in new.first.items():
-            time_s = scans[number].time_s
-            self._rec.set_time(look.TIMELINE, duration=look.nanoseconds(time_s))
-            log_obstacle(self._rec, self._scene, index)
-            text = f"obstacle {index} comes into view, {away_m / 1e3:.1f} km away"
-            self._events.append((time_s, text, look.TOLD))
-        rows, counts = np.unique(new.scans, return_counts=True)
-        if not len(rows):
-            return
-        times = [look.time_column(np.array([scans[row].time_s for row in rows]))]
-        self._rec.send_columns(
-            f"{look.PLAN}/{look.SENSED}", times, rr.Points2D.columns(positions=new.points_m).partition(counts)
-        )
-        posts = np.full((len(new.points_m), 2, 3), self._scene.base_m)
-        posts[:, :, :2] = new.points_m[:, None]
-        posts[:, 1, 2] = self._scene.obstacle_top_m
-        self._rec.send_columns(
-            f"{look.WORLD}/{look.SENSED}",
-            times,
-            rr.LineStrips3D.columns(strips=strips_3d(list(posts))).partition(counts),
-        )
+    def _send_scans(self, scans: Sequence[RangeScan]) -> None:
+        """Shows what scans returned, and which of it had not been seen before: dots, and posts in the 3-D view."""
+        times = [look.time_column(np.array([scan.time_s for scan in scans]))]
+        returned = [returns_m(scan) for scan in scans]
+        new = [self._sensed.new(points) for points in returned]
+        for entity, rows in (("scan", returned), (look.SENSED, new)):
+            dots = rr.Points2D.columns(positions=np.concatenate(rows)).partition([len(each) for each in rows])
+            self._rec.send_columns(f"{look.PLAN}/{entity}", times, dots)
+        points_m = np.concatenate(new)
+        posts = np.full((len(points_m), 2, 3), self._scene.base_m)
+        posts[:, :, :2], posts[:, 1, 2] = points_m[:, None], self._scene.obstacle_top_m
+        strips = rr.LineStrips3D.columns(strips=strips_3d(list(posts))).partition([len(each) for each in new])
+        self._rec.send_columns(f"{look.WORLD}/{look.SENSED}", times, strips)
 
     def _send_aircraft(self, block: Track, position_m: FloatArray, rows: IntArray, step: int) -> None:
         """Moves the aircraft in the 3-D view at some rows, and at every so many of these in the plan view."""
@@ -333,29 +308,3 @@ class RerunLog:
             quaternion=quaternions(block.heading_deg[rows], level, level),
         )
         self._rec.send_columns(f"{look.PLAN}/aircraft", [look.time_column(block.time_s[rows])], pose)
-
-    def _send_trail(self, block: Track, position_m: FloatArray) -> None:
-        """Sends the trail in pieces, each at the time of its last point and joined to the one before."""
-        last_row = len(block) - 1
-        ends = np.append(np.arange(self._piece_rows - 1, last_row, self._piece_rows), last_row)
-        step = max(self._piece_rows // 4, 1)
-        pieces = []
-        first = 0
-        for last in ends.tolist():
-            rows = np.append(np.arange(first, last, step), last)
-            pieces.append(np.concatenate((self._last_point, position_m[rows])))
-            self._last_point = position_m[last : last + 1]
-            first = last + 1
-        self._whole.append(np.concatenate(pieces))
-        starts = np.append(0, ends[:-1] + 1)
-        off = np.maximum.reduceat(np.nan_to_num(np.abs(block.cross_track_m)), starts)
-        colours = look.error_colours(off / self._scene.limits.cross_track_threshold_m)
-        times = [look.time_column(block.time_s[ends])]
-        for entity, strips in (
-            (
-                look.PLAN,
-                rr.LineStrips2D.columns(strips=strips_2d([piece[:, :2] for piece in pieces]), colors=colours),
-            ),
-            (look.WORLD, rr.LineStrips3D.columns(strips=strips_3d(pieces), colors=colours)),
-        ):
-            self._rec.send_columns(f"{entity}/{look.FLOWN}", times, strips)

@@ -20,8 +20,6 @@ AHEAD_S = 30.0
 """Arrows end where an obstacle will be after so long."""
 MOTION_STEP_ROWS = 10
 """True obstacles are moved at every so many rows of the track."""
-TRACKED = "tracked"
-"""Below PLAN: outlines; below that `velocity`, the arrows."""
 
 
 class Tracked:
@@ -47,25 +45,17 @@ class Tracked:
         every = [each for _, moving in rows for each in moving]
         outlines = [each.points_m for each in every]
         rec.send_columns(
-            f"{look.PLAN}/{TRACKED}",
+            f"{look.PLAN}/{look.TRACKED}",
             times,
             rr.LineStrips2D.columns(strips=strips_2d(outlines)).partition(counts),
         )
         middles = np.array([outline.mean(axis=0) for outline in outlines]).reshape(-1, 2)
         vectors = AHEAD_S * np.array([each.velocity_mps for each in every]).reshape(-1, 2)
         rec.send_columns(
-            f"{look.PLAN}/{TRACKED}/velocity",
+            f"{look.PLAN}/{look.TRACKED}/velocity",
             times,
             rr.Arrows2D.columns(origins=middles, vectors=vectors).partition(counts),
         )
-
-
-def log_tracked_style(rec: rr.RecordingStream) -> None:
-    """Logs what all of it has in common."""
-    outline = rr.LineStrips2D.from_fields(colors=[look.MOVES], radii=rr.Radius.ui_points(1.5), draw_order=26)
-    rec.log(f"{look.PLAN}/{TRACKED}", outline, static=True)
-    arrow = rr.Arrows2D.from_fields(colors=[look.MOVES], radii=rr.Radius.ui_points(1.0), draw_order=27)
-    rec.log(f"{look.PLAN}/{TRACKED}/velocity", arrow, static=True)
 
 
 class Changing:

@@ -144,7 +144,7 @@ def _is_shared(entity: str) -> bool:
     if entity == f"/__properties/{look.FRAME}":
         return True
     parts = entity.strip("/").split("/")
-    if parts[0] not in (look.PLAN, look.WORLD) or look.SENSED in parts:
+    if parts[0] not in (look.PLAN, look.WORLD):
         return False
     return len(parts) == 1 or parts[1] in SHARED
 

@@ -13,51 +13,6 @@ from harness.recording import blueprint as look
 from harness.recording.scene import fan
 from harness.recording.solids import circle, strips_2d, strips_3d
 
-MET = "met"
-"""Below PLAN: edges of what moves, where the planner expects to meet them."""
-
-STYLES = (
-    # Entity below PLAN, colour, width in points of the screen, order of drawing.
-    ("window", look.WINDOW, 1.5, 22),
-    ("sectors", look.SECTOR, 1.5, 23),
-    ("candidates", look.CANDIDATE, 1.0, 30),
-    ("chosen", look.CHOSEN, 3.0, 40),
-)
-
-
-def log_plan_style(rec: rr.RecordingStream, thin: bool = False) -> None:
-    """Logs what all plans have in common; of a thin recording that of the plan itself."""
-    for entity, colour, width, order in STYLES[-1:] if thin else STYLES:
-        style = rr.LineStrips2D.from_fields(
-            colors=[colour], radii=rr.Radius.ui_points(0.5 * width), draw_order=order
-        )
-        rec.log(f"{look.PLAN}/{entity}", style, static=True)
-    rec.log(
-        f"{look.PLAN}/waypoints",
-        rr.Points2D.from_fields(colors=[look.CHOSEN], radii=rr.Radius.ui_points(3.5), draw_order=41),
-        static=True,
-    )
-    if thin:
-        return
-    rec.log(
-        f"{look.PLAN}/{MET}",
-        rr.Points2D.from_fields(colors=[look.MET], radii=rr.Radius.ui_points(1.0), draw_order=24),
-        static=True,
-    )
-    rec.log(
-        f"{look.PLAN}/guide",
-        rr.Arrows2D.from_fields(colors=[look.GUIDE], radii=rr.Radius.ui_points(1.0), draw_order=35),
-        static=True,
-    )
-    rec.log(
-        f"{look.WORLD}/chosen",
-        rr.LineStrips3D.from_fields(colors=[look.CHOSEN], radii=rr.Radius.ui_points(1.25)),
-        static=True,
-    )
-    for entity, name in ((look.SEARCH, "search"), (look.DELAYS, "plan delay")):
-        points = rr.SeriesPoints(names=[name], colors=[look.CHOSEN], marker_sizes=[2.0])
-        rec.log(f"{look.SERIES}/{entity}", points, static=True)
-
 
 def send_plans(
     rec: rr.RecordingStream,
@@ -102,7 +57,7 @@ def send_plans(
     )
     met = [p.met_m if p else np.zeros((0, 2)) for p in pictures]
     rec.send_columns(
-        f"{look.PLAN}/{MET}",
+        f"{look.PLAN}/{look.MET}",
         times,
         rr.Points2D.columns(positions=np.concatenate(met)).partition([len(each) for each in met]),
     )

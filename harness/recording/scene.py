@@ -15,7 +15,6 @@ import rerun as rr
 from harness.flight.record import FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
-from harness.recording.layout import THIN_SERIES
 from harness.recording.solids import (
     CIRCLE_POINTS,
     circle,
@@ -24,7 +23,6 @@ from harness.recording.solids import (
     outlines,
     rims,
     strips_2d,
-    strips_3d,
 )
 from harness.recording.summary import colours, summary
 
@@ -66,7 +64,6 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
             rec.log(f"{look.WORLD}/outlines", rims(scene, standing, look.OUTLINE, points), static=True)
         log_solids(rec, f"{look.WORLD}/{look.TRUE}", scene, standing, look.OBSTACLE)
     _log_aircraft(rec, scene.frame)
-    _log_series_style(rec, scene, thin)
     if not thin:
         range_m = scene.mission.sensor_range_m
         sensing = lines_2d([circle((0.0, 0.0), range_m)], look.SENSING, 1.0, 20)
@@ -76,71 +73,12 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         log_summary(rec, scene, None)
 
 
-def _log_series_style(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
-    """Names and colours of the time series that the recording has: a layout is made by what there is."""
-    for entity, (name, colour, width) in look.SERIES_STYLE.items():
-        plot = entity.partition("/")[0]
-        too_much = thin and (plot not in THIN_SERIES or entity in look.WHOLE_ONLY)
-        nothing = plot in scene.empty_series or (entity == look.BELIEVED_OFF and not scene.believes)
-        if not too_much and not nothing:
-            style = look.series_lines(name, colour, width)
-            rec.log(f"{look.SERIES}/{entity}", style, static=True)
-
-
-def send_believed(rec: rr.RecordingStream, block: Track, piece_rows: int, last_m: FloatArray) -> FloatArray:
-    """Shows where the aircraft believed to be, piece by piece as the trail, and how far off that was.
-
-    Returns:
-        The last point.
-    """
-    believed = block.believed_m
-    ends = np.append(np.arange(piece_rows - 1, len(block) - 1, piece_rows), len(block) - 1)
-    starts = np.append(0, ends[:-1] + 1)
-    pieces = [np.concatenate((last_m, believed[: ends[0] + 1]))]
-    pieces += [believed[start - 1 : end + 1] for start, end in zip(starts[1:], ends[1:], strict=True)]
-    times = [look.time_column(block.time_s[ends])]
-    colours = np.tile(np.array(look.CHOSEN, dtype=np.uint8), (len(pieces), 1))
-    for entity, strips in (
-        (
-            look.PLAN,
-            rr.LineStrips2D.columns(strips=strips_2d([each[:, :2] for each in pieces]), colors=colours),
-        ),
-        (look.WORLD, rr.LineStrips3D.columns(strips=strips_3d(pieces), colors=colours)),
-    ):
-        rec.send_columns(f"{entity}/{look.BELIEVED}", times, strips)
-    every = [look.time_column(block.time_s)]
-    assert block.believed_cross_track_m is not None
-    for name, values in (
-        (f"{look.NAVIGATION}/flown", block.navigation_error_m),
-        (look.BELIEVED_OFF, block.believed_cross_track_m),
-    ):
-        rec.send_columns(f"{look.SERIES}/{name}", every, rr.Scalars.columns(scalars=values))
-    return believed[-1:]
-
-
-def log_obstacle(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
-    """Shows an obstacle that has come into view: a solid from the current time on."""
-    obstacle = scene.obstacles[index]
-    if obstacle.stands_for_ever:
-        log_solids(rec, f"{look.WORLD}/obstacles/{index}", scene, [obstacle], look.OBSTACLE, static=False)
-        return
-    place = f"moving/{index}/{look.SENSED}"
-    rec.log(f"{look.PLAN}/{place}", lines_2d(outlines(obstacle.shape), look.MOVING, 2.5, 11))
-    log_solids(rec, f"{look.WORLD}/{place}", scene, [obstacle], look.MOVING, static=False)
-
-
 def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
     """Outlines a moving or timed obstacle from the current time on, where it is at its epoch."""
     obstacle = scene.obstacles[index]
     rec.log(f"{look.PLAN}/moving/{index}", lines_2d(outlines(obstacle.shape), look.MOVING_DIM, 1.5, 10))
     rec.log(f"{look.WORLD}/moving/{index}", rims(scene, [obstacle], look.MOVING_DIM))
-
-
-def log_trail_style(rec: rr.RecordingStream) -> None:
-    """Logs what all pieces of a trail have in common."""
-    width = rr.Radius.ui_points(1.25)
-    rec.log(f"{look.PLAN}/{look.FLOWN}", rr.LineStrips2D.from_fields(radii=width, draw_order=50), static=True)
-    rec.log(f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D.from_fields(radii=width), static=True)
+    log_solids(rec, f"{look.WORLD}/moving/{index}", scene, [obstacle], look.MOVING, static=False)
 
 
 def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:

@@ -233,26 +233,24 @@ def test_scans_are_drawn_as_the_aircraft_goes_on(recording: tuple[Path, Flight])
     )
 
 
-def test_obstacles_appear_as_they_are_sensed(tmp_path: Path, make_track: Callable[..., Track]) -> None:
-    """Sees the near edge of the circle from 5 s on, and something that is not there."""
+def test_what_two_scans_in_a_row_have_shown_is_marked_once(
+    tmp_path: Path, make_track: Callable[..., Track]
+) -> None:
+    """The near edge of the circle from 5 s on, and at 5 s something that is not there."""
     near, false = (300.0, 1250.0), (-300.0, 0.0)
     log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
-    for time_s, points in ((0.0, [false]), (5.0, [near, false]), (10.0, [near])):
+    for time_s, points in ((0.0, []), (5.0, [near, false]), (10.0, [near]), (15.0, [near, false])):
         away = np.array([complex(*point) for point in points])
         ranges = np.abs(away)
         log.on_scan(RangeScan(time_s, time_s, 0.0, 0.0, 0.0, 0.0, 0.1, away / ranges, ranges, 2000.0), STATE)
     log.on_block(make_track(201, plan_index=-1))
     log.close()
     entities = read(tmp_path / "a.rrd")
-    assert seconds(entities, "/world/obstacles/0/circles") == [5.0]
-    assert "/world/obstacles/1/polygons" not in entities
-    assert seconds(entities, "/plan/sensed") == seconds(entities, "/world/sensed") == [5.0]
-    np.testing.assert_array_equal(column(entities, "/plan/sensed", "positions"), [[near]])
-    ((post,),) = column(entities, "/world/sensed", "strips")
+    assert seconds(entities, "/plan/sensed") == seconds(entities, "/world/sensed") == [0.0, 5.0, 10.0, 15.0]
+    np.testing.assert_array_equal(column(entities, "/plan/sensed", "positions")[2], [near])
+    assert [len(row) for row in column(entities, "/plan/sensed", "positions")] == [0, 0, 1, 0]
+    (post,) = column(entities, "/world/sensed", "strips")[2]
     np.testing.assert_allclose(post, [(*near, 0.0), (*near, SCENE.obstacle_top_m)], rtol=1e-6)
-    assert [str(text) for (text,) in column(entities, "/events", "text")] == [
-        "t = 5 s: obstacle 0 comes into view, 1.3 km away"
-    ]
 
 
 def test_what_should_not_happen_is_a_warning(tmp_path: Path, make_track: Callable[..., Track]) -> None:
