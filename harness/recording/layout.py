@@ -9,24 +9,8 @@ from typing import Final
 import rerun as rr
 import rerun.blueprint as rrb
 
-from harness.recording.blueprint import (
-    BACKGROUND,
-    BELIEVED,
-    COLOURS,
-    EVENTS,
-    FLOWN,
-    NAVIGATION,
-    PLAN,
-    PLAN_DELAY,
-    SENSED,
-    SERIES,
-    STATES,
-    SUMMARY,
-    THROTTLE,
-    TIMELINE,
-    WORLD,
-    Frame,
-)
+from harness.recording import blueprint as look
+from harness.recording.blueprint import NAVIGATION, PLAN, SERIES, STATES, WORLD, Frame
 
 
 class Layout(rrb.Blueprint):
@@ -63,8 +47,7 @@ def blueprint(
 
     Args:
         frame: what to frame the views on.
-        runs: entity of each run below PLAN and WORLD, ending in a slash; of a single recording the empty
-            string, of a thin one nothing.
+        runs: entity of each run below PLAN and WORLD, ending in a slash; of a single recording "", of a thin one none.
         without: names of time series that have nothing to show.
         follows: whether the cursor stays at the latest time, for a flight that goes on.
         lanes: how many lanes of states there are; default: those of `runs`.
@@ -73,8 +56,8 @@ def blueprint(
     states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())
     below: list[rrb.Container | rrb.View] = [
         _events_view(),
-        rrb.TextDocumentView(origin=SUMMARY, name="Summary"),
-        *([rrb.TextDocumentView(origin=COLOURS, name="Colours")] if len(runs) == 1 else []),
+        rrb.TextDocumentView(origin=look.SUMMARY, name="Summary"),
+        *([rrb.TextDocumentView(origin=look.COLOURS, name="Colours")] if len(runs) == 1 else []),
     ]
     if lanes is None:
         lanes = 3 if len(runs) == 1 else 2 * len(runs)
@@ -92,7 +75,7 @@ def blueprint(
             column_shares=[13, 6],
         ),
         rrb.TimePanel(
-            timeline=TIMELINE,
+            timeline=look.TIMELINE,
             play_state="following" if follows else "paused",
             state="collapsed",
             playback_speed=60.0,
@@ -114,8 +97,8 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
 
 
 PLOTS: Final = (
-    (4, ("cross_track", "altitude_error", NAVIGATION, "speed", THROTTLE)),
-    (4, ("clearance", "search", PLAN_DELAY)),
+    (4, ("cross_track", "altitude_error", NAVIGATION, "speed", look.THROTTLE)),
+    (4, ("clearance", "search", look.PLAN_DELAY)),
     (5, ("bank",)),
 )
 """Rows of the time series: share of the height, and names."""
@@ -127,10 +110,10 @@ NOT_THIN: Final = tuple(name for _, names in PLOTS for name in names if name not
 def _events_view() -> rrb.TextLogView:
     """The log of events: one column, for each event says its time."""
     return rrb.TextLogView(
-        origin=EVENTS,
+        origin=look.EVENTS,
         name="Events",
         columns=rrb.TextLogColumns(
-            timeline_columns=[rrb.encodings.TimelineColumn(TIMELINE, visible=False)],
+            timeline_columns=[rrb.encodings.TimelineColumn(look.TIMELINE, visible=False)],
             text_log_columns=["Body"],
         ),
     )
@@ -147,12 +130,16 @@ def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:
         origin="/",
         contents=[f"/{PLAN}/**"],
         name="Plan view (north up)",
-        background=list(BACKGROUND),
+        background=list(look.BACKGROUND),
         visual_bounds=rrb.VisualBounds2D(
             x_range=[xmin - margin, xmax + margin], y_range=[-ymax - margin, -ymin + margin]
         ),
         overrides={
-            f"{PLAN}/{run}{each}": _up_to_cursor() for run in trails for each in (FLOWN, BELIEVED, SENSED)
+            f"{PLAN}/{run}{each}": _up_to_cursor()
+            for run in trails
+            for each in (look.FLOWN, look.BELIEVED, look.SENSED)
+            for run in trails
+            for each in (look.FLOWN, look.BELIEVED, look.SENSED)
         },
     )
 
@@ -172,12 +159,14 @@ def flight_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial3DView:
         origin=WORLD,
         contents=[f"/{WORLD}/**"],
         name="3-D flight",
-        background=list(BACKGROUND),
+        background=list(look.BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=(0.0, 0.0, 1.0)
         ),
-        overrides={f"{WORLD}/{run}{each}": _up_to_cursor() for run in trails for each in (FLOWN, SENSED)},
+        overrides={
+            f"{WORLD}/{run}{each}": _up_to_cursor() for run in trails for each in (look.FLOWN, look.SENSED)
+        },
     )
 
 
@@ -190,14 +179,13 @@ def series_views(
     """
     wanted = max(frame.clearance_m, 1.0)
     one, whole = len(runs) < 2, len(runs) == 1
+    believed = whole and NAVIGATION not in without
+    # Bank: a little beyond the limit; the less, the nearer the plot is to having room for numbers. The limit stands in
+    # the title: the axis of a low plot, as an overlay of many may have, has no number but 0.
+    limit, most_deg = frame.bank_limit_deg, 1.1 * (frame.bank_limit_deg or 50.0)
+    bank = f"Bank, deg; blue: command, red: limit{'' if limit is None else f' {limit:g}'}"
     rows: list[tuple[str, str, tuple[float, float] | None]] = [
-        (
-            "cross_track",
-            "Cross-track, m; blue: believed"
-            if whole and NAVIGATION not in without
-            else "Cross-track error, m",
-            None,
-        ),
+        ("cross_track", "Cross-track, m; blue: believed" if believed else "Cross-track error, m", None),
         (
             "clearance",
             f"Clearance, m; red: wanted {frame.clearance_m:g}" if one else "Clearance, m",
@@ -206,16 +194,20 @@ def series_views(
         ("altitude_error", "Altitude error, m", None),
         (NAVIGATION, "Navigation error, m", None),
         ("speed", "Speed, m/s; blue: over ground" if one else "Airspeed, m/s", None),
-        (THROTTLE, "Throttle, %", (-5.0, 105.0)),
+        (look.THROTTLE, "Throttle, %", (-5.0, 105.0)),
         ("search", "Search, ms", None),
-        (PLAN_DELAY, "Plan delay, s", None),
-        ("bank", _bank_title(frame, whole) if one else "Bank, deg (right +)", _bank_range_deg(frame)),
+        (look.PLAN_DELAY, "Plan delay, s", None),
+        (
+            "bank",
+            bank + (", violet: pitch" if whole else "") if one else "Bank, deg (right +)",
+            (-most_deg, most_deg),
+        ),
     ]
     return [
         rrb.TimeSeriesView(
             origin=f"{SERIES}/{entity}",
             name=title,
-            background=rrb.archetypes.PlotBackground(color=list(BACKGROUND), show_grid=True),
+            background=rrb.archetypes.PlotBackground(color=list(look.BACKGROUND), show_grid=True),
             axis_x=_whole_flight(),
             axis_y=rrb.ScalarAxis(range=limits) if limits else None,
             plot_legend=rrb.PlotLegend(visible=False)
@@ -242,18 +234,6 @@ def _plots(frame: Frame, runs: Sequence[str], without: Sequence[str]) -> rrb.Ver
     return rrb.Vertical(*rows, row_shares=shares)
 
 
-def _bank_range_deg(frame: Frame) -> tuple[float, float]:
-    """A little beyond the limit: the less, the nearer the plot is to having room for numbers."""
-    limit = 1.1 * (frame.bank_limit_deg or 50.0)
-    return -limit, limit
-
-
-def _bank_title(frame: Frame, whole: bool) -> str:
-    """With the limit as a number: the axis of a low plot, as an overlay of many may have, has none but 0."""
-    limit = "" if frame.bank_limit_deg is None else f" {frame.bank_limit_deg:g}"
-    return f"Bank, deg; blue: command, red: limit{limit}" + (", violet: pitch" if whole else "")
-
-
 def _whole_flight() -> rrb.TimeAxis:
     return rrb.TimeAxis(
         view_range=rr.TimeRange(
@@ -265,5 +245,7 @@ def _whole_flight() -> rrb.TimeAxis:
 def _up_to_cursor() -> rrb.VisibleTimeRanges:
     """Shows all there was of an entity up to the time cursor, not only the latest."""
     return rrb.VisibleTimeRanges(
-        timeline=TIMELINE, start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.cursor_relative()
+        timeline=look.TIMELINE,
+        start=rr.TimeRangeBoundary.infinite(),
+        end=rr.TimeRangeBoundary.cursor_relative(),
     )

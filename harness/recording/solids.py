@@ -106,12 +106,8 @@ def log_solids(
     static: bool = True,
 ) -> None:
     """Logs obstacles as solids: circles as cylinders, polygons as one mesh of prisms, terrain as its rim."""
-    heights = [drawn_heights(scene, each) for each in obstacles]
-    round_ = [
-        (each.shape, *at)
-        for each, at in zip(obstacles, heights, strict=True)
-        if isinstance(each.shape, Circle)
-    ]
+    shapes = [(each.shape, *drawn_heights(scene, each)) for each in obstacles]
+    round_ = [(shape, low, high) for shape, low, high in shapes if isinstance(shape, Circle)]
     if round_:
         rec.log(
             f"{entity}/circles",
@@ -124,13 +120,12 @@ def log_solids(
             ),
             static=static,
         )
-    shapes = [(each.shape, *at) for each, at in zip(obstacles, heights, strict=True)]
-    mesh = _mesh(
-        [prism(each, *at) for each, *at in shapes if isinstance(each, Polygon) and at[1] > at[0]], colour
-    )
+    prisms = [prism(shape, *at) for shape, *at in shapes if isinstance(shape, Polygon) and at[1] > at[0]]
+    mesh = _mesh(prisms, colour)
+    del prisms
     if mesh is not None:
         rec.log(f"{entity}/polygons", mesh, static=static)
-    terrain = [each for each, (low, high) in zip(obstacles, heights, strict=True) if high <= low]
+    terrain = [each for each, (_, low, high) in zip(obstacles, shapes, strict=True) if high <= low]
     if terrain:
         rec.log(f"{entity}/terrain", rims(scene, terrain, colour), static=static)
 

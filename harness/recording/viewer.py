@@ -194,18 +194,9 @@ def _viewer(command: list[str], scratch: Path) -> Iterator[subprocess.Popen[str]
     """Runs a viewer that is ended with the block; settings that allow no statistics lie in `scratch`."""
     settings = scratch / "rerun" / "analytics.json"
     settings.parent.mkdir()
-    settings.write_text(
-        json.dumps(
-            {
-                "analytics_enabled": False,
-                "analytics_id": "",
-                "metadata": {},
-                "config_file_path": str(settings),
-                "data_dir_path": str(scratch),
-            }
-        ),
-        encoding="utf-8",
-    )
+    none = {"analytics_enabled": False, "analytics_id": "", "metadata": {}}
+    kept = {"config_file_path": str(settings), "data_dir_path": str(scratch)}
+    settings.write_text(json.dumps(none | kept), encoding="utf-8")
     environment = {**os.environ, "XDG_CONFIG_HOME": str(scratch), "RUST_LOG": "error"}
     with (
         (scratch / LOG).open("w+", encoding="utf-8") as log,
