@@ -176,7 +176,7 @@ def _show_band(folder: Path) -> None:
 
     band = read_band(folder / "days")
     if band is not None and (folder / RECORDING).is_file():
-        from harness.recording.band import add_band
+        from harness.recording.overlay import add_band
 
         add_band(folder / RECORDING, *band[1:])
 

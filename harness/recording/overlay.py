@@ -1,4 +1,7 @@
-"""Several recordings in one: the world of the first, tracks and series of all, a colour for each."""
+"""Recordings made of recordings: several in one, with a colour for each; and one with the band of many days.
+
+An overlay has the world of the first, tracks and series of all.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,13 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import rerun as rr
 
 from harness.analysis.registry import METRICS
 from harness.analysis.rows import escaped
 from harness.files.errors import RunFolderError
+from harness.flight.record import FloatArray
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import layout_of
@@ -26,6 +31,8 @@ OWN = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 
 COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "grey")
 """Names of the colours in `blueprint.OVERLAY`, for the summary."""
+
+BAND_COLOUR = (120, 120, 120)
 
 FLOWN_LINE = "/flown"
 """Ends the entities of the time series that are drawn of every run."""
@@ -82,6 +89,29 @@ def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:
         return ""
     were = "was" if len(others) == 1 else "were"
     return f"The obstacles are those of {names[0]}; {', '.join(others)} {were} flown in another world."
+
+
+def add_band(recording: Path, left_m: FloatArray, right_m: FloatArray) -> None:
+    """Replaces a recording by one that also shows the edges (n, 2) of the band in which days fly, in both views.
+
+    Raises:
+        RunFolderError: the recording cannot be read.
+        OSError: it cannot be written.
+    """
+    chunks = chunks_of(recording)
+    frame = frame_of(chunks, recording)
+    entities = {chunk.entity_path for chunk in chunks}
+    (identity,) = {entry.recording_id for entry in rr.chunk.RrdReader(str(recording)).recordings()}
+    partial = recording.with_name(f"{recording.stem}.band{recording.suffix}")
+    with recording_stream(identity) as rec:
+        file = RecordingFile(rec, partial, layout_of(frame, entities, runs_in(entities)))
+        rec.send_chunks(chunks)
+        flat = [left_m, right_m]
+        rec.log(f"{look.PLAN}/band", rr.LineStrips2D(flat, colors=BAND_COLOUR), static=True)
+        steep = [np.column_stack((edge, np.full(len(edge), frame.altitude_m))) for edge in flat]
+        rec.log(f"{look.WORLD}/band", rr.LineStrips3D(steep, colors=BAND_COLOUR), static=True)
+        file.end()
+    partial.replace(recording)
 
 
 def send_recording(recording: Path, address: str) -> None:
