@@ -48,7 +48,6 @@ ALLOWED = {
         "gymnasium",
         "rasterio",
         "osmium",
-        "pyogrio",
         "planner",
         "aircraft",
         "wayproof",
@@ -75,7 +74,6 @@ ONLY_IN = {
     ),
     "rasterio": ("harness/world_files/readers/raster.py",),
     "osmium": ("harness/world_files/readers/osm.py",),
-    "pyogrio": ("harness/world_files/readers/vector.py",),
     "distributed": ("harness/campaign/workers.py",),
     "gymnasium": ("harness/learning/environments.py", "harness/front_door/wayproof/environments.py"),
     "datafusion": ("harness/recording/catalog.py",),
@@ -111,7 +109,6 @@ LATE = {
     "datafusion": (),
     "rasterio": (),
     "osmium": (),
-    "pyogrio": (),
 }
 
 LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {

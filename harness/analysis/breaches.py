@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from harness.files.mavlink.fences import Fence
 from harness.flight.record import FloatArray, Track
-from harness.run_files.fences import Fence, Fences
+from harness.run_files.fences import Fences
 from harness.world.world import World
 
 if TYPE_CHECKING:

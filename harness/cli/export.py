@@ -22,12 +22,6 @@ def export(
         Literal["flown", "planned"],
         typer.Option(metavar="WHAT", help="flown: the track; planned: the plans in effect."),
     ] = "flown",
-    tolerance_m: Annotated[
-        float,
-        typer.Option(
-            metavar="T", min=0.0, help="Leaves out points nearer than this to the path, seen from above."
-        ),
-    ] = 0.25,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: standard output.")] = None,
 ) -> int:
     """Writes a run for QGroundControl (plan), MAVLink (waypoints) or maps (geojson, kml).
@@ -41,7 +35,7 @@ def export(
     from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
 
     try:
-        file = exported(load_run(run_dir), form, what, tolerance_m)
+        file = exported(load_run(run_dir), form, what)
     except InputError:
         raise
     except RunFolderError as error:

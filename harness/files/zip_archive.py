@@ -41,22 +41,6 @@ class Unpacked(NamedTuple):
     others: int
 
 
-def kml_of(data: bytes, source: str, most: int) -> tuple[bytes, str, tuple[str, ...]]:
-    """The KML of a file that may be packed as KMZ (OGC 12-007r2), its name for faults, and notes on further files.
-
-    Raises:
-        InputError: it is packed, and cannot be unpacked or has no main KML file.
-    """
-    if not data.startswith(b"PK"):
-        return data, source, ()
-    try:
-        name, inner, others = unpacked(data, ".kml", most, "doc.kml")
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from error
-    notes = (f"{counted(others, 'further KML file')} in the archive passed over",) if others else ()
-    return inner, f"{source} ({name})", notes
-
-
 def unpacked(data: bytes, ending: str, most: int, main: str = "") -> Unpacked:
     """The file with an ending in a ZIP archive.
 

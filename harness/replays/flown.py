@@ -14,7 +14,7 @@ from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 from harness.replays.logs import MAX_BYTES, READERS, read_log
-from harness.run_files.csv_path import ALTITUDES, DEGREES, LOCAL
+from harness.run_files.drawn_lines import ALTITUDES, DEGREES, LOCAL
 
 if TYPE_CHECKING:
     import pyarrow as pa

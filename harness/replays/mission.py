@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import MAX_JSON_BYTES, InputError, read_text
+from harness.files.mavlink.commands import FLOWN, JUMP, WAYPOINT, name_of
 from harness.flight.record import FloatArray
 from harness.replays.logs import Command, logged_mission
-from harness.run_files.mission.commands import FLOWN, JUMP, WAYPOINT, name_of
 from harness.run_files.path_files import read_path
 
 CRUISE: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}

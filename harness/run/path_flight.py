@@ -111,7 +111,7 @@ def planned(
     if given.mission is None:
         limit_m = scenario.trackability.cross_track_m if corner_m is None else corner_m
         tightest = Tightest(frame.least_radius_m(speed), limit_m, wind_mps / speed)
-        way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, True, tightest)
+        way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, tightest)
         profile = _drawn_profile(given, way, scenario, altitude_m, ground)
         bends = _bends(profile, BEND_SHARE * scenario.trackability.altitude_m)
         places = way.waypoints_m[:, 0] + 1j * way.waypoints_m[:, 1]

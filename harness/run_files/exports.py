@@ -1,29 +1,36 @@
 """A run in the files of other tools: missions of QGroundControl and of MAVLink ground stations, GeoJSON, KML.
 
 Commands and frames of missions: https://mavlink.io/en/messages/common.html; the plan: QGroundControl's developer guide,
-Plan file format. A mission is the path's points as waypoints at the altitude that the run held; takeoff and landing are
-left to whoever flies it.
+Plan file format. A mission is the path's points as waypoints at the altitude that the run held; takeoff, landing and
+fences are left to whoever flies it.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from datetime import datetime, timedelta
+from typing import Final
 from xml.etree import ElementTree
 
 import numpy as np
 
+from aircraft.frames import LocalPlane
 from harness.files.errors import RunFolderError
-from harness.files.wording import counted
-from harness.run_files.exported_path import DIGITS, ExportedPath, geodetic, path_of, scenario_of_run
-from harness.run_files.mission.commands import WAYPOINT
+from harness.files.mavlink.commands import WAYPOINT
+from harness.flight.record import FloatArray, IntArray
 from harness.run_files.run_folder import Run
-from harness.scenario.obstacles import Polygon
-from harness.scenario.scenario import Scenario
+from harness.run_files.run_tables import PlanRow
+from harness.scenario.scenario import Scenario, parse_scenario
 from harness.scenario.sections import Origin
 
+FORWARD_M: Final = 0.5
+"""A planned point closer than this to the one before is left out; where a plan takes over, progress restarts."""
+TOLERANCE_M: Final = 0.25
+"""A point that is left out is nearer than this to the path, seen from above."""
+DIGITS: Final = 9
+"""Decimal places of degrees in files: a tenth of a millimetre."""
 MISSIONS: Final = ("plan", "waypoints")
 """Formats that an autopilot flies."""
 ABOVE_SEA: Final = 0
@@ -31,63 +38,113 @@ ABOVE_SEA: Final = 0
 ABSOLUTE: Final = 2
 """QGroundControl's AltitudeMode above mean sea level."""
 PX4, FIXED_WING = 12, 1
-LINE_COLOURS: Final = {"flown": "ff40b3ff", "planned": "ffffc440"}
-"""Colours of the recordings, as KML writes them: alpha, blue, green, red."""
-KML: Final = "http://www.opengis.net/kml/2.2"
-GX: Final = "http://www.google.com/kml/ext/2.2"
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedPath:
+    """A path on the WGS84 ellipsoid. All arrays are equally long.
+
+    Attributes:
+        what: "flown" or "planned".
+        scenario: of the run.
+        degrees: (n, 2) geodetic latitude and longitude, rounded for a file.
+        altitude_m: (n,) above mean sea level.
+        time_s: (n,) simulated time at which the aircraft was there, or followed the plan there.
+        started: date and time of `time_s` 0.
+    """
+
+    what: str
+    scenario: Scenario
+    degrees: FloatArray
+    altitude_m: FloatArray
+    time_s: FloatArray
+    started: datetime
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What an exported file holds, and what its user should know.
-
-    Attributes:
-        content: of the file.
-        notes: sentences about what the format cannot hold, and what does not hold of the run.
-    """
+    """What an exported file holds, and what its user should know, a sentence each."""
 
     content: bytes
     notes: tuple[str, ...] = ()
 
 
-def exported(run: Run, form: str, what: str, tolerance_m: float) -> Exported:
+def exported(run: Run, form: str, what: str) -> Exported:
     """A run as a file of another tool.
 
     Args:
         run: the run.
         form: one of `FORMATS`.
-        what: "flown" or "planned".
-        tolerance_m: how far a point that is left out may be from the path, seen from above.
+        what: "flown": the track; "planned": of every plan the part that was in effect.
 
     Raises:
         RunFolderError: the run has no such path.
     """
-    scenario = scenario_of_run(run)
-    path = path_of(run, scenario, what, tolerance_m)
+    path = _path_of(run, what)
     if len(path.degrees) < 2:
         raise RunFolderError(f"the run in {run.folder} has no {what} path: it is too short")
-    return Exported(FORMATS[form](path, scenario).encode(), tuple(_notes(run, scenario, form)))
-
-
-def _notes(run: Run, scenario: Scenario, form: str) -> list[str]:
-    """What is said of a file beside what it holds."""
-    origin, outcome = scenario.area.origin, run.metrics["outcome"]
-    others = sum(not obstacle.fixed for obstacle in scenario.obstacles)
-    notes = []
+    origin, outcome, notes = path.scenario.area.origin, run.metrics["outcome"], []
     if form in MISSIONS and outcome != "reached":
         ended = f"{outcome.replace('_', ' ')}: {run.metrics['reason']}"
         notes.append(f"the run did not reach its goal, and its mission would not either ({ended})")
     if origin == Origin():  # nobody knows any more whether it was given
         place = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
         notes.append(f"area.origin is the default: the file lies about {place}")
-    if form == "plan" and others:
-        notes.append(f"not among the plan's fences: {counted(others, 'obstacle')} that moves or appears")
-    return notes
+    return Exported(FORMATS[form](path).encode(), tuple(notes))
 
 
-def plan_text(path: ExportedPath, scenario: Scenario) -> str:
-    """A plan of QGroundControl: mission, area and standing obstacles as fences."""
-    held = scenario.mission.altitude_m
+def _path_of(run: Run, what: str) -> ExportedPath:
+    """The path of a run with no more points than it takes (Douglas and Peucker, 1973)."""
+    import shapely
+
+    scenario = parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"), as_flown=True)
+    track, altitude_m = run.track, run.track.up_m
+    points, rows = np.column_stack((track.east_m, track.north_m)), np.arange(len(track))
+    if what == "planned":
+        points, rows = planned_points(run)
+        altitude_m = np.full(len(track), scenario.mission.altitude_m)
+    if len(points) > 1:
+        numbered = shapely.LineString(np.column_stack((points, np.arange(len(points)))))
+        simple = shapely.simplify(numbered, TOLERANCE_M, preserve_topology=False)
+        kept = shapely.get_coordinates(simple, include_z=True)[:, 2].astype(np.int64)
+        points, rows = points[kept], rows[kept]
+    plane = LocalPlane(scenario.area.origin.latitude_deg, scenario.area.origin.longitude_deg)
+    degrees = np.array([plane.geodetic(*point) for point in points.tolist()]).reshape(-1, 2).round(DIGITS)
+    started = datetime.fromisoformat(str(run.manifest["started_utc"]))
+    return ExportedPath(what, scenario, degrees, altitude_m[rows].round(3), track.time_s[rows], started)
+
+
+def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
+    """The plan in effect, row by row of the track.
+
+    Returns:
+        (n, 2) east and north, and the (n,) rows of the track that they go with; both empty where nothing was planned.
+    """
+    track = run.track
+    points = np.full((len(track), 2), np.nan)
+    for plan in run.plans:
+        rows = np.flatnonzero(track.plan_index == plan.plan_index)
+        points[rows] = _on_plan(plan, track.arc_length_m[rows])
+    course = np.radians(track.course_deg)
+    ahead = np.column_stack((np.sin(course), np.cos(course)))
+    kept: list[int] = []
+    for row in np.flatnonzero(np.isfinite(points[:, 0])).tolist():
+        if not kept or (points[row] - points[kept[-1]]) @ ahead[row] > FORWARD_M:
+            kept.append(row)
+    return points[kept], np.array(kept, dtype=np.int64)
+
+
+def _on_plan(plan: PlanRow, arc_length_m: FloatArray) -> FloatArray:
+    """(k, 2) points of a plan at (k,) arc lengths, clamped to its ends."""
+    chord = np.append(0.0, np.cumsum(np.hypot(*np.diff(plan.path_m, axis=0).T)))
+    # The chords are a little shorter than the arcs that arc length is counted along.
+    along = chord * (plan.length_m / chord[-1])
+    return np.column_stack([np.interp(arc_length_m, along, plan.path_m[:, axis]) for axis in (0, 1)])
+
+
+def plan_text(path: ExportedPath) -> str:
+    """A plan of QGroundControl, without fences."""
+    held = path.scenario.mission.altitude_m
     items = [
         {
             "AMSLAltAboveTerrain": None,
@@ -103,7 +160,7 @@ def plan_text(path: ExportedPath, scenario: Scenario) -> str:
         for number, place in enumerate(path.degrees.tolist(), start=1)
     ]
     mission = {
-        "cruiseSpeed": scenario.aircraft.airspeed_mps,
+        "cruiseSpeed": path.scenario.aircraft.airspeed_mps,
         "firmwareType": PX4,
         "globalPlanAltitudeMode": ABSOLUTE,
         "hoverSpeed": 5,
@@ -114,7 +171,7 @@ def plan_text(path: ExportedPath, scenario: Scenario) -> str:
     }
     plan = {
         "fileType": "Plan",
-        "geoFence": fences(scenario),
+        "geoFence": {"circles": [], "polygons": [], "version": 2},
         "groundStation": "QGroundControl",
         "mission": mission,
         "rallyPoints": {"points": [], "version": 2},
@@ -123,9 +180,9 @@ def plan_text(path: ExportedPath, scenario: Scenario) -> str:
     return json.dumps(plan, indent=1) + "\n"
 
 
-def waypoints_text(path: ExportedPath, scenario: Scenario) -> str:
+def waypoints_text(path: ExportedPath) -> str:
     """The mission plain-text file, https://mavlink.io/en/file_formats; item 0 is home, at the path's start."""
-    degrees, held = path.degrees.tolist(), scenario.mission.altitude_m
+    degrees, held = path.degrees.tolist(), path.scenario.mission.altitude_m
     places = [(*degrees[0], 0.0), *((*place, held) for place in degrees)]
     rows = [
         (number, int(number == 0), ABOVE_SEA, WAYPOINT, 0, 0, 0, 0, *place, 1)
@@ -134,40 +191,7 @@ def waypoints_text(path: ExportedPath, scenario: Scenario) -> str:
     return "\n".join(("QGC WPL 110", *("\t".join(map(str, row)) for row in rows))) + "\n"
 
 
-def fences(scenario: Scenario) -> dict[str, Any]:
-    """A plan's geoFence: the area to stay in, and what stands in it for ever to stay out of.
-
-    A fence of QGroundControl has no holes: a polygon with holes is several triangles.
-    """
-    xmin, ymin, xmax, ymax = scenario.area.bounds_m
-    area = [(xmin, ymin), (xmax, ymin), (xmax, ymax), (xmin, ymax)]
-    rings: list[tuple[bool, Sequence[Sequence[float]]]] = [(True, area)]
-    circles = []
-    for obstacle in scenario.obstacles:
-        if obstacle.fixed and obstacle.circle is not None:
-            (center,) = geodetic(scenario, np.array([obstacle.circle.center_m])).tolist()
-            circle = {"center": center, "radius": obstacle.circle.radius_m}
-            circles.append({"circle": circle, "inclusion": False, "version": 1})
-        if obstacle.fixed and obstacle.polygon is not None:
-            rings += [(False, ring) for ring in _without_holes(obstacle.polygon)]
-    polygons = [
-        {"inclusion": inclusion, "polygon": geodetic(scenario, np.array(ring)).tolist(), "version": 1}
-        for inclusion, ring in rings
-    ]
-    return {"circles": circles, "polygons": polygons, "version": 2}
-
-
-def _without_holes(polygon: Polygon) -> list[Sequence[Sequence[float]]]:
-    """Rings, not closed, that together are a polygon without its holes."""
-    if not polygon.holes_m:
-        return [polygon.vertices_m]
-    import shapely
-
-    triangles = shapely.constrained_delaunay_triangles(shapely.Polygon(polygon.vertices_m, polygon.holes_m))
-    return [shapely.get_coordinates(each)[:-1].tolist() for each in shapely.get_parts(triangles)]
-
-
-def geojson_text(path: ExportedPath, scenario: Scenario) -> str:
+def geojson_text(path: ExportedPath) -> str:
     """A LineString after RFC 7946, its altitudes above mean sea level.
 
     Across the antimeridian it goes on beyond 180 degrees, so that no line leads round the earth. Times of single points
@@ -175,52 +199,35 @@ def geojson_text(path: ExportedPath, scenario: Scenario) -> str:
     """
     latitude, longitude = path.degrees.T
     places = np.column_stack((np.unwrap(longitude, period=360.0).round(DIGITS), latitude, path.altitude_m))
+    dates = [path.started + timedelta(seconds=time) for time in path.time_s.tolist()]
+    times = [each.isoformat(timespec="milliseconds").replace("+00:00", "Z") for each in dates]
     feature = {
         "type": "Feature",
         "properties": {
-            "name": path.name,
+            "name": path.scenario.name,
             "what": path.what,
-            "airspeed_mps": scenario.aircraft.airspeed_mps,
-            "coordinateProperties": {"times": path.dates, "time_s": path.time_s.round(3).tolist()},
+            "airspeed_mps": path.scenario.aircraft.airspeed_mps,
+            "coordinateProperties": {"times": times, "time_s": path.time_s.round(3).tolist()},
         },
         "geometry": {"type": "LineString", "coordinates": places.tolist()},
     }
     return json.dumps({"type": "FeatureCollection", "features": [feature]}) + "\n"
 
 
-def kml_text(path: ExportedPath, scenario: Scenario) -> str:
-    """A document of KML 2.2, https://www.ogc.org/standard/kml: what was planned as a line, what was flown as a track.
-
-    A track (gx:Track of Google's extension) has a date for every point.
-    """
-    root = ElementTree.Element("kml", {"xmlns": KML, "xmlns:gx": GX})
-    placemark = _added(_added(root, "Document"), "Placemark")
-    _added(placemark, "name", f"{path.name}, {path.what}")
-    style = _added(_added(placemark, "Style"), "LineStyle")
-    _added(style, "color", LINE_COLOURS[path.what])
-    _added(style, "width", "3")
-    line = _added(placemark, "LineString" if path.what == "planned" else "gx:Track")
-    _added(line, "altitudeMode", "absolute")
-    rows = [(str(b), str(a), str(up)) for (a, b), up in zip(path.degrees, path.altitude_m, strict=True)]
-    if path.what == "planned":
-        _added(line, "coordinates", " ".join(map(",".join, rows)))
-    else:
-        for date in path.dates:
-            _added(line, "when", date)
-        for row in rows:
-            _added(line, "gx:coord", " ".join(row))
+def kml_text(path: ExportedPath) -> str:
+    """A document of KML 2.2 with one line, its altitudes above mean sea level: https://www.ogc.org/standard/kml."""
+    rows = zip(path.degrees.tolist(), path.altitude_m.tolist(), strict=True)
+    root = ElementTree.Element("kml", {"xmlns": "http://www.opengis.net/kml/2.2"})
+    placemark = ElementTree.SubElement(ElementTree.SubElement(root, "Document"), "Placemark")
+    ElementTree.SubElement(placemark, "name").text = f"{path.scenario.name}, {path.what}"
+    line = ElementTree.SubElement(placemark, "LineString")
+    ElementTree.SubElement(line, "altitudeMode").text = "absolute"
+    ElementTree.SubElement(line, "coordinates").text = " ".join(f"{b},{a},{up}" for (a, b), up in rows)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _added(parent: ElementTree.Element, tag: str, text: str | None = None) -> ElementTree.Element:
-    """A new element in another."""
-    child = ElementTree.SubElement(parent, tag)
-    child.text = text
-    return child
-
-
-FORMATS: Final[dict[str, Callable[[ExportedPath, Scenario], str]]] = {
+FORMATS: Final[dict[str, Callable[[ExportedPath], str]]] = {
     "plan": plan_text,
     "waypoints": waypoints_text,
     "geojson": geojson_text,

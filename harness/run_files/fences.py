@@ -5,69 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 from harness.files.input_file import InputError
+from harness.files.mavlink.fences import Fence, Place
 
 if TYPE_CHECKING:
     from shapely import Geometry
-
-Place = tuple[float, float]
-
-CIRCLE_SIDES: Final = 720
-"""A circle is compared as a polygon of so many sides: one of 10 km is off by 0.1 m."""
-
-
-@dataclass(frozen=True)
-class Fence:
-    """An area to stay out of, or inside of.
-
-    Attributes:
-        name: where in its file it stands.
-        inclusion: to stay inside of; else to stay out of.
-        rings: the outer ring and its holes, (east, north) in metres, or latitude and longitude in degrees while it
-            is being read; empty for a circle.
-        center: of a circle, likewise.
-        radius_m: of a circle.
-    """
-
-    name: str
-    inclusion: bool
-    rings: tuple[tuple[Place, ...], ...] = ()
-    center: Place | None = None
-    radius_m: float = 0.0
-
-    @property
-    def kind(self) -> str:
-        """`inclusion` or `exclusion`."""
-        return "inclusion" if self.inclusion else "exclusion"
-
-    @property
-    def places(self) -> tuple[Place, ...]:
-        """All its positions."""
-        corners = tuple(place for ring in self.rings for place in ring)
-        return corners if self.center is None else (self.center,)
-
-    @cached_property
-    def area(self) -> Geometry:
-        """What it encloses."""
-        import shapely
-
-        if self.center is not None:
-            return shapely.Point(self.center).buffer(self.radius_m, quad_segs=CIRCLE_SIDES // 4)
-        return shapely.Polygon(self.rings[0], self.rings[1:])
-
-    def moved(self, place: Callable[[Place], Place]) -> Fence:
-        """The same fence with every position put elsewhere."""
-        rings = tuple(tuple(map(place, ring)) for ring in self.rings)
-        return replace(self, rings=rings, center=place(self.center) if self.center is not None else None)
-
-    def plain(self) -> dict[str, Any]:
-        """Its content for `metrics.json`."""
-        shape: dict[str, Any] = {"rings_m": [[list(point) for point in ring] for ring in self.rings]}
-        if self.center is not None:
-            shape = {"center_m": list(self.center), "radius_m": self.radius_m}
-        return {"name": self.name, "kind": self.kind, **shape}
 
 
 @dataclass(frozen=True)

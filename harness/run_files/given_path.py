@@ -30,8 +30,6 @@ SHORTEST_M: Final = 1e-6
 PAST_RAD: Final = np.radians(140.0)
 """A sharper corner is flown past and back: from there on an aircraft that does so comes nearer to both legs (flown: at
 140 degrees 118 m off against 125 m, at 150 degrees 178 m against 128 m)."""
-SHARPEST_RAD: Final = np.pi - 1e-3
-"""A sharper corner leads back: it has no arc that touches both legs."""
 FLATTEST: Final = 1e-12
 """Distance of the flattest corner from its arc, in radii."""
 LIMIT_SHARE: Final = 0.9
@@ -71,8 +69,8 @@ class CutCorner:
         east_m: where it is.
         north_m: where it is.
         turn_deg: the turn asked for, positive to the left.
-        radius_m: of the arc that is flown instead; 0 where the path leads back and there is none.
-        cut_m: how far from the corner that arc passes; 0 where there is none.
+        radius_m: of the arc that is flown instead; 0 where a loiter's circle is joined without one.
+        cut_m: how far from the corner that arc passes.
         arc_length_m: distance along the flown path to the place that belongs to the corner.
         half_m: the flown path is off the two legs for no longer than this before and after that place.
     """
@@ -94,7 +92,7 @@ class FlyBy:
     Attributes:
         waypoints_m: (k, 2) those of the points given that are needed.
         segments: (n, 6) as in `planner.interface.Path`.
-        corners: those that are cut by more than was left free, or have no arc, in order.
+        corners: those that are cut by more than was left free, in order.
         kept: (k,) which of the points given those are.
         stations_m: (k,) arc length of `segments` that belongs to each.
         given_m: (m, 3) the polyline once more, with the points where arcs touch it: east, north, and the arc length of
@@ -119,7 +117,6 @@ def fly_by(
     points_m: FloatArray,
     radius_m: float | FloatArray,
     free_cut_m: float | FloatArray,
-    overshoot: bool = False,
     tightest: Tightest | None = None,
     every: bool = False,
 ) -> FlyBy:
@@ -128,14 +125,13 @@ def fly_by(
     The arc at a corner of angle `a` that touches the legs `t` before and after it has the radius
     `t / tan(a / 2)` and passes the corner at `radius (1 / cos(a / 2) - 1)`. It is as wide as it can be without
     passing further off than `free_cut_m`, but not tighter than `radius_m` where there is room for that.
-    Neighbouring corners share the leg between them in proportion to what they need.
+    Neighbouring corners share the leg between them in proportion to what they need. Corners sharper than `PAST_RAD` are
+    flown past the next leg and back onto it, the turn beginning one radius before the corner.
 
     Args:
         points_m: (m, 2) points, not all in one place.
         radius_m: smallest radius that the aircraft should fly, > 0; (m,) if it differs from point to point.
         free_cut_m: a corner may be passed at this distance wherever that makes its arc wider, > 0; likewise.
-        overshoot: corners sharper than `PAST_RAD` are flown past the next leg and back onto it, the turn beginning one
-            radius before the corner.
         tightest: corners that would be cut by more than `LIMIT_SHARE` of what they may be passed at are flown more
             tightly, down to this; None: they are not.
         every: every corner is among the corners, however little it is cut.
@@ -147,12 +143,11 @@ def fly_by(
     length = np.abs(np.diff(place))
     ahead = np.diff(place) / length
     turn = np.angle(ahead[1:] / ahead[:-1])
-    shape = _shapes(turn, overshoot)
+    shape = _shapes(turn)
     wanted = np.where(shape.past, least, np.maximum(least, free / np.maximum(shape.cut, FLATTEST)))
     if tightest is not None:
         wanted = _tightened(wanted, shape, ahead, turn, tightest.of(kept, len(points_m)))
     radius = np.minimum(_fitting(length, least, shape), wanted)
-    radius[shape.back] = 0.0
 
     before, after = radius * shape.before, radius * shape.after
     straight = length - np.append(before, 0.0) - np.append(0.0, after)
@@ -171,12 +166,12 @@ def fly_by(
             rows += arcs
     # Where along the rounded path each turn begins, passes its corner, ends.
     middles, over = begun + radius * shape.corner, begun + radius * (np.abs(turn) + 2.0 * shape.back_turn)
-    cut = np.where(shape.back, 0.0, radius * shape.cut)
+    cut = radius * shape.cut
     half = np.maximum(middles - begun, over - middles)
     told = np.column_stack((points[1:-1], np.degrees(turn), radius, cut, middles, half))
     corners = tuple(
         CutCorner(int(kept[i + 1]), *told[i].tolist())
-        for i in np.flatnonzero(every | shape.back | (cut > free * (1.0 + 1e-9))).tolist()
+        for i in np.flatnonzero(every | (cut > free * (1.0 + 1e-9))).tolist()
     )
     stations = np.concatenate(([0.0], middles, [station]))
     inner = np.stack(
@@ -192,7 +187,6 @@ class _Shapes(NamedTuple):
     """How corners are rounded, each (k,), lengths in radii of the turn.
 
     Attributes:
-        back: no arc is flown: the path leads back.
         past: flown past the next leg and back onto it.
         before: where the turn begins before the corner.
         after: where it ends after it.
@@ -202,7 +196,6 @@ class _Shapes(NamedTuple):
         back_turn: angle (rad) by which it turns too far, and back.
     """
 
-    back: NDArray[np.bool_]
     past: NDArray[np.bool_]
     before: FloatArray
     after: FloatArray
@@ -212,7 +205,7 @@ class _Shapes(NamedTuple):
     back_turn: FloatArray
 
 
-def _shapes(turn: FloatArray, overshoot: bool) -> _Shapes:
+def _shapes(turn: FloatArray) -> _Shapes:
     """The shapes of corners by their angles.
 
     A turn that begins one radius before a corner of angle `a` has its centre at (sin a - cos a, sin a + cos a), in
@@ -220,15 +213,13 @@ def _shapes(turn: FloatArray, overshoot: bool) -> _Shapes:
     and two radii from the first.
     """
     angle = np.abs(turn)
-    past = overshoot & (angle > PAST_RAD)
-    back = ~past & (angle > SHARPEST_RAD)
-    half = 0.5 * np.where(back | past, 0.0, angle)
+    past = angle > PAST_RAD
+    half = 0.5 * np.where(past, 0.0, angle)
     along, beside = np.sin(angle) - np.cos(angle), np.sin(angle) + np.cos(angle)
     share = np.clip(0.5 * (1.0 + beside), -1.0, 1.0)
     tangent = np.tan(half)
     cut = np.where(past, np.sqrt(2.0) - 1.0, 1.0 / np.cos(half) - 1.0)
     return _Shapes(
-        back=back,
         past=past,
         before=np.where(past, 1.0, tangent),
         after=np.where(past, along + 2.0 * np.sqrt(1.0 - share * share), tangent),

@@ -8,7 +8,7 @@ import re
 from typing import Any, Final
 
 from harness.files.input_file import InputError
-from harness.run_files.path_as_read import PathAsRead
+from harness.run_files.drawn_lines import PathAsRead
 
 FLYING_MPS: Final = 12.0
 """Before the first fix and after the last at this ground speed the aircraft rolls, or stands."""

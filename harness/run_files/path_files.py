@@ -16,20 +16,15 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError, decoded, read_data
+from harness.files.mavlink.fences import Place
+from harness.files.mavlink.items import HOME, WPL
 from harness.files.wording import counted
-from harness.files.zip_archive import kml_of
-from harness.run_files.csv_path import read_csv
-from harness.run_files.fences import Fences, Place, in_plane
-from harness.run_files.geojson_path import read_geojson
+from harness.run_files.drawn_lines import PathAsRead, read_csv, read_geojson, read_gpx, read_kml
+from harness.run_files.fences import Fences, in_plane
 from harness.run_files.given_path import SAME_PLACE_M, FloatArray
 from harness.run_files.igc_path import read_igc
-from harness.run_files.map_paths import read_gpx, read_kml
-from harness.run_files.mission.items import HOME, MissionAsRead
-from harness.run_files.mission.plan_file import read_plan
-from harness.run_files.mission.program import program
-from harness.run_files.mission.steps import Program
-from harness.run_files.mission.wpl_file import WPL, read_waypoints
-from harness.run_files.path_as_read import PathAsRead
+from harness.run_files.mission.mission_files import MissionAsRead, read_plan, read_waypoints
+from harness.run_files.mission.program import Program, program
 from harness.scenario.sections import ALTITUDES_M
 
 MAX_BYTES: Final = 64_000_000
@@ -38,12 +33,11 @@ LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
     ".csv": read_csv,
     ".geojson": read_geojson,
     ".json": read_geojson,
-    ".kml": read_kml,
-    ".kmz": read_kml,
     ".gpx": read_gpx,
     ".igc": read_igc,
 }
 """Readers of drawn lines and recorded tracks by the ending of a file's name."""
+KML: Final = (".kml", ".kmz")
 MISSIONS: Final[dict[str, Callable[[str, str], MissionAsRead]]] = {
     ".plan": read_plan,
     ".mission": read_plan,
@@ -52,8 +46,6 @@ MISSIONS: Final[dict[str, Callable[[str, str], MissionAsRead]]] = {
 }
 """Readers of missions, likewise."""
 JSON_ENDINGS: Final = (".json", ".txt", ".mission")
-PACKED: Final = (".kml", ".kmz")
-"""Endings of KML files, packed or not."""
 PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"|"groundStation"\s*:\s*"MissionPlanner"')
 """What stands in every plan of QGroundControl, or mission of Mission Planner in JSON, whatever the name of its file."""
 
@@ -100,32 +92,29 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
         InputError: the file cannot be read, is not of its format, or holds no path that can be flown.
     """
     source, suffix = str(path), path.suffix.lower()
-    if suffix not in (*LINES, *MISSIONS):
-        raise InputError(f"{path}: is none of {', '.join((*LINES, *MISSIONS))}; save the path as one of them")
-    text, name, notes = _text_of(path, suffix)
-    mission = _mission_reader(text, suffix)
-    if mission is not None:
-        return _of_mission(mission(text, source), origin_deg)
-    found = LINES[suffix](text, name)
+    every = (*LINES, *KML, *MISSIONS)
+    if suffix not in every:
+        raise InputError(f"{path}: is none of {', '.join(every)}; save the path as one of them")
+    data = read_data(path, MAX_BYTES, "a path")
+    if suffix in KML:
+        found = read_kml(data, source, MAX_BYTES)
+    elif suffix == ".igc":  # loggers write names in Latin-1
+        found = read_igc(data.decode("latin-1"), source)
+    else:
+        text = decoded(data, source, "a path", utf_16=True)
+        mission = _mission_reader(text, suffix)
+        if mission is not None:
+            return _of_mission(mission(text, source), origin_deg)
+        found = LINES[suffix](text, source)
     if len(found.positions) < 2:
         raise InputError(f"{path}: has {counted(len(found.positions), 'point')}; a path has at least 2")
     names = [f"point {number}" for number in range(len(found.positions))]
-    origin, place = _plane(found.local, found.positions, names, origin_deg, source)
+    origin, place = (None, _as_it_is) if found.local else _plane(found.positions, names, origin_deg, source)
     points = np.array([place(position) for position in found.positions])
     altitudes = np.array(() if any_altitude else found.altitudes_m)
     _check_points(points, () if found.above_ground else altitudes.tolist(), source)
     fences = _fences(found.fences, origin, place, source)
-    notes = (*found.notes, *notes)
-    return PathAsGiven(source, points, origin, altitudes, found.above_ground, None, fences, notes)
-
-
-def _text_of(path: Path, suffix: str) -> tuple[str, str, tuple[str, ...]]:
-    """The text of a path's file, what it is called in faults, and notes on what was packed with it."""
-    data = read_data(path, MAX_BYTES, "a path")
-    if suffix == ".igc":  # loggers write names in Latin-1
-        return data.decode("latin-1"), str(path), ()
-    data, name, notes = kml_of(data, str(path), MAX_BYTES) if suffix in PACKED else (data, str(path), ())
-    return decoded(data, name, "a path", utf_16=True), name, notes
+    return PathAsGiven(source, points, origin, altitudes, found.above_ground, None, fences, found.notes)
 
 
 def _mission_reader(text: str, suffix: str) -> Callable[[str, str], MissionAsRead] | None:
@@ -141,12 +130,12 @@ def _of_mission(found: MissionAsRead, origin_deg: Place | None) -> PathAsGiven:
     source, flown = found.source, program(found)
     placed = [(f"item {step.item}", step.position) for step in flown.steps if step.position is not None]
     names, positions = zip(*placed, strict=True)
-    origin, place = _plane(flown.local, positions, names, origin_deg, source)
+    origin, place = _plane(positions, names, origin_deg, source)
     points = np.array([place(position) for position in positions])
     _check_span(points, source)
     steps = tuple(replace(step, position=step.position and place(step.position)) for step in flown.steps)
-    notes, unknown = found.notes, found.home is None and not flown.local
-    if unknown and any(step.height_m is not None and step.above == HOME for step in flown.steps):
+    notes = found.notes
+    if found.home is None and any(step.height_m is not None and step.above == HOME for step in flown.steps):
         notes = (*notes, "has no home: altitudes above home are counted from the sea")
     fences = _fences(found.fences, origin, place, source)
     return PathAsGiven(
@@ -180,12 +169,14 @@ def given_points(points: Any) -> PathAsGiven:
     return PathAsGiven("path", points, None, altitudes)
 
 
+def _as_it_is(place: Place) -> Place:
+    return place
+
+
 def _plane(
-    local: bool, positions: Sequence[Place], names: Sequence[str], origin: Place | None, source: str
-) -> tuple[Place | None, Callable[[Place], Place]]:
-    """Latitude and longitude of the origin, None for positions in metres, and what puts a position into the plane."""
-    if local:
-        return None, lambda place: place
+    positions: Sequence[Place], names: Sequence[str], origin: Place | None, source: str
+) -> tuple[Place, Callable[[Place], Place]]:
+    """Latitude and longitude of the origin, and what puts a position into the plane."""
     for name, position in zip(names, positions, strict=True):
         if not _on_earth(position):
             raise InputError(

@@ -17,12 +17,12 @@ from harness.world_files.readers import (
     fences,
     footprints,
     geo_json,
+    kml,
     numpy_dem,
     occupancy,
     open_air,
     osm,
     raster,
-    vector,
     zones,
 )
 
@@ -35,7 +35,7 @@ KINDS: Final[dict[str, Callable[[Path, Reading], Contents]]] = {
     "osm_pbf": osm.read_pbf,
     "cityjson": city_json.read,
     "geojson": geo_json.read,
-    "kml": vector.read_kml,
+    "kml": kml.read,
     "openair": open_air.read,
     "ed269": zones.read_ed269,
     "ed318": zones.read_ed318,
@@ -43,7 +43,6 @@ KINDS: Final[dict[str, Callable[[Path, Reading], Contents]]] = {
     "ardupilot_fence": fences.read_ardupilot,
     "ros_map": occupancy.read_ros,
     "moving_ai": occupancy.read_moving_ai,
-    "vector": vector.read,
 }
 """Readers by the name of their kind."""
 
@@ -56,7 +55,8 @@ GIVEN_UP: Final = {
     **{".pgm": IMAGE, ".png": IMAGE, ".world": GAZEBO, ".sdf": GAZEBO, ".igc": FLIGHT, ".gpx": FLIGHT},
     ".scen": "a list of MovingAI problems; give the .map file that it names",
     ".npy": "a plain array; save it as GeoTIFF or ESRI ASCII grid",
-    ".dxf": "a drawing without a place on earth; give GeoPackage or GeoJSON",
+    ".dxf": "a drawing without a place on earth; give GeoJSON",
+    **dict.fromkeys((".gpkg", ".shp", ".fgb"), "a vector file; make GeoJSON of it (ogr2ogr a.geojson FILE)"),
     ".las": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
 }
 """Files that are not read, by ending, with what would do."""
@@ -146,7 +146,7 @@ def _binary(path: Path, first: bytes, ending: str) -> str | None:
         return "srtm"
     if b"OSMHeader" in first[:64]:
         return "osm_pbf"
-    return "vector" if ending in (".gpkg", ".shp", ".fgb") and first[:1] != b"<" else None
+    return None
 
 
 def _text(path: Path, first: bytes) -> str | None:

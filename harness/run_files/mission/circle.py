@@ -21,20 +21,12 @@ SHORTEST_M: Final = 1e-6
 NEAR: Final = 1e-9
 ON_CIRCLE_M: Final = 0.01
 """A place no further from a circle lies on it."""
-STEP_RAD: Final = math.radians(2.0)
-"""Angle between places round a circle."""
 SAME_DIRECTION: Final = 1e-5
 """Directions that differ by less, in radians, are no corner."""
 
 
 class Circle(NamedTuple):
-    """A circle that is gone round.
-
-    Attributes:
-        center: of it.
-        radius_m: of it.
-        side: +1 to the left (counter-clockwise), -1 to the right.
-    """
+    """A circle that is gone round, `side` +1 to the left (counter-clockwise), -1 to the right."""
 
     center: complex
     radius_m: float
@@ -60,13 +52,6 @@ class Circle(NamedTuple):
     def direction(self, place: complex) -> complex:
         """Direction of flight at a place of it."""
         return (place - self.center) / abs(place - self.center) * 1j * self.side
-
-    def round_from(self, begin: complex, end: complex) -> tuple[np.ndarray, np.ndarray]:
-        """Places round it from one of its places to another, and how far it is from each to the end."""
-        swept = max(self.side * cmath.phase((end - self.center) / (begin - self.center)), 0.0)
-        turned = np.linspace(0.0, swept, 2 + int(swept / STEP_RAD))
-        places = self.center + (begin - self.center) * np.exp(1j * self.side * turned)
-        return places, self.radius_m * (swept - turned)
 
     def has(self, pose: Pose) -> bool:
         """Whether a pose is on it, and goes round it."""
@@ -119,15 +104,6 @@ def sampled(row: Row, pieces: int) -> tuple[np.ndarray, np.ndarray]:
     """Places along a segment, east + i north, both ends among them, and how far along it each is."""
     along = np.linspace(0.0, row[5], pieces + 1)
     return np.array([end_of((*row[:5], part))[0] for part in along.tolist()]), along
-
-
-def passes(rows: Sequence[Row], place: complex) -> tuple[float, float]:
-    """Where along a way it is nearest to a place, and how far off it is there."""
-    pieces = [sampled(row, 49) for row in rows]
-    begun = np.cumsum([0.0, *(row[5] for row in rows)])
-    along = np.concatenate([begin + each for begin, (_, each) in zip(begun, pieces, strict=False)])
-    off = np.abs(np.concatenate([places for places, _ in pieces]) - place)
-    return float(along[off.argmin()]), float(off.min())
 
 
 def onto(pose: Pose, circle: Circle, turn_m: float) -> list[Row]:

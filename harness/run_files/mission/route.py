@@ -16,9 +16,10 @@ from typing import Final
 import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
-from aircraft.guidance.mission_legs import MissionLeg, straight
+from aircraft.guidance.mission_legs import MissionLeg
 from aircraft.interface import Route
 from harness.files.input_file import InputError
+from harness.files.mavlink.items import GROUND
 from harness.run_files.given_path import PAST_RAD, SAME_PLACE_M, CutCorner, FloatArray, FlyBy
 from harness.run_files.mission.circle import (
     SAME_DIRECTION,
@@ -30,12 +31,10 @@ from harness.run_files.mission.circle import (
     end_of,
     length_of,
     onto,
-    passes,
     sampled,
     towards,
 )
-from harness.run_files.mission.items import GROUND
-from harness.run_files.mission.steps import Loiter, MissionStep, Program
+from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.vertices import (
     Flying,
     MissionRoute,
@@ -50,24 +49,17 @@ from harness.run_files.mission.vertices import (
 LANDING_HEIGHT_M: Final = 15.0
 """A landing is flown down to this height above its place; flare and touchdown are not."""
 CLIMB_SHARE: Final = 0.8
-"""A loiter to an altitude and a climb straight on are as long as this share of the fastest climb takes."""
+"""A loiter to an altitude is as long as this share of the fastest climb takes."""
 ARC_RAD: Final = math.pi / 2
 """Longest arc of a circle in one segment."""
 SAMPLE_M: Final = 5.0
 """Points along circles are this close together, where a track is compared with them."""
 PAST_RADII: Final = 3.0
 """A turn of more than `PAST_RAD` goes past the next leg and is back on it after no more than so many radii."""
-LEG_SHARE: Final = 0.5
-"""Part of the leg before a waypoint that a turn onto a circle may take: the corner before needs the other."""
 
 
 def mission_route(mission: Program, flying: Flying, source: str) -> MissionRoute:
-    """Makes the route of a mission.
-
-    Args:
-        mission: the mission, in the plane.
-        flying: what it is flown with.
-        source: its name, for faults.
+    """Makes the route of a mission that lies in the plane; `source` names it in faults.
 
     Raises:
         InputError: all of it is in one place.
@@ -106,9 +98,6 @@ class _Build:
         """Adds a step to the route."""
         if step.airspeed_mps is not None:
             self._change_speed(step, step.airspeed_mps or self._flying.airspeed_mps)
-        if step.straight:
-            self._straight(step)
-            return
         at = step.place if step.place is not None else self._here()
         assert at is not None  # the first step has a place
         altitude = altitude_m(step, self._home_m, self._ground_m(at), self._altitude_m)
@@ -151,14 +140,6 @@ class _Build:
             if abs(after.place - before.place) > SAME_PLACE_M:
                 return (after.place - before.place) / abs(after.place - before.place)
         return self._pose[1] if self._pose else None
-
-    def _straight(self, step: MissionStep) -> None:
-        heading, here = self._heading(), self._here()
-        if heading is None or here is None:
-            self._notes.append(f"item {step.item}: not flown, there is no course before it")
-            return
-        altitude = altitude_m(step, self._home_m, self._ground_m(here), self._altitude_m)
-        self._add(Vertex(here + self._climbing_m(altitude) * heading, altitude, step.item))
 
     def _climbing_m(self, altitude: float) -> float:
         """How far it takes to climb or sink from the present altitude to another; 1 m at the least."""
@@ -209,15 +190,14 @@ class _Build:
     def _join(self, item: int, circle: Circle, turn_m: float, altitude: float) -> Pose:
         """Gets onto a circle."""
         here, heading = self._here(), self._heading()
-        touch = circle.joined_from(here) if here is not None else None
-        if touch is not None and self._run and self._flying.heads_for_centres:
+        touch = circle.joined_from(here) if here is not None and self._run else None
+        if touch is not None and self._flying.heads_for_centres:
             assert here is not None
             return self._join_from_far(item, circle, circle.edge(here), altitude)
-        if touch is not None and self._run and not self._turns_to(touch):
-            if not self._turn_onto(circle, touch):
-                self._add(Vertex(touch, altitude, None))
-                self.flush()
-        elif heading is not None:
+        if touch is not None and not self._turns_to(touch) and not self._is_near(touch, turn_m):
+            self._add(Vertex(touch, altitude, None))
+            self.flush()
+        elif heading is not None:  # over the waypoint, and from there by a turn
             self.flush()
             assert self._pose is not None
             if not circle.has(self._pose):
@@ -250,53 +230,18 @@ class _Build:
         self._passed.append((None, edge, self._length_m))
         return self._pose
 
-    def _turn_onto(self, circle: Circle, touch: complex) -> bool:
-        """Gets onto a circle from a waypoint so near that the turn there ends on it; whether that was so.
-
-        The turn is rounded onto the circle, not on the short leg to where a line from the waypoint touches it.
-        """
-        last, heading = self._run[-1], self._heading()
-        before = next((each for each in self._run[::-1] if abs(last.place - each.place) > SAME_PLACE_M), None)
-        if heading is None or before is None or abs(touch - last.place) <= SAME_PLACE_M:
+    def _is_near(self, touch: complex, turn_m: float) -> bool:
+        """Whether a corner at the last waypoint has no room before a place that is to be flown to next."""
+        heading, way = self._heading(), touch - self._run[-1].place
+        if heading is None or abs(way) <= SAME_PLACE_M:
             return False
-        angle = cmath.phase((touch - last.place) / heading)
-        turn_m = self._flying.corner_radius_m(last._replace(airspeed_mps=self._mps), angle)
-        past = abs(angle) > PAST_RAD
-        trim_m = turn_m * (1.0 if past else math.tan(0.5 * abs(angle)))
-        room_m = PAST_RADII * turn_m if past else trim_m
-        back_m = min(trim_m, LEG_SHARE * abs(last.place - before.place))
-        if abs(touch - last.place) >= room_m or back_m <= 0.0:
-            return False
-        self._run[-1] = last._replace(place=last.place - back_m * heading)
-        self.flush()
-        assert self._pose is not None
-        begin, begins_m = self._pose[0], self._length_m
-        rows = onto(self._pose, circle, turn_m)
-        past_m, cut_m = passes(rows, last.place)
-        at_m = begins_m + past_m
-        self.rows += rows
-        self._pose, self._length_m = end_of(rows[-1]), begins_m + length_of(rows)
-        # As given: the waypoint, where the circle is touched from there, and the circle from there on.
-        round_it, left_m = circle.round_from(touch, self._pose[0])
-        drawn = np.concatenate(([begin, last.place], round_it))
-        stations = [begins_m, at_m, *np.maximum(self._length_m - left_m, at_m)]
-        self._given.append(np.column_stack((drawn.real, drawn.imag, stations)))
-        first_m = self._legs.pop().stations_m[0]
-        self._legs += (
-            straight((before.place, last.place), (first_m, at_m), last.acceptance_m or None),
-            straight((last.place, touch), (at_m, self._length_m), 0.0),
-        )
-        item, place, half_m = last.item or 0, last.place, max(at_m - begins_m, self._length_m - at_m)
-        turn_deg = math.degrees(angle)
-        self._corners.append(CutCorner(item, place.real, place.imag, turn_deg, turn_m, cut_m, at_m, half_m))
-        if last.item is not None:
-            self._passed[-1] = (last.item, place, at_m)
-        return True
+        angle = abs(cmath.phase(way / heading))
+        return abs(way) < turn_m * (PAST_RADII if angle > PAST_RAD else math.tan(0.5 * angle))
 
     def _target(self, number: int, circle: Circle) -> complex | None:
         """What the aircraft turns to as it leaves a circle; None where it goes on round it or straight."""
         step = self._steps[number + 1] if number + 1 < len(self._steps) else None
-        if step is None or step.place is None or step.straight:
+        if step is None or step.place is None:
             return None
         place = step.place
         if step.loiter is None or abs(place - circle.center) < SAME_PLACE_M:

@@ -12,18 +12,9 @@ import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
 from aircraft.guidance.mission_legs import MissionLeg, straight
-from harness.run_files.given_path import (
-    FLATTEST,
-    LIMIT_SHARE,
-    PAST_RAD,
-    SAME_PLACE_M,
-    FloatArray,
-    FlyBy,
-    Tightest,
-    fly_by,
-)
-from harness.run_files.mission.items import GROUND, HOME, SEA
-from harness.run_files.mission.steps import MissionStep
+from harness.files.mavlink.items import GROUND, HOME, SEA
+from harness.run_files.given_path import SAME_PLACE_M, FloatArray, FlyBy, Tightest, fly_by
+from harness.run_files.mission.program import MissionStep
 
 Ground = Callable[[FloatArray, FloatArray], FloatArray]
 """East and north -> height of the ground above mean sea level, NaN where it is not known."""
@@ -50,7 +41,7 @@ class Flying:
         climb_mps: fastest climb and descent at an airspeed.
         free_cut_m: a corner may be passed at this distance only to make its arc wider.
         ground: height of the ground; None: not known, then it is taken to be as high as home.
-        least_radius_m: of a turn at the bank limit at an airspeed, in calm air; None: the same.
+        least_radius_m: of a turn at the bank limit at an airspeed, in calm air.
         heads_for_centres: a loiter is flown to as far as its circle on the line to its centre; else along a tangent.
         corner_m: how far off every corner may be passed; None: as its item says, else `CORNER_M`.
         wind_mps: east + i north where the wind blows to.
@@ -61,20 +52,11 @@ class Flying:
     turn_radius_m: Callable[[float], float]
     climb_mps: Callable[[float], tuple[float, float]]
     free_cut_m: float
+    least_radius_m: Callable[[float], float]
     ground: Ground | None = None
-    least_radius_m: Callable[[float], float] | None = None
     heads_for_centres: bool = False
     corner_m: float | None = None
     wind_mps: complex = 0j
-
-    def corner_radius_m(self, vertex: Vertex, angle_rad: float) -> float:
-        """Radius of the arc at a corner: with bank in hand, or less where that would pass too far off."""
-        wide = self.turn_radius_m(vertex.airspeed_mps)
-        least = wide if self.least_radius_m is None else self.least_radius_m(vertex.airspeed_mps)
-        # A turn that goes past begins one radius before the corner, as at a right angle.
-        off = 1.0 / math.cos(0.5 * (abs(angle_rad) if abs(angle_rad) <= PAST_RAD else 0.5 * math.pi)) - 1.0
-        most = LIMIT_SHARE * corner_limit_m(vertex.acceptance_m, self.corner_m) / max(off, FLATTEST)
-        return max(min(wide, most), least)
 
 
 class Vertex(NamedTuple):
@@ -126,14 +108,13 @@ def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:
     """Lines and arcs through some waypoints, not all in one place."""
     points = np.array([(vertex.place.real, vertex.place.imag) for vertex in run])
     speeds = [vertex.airspeed_mps for vertex in run]
-    radii = np.array([flying.turn_radius_m(speed) for speed in speeds])
+    wide, least = (
+        np.array([of(each) for each in speeds]) for of in (flying.turn_radius_m, flying.least_radius_m)
+    )
     free = np.array([min(flying.free_cut_m, vertex.acceptance_m or math.inf) for vertex in run])
-    tightest = None
-    if flying.least_radius_m is not None:
-        least = np.array([flying.least_radius_m(speed) for speed in speeds])
-        limits = np.array([corner_limit_m(vertex.acceptance_m, flying.corner_m) for vertex in run])
-        tightest = Tightest(least, limits, flying.wind_mps / np.array(speeds, dtype=np.complex128))
-    return fly_by(points, radii, free, overshoot=True, tightest=tightest, every=True)
+    limits = np.array([corner_limit_m(vertex.acceptance_m, flying.corner_m) for vertex in run])
+    wind = flying.wind_mps / np.array(speeds, dtype=np.complex128)
+    return fly_by(points, wide, free, Tightest(least, limits, wind), every=True)
 
 
 def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:
@@ -150,14 +131,7 @@ def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:
 
 
 def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, before_m: float) -> float:
-    """Altitude of a step above mean sea level.
-
-    Args:
-        step: the step.
-        home_altitude_m: of home, above mean sea level.
-        ground_m: of the ground below it, above mean sea level; NaN where it is not known.
-        before_m: of the step before, NaN at the first.
-    """
+    """Altitude of a step above mean sea level, by those of home, of the ground below, and of the step before or NaN."""
     if step.height_m is None:
         return before_m if math.isfinite(before_m) else home_altitude_m
     return step.height_m + {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
@@ -197,10 +171,7 @@ def followed(
 ) -> list[tuple[float, float]]:
     """Altitudes on the way to a waypoint that is above ground: above it all the way, as ArduPilot flies it.
 
-    Args:
-        ends: of the leg; the second has a height above ground.
-        stations_m: arc lengths at both.
-        ground_m: height of the ground at a place.
+    Args are the ends of the leg, of which the second has a height above ground, arc lengths at both, and the ground.
     """
     (begin, end), (begin_m, end_m) = ends, stations_m
     assert end.agl_m is not None

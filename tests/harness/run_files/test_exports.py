@@ -22,8 +22,7 @@ from pyproj import CRS, Transformer
 from aircraft.frames import LocalPlane
 from harness.cli.app import main
 from harness.flight.record import FloatArray
-from harness.run_files.exported_path import planned_points
-from harness.run_files.exports import FORMATS, fences
+from harness.run_files.exports import FORMATS, planned_points
 from harness.run_files.path_files import PathAsGiven, read_path
 from harness.run_files.run_folder import Run, load_run
 from harness.scenario.scenario import parse_scenario
@@ -152,61 +151,15 @@ def test_geojson_is_read_by_geojson(what: str, export: Export, run: Run) -> None
 
 @pytest.mark.parametrize("what", ["flown", "planned"])
 def test_kml_is_what_the_standard_says(what: str, export: Export, run: Run) -> None:
-    names = {"k": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
-    root = ElementTree.parse(export("kml", what)).getroot()
-    (placemark,) = root.findall(".//k:Placemark", names)
+    names = {"k": "http://www.opengis.net/kml/2.2"}
+    (placemark,) = ElementTree.parse(export("kml", what)).getroot().findall(".//k:Placemark", names)
     assert placemark.findtext("k:name", None, names) == f"far, {what}"
-    if what == "planned":
-        (line,) = placemark.findall("k:LineString", names)
-        rows = [row.split(",") for row in (line.findtext("k:coordinates", "", names)).split()]
-    else:
-        (line,) = placemark.findall("gx:Track", names)
-        rows = [(row.text or "").split() for row in line.iterfind("gx:coord", names)]
-        whens = [datetime.fromisoformat(when.text or "") for when in line.iterfind("k:when", names)]
-        assert len(whens) == len(rows)
-        assert abs(whens[0] - datetime.fromisoformat(str(run.manifest["started_utc"]))).total_seconds() < 1.0
-        flight_s = (whens[-1] - whens[0]).total_seconds()
-        assert flight_s == pytest.approx(run.metrics["flight_time_s"], abs=1.0)
+    (line,) = placemark.findall("k:LineString", names)
+    rows = [row.split(",") for row in (line.findtext("k:coordinates", "", names)).split()]
     assert line.findtext("k:altitudeMode", None, names) == "absolute"
     longitude, latitude, altitude = np.array(rows, dtype=np.float64).T.tolist()
     assert_same_line(in_plane(run, latitude, longitude), line_of(run, what))
     assert np.array(altitude) == pytest.approx(450.0, abs=1.0)
-
-
-def test_fences_of_a_plan_are_the_area_and_what_stands_in_it(export: Export, run: Run) -> None:
-    fence = json.loads(Path(export("plan")).read_text())["geoFence"]
-    (area,) = fence["polygons"]
-    assert area["inclusion"] is True
-    corners = in_plane(run, *(list(column) for column in zip(*area["polygon"], strict=True)))
-    assert corners == pytest.approx(
-        np.array([[80e3, 60e3], [88e3, 60e3], [88e3, 68e3], [80e3, 68e3]]), abs=0.01
-    )
-    (circle,) = fence["circles"]
-    assert circle["inclusion"] is False
-    assert circle["circle"]["radius"] == 400.0
-    (centre,) = in_plane(run, *([value] for value in circle["circle"]["center"]))
-    assert centre == pytest.approx([83500.0, 63600.0], abs=0.01)
-
-
-def test_fences_of_a_polygon_with_holes_leave_the_holes_free() -> None:
-    shell = [[500, 500], [5500, 500], [5500, 5500], [500, 5500]]
-    holes = [
-        [[700, 700], [3800, 700], [3800, 5300], [700, 5300]],
-        [[4000, 700], [5300, 800], [5300, 2500]],
-        [[4100, 3000], [5000, 3000], [4500, 5000]],
-    ]
-    scenario = parse_scenario(
-        "{schema: wayproof/scenario/1, name: a, area: {bounds_m: [0, 0, 6000, 6000]},"
-        f" obstacles: [{{polygon: {{vertices_m: {shell}, holes_m: {holes}}}}}],"
-        " mission: {start_m: [2000, 3000], goal_m: [3000, 1500]}}"
-    )
-    _, *fenced = fences(scenario)["polygons"]
-    there = Transformer.from_crs("EPSG:4326", "+proj=aeqd +lat_0=47 +lon_0=8 +ellps=WGS84")
-    parts = [shapely.Polygon([there.transform(*place) for place in each["polygon"]]) for each in fenced]
-    assert [each["inclusion"] for each in fenced] == [False] * len(fenced)
-    solid = shapely.Polygon(shell, holes)
-    assert shapely.symmetric_difference(shapely.union_all(parts), solid).area < 2e-4 * solid.area
-    assert sum(part.area for part in parts) == pytest.approx(solid.area, rel=1e-4)
 
 
 def test_planned_path_goes_on_where_one_plan_takes_over_from_another(run: Run) -> None:
@@ -235,14 +188,6 @@ def test_what_is_exported_can_be_checked_and_is_trackable(
     assert parse_scenario(checked.scenario_yaml).mission.altitude_m == pytest.approx(450.0, abs=0.1)
     length = run.metrics["flown_length_m"]
     assert checked.metrics["flown_length_m"] == pytest.approx(length, rel=0.01)
-
-
-def test_fewer_points_are_written_with_more_tolerance(export: Export) -> None:
-    counts = []
-    for tolerance in ("0", "0.25", "20"):
-        collection = json.loads(Path(export("geojson", "flown", "--tolerance-m", tolerance)).read_text())
-        counts.append(len(collection["features"][0]["geometry"]["coordinates"]))
-    assert counts[0] > 1000 > counts[1] > counts[2] >= 2
 
 
 def test_standard_output_has_the_file_and_nothing_else(
@@ -288,7 +233,6 @@ def test_what_its_user_should_know_is_said(
     ("options", "sentence"),
     [
         (["--format", "gpx"], "'gpx' is not one of"),
-        (["--format", "kml", "--tolerance-m", "-1"], "greater than or equal to 0"),
         ([], "Missing option"),
     ],
 )

@@ -125,13 +125,6 @@ def test_a_corner_between_dense_points_has_the_room_of_its_legs() -> None:
     assert corner.radius_m == pytest.approx(110.0)
 
 
-def test_there_and_back_again_is_a_corner_that_no_arc_rounds() -> None:
-    way = fly_by(np.array([(0.0, 0), (0, 1000), (0, 0)]), 110.0, 1.0)
-    assert np.isfinite(way.segments).all()
-    assert (way.segments[:, 5] > 0).all()
-    assert (way.corners[0].radius_m, way.corners[0].cut_m, way.corners[0].arc_length_m) == (0.0, 0.0, 1000.0)
-
-
 def test_a_path_may_cross_itself_at_one_of_its_points() -> None:
     points = np.array([(0.0, 0), (0, 2000), (1000, 1000), (0, 1000), (-1000, 1000), (0, 0), (500, -900)])
     way = fly_by(points, 50.0, 0.1)

@@ -12,7 +12,7 @@ import pytest
 from pyproj import Geod
 
 from harness.files.strict_yaml import InputError
-from harness.run_files.mission.steps import MissionStep
+from harness.run_files.mission.program import MissionStep
 from harness.run_files.mission.vertices import altitude_m
 from harness.run_files.path_files import read_path
 
@@ -138,19 +138,6 @@ def test_csv_in_metres(columns: str, tmp_path: Path) -> None:
     assert given.altitudes_m.tolist() == []
 
 
-@pytest.mark.parametrize(("frame", "place"), [(4, (100.0, 200.0, 50.0)), (1, (200.0, 100.0, -50.0))])
-def test_mission_in_local_metres(frame: int, place: tuple[float, float, float], tmp_path: Path) -> None:
-    """ENU has east first and up positive, NED north first and down positive."""
-    path = tmp_path / "local.waypoints"
-    rows = [line(1, 0, frame, 16, 0, 0, 0, 0, 0, 0, place[2], 1)]
-    path.write_text(wpl(*rows, line(2, 0, frame, 16, 0, 0, 0, 0, *place, 1)))
-    given = read_path(path)
-    assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 200.0]]
-    assert given.origin_deg is None
-    assert given.mission is not None
-    assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.steps] == [450.0, 450.0]
-
-
 @pytest.mark.parametrize("column", ["altitude_m", "z_m", "up_m"])
 @pytest.mark.parametrize("names", ["x_m,y_m", "latitude_deg,longitude_deg"])
 def test_csv_with_altitudes(names: str, column: str, tmp_path: Path) -> None:
@@ -186,7 +173,7 @@ BROKEN = {
     "far beyond": ("a.csv", "x_m,y_m\n1e308,0\n-1e308,1\n", "must stay within 500 km of its origin"),
     "too far": ("a.csv", "x_m,y_m\n0,0\n9e5,0\n", ": reaches 900 km; must stay within 500 km"),
     "not degrees": ("a.geojson", geojson([[0, 0], [3000, 2000]]), "latitude 2000, longitude 3000"),
-    "not json": ("a.geojson", '{"type":\n "LineString",,}', ":2: is not JSON"),
+    "not json": ("a.geojson", '{"type":\n "LineString",,}', ":2: is not whole JSON"),
     "json nan": ("a.geojson", '{"type": "LineString", "coordinates": [[NaN, 1], [1, 2]]}', "must be finite"),
     "polygon": ("a.geojson", geojson([LINE], "Polygon"), ": has 0 LineStrings; must have exactly one"),
     "no geojson": ("a.geojson", '{"points": []}', ": has no type; must be a GeoJSON LineString"),
@@ -222,12 +209,12 @@ BROKEN = {
     "unknown frame": (
         "a.waypoints",
         wpl(*wpl_items(frame=9)),
-        ":3: item 1 has the frame 9; must be one of 0, 1, 2, 3",
+        ":3: item 1 has the frame 9; must be one of 0, 2, 3, 5",
     ),
-    "mixed frames": (
+    "a local frame": (
         "a.waypoints",
         wpl(wpl_items()[0], *wpl_items(frame=4)[1:]),
-        ": mixes local and global frames; must have one of both",
+        ": item 2 has the frame 4; must be one of 0, 2, 3, 5, 6, 10, 11 (a path in local metres can be given as CSV)",
     ),
     "a jump to nowhere": (
         "a.waypoints",
@@ -432,18 +419,6 @@ def test_a_place_that_is_none_is_told_by_the_number_of_its_item(tmp_path: Path) 
     )
     with pytest.raises(InputError, match="item 4 is at latitude 91, longitude 8; must be degrees"):
         read_path(path)
-
-
-def test_a_path_of_kml_may_have_blanks_round_its_commas(tmp_path: Path) -> None:
-    text = " ".join(f"{longitude}, {latitude} ,500" for latitude, longitude in POINTS)
-    mode = "<altitudeMode>absolute</altitudeMode>"
-    path = tmp_path / "a.kml"
-    path.write_text(
-        f"<kml><Placemark><LineString>{mode}<coordinates>{text}</coordinates></LineString></Placemark></kml>"
-    )
-    found = read_path(path)
-    assert len(found.points_m) == 3
-    assert found.altitudes_m.tolist() == [500.0] * 3
 
 
 def test_a_first_waypoint_that_is_numbered_1_and_above_home_is_no_home(tmp_path: Path) -> None:

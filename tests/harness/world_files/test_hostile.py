@@ -83,7 +83,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
             '<kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>'
             "8,47 8.1,far 8.1,47.1 8,47</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></kml>",
         ),
-        "coordinates that are not longitude,latitude",
+        "corner 1: is 'far'; must be a finite number",
     ),
     "entities": (text("a.osm", BOMB), "declares XML entities"),
     "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "is not whole XML"),
@@ -106,6 +106,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
         lambda folder: zipped(folder / "a.npz", elevation__npy=npy(np.array([1.0]))),
         "must have numbers `elevation`",
     ),
+    "a vector file": (text("a.gpkg", "SQLite"), "is a vector file; make GeoJSON of it"),
     "a Gazebo world": (
         text("a.world", "<sdf><world/></sdf>"),
         "is a Gazebo world; give its footprints as GeoJSON",

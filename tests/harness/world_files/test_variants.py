@@ -222,7 +222,7 @@ def test_a_fence_among_waypoints_with_circles_and_a_torn_one(tmp_path: Path) -> 
     assert (inside.keep_in, circle.keep_in) == (True, False)
     metres2 = circle.footprint.area * 111_170.0 * 111_320.0 * math.cos(math.radians(47.0005))
     assert metres2 == pytest.approx(math.pi * 400.0, rel=0.005)
-    with pytest.raises(WorldFileError, match="should have more"):
+    with pytest.raises(WorldFileError, match="begins a fence of 4 corners, of which 3 follow"):
         read_any(written(tmp_path / "torn.waypoints", "QGC WPL 110\n" + "".join(rows[:4] + rows[5:])))
 
 
@@ -392,8 +392,7 @@ def test_kml_with_blanks_after_commas_and_lines_beside_its_polygon(tmp_path: Pat
     assert (part.bottom, part.top) == (NO_BOTTOM, Limit(120.0, Datum.GROUND))
     assert "1 point, line or wall passed over" in found.notes
     lone = text.replace("LineString", "LinearRing")
-    with pytest.raises(WorldFileError, match="has 1 shape that cannot be read"):
-        read_any(written(tmp_path / "b.kml", lone))
+    assert "1 point, line or wall passed over" in read_any(written(tmp_path / "b.kml", lone)).notes
 
 
 def test_chimneys_and_towers_stand_like_buildings_and_piers_do_not(tmp_path: Path) -> None:

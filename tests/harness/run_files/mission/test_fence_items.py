@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from harness.files.input_file import InputError
-from harness.run_files.mission.wpl_file import read_waypoints
+from harness.run_files.mission.mission_files import read_waypoints
 from harness.run_files.path_files import read_path
 from harness.world_files.kinds import read as read_world
 from harness.world_files.parts import Reading, WorldFileError
@@ -49,7 +49,7 @@ def test_a_fence_about_home(tmp_path: Path) -> None:
     path.write_text("QGC WPL 110\n0 0 0 5005 50 0 0 0 0 0 0 0\n")
     with pytest.raises(InputError, match="no items to fly to, but a fence of 1 item"):
         read_path(path)
-    with pytest.raises(WorldFileError, match="has a fence about home, whose place it does not say"):
+    with pytest.raises(WorldFileError, match="is a fence about home, which has no position"):
         read_world(path, None, Reading())
     path.write_text(wpl(*WAYPOINTS, (5005, 50.0, 0.0, 0.0)))
     (part,) = read_world(path, None, Reading()).parts

@@ -12,8 +12,8 @@ import pytest
 from harness.files.input_file import InputError
 from harness.run_files.given_path import FloatArray
 from harness.run_files.mission.circle import end_of
+from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.route import LANDING_HEIGHT_M, mission_route
-from harness.run_files.mission.steps import Loiter, MissionStep, Program
 from harness.run_files.mission.vertices import Flying, Ground, MissionRoute
 
 TURN_M = 100.0
@@ -21,7 +21,13 @@ TURN_M = 100.0
 
 def flying(ground: Ground | None = None) -> Flying:
     return Flying(
-        25.0, (20.0, 30.0), lambda speed: TURN_M * (speed / 25.0) ** 2, lambda speed: (5.0, 6.0), 3.0, ground
+        25.0,
+        (20.0, 30.0),
+        lambda speed: TURN_M * (speed / 25.0) ** 2,
+        lambda speed: (5.0, 6.0),
+        3.0,
+        lambda speed: TURN_M * (speed / 25.0) ** 2,
+        ground,
     )
 
 
@@ -34,7 +40,7 @@ def route(*steps: tuple[MissionStep, complex | None], ground: Ground | None = No
     placed = tuple(
         replace(each, position=None if place is None else (place.real, place.imag)) for each, place in steps
     )
-    made = mission_route(Program(True, placed, (), 400.0), flying(ground), "m")
+    made = mission_route(Program(placed, (), 400.0), flying(ground), "m")
     rows = made.way.segments.tolist()
     for before, after in itertools.pairwise(rows):
         place, direction = end_of(tuple(before))
@@ -118,14 +124,6 @@ def test_a_landing_ends_above_its_place_on_the_way_down() -> None:
     assert altitude(made, 3) == 400.0 + LANDING_HEIGHT_M
     end = made.way.segments[-1, :2] + made.way.segments[-1, 5] * made.way.segments[-1, 2:4]
     assert end[1] == pytest.approx(3000.0 - 2000.0 * LANDING_HEIGHT_M / 100.0)
-
-
-def test_straight_on_until_an_altitude_is_reached() -> None:
-    made = route(
-        (step(1), 0j), (step(2), 1000j), (step(3, 200.0, straight=True), None), (step(4, 200.0), 9000j)
-    )
-    assert dict(made.marks)[3] - dict(made.marks)[2] == pytest.approx(100.0 / (0.8 * 5.0) * 25.0)
-    assert altitude(made, 3) == 600.0
 
 
 def test_speeds_are_those_the_aircraft_holds_and_others_are_told() -> None:

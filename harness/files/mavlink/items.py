@@ -1,4 +1,7 @@
-"""Mission items as files hold them, and the mission that they are."""
+"""Mission items as files hold them, and plain-text files of them: "QGC WPL" (.waypoints, .txt).
+
+The format: https://mavlink.io/en/file_formats/#mission_plain_text_file
+"""
 
 from __future__ import annotations
 
@@ -7,22 +10,23 @@ from dataclasses import dataclass
 from typing import Final
 
 from harness.files.input_file import InputError
-from harness.run_files.fences import Fences
-from harness.run_files.mission import commands
+from harness.files.mavlink import commands
+from harness.files.values import finite, whole
 
 SEA, HOME, GROUND = "sea", "home", "ground"
 MISSION: Final = 2
 """MAV_FRAME of commands without a place. ArduPilot takes an altitude in it as above the sea; PX4 refuses it."""
-FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11: GROUND, 4: HOME, 1: HOME}
-"""MAV_FRAME to what its altitude is above. Autopilots load no item to fly to in any other frame."""
-LOCAL_ENU, LOCAL_NED = 4, 1
-LOCAL: Final = (LOCAL_ENU, LOCAL_NED)
+FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11: GROUND}
+"""MAV_FRAME to what its altitude is above. Autopilots load no item to fly to in any other global frame."""
 MOST: Final = {"command": 65_535, "frame": 255}
 """The largest numbers that MAVLink's message of a mission item has room for."""
-NOWHERE: Final = 1e-7
-"""Degrees, or metres: a position with less than this in both is none. ArduPilot writes zeros where none is meant."""
-MOST_TOLD: Final = 10
-"""Numbers of items that a note has at most."""
+NOWHERE_DEG: Final = 1e-7
+"""A position with less than this in both is none. ArduPilot writes zeros where none is meant."""
+WPL: Final = "QGC WPL"
+CELLS: Final = 12
+COMMENT: Final = "#"
+FIRST_PARAMETER: Final = 5
+"""The field, counted from 1, of the first parameter of an item."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +38,8 @@ class Item:
         number: its number in the mission.
         command: MAV_CMD.
         frame: MAV_FRAME.
-        params: the seven parameters; the last three are latitude or x, longitude or y, altitude or z. What is left to
-            the autopilot is 0.
+        params: the seven parameters; the last three are latitude, longitude, altitude. What is left to the autopilot
+            is 0.
         autocontinue_off: the file says that the mission waits after it.
     """
 
@@ -55,16 +59,9 @@ class Item:
 
     @property
     def position(self) -> tuple[float, float] | None:
-        """Latitude and longitude, or east and north; None where it has none."""
-        x, y = self.params[4:6]
-        if self.frame == LOCAL_NED:
-            x, y = y, x
-        return None if max(abs(x), abs(y)) < NOWHERE and self.frame not in LOCAL else (x, y)
-
-    @property
-    def height_m(self) -> float:
-        """Its altitude, above what `above` says."""
-        return -self.params[6] if self.frame == LOCAL_NED else self.params[6]
+        """Latitude and longitude; None where it has none."""
+        latitude, longitude = self.params[4:6]
+        return None if max(abs(latitude), abs(longitude)) < NOWHERE_DEG else (latitude, longitude)
 
     @property
     def above(self) -> str:
@@ -76,30 +73,9 @@ class Item:
         if self.frame not in FRAMES:
             raise InputError(
                 f"{self.place}: item {self.number} has the frame {self.frame}; must be one of "
-                f"{', '.join(map(str, sorted(FRAMES)))}"
+                f"{', '.join(map(str, sorted(FRAMES)))} (a path in local metres can be given as CSV)"
             )
         return FRAMES[self.frame]
-
-
-@dataclass(frozen=True)
-class MissionAsRead:
-    """A mission as its file has it.
-
-    Attributes:
-        source: the file, for faults.
-        items: in order.
-        home: its position, as that of items; None where the file has none.
-        home_altitude_m: above mean sea level.
-        fences: that come with it.
-        notes: on what else does, a line each.
-    """
-
-    source: str
-    items: tuple[Item, ...]
-    home: tuple[float, float] | None
-    home_altitude_m: float
-    fences: Fences
-    notes: tuple[str, ...] = ()
 
 
 def filled(
@@ -127,13 +103,22 @@ def filled(
     return tuple(0.0 if value is None else value for value in params)
 
 
-def waiting_notes(items: Sequence[Item]) -> tuple[str, ...]:
-    """What is to be said of items that are flown to and whose `autocontinue` is off."""
-    numbers = [item.number for item in items if item.autocontinue_off and item.command in commands.FLOWN]
-    if not numbers:
-        return ()
-    told = ", ".join(map(str, numbers[:MOST_TOLD])) + (", ..." if len(numbers) > MOST_TOLD else "")
-    return (
-        f"item{'' if len(numbers) == 1 else 's'} {told}: autocontinue is off: PX4 waits there to be told to go on; "
-        "flown on, as ArduPilot does",
-    )
+def wpl_items(text: str, source: str) -> list[Item]:
+    """The items of a plain-text file, home among them; lines after # are comments. `source` begins a fault.
+
+    Raises:
+        InputError: a line is no item.
+    """
+    where = f"{source}:" if source else "line "
+    rows = [(f"{where}{number}", line.split()) for number, line in enumerate(text.splitlines(), start=1)]
+    return [_item(cells, place) for place, cells in rows[1:] if cells and not cells[0].startswith(COMMENT)]
+
+
+def _item(cells: list[str], place: str) -> Item:
+    if len(cells) != CELLS:
+        raise InputError(f"{place}: has {len(cells)} fields; a mission item has {CELLS}")
+    number, frame, command = (whole(cells[field], place) for field in (0, 2, 3))
+    # What is left to the autopilot is 0, or no number.
+    given = [None if cell.lower() == "nan" else finite(cell, place) for cell in cells[4:11]]
+    params = filled(given, command, frame, lambda index: f"{place}: field {FIRST_PARAMETER + index} is nan")
+    return Item(place, number, command, frame, params, finite(cells[11], place) == 0.0)

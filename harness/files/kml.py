@@ -1,0 +1,168 @@
+"""Shapes of KML files (OGC 12-007r2), plain or packed as KMZ.
+
+Read with Python's XML parser: GDAL makes zero of a coordinate that is no number. Elements are told by their names,
+whatever the namespace: these files carry several.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Final, NamedTuple
+from xml.etree import ElementTree
+
+from harness.files.input_file import InputError
+from harness.files.values import finite, shown
+from harness.files.wording import counted
+from harness.files.zip_archive import unpacked
+
+LINES: Final = ("LineString", "Track")
+OTHERS: Final = (
+    "Point",
+    "Model",
+    "NetworkLink",
+    "GroundOverlay",
+    "ScreenOverlay",
+    "PhotoOverlay",
+    "LinearRing",
+)
+GIVEN_UP: Final = ("altitudeOffset", "MultiTrack")
+"""Elements of Google's extension that are refused by name."""
+BOUNDARIES: Final = ("outerBoundaryIs", "innerBoundaryIs")
+COMMA: Final = re.compile(r"\s*,\s*")
+
+Element = ElementTree.Element
+Point = tuple[float, float, float | None]
+"""Latitude, longitude, altitude."""
+
+
+class Shape(NamedTuple):
+    """A line or a polygon of KML.
+
+    Attributes:
+        name: of its Placemark, or the Placemark's number.
+        mode: altitudeMode; empty where there is none.
+        rings: points of the line; of a polygon those of its outer boundary, then of the inner ones.
+        data: ExtendedData of its Placemark.
+    """
+
+    name: str
+    mode: str
+    rings: tuple[tuple[Point, ...], ...]
+    data: Mapping[str, str]
+
+
+class Kml(NamedTuple):
+    """What a KML file has: lines, polygons, how many of what else, and notes on further files of its archive."""
+
+    source: str
+    lines: tuple[Shape, ...]
+    polygons: tuple[Shape, ...]
+    others: Counter[str]
+    notes: tuple[str, ...]
+
+
+def read_kml(data: bytes, source: str, most: int) -> Kml:
+    """Reads a KML file.
+
+    Args:
+        data: its bytes.
+        source: begins a fault: the file, or nothing.
+        most: bytes that an archive may unpack to.
+
+    Raises:
+        InputError: it is none, cannot be unpacked, has a coordinate that is no number, or what is refused by name.
+    """
+    notes: tuple[str, ...] = ()
+    if data.startswith(b"PK"):
+        try:
+            name, data, further = unpacked(data, ".kml", most, "doc.kml")
+        except InputError as error:
+            raise InputError(f"{source}: {error}" if source else str(error)) from error
+        source = f"{source} ({name})" if source else ""
+        notes = (f"{counted(further, 'further KML file')} in the archive passed over",) if further else ()
+    root = parsed_xml(data, source, "kml")
+    lines: list[Shape] = []
+    polygons: list[Shape] = []
+    for number, each in enumerate(named(root, "Placemark"), start=1):
+        name, kept = shown(text_of(each, "name") or f"Placemark {number}"), dict(_data(each))
+        where = f"{source}: {name}" if source else name
+        for kind in LINES:
+            for line in named(each, kind):
+                points = _points(line, where, "point")
+                lines.append(Shape(name, text_of(line, "altitudeMode"), (points,), kept))
+        for area in named(each, "Polygon"):
+            inner = [ring for boundary in BOUNDARIES for ring in named(area, boundary)]
+            if not inner:
+                raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
+            rings = tuple(_points(ring, where, "corner") for ring in inner)
+            polygons.append(Shape(name, text_of(area, "altitudeMode"), rings, kept))
+    others = Counter(kind for each in root.iter() if (kind := name_of(each)) in OTHERS)
+    others["LinearRing"] -= sum(len(each.rings) for each in polygons)
+    return Kml(source, tuple(lines), tuple(polygons), others, notes)
+
+
+def parsed_xml(data: bytes, source: str, root: str) -> Element:
+    """The root of an XML text; `source` begins a fault.
+
+    Raises:
+        InputError: it is no whole XML, declares entities, is of another root, or has an element of `GIVEN_UP`.
+    """
+    where = f"{source}: " if source else ""
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # a few lines of entities unpack to gigabytes
+        raise InputError(f"{where}declares a document type or XML entities; remove the declaration")
+    try:
+        found = ElementTree.fromstring(data)
+    except ElementTree.ParseError as error:
+        at = f"{source}:{error.position[0]}" if source else f"line {error.position[0]}"
+        raise InputError(f"{at}: is not whole XML ({error}); it may be torn") from error
+    except (ValueError, LookupError, RecursionError) as error:
+        raise InputError(f"{where}is not XML ({error})") from error
+    if name_of(found).lower() != root:
+        raise InputError(f"{where}is {shown(name_of(found))}; must be {root.upper()}")
+    for each in found.iter():
+        if name_of(each) in GIVEN_UP:
+            raise InputError(
+                f"{where}has gx:{name_of(each)}, which is not read; save it as plain lines and shapes"
+            )
+    return found
+
+
+def name_of(element: Element) -> str:
+    """The name of an element without its namespace."""
+    return str(element.tag).rpartition("}")[2]
+
+
+def named(element: Element, name: str) -> Iterator[Element]:
+    """All elements of a name, itself among them."""
+    return (each for each in element.iter() if name_of(each) == name)
+
+
+def text_of(element: Element, name: str) -> str:
+    """The text of the first element of a name; empty where there is none."""
+    return next(((each.text or "").strip() for each in named(element, name)), "")
+
+
+def _data(placemark: Element) -> Iterator[tuple[str, str]]:
+    """Names and values of ExtendedData, untyped and typed."""
+    for each in named(placemark, "Data"):
+        yield each.get("name", ""), text_of(each, "value")
+    for each in named(placemark, "SimpleData"):
+        yield each.get("name", ""), (each.text or "").strip()
+
+
+def _points(element: Element, where: str, what: str) -> tuple[Point, ...]:
+    """Points of a line, one element each in a gx:Track; blanks round a comma do not part positions."""
+    if name_of(element) == "Track":
+        rows = [(each.text or "").split() for each in named(element, "coord")]
+    else:
+        rows = [part.split(",") for part in COMMA.sub(",", text_of(element, "coordinates")).split()]
+    return tuple(_point(row, f"{where}: {what} {number}") for number, row in enumerate(rows))
+
+
+def _point(row: list[str], where: str) -> Point:
+    if len(row) not in (2, 3):
+        raise InputError(f"{where}: is {shown(','.join(row))!r}; must be longitude,latitude[,altitude]")
+    longitude, latitude, *altitude = (finite(each, where) for each in row)
+    return latitude, longitude, altitude[0] if altitude else None

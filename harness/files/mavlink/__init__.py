@@ -1,0 +1,1 @@
+"""Files of MAVLink's ground stations: mission items and fences."""
