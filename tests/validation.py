@@ -37,6 +37,11 @@ TRIED = {
     "airspeed 18.1 m/s": (("aircraft.airspeed_mps", "18.1"),),
     "gain 1": (("guidance.gain", "1"),),
     "gain 3": (("guidance.gain", "3"),),
+    "roll of 180 deg/s at most, in 0.1 s": (
+        ("aircraft.autopilot.roll_rate_limit_degps", "180"),
+        ("aircraft.autopilot.roll_time_constant_s", "0.1"),
+    ),
+    "height off by 2.1 m (1 sigma)": (("navigation.altitude_sigma_m", "2.1"),),
     "light turbulence": (("environment.turbulence", "{intensity: light}"),),
 }
 """What the answer hangs on: name, and keys of the simulated flight."""
@@ -76,7 +81,12 @@ def _thor(flown: Path, keys: tuple[tuple[str, str], ...]) -> Replay:
 def _tried(name: str, told: dict[str, Any]) -> str:
     figures = told["simulated"]
     cells = [figures["outside_p95_m"], figures["outside_max_mean_m"], figures["lap_mean_s"]]
-    return f"| {name} | {' | '.join(f'{cell:.1f}' for cell in (*cells, told['distance_between_m']['p50']))} |"
+    cells += [
+        told["distance_between_m"]["p50"],
+        figures["roll_rate_p95_degps"],
+        figures["height_error_p95_m"],
+    ]
+    return f"| {name} | {' | '.join(f'{cell:.1f}' for cell in cells)} |"
 
 
 def _proto(flown: Path) -> list[str]:

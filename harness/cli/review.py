@@ -284,7 +284,7 @@ def replay(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Its mission: a file of `check`, or a JSON with its corners. Default: that of a .bin log.",
+            help="Its mission: a file of `check`, or a JSON with its corners. Default: that of the log.",
         ),
     ] = None,
     guidance: GuidanceOption = None,

@@ -59,12 +59,12 @@ class FlownFlight:
         return next((self.columns[name] for name in AIRSPEEDS if name in self.columns), None)
 
 
-def read_flown(path: Path, plane: LocalPlane) -> FlownFlight:
+def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     """Reads a flown flight; rows by hand, before the autopilot was on, are left out where the file tells them.
 
     Args:
         path: .parquet or .csv with the columns that this module names, or a log of `harness.replays.logs`.
-        plane: positions in degrees are put into it.
+        plane: positions in degrees are put into it; None: into one about a table's first.
 
     Raises:
         InputError: it cannot be read or has no track.
@@ -74,7 +74,9 @@ def read_flown(path: Path, plane: LocalPlane) -> FlownFlight:
         raise InputError(
             f"{path}: is no flight log that is read; must end in {', '.join((*TABLES, *READERS))}"
         )
-    columns, notes = (_of_table(path, plane), []) if suffix in TABLES else read_log(path, plane)
+    columns, notes = (
+        (_of_table(path, plane), []) if suffix in TABLES else read_log(path, plane or LocalPlane(0.0, 0.0))
+    )
     if suffix in READERS and not any(name in columns for name in AIRSPEEDS):
         notes.append("airspeed: the log has none; taken to be constant where wind is fitted")
     if len(columns["time_s"]) < 3 or not (np.diff(columns["time_s"]) > 0.0).all():
@@ -95,7 +97,7 @@ def read_flown(path: Path, plane: LocalPlane) -> FlownFlight:
     return flight.rows(np.flatnonzero(switch > 0))
 
 
-def _of_table(path: Path, plane: LocalPlane) -> dict[str, FloatArray]:
+def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
     """Columns of a table, without the rows that have no place."""
     table = _table(path)
     place, wanted = _wanted(table.column_names, path)
@@ -104,6 +106,7 @@ def _of_table(path: Path, plane: LocalPlane) -> dict[str, FloatArray]:
     columns = {name: each[known] for name, each in columns.items()}
     if place in DEGREES:
         pairs = np.column_stack((columns["east_m"], columns["north_m"])).tolist()
+        plane = plane or LocalPlane(*pairs[0])
         placed = np.array([plane.plane(*pair) for pair in pairs]).reshape(-1, 2)
         columns["east_m"], columns["north_m"] = placed.T
     return columns

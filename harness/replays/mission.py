@@ -14,12 +14,15 @@ from aircraft.frames import LocalPlane
 from harness.files.input_file import MAX_JSON_BYTES, InputError, read_text
 from harness.files.mavlink.commands import FLOWN, JUMP, WAYPOINT, name_of
 from harness.flight.record import FloatArray
+from harness.replays.flown import FlownFlight
 from harness.replays.logs import Command, logged_mission
 from harness.run_files.path_files import read_path
 
 CRUISE: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}
 BANK: Final = {"ROLL_LIMIT_DEG": 1.0, "LIM_ROLL_CD": 0.01}
 """Parameters of ArduPlane, today's name before the earlier one, and their units in m/s and degrees."""
+TARGET_RADIUS_M: Final = 10.0
+"""A corner that only `target_index` tells of counts as reached from here: the table does not tell its radius."""
 CORNERS: Final = "two or more pairs [east, north] of numbers in m"
 
 
@@ -121,6 +124,33 @@ def mission_of_log(path: Path) -> tuple[FlownMission, str]:
     )
     told = f"{radius:g} m" if radius > 0.0 else "by the rule of the law"
     return found, f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {told}"
+
+
+def mission_of_targets(flight: FlownFlight) -> tuple[FlownMission, str]:
+    """Corners ahead of where `target_index` changes, so that it changes there again; and a note.
+
+    Raises:
+        InputError: the table has no such column, or its targets are not 0, 1, ... in turn.
+    """
+    if "target_index" not in flight:
+        raise InputError(
+            f"{flight.source}: its mission is not known; give --mission FILE, or a column target_index"
+        )
+    target = flight["target_index"]
+    reached = np.flatnonzero((np.diff(target) != 0.0) & (target[:-1] >= 0.0))
+    numbers = np.unique(target[reached])
+    if len(numbers) < 2 or (numbers != np.arange(len(numbers))).any():
+        told = ", ".join(f"{each:g}" for each in numbers[:8].tolist()) or "none"
+        raise InputError(
+            f"{flight.source}: target_index: is changed from {told}; must be from 0, 1 and so on; give --mission FILE"
+        )
+    going = np.column_stack((flight["ve_mps"], flight["vn_mps"]))[reached]
+    ahead = TARGET_RADIUS_M * going / np.hypot(*going.T)[:, None]
+    places = np.column_stack((flight["east_m"], flight["north_m"]))[reached] + ahead
+    corners = np.array([places[target[reached] == number].mean(axis=0) for number in numbers])
+    far = f"{TARGET_RADIUS_M:g} m"
+    note = f"mission: {len(corners)} corners, {far} ahead of where target_index changes, reached from {far}"
+    return FlownMission(corners, TARGET_RADIUS_M), note
 
 
 def _lap(commands: Sequence[Command], path: Path) -> list[Command]:

@@ -14,9 +14,9 @@ from aircraft.frames import LocalPlane
 from harness.files.errors import RunFolderError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
-from harness.replays.flown import FlownFlight, read_flown
+from harness.replays.flown import TABLES, FlownFlight, read_flown
 from harness.replays.measures import Side, compared, legs_of
-from harness.replays.mission import FlownMission, mission_of_log, read_mission
+from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, read_mission
 from harness.replays.simulated import Asked, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows
 
@@ -65,7 +65,8 @@ def replay(
         log: as `harness.replays.flown.read_flown` takes it.
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
         out: folder to write.
-        mission: as `harness.replays.mission.read_mission` takes it; None: that of the log, if it has one.
+        mission: as `harness.replays.mission.read_mission` takes it; None: that of the log, or
+            of its column `target_index`.
         overrides: keys of the simulated flight's scenario to replace, `guidance.kind` for one, as
             `harness.scenario.scenario.load_scenario` takes them.
         windows: the wind changes as the log shows it; else it is steady.
@@ -78,10 +79,7 @@ def replay(
     """
     if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / INDEX).exists())):
         raise RunFolderError(f"{out} holds other things; give a new folder")
-    flown_mission, *notes = (read_mission(mission),) if mission else mission_of_log(log)
-    origin = flown_mission.origin
-    plane = LocalPlane(origin.latitude_deg, origin.longitude_deg) if origin else LocalPlane(0.0, 0.0)
-    flight = read_flown(log, plane)
+    flown_mission, flight, notes = _read(log, mission)
     wind = fit_wind(flight)
     winds = (fit_windows(flight, wind) if windows else []) or [wind]
     asked = _asked(flight, flown_mission, winds, wind)
@@ -110,6 +108,18 @@ def replay(
     found = Replay(told, flown.columns, columns, corners_m, out)
     _write(found, {"flown": flown, "simulated": simulated}, recording)
     return found
+
+
+def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, list[str]]:
+    """The mission, what was flown, and where the mission is from, if it is of the log."""
+    if mission is None and log.suffix.lower() in TABLES:
+        flight = read_flown(log)
+        found, note = mission_of_targets(flight)
+        return found, flight, [note]
+    found, *notes = (read_mission(mission),) if mission else mission_of_log(log)
+    origin = found.origin
+    plane = LocalPlane(origin.latitude_deg, origin.longitude_deg) if origin else LocalPlane(0.0, 0.0)
+    return found, read_flown(log, plane), notes
 
 
 def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Asked:

@@ -99,6 +99,27 @@ def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
     assert again.digest == wayproof.fly(again.scenario).digest or again.outcome == "reached"
 
 
+@needs_flown
+def test_corners_are_found_of_the_targets_alone(tmp_path: Path) -> None:
+    """Thor's corners counted as reached from 10 m; a table without targets, or with some left out, is refused."""
+    table = pq.read_table(FLOWN / "thor75.parquet")
+    found = wayproof.replay(FLOWN / "thor75.parquet", "ultrastick25e", out=tmp_path / "out")
+    corners = json.loads((FLOWN / "thor75.json").read_text())["mission"]["corners_east_north_m"]
+    assert np.hypot(*(found.corners_m - np.array(corners)).T).max() < 2.5
+    assert found.told["notes"][0].startswith("mission: 4 corners, 10 m ahead of where target_index changes")
+    assert found.told["distance_between_m"]["p50"] <= 4.0
+    pq.write_table(table.drop_columns(["target_index"]), tmp_path / "none.parquet")
+    with pytest.raises(wayproof.InputError, match="give --mission FILE, or a column target_index"):
+        wayproof.replay(tmp_path / "none.parquet", "ultrastick25e", out=tmp_path / "none")
+    from_ten = pa.array(table["target_index"].to_numpy() + 10)
+    place = table.column_names.index("target_index")
+    pq.write_table(table.set_column(place, "target_index", from_ten), tmp_path / "ten.parquet")
+    with pytest.raises(
+        wayproof.InputError, match="target_index: is changed from 10, 11, 12, 13; must be from 0"
+    ):
+        wayproof.replay(tmp_path / "ten.parquet", "ultrastick25e", out=tmp_path / "ten")
+
+
 def test_the_mission_of_an_ardupilot_log_is_its_waypoints_between_a_jump_and_its_target(
     tmp_path: Path,
 ) -> None:
