@@ -29,9 +29,6 @@ STATE_PROPERTIES = (
 )
 """Read for `AircraftState`, in this order."""
 
-FAULT_PROPERTIES = ("attitude/phi-rad", "velocities/vtrue-fps", "position/h-sl-ft", "aero/alpha-rad")
-"""Read to tell whether control is lost, in this order."""
-
 COMMAND_PROPERTIES = ("wayproof/roll-cmd-rad", "wayproof/altitude-cmd-ft", "wayproof/airspeed-cmd-fps")
 """Written for a command, in this order."""
 

@@ -10,8 +10,7 @@ from typing import Final, NamedTuple
 
 from harness.files.crash import sentence, trace
 from harness.files.printing import PrintingAside
-from harness.mapping.read_only_map import ReadOnlyMap
-from planner.interface import MapView, Mission, Plan, Planner, PlanRequest
+from planner.interface import Mission, Plan, Planner, PlanRequest
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport
 
@@ -49,11 +48,12 @@ class AskedPlanner:
     Args:
         planner: the planner.
         mission: of the flight.
-        seen: the map.
     """
 
-    def __init__(self, planner: Planner, mission: Mission, seen: MapView) -> None:
-        self._planner, self._mission, self._seen = planner, mission, ReadOnlyMap(seen)
+    def __init__(self, planner: Planner, mission: Mission) -> None:
+        self._planner, self._mission = planner, mission
+        self.shielded = self.shield is not None
+        """Whether there is a shield around the planner."""
         self.compute_ms = math.nan
         """Processor time of the planner's thread for the last answer: what else the machine does is not in it."""
         self.wall_ms = math.nan
@@ -68,7 +68,7 @@ class AskedPlanner:
     @property
     def backup(self) -> str:
         """Why the shield flies its backup; empty while it flies the planner's path, and without a shield."""
-        return str(getattr(self._planner, "backup", "")) if self.shield is not None else ""
+        return str(getattr(self._planner, "backup", "")) if self.shielded else ""
 
     def plan(self, request: PlanRequest) -> Answer:
         """The answer to a request; its `flown` is the `own` of the answer in effect.
@@ -77,7 +77,6 @@ class AskedPlanner:
             PlannerFailedError: the planner raised, or its answer cannot be flown.
             KeyboardInterrupt: as ever.
         """
-        request = request._replace(seen=self._seen)
         begun, began = time.thread_time(), time.perf_counter()
         try:
             with PrintingAside():

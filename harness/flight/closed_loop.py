@@ -19,7 +19,7 @@ from harness.flight.sensing import Sensing
 from harness.flight.signals import held_back
 from harness.flight.state_estimator import PerfectEstimator, StateEstimator
 from harness.flight.termination import Ending, Termination
-from harness.flight.timetable import Instant, intervals
+from harness.flight.timetable import intervals
 from harness.flight.track_log import FlightLog
 from harness.mapping.sensed_map import SensedMap
 from harness.world.range_sensor import RangeSensor
@@ -126,6 +126,7 @@ class ClosedLoop:
                 "every flight needs a loop of its own"
             )
         self._loop, self._observers, self._begun_s = loop, observers, time.perf_counter()
+        self._model, self._navigator, self._guidance = loop.model, loop.navigator, loop.guidance
         self._sensing = Sensing(loop.sensor, loop.seen, observers)
         self._fixes = FixEvents(loop.navigator, observers)
         self._true_error = TrueCrossTrack(self.plans)
@@ -135,7 +136,9 @@ class ClosedLoop:
         timetable = intervals(loop.model.step_rate_hz, loop.scan_rate_hz if loop.sensor else 0.0)
         self._intervals, self._first_steps = itertools.cycle(timetable), timetable[0][0].steps
         self._check_navigation()
-        self._finish_if_ended(self._judge())
+        ending = self._judge()
+        if ending is not None:
+            self._finish(ending)
 
     def step(self, roll_command_rad: float | None = None) -> None:
         """Flies one guidance interval, or up to the end of the flight if that comes first.
@@ -144,24 +147,27 @@ class ClosedLoop:
             roll_command_rad: held in place of the command of the guidance law; None: the law steers.
         """
         self._roll_override_rad = roll_command_rad
-        for instant in next(self._intervals):
-            if instant.scan:
+        for guidance, scan, steps in next(self._intervals):
+            if scan:
                 self._sensing.scan(self.true, self.believed)
-            scanned = self._map()
-            ending = (
-                self._plan(scanned, instant)
-                or self._guide(instant)
-                or self._advance(instant.steps)
-                or self._judge()
-            )
-            if self._finish_if_ended(ending):
+            scanned = bool(self._sensing.pending) and self._map()
+            ending = None
+            if scanned or (guidance and self.plans.wants_more_time):
+                ending = self.plans.ask(self.believed, self.steering.arc_length_m, scanned)
+            if guidance and ending is None:
+                ending = self._guide()
+            if ending is None:
+                ending = self._advance(steps) or self._judge()
+            if ending is not None:
+                self._finish(ending)
                 return
 
     def _read_state(self) -> None:
         """Reads the true state, and what navigation makes of it."""
-        self.true = self._loop.model.state()
-        self.believed = self._loop.navigator.believed(self.true)
-        self._check_navigation()
+        self.true = self._model.state()
+        self.believed = self._navigator.believed(self.true)
+        if self.believed is not self.true:
+            self._check_navigation()
 
     def _check_navigation(self) -> None:
         """Forgets the map if the believed position has jumped: it was entered from elsewhere.
@@ -179,27 +185,21 @@ class ClosedLoop:
         self.plans.scan_s = scan.time_s
         return True
 
-    def _plan(self, scanned: bool, instant: Instant) -> Ending | None:
-        """Asks the planner after a scan, or while it wants more time; returns the ending if that is its answer."""
-        if not (scanned or (instant.guidance and self.plans.wants_more_time)):
-            return None
-        return self.plans.ask(self.believed, self.steering.arc_length_m, scanned)
-
-    def _guide(self, instant: Instant) -> Ending | None:
-        """Steers along the plan in effect where guidance is due, and logs a row of the track."""
-        if not instant.guidance:
-            return None
-        loop, believed = self._loop, self.believed
-        ending = self.plans.take_effect(believed, loop.guidance) or self._steer()
+    def _guide(self) -> Ending | None:
+        """Steers along the plan in effect, and logs a row of the track."""
+        believed = self.believed
+        ending = self.plans.take_effect(believed, self._guidance) if self.plans.coming else None
+        ending = ending or self._steer()
         if ending is not None:
             return ending
-        altitude_m, airspeed_mps = loop.vertical.command(believed, self.steering.arc_length_m)
-        too_high_m, too_fast_mps = loop.navigator.held_errors
-        loop.model.command(
-            self.steering.roll_command_rad,
+        steering = self.steering
+        altitude_m, airspeed_mps = self._loop.vertical.command(believed, steering.arc_length_m)
+        too_high_m, too_fast_mps = self._navigator.held_errors
+        self._model.command(
+            steering.roll_command_rad,
             # The model's loops measure without error: it is taken off the command.
             altitude_m - too_high_m,
-            self.steering.airspeed_or(airspeed_mps) - too_fast_mps,
+            steering.airspeed_or(airspeed_mps) - too_fast_mps,
         )
         self._log_row()
         return None
@@ -208,9 +208,9 @@ class ClosedLoop:
         """Updates the guidance law, if there is a plan; an exception or a number that is not finite ends the flight."""
         if self.plans.index >= 0:
             try:
-                steering = self._loop.guidance.update(self.believed)
-                numbers = steering.roll_command_rad, steering.cross_track_m, steering.arc_length_m
-                finite = all(map(math.isfinite, numbers)) and not math.isinf(steering.airspeed_mps)
+                steering = self._guidance.update(self.believed)
+                numbers = steering.roll_command_rad + steering.cross_track_m + steering.arc_length_m
+                finite = math.isfinite(numbers) and not math.isinf(steering.airspeed_mps)
             except Exception as error:
                 self._law_error = trace(error)
                 return Ending(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
@@ -228,38 +228,37 @@ class ClosedLoop:
 
     def _advance(self, steps: int) -> Ending | None:
         """Advances the flight model; a planner that wants more time is asked again half way."""
-        model, ending = self._loop.model, None
         if self.plans.wants_more_time:
-            model.advance(steps // 2)
+            self._model.advance(steps // 2)
             steps -= steps // 2
             self._read_state()
             ending = self.plans.ask(self.believed, self.steering.arc_length_m, scanned=False)
-        if ending is None:
-            model.advance(steps)
-            self._read_state()
-        return ending
+            if ending is not None:
+                return ending
+        self._model.advance(steps)
+        self._read_state()
+        return None
 
     def _judge(self) -> Ending | None:
         """How the flight ends at the true state; None while it goes on."""
-        return self._loop.termination.verdict(self.true, self._loop.model.fault())
+        return self._loop.termination.verdict(self.true, self._model.fault())
 
     def _log_row(self) -> None:
         """Logs the state and the latest steering as a row of the track."""
-        steered = not math.isnan(self.steering.cross_track_m)
+        true, steering = self.true, self.steering
+        steered = not math.isnan(steering.cross_track_m)
         index = self.plans.index if steered else -1  # a law may fail in its first update
-        if self.believed is self.true:
-            self._log.add(self.true, self.steering, index)
+        if self.believed is true:
+            self._log.add(true, steering, index)
         else:
-            true_m = self._true_error.cross_track_m(self.true, self.steering.arc_length_m, index)
-            self._log.add(self.true, self.steering, index, self.believed, true_m)
+            true_m = self._true_error.cross_track_m(true, steering.arc_length_m, index)
+            self._log.add(true, steering, index, self.believed, true_m)
 
-    def _finish_if_ended(self, ending: Ending | None) -> bool:
-        """Closes the flight if it has ended; returns whether it has."""
-        if ending is None:
-            return False
+    def _finish(self, ending: Ending) -> None:
+        """Closes the flight."""
         if self.true.time_s == 0.0:  # a track has at least two rows
             self._log_row()
-            self._loop.model.advance(self._first_steps)
+            self._model.advance(self._first_steps)
             self._read_state()
         if ending.outcome is not Outcome.LOST_CONTROL:
             self._steer()  # so that the last row has the steering at the end
@@ -268,7 +267,6 @@ class ClosedLoop:
         text = f"{self.ending.outcome.value}: {self.ending.reason}"
         for observer in self._observers:
             observer.on_event(self.true.time_s, text if ending.outcome is Outcome.REACHED else Caution(text))
-        return True
 
     def hand_on(self) -> None:
         """Hands the rows since the last block on to the observers."""

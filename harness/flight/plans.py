@@ -13,6 +13,7 @@ from harness.flight.asked_planner import Answer, AskedPlanner, PlannerFailedErro
 from harness.flight.observer import NOMINAL, Caution, Observer, ShieldState
 from harness.flight.record import AcceptedPlan, Outcome
 from harness.flight.termination import Ending
+from harness.mapping.read_only_map import ReadOnlyMap
 from planner.interface import MapView, Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.shield.intervention_log import ShieldReport
 
@@ -33,9 +34,10 @@ class Plans:
     def __init__(
         self, planner: Planner, mission: Mission, seen: MapView, observers: Sequence[Observer]
     ) -> None:
-        self._planner, self._seen = AskedPlanner(planner, mission, seen), seen
+        self._planner, self._seen = AskedPlanner(planner, mission), ReadOnlyMap(seen)
         self._latency_s, self._observers = mission.compute_latency_s, observers
-        self._coming: tuple[float, float, Answer, Route] | None = None
+        self.coming: tuple[float, float, Answer, Route] | None = None
+        """The plan on its way: time of its search (ms) and of the scan that it used (s), answer and route."""
         self._own: Plan | None = None  # the plan in effect, as the planner gave it
         self.scan_s = math.nan
         """When the latest scan that the map has was taken."""
@@ -79,7 +81,7 @@ class Plans:
             How the flight ends, if that is the planner's answer.
         """
         self._scanned |= scanned
-        if self._coming is not None:
+        if self.coming is not None:
             return None
         self._arc_length_m = arc_length_m
         request = self._request(state, arc_length_m)
@@ -90,7 +92,8 @@ class Plans:
             self.error = error.trace
             return Ending(Outcome.PLANNER_FAILED, str(error))
         plan = answer.plan
-        self._note_backup(state.time_s)
+        if self._planner.shielded:
+            self._note_backup(state.time_s)
         self._told, self.wants_more_time = plan.reason, plan.wants_more_time
         if plan.status is PlanStatus.KEPT:
             return None
@@ -104,7 +107,7 @@ class Plans:
             self._stuck, self._in_vain = "", set()
             assert plan.path is not None
             route = Route(plan.path.segments, plan.path.loiter)
-            self._coming = (self._planner.compute_ms, self.scan_s, answer, route)
+            self.coming = (self._planner.compute_ms, self.scan_s, answer, route)
             self._due_s = state.time_s + self._latency_s - LATE_S
         return None
 
@@ -118,11 +121,11 @@ class Plans:
         Returns:
             How the flight ends, if the guidance law raised an exception; the plan is then not in effect.
         """
-        if self._coming is None or state.time_s < self._due_s:
+        if self.coming is None or state.time_s < self._due_s:
             return None
-        compute_ms, scan_s, answer, route = self._coming
+        compute_ms, scan_s, answer, route = self.coming
         late_s = state.time_s - (self._due_s - self._latency_s)
-        self._coming, self._due_s = None, math.inf
+        self.coming, self._due_s = None, math.inf
         try:
             guidance.follow(route, arc_length_m=late_s * state.groundspeed_mps)
         except Exception as error:  # a law of somebody else's may raise anything
@@ -144,23 +147,22 @@ class Plans:
         """The planner's reason for having found no plan, to be added to the reason of an ending; else empty."""
         if outcome in (Outcome.PLANNER_FAILED, Outcome.UNREACHABLE):
             return ""
-        if not (self.accepted or self._coming) and self._told:
+        if not (self.accepted or self.coming) and self._told:
             return f"; no plan was ever found: {in_a_line(self._told)}"
         if outcome is Outcome.TIMEOUT and self._stuck:
             return f"; the planner's last reason: {in_a_line(self._stuck)}"
         return ""
 
     def _request(self, state: AircraftState, arc_length_m: float) -> PlanRequest:
-        flown = self._own
         speed_mps = max(state.groundspeed_mps, 1e-9)
         return PlanRequest(
-            time_s=state.time_s,
-            position_m=(state.east_m, state.north_m),
-            direction=(state.velocity_east_mps / speed_mps, state.velocity_north_mps / speed_mps),
-            seen=self._seen,
-            flown=flown,
-            arc_length_m=arc_length_m if flown else 0.0,
-            scanned=self._scanned,
+            state.time_s,
+            (state.east_m, state.north_m),
+            (state.velocity_east_mps / speed_mps, state.velocity_north_mps / speed_mps),
+            self._seen,
+            self._own,
+            arc_length_m if self._own else 0.0,
+            self._scanned,
         )
 
     def _note_backup(self, time_s: float) -> None:

@@ -24,7 +24,8 @@ class Sensing:
 
     def __init__(self, sensor: RangeSensor | None, seen: SensedMap, observers: Sequence[Observer]) -> None:
         self._sensor, self._seen, self._observers = sensor, seen, observers
-        self._pending: deque[RangeScan] = deque()
+        self.pending: deque[RangeScan] = deque()
+        """Scans that the map has not got yet, the oldest first."""
 
     def scan(self, true: AircraftState, believed: AircraftState) -> None:
         """Takes a scan from the true state; the map receives it as taken from the believed one."""
@@ -34,17 +35,17 @@ class Sensing:
             observer.on_scan(scan, true)
         if believed is not true:
             scan = scan.taken_from(believed.east_m, believed.north_m, believed.heading_rad)
-        self._pending.append(scan)
+        self.pending.append(scan)
 
     def enter(self, time_s: float) -> RangeScan | None:
         """Enters the oldest scan into the map if it is available; returns it, else None."""
-        if not self._pending or self._pending[0].available_s > time_s + LATE_S:
+        if not self.pending or self.pending[0].available_s > time_s + LATE_S:
             return None
-        scan = self._pending.popleft()
+        scan = self.pending.popleft()
         self._seen.update(scan)
         return scan
 
     def start_over(self, time_s: float) -> None:
         """Forgets the map and the pending scans."""
-        self._pending.clear()
+        self.pending.clear()
         self._seen.start_over(time_s)

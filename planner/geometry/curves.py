@@ -54,8 +54,8 @@ def end_of(path: Path) -> Pose:
 def place_on(path: Path, arc_length_m: float) -> tuple[Pose, float]:
     """The pose `arc_length_m` along a path, clamped to its ends, and the curvature (1/m) there."""
     left = max(arc_length_m, 0.0)
-    *before, last = path.segments.tolist()
-    for row in before:
+    last = path.rows[-1]
+    for row in path.rows[:-1]:
         if left <= row[5]:
             return along(row, left), row[4]
         left -= row[5]

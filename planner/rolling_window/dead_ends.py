@@ -55,6 +55,11 @@ class DeadEnds:
             self._retry_s, self._places = math.inf, []
             self._memory.forgive()
 
+    @property
+    def waits(self) -> bool:
+        """Whether a time is set at which what was given up is tried again."""
+        return self._retry_s < math.inf
+
     def give_up(self, place: Pose) -> None:
         """Gives up a place on a course, and what lies to its sides: a turn takes so much room."""
         east, north, along_east, along_north = place

@@ -24,7 +24,7 @@ import math
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose, Segment, along, on_loiter, place_on
-from planner.interface import FloatArray, Mission, Plan, PlanRequest, PlanStatus
+from planner.interface import FloatArray, MapView, Mission, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.plan_checks import start_tolerance_m
 from planner.rolling_window.anytime_search import AnytimeSearch
@@ -73,6 +73,7 @@ class RollingWindow:
         self._local = LocalPlanning(
             mission, memory, margin_m=config.margin_m, steps=config.steps, candidates=config.candidates
         )
+        self._start_tolerance_m = start_tolerance_m(mission)
         self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
         least_m = self._lead_m + 2.0 * mission.turn_radius_m
         self._commitment = Commitment(mission, memory, self._local, least_m, shielded)
@@ -99,6 +100,7 @@ class RollingWindow:
             self._proofs.no_way,
         )
         self._threats: Threats | None = None  # while something moves or has just appeared
+        self._served: tuple[object, ...] = ()  # by what the plan in effect served, as long as nothing is due
         self.state = PlanningState.ESCAPING
 
     @property
@@ -113,6 +115,9 @@ class RollingWindow:
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
+        if self._serves_on(request):
+            self._log.note(request.time_s, "")
+            return KEPT
         answer = self._planned(request)
         on_course = self.state is PlanningState.FOLLOWING or (
             self._monitor.plan is None and answer.status is not PlanStatus.FOUND
@@ -123,7 +128,20 @@ class RollingWindow:
         self._log.refused_plans = self._search.refused
         return answer
 
+    def _serves_on(self, request: PlanRequest) -> bool:
+        """Whether the plan in effect served last, and nothing was seen since or is due: so it is with most requests."""
+        seen, plan, here_m = request.seen, self._monitor.plan, request.arc_length_m
+        if self._served != (request.flown, seen.revision, seen.last_contradiction_s) or seen.moving:
+            return False
+        assert plan is not None
+        if plan.holds(here_m) or self._due(request, plan, here_m, newly_cut=False):
+            return False
+        self._local.trail.add(request.position_m)
+        self._monitor.nothing_new()
+        return True
+
     def _planned(self, request: PlanRequest) -> Plan:
+        self._served = ()
         fresh_m = self._take_in(request)
         plan = self._monitor.plan
         if plan is None:
@@ -135,10 +153,18 @@ class RollingWindow:
             self._loiter(now, plan)
         self._search.anew |= self._free_again(now)
         newly_cut = self._monitor.look(plan, now.here_m, request.position_m, fresh_m)
-        if not self._due(now, plan, newly_cut) and self._search.running is None:
+        if not self._due(request, plan, now.here_m, newly_cut) and self._search.running is None:
+            if self._nothing_waits(request.seen):
+                self._served = request.flown, request.seen.revision, request.seen.last_contradiction_s
             return KEPT
         self._monitor.searched_at_m = request.arc_length_m
         return self._roll(now)
+
+    def _nothing_waits(self, seen: MapView) -> bool:
+        """Whether, as long as nothing is seen, only the way flown can make a search due."""
+        feared = self._threats is not None or len(seen.moving) > 0
+        waits = self._search.freed or self._monitor.waits or self._giving_up.dead_ends.waits
+        return self.state is PlanningState.FOLLOWING and not (feared or waits)
 
     def _take_in(self, request: PlanRequest) -> FloatArray:
         """Takes in what was seen and flown since the last request; returns (k, 2) edge points that have come in."""
@@ -154,28 +180,27 @@ class RollingWindow:
             self._monitor.plan = None
         return fresh_m
 
-    def _due(self, now: Situation, plan: CommittedPlan, newly_cut: bool) -> bool:
+    def _due(self, request: PlanRequest, plan: CommittedPlan, here_m: float, newly_cut: bool) -> bool:
         """Whether the window is to roll on now."""
-        meets = self._threats is not None and self._meets_something(plan, now.here_m)
+        meets = self._threats is not None and self._meets_something(plan, here_m)
         self._monitor.broken |= meets
-        if self._left_behind(now):
+        if self._left_behind(request, plan, here_m):
             return True
-        since_m = now.request.arc_length_m - self._monitor.searched_at_m
+        since_m = request.arc_length_m - self._monitor.searched_at_m
         if self._giving_up.out_of_effort and self._search.up_to_date:
             return self._giving_up.whole_turn(since_m)
-        return self._monitor.due(plan, now.here_m, since_m, newly_cut) or meets or self._search.anew
+        return self._monitor.due(plan, here_m, since_m, newly_cut) or meets or self._search.anew
 
     def _free_again(self, now: Situation) -> bool:
         """Whether edge points have gone, and a rolling step has been flown, since the last search."""
         since_m = now.request.arc_length_m - self._monitor.searched_at_m
         return self._search.freed and since_m >= self._rolling_step_m
 
-    def _left_behind(self, now: Situation) -> bool:
+    def _left_behind(self, request: PlanRequest, plan: CommittedPlan | None, here_m: float) -> bool:
         """Whether the plan in effect is so far off that none can go on from it, as after a jump of the position."""
-        if now.plan is None:
+        if plan is None:
             return False
-        off_m = math.dist(place_on(now.plan.path, now.here_m)[0][:2], now.request.position_m)
-        return off_m > start_tolerance_m(self._mission)
+        return math.dist(place_on(plan.path, here_m)[0][:2], request.position_m) > self._start_tolerance_m
 
     def _meets_something(self, plan: CommittedPlan, here_m: float) -> bool:
         """Whether the plan in effect would come too near to what moves or has just appeared."""
@@ -184,7 +209,8 @@ class RollingWindow:
 
     def _roll(self, now: Situation) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
-        start, ahead = self._start(now), None if self._left_behind(now) else now.ahead
+        left_behind = self._left_behind(now.request, now.plan, now.here_m)
+        start, ahead = self._start(now), None if left_behind else now.ahead
         serving = ahead if math.isinf(self._monitor.cut_m) and not self._monitor.broken else None
         self._search.nearer = None
         if serving is not None and (serving.shortest or self._search.up_to_date) and not self._search.anew:

@@ -171,6 +171,15 @@ class PlanMonitor:
         )
         return self.cut_m < before
 
+    @property
+    def waits(self) -> bool:
+        """Whether edges that came in have yet to be compared."""
+        return len(self._waiting) > 0
+
+    def nothing_new(self) -> None:
+        """Takes in that no edge has come in, while none waits."""
+        self._since += 1
+
     def urgent(self, plan: CommittedPlan, here_m: float) -> bool:
         """Whether the plan in effect is broken, and what is wrong with it is near."""
         return self.broken and min(self.cut_m, plan.loiter_entry_m) - here_m < self._limits.urgent_m

@@ -16,7 +16,7 @@ from aircraft.airframes import AircraftError, airframe
 from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState, FlightModel
 from aircraft.jsbsim_model import JsbsimModel
-from aircraft.properties import FAULT_PROPERTIES
+from aircraft.properties import STATE_PROPERTIES
 from aircraft.start import Atmosphere, StartConditions
 
 PLANE = LocalPlane(47.0, 8.0)
@@ -251,12 +251,9 @@ def test_each_limit_is_a_fault_of_its_own(reading: str, good: float, bad: float,
     model = model_of("aerosonde")
 
     def reads(value: float) -> None:
-        place = FAULT_PROPERTIES.index(reading)
-        model._read_for_fault = (
-            *model._read_for_fault[:place],
-            lambda: value,
-            *model._read_for_fault[place + 1 :],
-        )
+        place = STATE_PROPERTIES.index(reading)
+        model._read = (*model._read[:place], lambda: value, *model._read[place + 1 :])
+        model.state()
 
     reads(good)
     assert model.fault() is None
