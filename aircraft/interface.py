@@ -106,6 +106,8 @@ class Performance:
         tracking_error_m: cross-track error that the guidance stays within on such a plan.
         hold_radius_m: smallest radius of a full turn that is held. It is less than `turn_radius_m`: a hold
             needs no bank in reserve for changes of curvature, only for gusts.
+        spaced_radius_m: smallest radius of turns with a straight between them on which the aircraft rolls. It lies
+            between the two, and is `turn_radius_m` in calm air.
     """
 
     airspeed_mps: float
@@ -113,6 +115,7 @@ class Performance:
     roll_in_s: float
     tracking_error_m: float
     hold_radius_m: float
+    spaced_radius_m: float
 
 
 class FlightModel(Protocol):

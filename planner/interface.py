@@ -7,7 +7,7 @@ Curvature is positive for a left (counter-clockwise) turn.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -118,6 +118,8 @@ class Mission:
         sensor_latency_s: a scan is known this long after it was taken.
         wind_mps: the strongest steady wind to expect.
         least_hold_radius_m: smallest radius of a full turn that ends a plan; None: that of any turn.
+        least_spaced_radius_m: smallest radius of turns with a straight between them on which the aircraft rolls;
+            None: that of any turn.
     """
 
     goal_m: tuple[float, float]
@@ -133,11 +135,22 @@ class Mission:
     sensor_latency_s: float = 0.0
     wind_mps: float = 0.0
     least_hold_radius_m: float | None = None
+    least_spaced_radius_m: float | None = None
 
     @property
     def hold_radius_m(self) -> float:
         """Radius of the full turns that plans end in."""
         return self.turn_radius_m if self.least_hold_radius_m is None else self.least_hold_radius_m
+
+    @property
+    def spaced(self) -> Mission:
+        """For a planner that leaves a straight to roll between any two turns: they may be tighter, and are steeper.
+
+        A steeper turn takes longer to roll into: about as its curvature grows.
+        """
+        radius_m = self.least_spaced_radius_m or self.turn_radius_m
+        roll_in_s = self.roll_in_s * self.turn_radius_m / radius_m
+        return replace(self, turn_radius_m=radius_m, roll_in_s=roll_in_s)
 
     @property
     def off_path_m(self) -> float:

@@ -86,6 +86,7 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
         sensor_latency_s=scenario.sensor.latency_s,
         wind_mps=wind_mps_of(scenario),
         least_hold_radius_m=performance.hold_radius_m,
+        least_spaced_radius_m=performance.spaced_radius_m,
     )
 
 

@@ -152,7 +152,7 @@ class Limits(NamedTuple):
 
     Attributes:
         radius_m: smallest radius.
-        roll_m: distance flown while rolling into a turn; kept straight between a left and a right turn.
+        roll_m: distance flown while rolling into a turn, the wind behind; straight between a left and a right turn.
     """
 
     radius_m: float
@@ -161,12 +161,12 @@ class Limits(NamedTuple):
     @classmethod
     def of(cls, mission: Mission) -> Limits:
         """Those of a mission."""
-        return cls(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
+        return cls(mission.turn_radius_m, mission.ground_speed_mps * mission.roll_in_s)
 
     @classmethod
     def of_holds(cls, mission: Mission) -> Limits:
         """Those of the full turns that plans of a mission end in."""
-        return cls(mission.hold_radius_m, mission.speed_mps * mission.roll_in_s)
+        return cls(mission.hold_radius_m, mission.ground_speed_mps * mission.roll_in_s)
 
 
 def fillet(

@@ -63,7 +63,7 @@ class RollingWindow:
     """
 
     def __init__(self, config: RollingWindowConfig, mission: Mission, shielded: bool = True) -> None:
-        config = config.resolved(mission)
+        config, mission = config.resolved(mission), mission.spaced
         assert config.margin_m is not None
         assert config.rolling_step_m is not None
         self._shielded = shielded

@@ -52,6 +52,23 @@ def test_a_hold_is_tighter_than_a_turn() -> None:
     assert performance(frame, 25.0, 1.0).hold_radius_m == pytest.approx(calm_by_hand)  # no tighter than that
 
 
+@pytest.mark.parametrize(("turbulence", "bank_deg"), [(None, 38.0), ("moderate", 33.0)])
+def test_turns_with_room_to_roll_between_them_are_tighter_in_wind(
+    turbulence: str | None, bank_deg: float
+) -> None:
+    frame = airframe("aerosonde")
+    calm = performance(frame, 25.0, 0.0, turbulence)
+    assert calm.spaced_radius_m == calm.turn_radius_m
+    assert (
+        performance(frame, 25.0, 1.0, turbulence).spaced_radius_m == calm.turn_radius_m
+    )  # no tighter than that
+    for wind_mps in (8.0, 12.0):  # the limit of 45 less 7, in moderate turbulence 12
+        windy = performance(frame, 25.0, wind_mps, turbulence)
+        by_hand = (25.0 + wind_mps) ** 2 / (9.80665 * math.tan(math.radians(bank_deg)))
+        assert windy.spaced_radius_m == pytest.approx(by_hand)
+        assert windy.hold_radius_m < windy.spaced_radius_m < windy.turn_radius_m
+
+
 @pytest.mark.flights
 @given(st.sampled_from(VERIFIED), st.floats(0.0, 1.0), st.floats(0.0, 0.9))
 def test_more_wind_or_turbulence_never_tightens_the_turn(name: str, share: float, wind_share: float) -> None:

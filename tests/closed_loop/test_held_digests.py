@@ -19,8 +19,8 @@ from harness.scenario.shipped import scenario_path
 
 HELD = {
     "aerosonde_forest": "0ca7df4598c874b63c63a47fe7b8b7b381107b7092acc205e886d632502b5ffc",
-    "polygon_town": "6c0fd27e7de66e8b479bf0492505b8fbf5ee06f874b5613246b8211f89d79648",
-    "one_of_everything": "7498f60b9eef980fe43ab8f7ad6ff6848ec32467c4b0389f1d21588912c2c088",
+    "polygon_town": "60b1ac16ef45d940532621a1c84dafe9d9feb643bdc7f3409b39ac2615e4b411",
+    "one_of_everything": "f8432ed34bc7ff9862567bffc8f25ad99bf817582325b15ed45842340ad23ea9",
 }
 """SHA-256 of the first minute of each."""
 

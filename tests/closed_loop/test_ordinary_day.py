@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path as FilePath
 
@@ -10,9 +11,14 @@ import pyarrow.parquet as pq
 import pytest
 
 import wayproof
+from aircraft.airframes import airframe
+from aircraft.envelope import performance
+from aircraft.start import Atmosphere
+from harness.bench.tracking import course, fly_course
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 
 CAMPAIGNS = FilePath(__file__).parents[2] / "scenarios" / "campaigns"
+CTU = FilePath(__file__).parents[3] / "shared" / "worlds" / "ctu_dubins" / "ctu-dubins-dense-14.json"
 
 
 class Hold:
@@ -56,6 +62,50 @@ def test_a_hold_is_kept_within_a_metre(wind_mps: float, turbulence: dict[str, st
     off_m = track.cross_track_m[track.time_s > 30.0].abs()
     assert 100.0 < holds[0].radius_m < 210.0
     assert off_m.max() < 1.0
+
+
+@pytest.mark.flights
+@pytest.mark.parametrize("intensity", [None, "moderate"])
+@pytest.mark.parametrize(
+    ("name", "airspeed_mps", "wind_mps"), [("aerosonde", 25.0, 8.0), ("c172p", 50.0, 15.0)]
+)
+def test_turns_with_room_to_roll_are_kept_within_what_planning_allows_for(
+    name: str, airspeed_mps: float, wind_mps: float, intensity: str | None
+) -> None:
+    frame = airframe(name)
+    planned = performance(frame, airspeed_mps, wind_mps, intensity)
+    air = Atmosphere(wind_mps, 0.0, "tustin" if intensity else None, intensity, 1)
+    flown = fly_course(frame, airspeed_mps, air, course(1, planned.spaced_radius_m))
+    assert flown.cross_track_max_m <= planned.tracking_error_m
+    assert flown.bank_saturation == 0.0
+
+
+@pytest.mark.flights
+@pytest.mark.skipif(not CTU.exists(), reason="the shared worlds are not here")
+def test_a_dense_public_world_in_wind_is_flown_with_the_turns_that_wind_allows(tmp_path: FilePath) -> None:
+    world = json.loads(CTU.read_text())
+    scenario = {
+        "schema": "wayproof/scenario/1",
+        "name": "dense",
+        "area": {"bounds_m": world["bounds_m"]},
+        "obstacles": [{"polygon": {"vertices_m": each}} for each in world["polygons_m"]]
+        + [{"circle": {"center_m": [x, y], "radius_m": r}} for x, y, r in world["circles_m"]],
+        "mission": {
+            **{key: world[key] for key in ("start_m", "course_deg", "goal_m", "goal_radius_m")},
+            "altitude_m": 300,
+            "time_limit_s": 1200,
+        },
+        "aircraft": {"model": "aerosonde", "airspeed_mps": 25},
+        "sensor": {"range_m": world["sensor_range_m"]},
+        "planner": {"kind": "rolling_window", "clearance_m": world["clearance_m"]},
+        "environment": {"wind": {"speed_mps": 8, "from_deg": 300}},
+    }
+    (tmp_path / "dense.yaml").write_text(json.dumps(scenario))
+    run = wayproof.fly(tmp_path / "dense.yaml")
+    assert run.metrics["outcome"] == "reached"
+    assert run.metrics["clearance_violation_s"] == 0.0
+    assert run.metrics["cross_track_m"]["max"] < 1.0
+    assert run.metrics["flown_length_m"] < 1.3 * world["optimum_m"]  # 1.67 with turns for 30 degrees of bank
 
 
 @pytest.mark.flights
