@@ -89,7 +89,7 @@ def _ring(points: Sequence[Point]) -> tuple[Point, ...]:
 
 KindName = Literal[
     "geotiff", "ascii_grid", "srtm", "numpy_dem", "osm", "osm_pbf", "cityjson", "geojson", "kml", "openair",
-    "ed269", "ed318", "plan_fence", "ardupilot_fence", "ros_map", "moving_ai", "vector"
+    "ed269", "ed318", "plan_fence", "ardupilot_fence", "ros_map", "moving_ai"
 ]  # fmt: skip
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import codecs
 import gc
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
-from xml.parsers import expat
 
 from harness.files.input_file import InputError, open_regular
+from harness.files.values import parsed_json
 from harness.world_files.parts import WorldFileError
 
 MAX_BYTES: Final = 400_000_000
@@ -50,12 +49,16 @@ def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> b
         reason = error.strerror if isinstance(error, OSError) else error
         raise WorldFileError(f"cannot be read ({reason}); give the path of a file") from error
     if too_large:
-        raise WorldFileError(f"is larger than {most // 10**6} MB; cut the area of interest out of it first")
+        raise WorldFileError(f"is larger than {most // 10**6} MB; cut the area of interest out of it")
     return data
 
 
 def text_of(data: bytes) -> str:
-    """Bytes as text: UTF-8, UTF-16 with a byte order mark, or Latin-1 as older airspace files are."""
+    """The text of some bytes: UTF-8 or UTF-16 that says so, else Latin-1.
+
+    Raises:
+        WorldFileError: they are no text.
+    """
     if data.startswith(UTF_16):
         return data.decode("utf-16", "replace")
     if b"\0" in data:
@@ -70,42 +73,12 @@ def json_of(path: Path, lines: bool = False) -> Any:
     """The content of a JSON file; where `lines`, a list of JSON texts, as they may stand one a line.
 
     Raises:
-        WorldFileError: it is too large, is not JSON, or has numbers that are not finite.
+        InputError: it is not JSON; the text names no file.
+        WorldFileError: it is too large.
     """
-
-    def refuse(word: str) -> float:
-        raise WorldFileError(f"has the number {word}; must have finite numbers only")
-
     text = text_of(read_bytes(path, MAX_TREE_BYTES))
     first, _, more = text.lstrip().partition("\n")
-    try:
-        if lines and first.rstrip().endswith("}") and more.lstrip().startswith("{"):
-            return [json.loads(line, parse_constant=refuse) for line in text.splitlines() if line.strip()]
-        whole = json.loads(text, parse_constant=refuse)
-    except (RecursionError, MemoryError) as error:
-        raise WorldFileError("is nested too deeply; must be a map") from error
-    except json.JSONDecodeError as error:
-        raise WorldFileError(
-            f"is not whole JSON (line {error.lineno}); it may be torn: get it again"
-        ) from error
-    except ValueError as error:
-        if isinstance(error, WorldFileError):
-            raise
-        raise WorldFileError("has a number of too many digits; must be a map") from error
+    if lines and first.rstrip().endswith("}") and more.lstrip().startswith("{"):
+        return [parsed_json(line, "", once=False) for line in text.splitlines() if line.strip()]
+    whole = parsed_json(text, "", once=False)
     return [whole] if lines else whole
-
-
-def check_xml(data: bytes) -> None:
-    """Raises WorldFileError unless a text is whole XML without entities, a few lines of which unpack to gigabytes."""
-    parser = expat.ParserCreate()
-    parser.EntityDeclHandler = _no_entities
-    try:
-        parser.Parse(data, True)
-    except expat.ExpatError as error:
-        raise WorldFileError(
-            f"is not whole XML (line {error.lineno}); it may be torn: get it again"
-        ) from error
-
-
-def _no_entities(*_: object) -> None:
-    raise WorldFileError("declares XML entities; must be plain XML")

@@ -53,10 +53,10 @@ GAZEBO: Final = "a Gazebo world; give its footprints as GeoJSON, or its cells as
 FLIGHT: Final = "a flight, not a world; `wayproof check` takes flown paths"
 GIVEN_UP: Final = {
     **{".pgm": IMAGE, ".png": IMAGE, ".world": GAZEBO, ".sdf": GAZEBO, ".igc": FLIGHT, ".gpx": FLIGHT},
+    **dict.fromkeys((".gpkg", ".shp", ".fgb"), "a vector file; make GeoJSON of it (ogr2ogr a.geojson FILE)"),
     ".scen": "a list of MovingAI problems; give the .map file that it names",
     ".npy": "a plain array; save it as GeoTIFF or ESRI ASCII grid",
     ".dxf": "a drawing without a place on earth; give GeoJSON",
-    **dict.fromkeys((".gpkg", ".shp", ".fgb"), "a vector file; make GeoJSON of it (ogr2ogr a.geojson FILE)"),
     ".las": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
 }
 """Files that are not read, by ending, with what would do."""
@@ -66,20 +66,19 @@ FAMILIES: Final = (
 )
 GRID_KEYS: Final = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize")
 """Words with which an ESRI ASCII grid may begin."""
+HEAD: Final = 65_536
+"""Bytes at the begin of a file by which its kind is told, but for JSON."""
 
-_XML_ROOT: Final = re.compile(rb"<(?:[A-Za-z_][\w.-]*:)?([A-Za-z_][\w.-]*)[\s>/]")
+_XML_ROOT: Final = re.compile(r"<(?:[A-Za-z_][\w.-]*:)?([A-Za-z_][\w.-]*)[\s>/]")
 _OPEN_AIR: Final = re.compile(r"^(AC\s|AN\s(.*\n)+?(DP|DC|DA|DB|DY)\s)", re.IGNORECASE | re.MULTILINE)
 """An airspace begins with its class, or with its name and something of a shape."""
 _PLACE: Final = re.compile(r"\s*[-+]?\d+\.\d+[\s,]+[-+]?\d+\.\d+\s*$")
 _JSON_KINDS: Final = (
-    ("cityjson", re.compile(rb'"CityObjects"\s*:')),
-    ("plan_fence", re.compile(rb'"geoFence"\s*:|"fileType"\s*:\s*"Plan"')),
-    ("ed269", re.compile(rb'"UASZoneList"\s*:|"horizontalProjection"\s*:')),
-    ("ed318", re.compile(rb'"(?:layer|extent)"\s*:\s*\{')),
-    (
-        "geojson",
-        re.compile(rb'"type"\s*:\s*"(?:Feature(?:Collection)?|(?:Multi)?Polygon|GeometryCollection)"'),
-    ),
+    ("cityjson", r'"CityObjects"\s*:'),
+    ("plan_fence", r'"geoFence"\s*:|"fileType"\s*:\s*"Plan"'),
+    ("ed269", r'"UASZoneList"\s*:|"horizontalProjection"\s*:'),
+    ("ed318", r'"(?:layer|extent)"\s*:\s*\{'),
+    ("geojson", r'"type"\s*:\s*"(?:Feature(?:Collection)?|(?:Multi)?Polygon|GeometryCollection)"'),
 )
 """Kind of a JSON file by a key that it has somewhere; the first that is found counts."""
 
@@ -90,8 +89,8 @@ def read(path: Path, kind: str | None, reading: Reading) -> Contents:
     Raises:
         WorldFileError: it is of none of the kinds, or cannot be used.
     """
-    found = kind or kind_of(path)
     try:
+        found = kind or kind_of(path)
         contents = footprints.finished(KINDS[found](path, reading))
     except InputError as error:
         raise WorldFileError(str(error)) from error
@@ -117,7 +116,7 @@ def kind_of(path: Path) -> str:
     Raises:
         WorldFileError: it is of none of them; the message says what would do.
     """
-    first, ending = bounded.read_bytes(path, first=65_536), path.suffix.lower()
+    first, ending = bounded.read_bytes(path, first=HEAD), path.suffix.lower()
     if not first:
         raise WorldFileError("is empty; get it again")
     found = _binary(path, first, ending) or _text(path, first)
@@ -131,37 +130,34 @@ def kind_of(path: Path) -> str:
 def _binary(path: Path, first: bytes, ending: str) -> str | None:
     if first[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
         return "geotiff"
-    if first[:2] == b"PK":
-        try:
-            with zipfile.ZipFile(path) as archive:
-                names = [name.lower() for name in archive.namelist() if not name.endswith("/")]
-        except (zipfile.BadZipFile, OSError, ValueError) as error:
-            raise WorldFileError("is a damaged ZIP archive; get it again") from error
-        for end, kind in PACKED.items():
-            if any(name.endswith(end) for name in names):
-                return kind
-        held = names[0].rpartition("/")[2][:40] if names else "nothing"
-        raise WorldFileError(f"is a ZIP archive with {held!r}; unpack it and give the file")
     if ending == ".hgt" or path.name.lower().endswith(".hgt.gz"):
         return "srtm"
     if b"OSMHeader" in first[:64]:
         return "osm_pbf"
-    return None
+    if first[:2] != b"PK":
+        return None
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [name.lower() for name in archive.namelist() if not name.endswith("/")]
+    except (zipfile.BadZipFile, OSError, ValueError) as error:
+        raise WorldFileError("is a damaged ZIP archive; get it again") from error
+    for end, kind in PACKED.items():
+        if any(name.endswith(end) for name in names):
+            return kind
+    held = names[0].rpartition("/")[2][:40] if names else "nothing"
+    raise WorldFileError(f"is a ZIP archive with {held!r}; unpack it and give the file")
 
 
 def _text(path: Path, first: bytes) -> str | None:
-    if first.startswith(bounded.UTF_16):
-        first = bounded.text_of(first).encode()
-    if b"\0" in first:
+    if b"\0" in first and not first.startswith(bounded.UTF_16):
         return None
-    start = first.lstrip(b"\xef\xbb\xbf\x1e \t\r\n")
-    if start[:1] == b"<":
-        root = _XML_ROOT.search(start)
-        return {b"osm": "osm", b"kml": "kml"}.get(root[1].lower()) if root else None
-    if start[:1] in b"{[":
+    text = bounded.text_of(first).lstrip("\ufeff\x1e \t\r\n")
+    if text[:1] == "<":
+        root = _XML_ROOT.search(text)
+        return {"osm": "osm", "kml": "kml"}.get(root[1].lower()) if root else None
+    if text[:1] in ("{", "["):
         return _json(path)
-    text = bounded.text_of(first)
-    lines = text.splitlines()[:-1] if len(first) == 65_536 else text.splitlines()
+    lines = text.splitlines()[:-1] if len(first) == HEAD else text.splitlines()
     return _of_lines([line.strip() for line in lines if line.strip() and line.lstrip()[0] not in "*#"])
 
 
@@ -183,12 +179,10 @@ def _of_lines(lines: list[str]) -> str | None:
 
 
 def _json(path: Path) -> str | None:
-    data = bounded.read_bytes(path, bounded.MAX_TREE_BYTES)
-    if data.startswith(bounded.UTF_16):
-        data = bounded.text_of(data).encode()
-    if b'"elements"' in data and b"Overpass" in data:
+    text = bounded.text_of(bounded.read_bytes(path, bounded.MAX_TREE_BYTES))
+    if '"elements"' in text and "Overpass" in text:
         raise WorldFileError("is JSON of Overpass; ask it for XML ([out:xml]) and give that")
-    found = next((kind for kind, pattern in _JSON_KINDS if pattern.search(data)), None)
+    found = next((kind for kind, pattern in _JSON_KINDS if re.search(pattern, text)), None)
     if found is None:
         bounded.json_of(path)  # says so where it is no JSON at all
     return found

@@ -25,18 +25,19 @@ from harness.world_files.parts import (
     WorldFileError,
 )
 
-_NUMBER: Final = re.compile(r"\d+(?:\.\d*)?|\.\d+")
-_SURFACE: Final = re.compile(r"(SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?)")
+_FEET: Final = dict.fromkeys(("FEET", "FOOT", "FT", "F"), FOOT_M)
+_METRES: Final = dict.fromkeys(("METRES", "METERS", "METRE", "METER", "MTR", "M"), 1.0)
+_UNITS: Final = {"FL": 100.0 * FOOT_M, **_FEET, **_METRES}
+_ON_GROUND: Final = ("SURFACE", "GROUND", "RELATIVE", "ASFC", "AGL", "GND", "SFC")
+_AT_SEA: Final = ("AMSL", "MSL", "SEA", "STD", "QNH", "ALT", "GEOID", "MEAN", "LEVEL")
+_DATUMS: Final = {**dict.fromkeys(_ON_GROUND, Datum.GROUND), **dict.fromkeys(_AT_SEA, Datum.SEA)}
+_WORDS: Final = sorted((*_UNITS, *_DATUMS, "ABOVE"), key=len, reverse=True)
+_TOKEN: Final = re.compile(rf"-?\s*(?:\d+(?:\.\d*)?|\.\d+)|{'|'.join(_WORDS)}|[^\s()'./+\N{{DEGREE SIGN}}]")
+"""A number, or a word that a limit may consist of. Nothing is guessed of a limit with others, as `ASK 123.5`."""
+_SURFACE: Final = re.compile(r"SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?")
 _NO_END: Final = re.compile(r"(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b")
-_GROUND: Final = re.compile(r"AGL|GND|SFC|GROUND|SURFACE|RELATIVE")
-_SEA: Final = re.compile(r"SL|SEA|STD|FL|QNH|ALT|GEOID")
-_UNIT: Final = re.compile(r"FL|\d\s*(FT|FEET|F\b|M(?!SL))")
-_METRES: Final = re.compile(r"\d\s*(M|METRES?|METERS?|MTR)(?=\b|AMSL|MSL|AGL|ASFC|GND|SFC)")
-_WORD: Final = re.compile(
-    r"\d+(?:[.,]\d*)?|\.\d+|[-+]|AMSL|MSL|METRES|METERS|METER|METRE|MEAN|MTR|FEET|FL|FT|F|"
-    r"M(?!\w)|M(?=AMSL|MSL|AGL|ASFC|GND|SFC)|AGL|ASFC|GND|SFC|GROUND|ALT|STD|QNH|ABOVE|SEA|LEVEL|RELATIVE|[()'./]"
-)
-"""Words that a limit may consist of. Nothing is guessed of a limit with other words, as `ASK 123.5`."""
+_NOT_KNOWN: Final = -9000.0
+"""A limit as low as this stands for one that is not known, as -9998 in files of the FAA."""
 _SIDES: Final = {"lower": ("lower|floor|bottom", "min"), "upper": ("upper|ceiling|top", "max")}
 """Beginnings of the names of attributes with a limit; the last belong to altitudes only."""
 _NAMES: Final = {
@@ -52,56 +53,53 @@ _BOTH: Final = re.compile(
     r"uom|units?|uomdimensions|altitudeunit|(altitude|vertical|height)?reference|(vertical)?datum"
 )
 """Names of attributes with the unit or the reference of both."""
-_NO_NUMBER: Final = -9000.0
-"""A limit as low as this stands for one that is not known, as -9998 in files of the FAA."""
 
 _LENGTH: Final = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*([a-z]*)\.?")
-_FEET: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(?:'|ft)\s*(?:(\d+(?:\.\d+)?)\s*(?:''|\"|in)?)?")
+_FEET_AND_INCHES: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(?:'|ft)\s*(?:(\d+(?:\.\d+)?)\s*(?:''|\"|in)?)?")
 _THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")
 """Numbers such as `1,200`, which are twelve hundred to some and one and a fifth to others."""
 _LENGTHS_M: Final = {
-    **dict.fromkeys(("", "m", "mtr", "metre", "metres", "meter", "meters"), 1.0),
-    **dict.fromkeys(("ft", "foot", "feet"), FOOT_M),
+    **{name.lower(): metres for name, metres in (*_FEET.items(), *_METRES.items()) if name != "F"},
     **dict.fromkeys(("in", "inch", "inches"), FOOT_M / 12.0),
-    **{"cm": 0.01, "km": 1000.0},
+    **{"": 1.0, "cm": 0.01, "km": 1000.0},
 }
 """Metres of the units that OpenStreetMap has: https://wiki.openstreetmap.org/wiki/Map_features/Units."""
 _HEIGHT: Final = (
-    "height",
-    "building:height",
-    "building_height",
-    "measuredheight",
-    "render_height",
-    "est_height",
+    *("height", "building:height", "building_height"),
+    *("measuredheight", "render_height", "est_height"),
 )
 _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")
 
 
-def limit_of(text: str) -> Limit | None:
-    """A height as airspace files write it, `2500 ft AMSL`, `FL 65`, `100m GND`; a number alone is feet above the sea.
+def limit_of(text: str, unit_m: float | None = FOOT_M, datum: Datum | None = Datum.SEA) -> Limit | None:
+    """A height as airspace files write it, `2500 ft AMSL`, `FL 65`, `100m GND`.
+
+    Args:
+        text: the height.
+        unit_m: of a number without a unit.
+        datum: likewise; that of a flight level is the sea.
 
     Returns:
         The limit; NO_BOTTOM for the surface; None where it cannot be told.
     """
-    word = " ".join(text.upper().replace("\N{DEGREE SIGN}", " ").split())
+    word = " ".join(text.upper().split())
     if _SURFACE.fullmatch(word):
         return NO_BOTTOM
     if _NO_END.match(word):
         return NO_TOP
     if word in ("MSL", "AMSL", "SEA LEVEL"):
         return Limit(0.0)
-    numbers = _NUMBER.findall(word)
-    if len(numbers) != 1 or _WORD.sub("", word).strip():
+    tokens = _TOKEN.findall(word)
+    numbers = [each for each in tokens if each[-1] in "0123456789."]
+    words = [each for each in tokens if each not in numbers]
+    if len(numbers) != 1 or not set(words) <= set(_WORDS):
         return None
-    value = -float(numbers[0]) if re.search(r"-\s*" + re.escape(numbers[0]), word) else float(numbers[0])
-    if "FL" in word:
-        return Limit(value * 100.0 * FOOT_M)
-    ground = _GROUND.search(word) is not None
-    if value <= _NO_NUMBER or (
-        ground and value < 0.0
-    ):  # as in SFC-2500, which says where a zone begins as well
-        return None
-    return Limit(value * (1.0 if _METRES.search(word) else FOOT_M), Datum.GROUND if ground else Datum.SEA)
+    value = float(numbers[0].replace(" ", ""))
+    datum = next((_DATUMS[each] for each in words if _DATUMS.get(each) is Datum.GROUND), datum)
+    if value <= _NOT_KNOWN or (datum is Datum.GROUND and value < 0.0):
+        return None  # as in SFC-2500, which says where a zone begins as well
+    factor = next((_UNITS[each] for each in words if each in _UNITS), unit_m)
+    return Limit(value * (factor or 1.0), Datum.SEA if "FL" in words else datum or Datum.SEA)
 
 
 def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | None:
@@ -115,39 +113,27 @@ def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | No
     """
     if isinstance(value, bool | Mapping | list) or value is None:
         return None
-    word, said, told = str(value).strip().upper(), said.upper(), list[str]()
-    if re.search(r"[1-9]", word):  # a height, and not the surface
-        word = _with_reference(_with_unit(word, said, told), said, told)
-    limit = limit_of(word)
-    new = [f"{name or 'a part'}: {each}" for each in told] if limit is not None else []
-    notes += [each for each in new if each not in notes[-4:]]
-    return limit
-
-
-def _with_unit(word: str, said: str, told: list[str]) -> str:
-    """A height with the unit that is said of it, where it has none."""
-    if _UNIT.search(word):
-        return word
-    unit = re.search(r"\b(FL|F|FT|FEET|FOOT|M|MTR|MET(ER|RE)S?)\b", said)
-    if unit is None:
+    text, said = str(value), said.upper()
+    apart = re.findall(r"[A-Z]+", said)
+    unit_m = next((_UNITS[each] for each in apart if each in _UNITS), None)
+    datum = next((_DATUMS[each] for each in apart if each in _DATUMS), None)
+    limit = limit_of(text, unit_m, datum)
+    own = set(_TOKEN.findall(text.upper()))
+    is_level = "FL" in own or (unit_m == _UNITS["FL"] and not own & set(_UNITS))
+    if limit is not None and is_level:
+        limit = Limit(limit.height_m)
+    if limit is None or not re.search(r"[1-9]", text):  # the surface, or nothing that is known
+        return limit
+    told = []
+    if unit_m is None and not own & set(_UNITS):
         told.append("its limits name no unit; taken as metres")
-    elif unit[1] == "FL":
-        return f"FL {word}"
-    metres = unit is None or unit[1].startswith("M")
-    return re.sub(r"([\d.]+)", rf"\1 {'M' if metres else 'FT'} ", word, count=1)
-
-
-def _with_reference(word: str, said: str, told: list[str]) -> str:
-    """A height with the reference that is said of it, where it has none."""
-    if _GROUND.search(word) or _SEA.search(word):
-        return word
-    if _GROUND.search(said):
-        return f"{word} AGL"
-    if re.search("WGS|W84|HAE|ELLIPS", said):
-        told.append("its limits are above the ellipsoid; taken as above mean sea level")
-    elif not _SEA.search(said):
-        told.append("its limits name no reference; taken as above mean sea level")
-    return f"{word} AMSL"
+    if not is_level and datum is None and not own & set(_DATUMS):
+        if re.search("WGS|W84|HAE|ELLIPS", said):
+            told.append("its limits are above the ellipsoid; taken as above mean sea level")
+        else:
+            told.append("its limits name no reference; taken as above mean sea level")
+    notes += [new for each in told if (new := f"{name or 'a part'}: {each}") not in notes[-4:]]
+    return limit
 
 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:
@@ -176,30 +162,23 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     Raises:
         WorldFileError: it is a facility map, whose ceilings are those up to which one may fly.
     """
-    said = {key.lower().replace("_", ""): value for key, value in tags.items() if value is not None}
-    if "ceiling" in said and any(key.startswith(("apt1", "mapeff")) for key in said):
+    given = {key.lower().replace("_", ""): value for key, value in tags.items() if value is not None}
+    if "ceiling" in given and any(key.startswith(("apt1", "mapeff")) for key in given):
         raise WorldFileError(
             "is a facility map of the FAA, up to whose ceilings one may fly; give the airspace"
         )
-    both = [str(value) for key, value in said.items() if _BOTH.fullmatch(key)]
-    lower = _side(said, "lower", both, notes, name) if _key(said, "lower") else NO_BOTTOM
-    upper = _side(said, "upper", both, notes, name) if _key(said, "upper") else NO_TOP
-    return band_of(lower, upper, notes, name)
-
-
-def _key(said: Mapping[str, Any], side: str) -> re.Match[str] | None:
-    """The name of the attribute with a limit; None where there is none."""
-    return next((match for key in said if (match := _NAMES[side].fullmatch(key))), None)
-
-
-def _side(said: Mapping[str, Any], side: str, both: list[str], notes: list[str], name: str) -> Limit | None:
-    """One limit of an airspace, with what its name and other attributes say of it."""
-    match, begins = _key(said, side), re.compile("|".join(_SIDES[side]))
-    if match is None:
-        return None
-    own = [str(value) for key, value in said.items() if begins.match(key) and _OWN.search(key)]
-    words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
-    return limit_told(said[match[0]], " ".join((*words, *own, *both)), notes, name)
+    both = [str(value) for key, value in given.items() if _BOTH.fullmatch(key)]
+    found: list[Limit | None] = []
+    for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
+        match = next((match for key in given if (match := _NAMES[side].fullmatch(key))), None)
+        if match is None:
+            found.append(none)
+            continue
+        begins = tuple("|".join(_SIDES[side]).split("|"))
+        own = [str(value) for key, value in given.items() if key.startswith(begins) and _OWN.search(key)]
+        words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
+        found.append(limit_told(given[match[0]], " ".join((*words, *own, *both)), notes, name))
+    return band_of(found[0], found[1], notes, name)
 
 
 def has_limits(tags: Mapping[str, Any]) -> bool:
@@ -210,16 +189,14 @@ def has_limits(tags: Mapping[str, Any]) -> bool:
 
 def metres_of(value: Any) -> float | None:
     """A length in metres unless it says otherwise: `12`, `12.5 m`, `40 ft`, `7'4"`; None where it says none."""
-    if isinstance(value, bool) or value is None:
+    if isinstance(value, bool) or value is None or _THOUSANDS.search(str(value)):
         return None
     if isinstance(value, int | float):
         return float(value) if math.isfinite(value) else None
-    if _THOUSANDS.search(str(value)):
-        return None
     text = str(value).strip().lower().replace("\N{RIGHT SINGLE QUOTATION MARK}", "'").replace(",", ".")
     if (match := _LENGTH.fullmatch(text)) and match[2] in _LENGTHS_M:
         return float(match[1]) * _LENGTHS_M[match[2]]
-    if match := _FEET.fullmatch(text):
+    if match := _FEET_AND_INCHES.fullmatch(text):
         return (float(match[1]) + float(match[2] or 0.0) / 12.0) * FOOT_M
     return None
 
@@ -227,7 +204,7 @@ def metres_of(value: Any) -> float | None:
 def _largest(value: Any) -> float:
     """A length, of a text that is none the largest number in it: lists and ranges stand for the highest."""
     plain = metres_of(value)
-    numbers = map(float, _NUMBER.findall(str(value)[:100])) if plain is None else (plain,)
+    numbers = map(float, re.findall(r"\d+(?:\.\d*)?", str(value)[:100])) if plain is None else (plain,)
     return max((each for each in numbers if math.isfinite(each)), default=0.0)
 
 
@@ -258,24 +235,17 @@ class Doubts:
             )
         return notes
 
-    def top_m(self, tags: Mapping[str, Any], names: tuple[str, ...]) -> float | None:
-        """The first of some attributes that is above zero; None where none is."""
+    def length_m(self, tags: Mapping[str, Any], names: Sequence[str], bottom: bool = False) -> float:
+        """The first of some attributes that is above zero, of a bottom that is a plain length; 0 where none is."""
         for name in names:
-            if (given := tags.get(name)) is not None:
-                plain = metres_of(given)
-                if plain is None or plain < 0.0:
-                    self.odd[f"{name}={str(given)[:20]!r}"] += 1
-                if (largest := _largest(given)) > 0.0:
-                    return largest
-        return None
-
-    def bottom_m(self, tags: Mapping[str, Any], names: tuple[str, ...]) -> float:
-        """The first of some attributes that is a plain length; 0 where none is."""
-        for name in names:
-            if (given := tags.get(name)) is not None:
-                if (plain := metres_of(given)) is not None:
-                    return plain
+            if (given := tags.get(name)) is None:
+                continue
+            plain = metres_of(given)
+            if plain is None or (plain < 0.0 and not bottom):
                 self.odd[f"{name}={str(given)[:20]!r}"] += 1
+            found = (plain or 0.0) if bottom else _largest(given)
+            if found > 0.0 or (bottom and plain is not None):
+                return found
         return 0.0
 
 
@@ -289,17 +259,15 @@ def building(
     `building:min_level` times 3 m, else at the ground. A height of zero or less says nothing.
     """
     tags = {key.lower(): value for key, value in tags.items()}
-    top = doubts.top_m(tags, _HEIGHT)
-    if top is None and (levels := doubts.top_m(tags, _LEVELS)) is not None:
-        roof = doubts.top_m(tags, ("roof:height", "roof_height"))
-        top = LEVEL_M * levels + (
-            LEVEL_M * (doubts.top_m(tags, ("roof:levels",)) or 0.0) if roof is None else roof
-        )
-    if top is None:
+    top = doubts.length_m(tags, _HEIGHT)
+    if not top and (levels := doubts.length_m(tags, _LEVELS)):
+        roof = doubts.length_m(tags, ("roof:height", "roof_height"))
+        top = LEVEL_M * levels + (roof or LEVEL_M * doubts.length_m(tags, ("roof:levels",)))
+    if not top:
         top = reading.default_height_m
         doubts.guessed += 1
-    bottom = doubts.bottom_m(tags, ("min_height", "render_min_height"))
-    bottom = bottom or LEVEL_M * doubts.bottom_m(tags, ("building:min_level", "min_level"))
+    bottom = doubts.length_m(tags, ("min_height", "render_min_height"), bottom=True)
+    bottom = bottom or LEVEL_M * doubts.length_m(tags, ("building:min_level", "min_level"), bottom=True)
     begin = NO_BOTTOM if bottom <= 0.0 else Limit(min(bottom, top), Datum.GROUND)
     return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
 

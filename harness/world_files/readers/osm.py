@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
+from xml.parsers import expat
 
 from harness.files.wording import counted
-from harness.world_files.bounded import MAX_BYTES, check_xml, read_bytes
+from harness.world_files.bounded import MAX_BYTES, read_bytes
 from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
 from harness.world_files.readers import limits
 
@@ -33,7 +34,7 @@ def read_xml(path: Path, reading: Reading) -> Contents:
         WorldFileError: it is not whole, has no building, or osmium is not installed.
     """
     data = read_bytes(path, MAX_BYTES)
-    check_xml(data)
+    _check_xml(data)
     if re.search(rb"<nd [^>]*\blat=", data):
         raise WorldFileError(
             "has places inside its ways (`out geom`); ask Overpass for `out body; >; out skel`"
@@ -53,6 +54,22 @@ def read_xml(path: Path, reading: Reading) -> Contents:
                 for each in osmium.FileProcessor(str(path), kind):
                     writer.add(each)
         return read_pbf(ordered, reading)
+
+
+def _check_xml(data: bytes) -> None:
+    """Raises WorldFileError unless a text is whole XML without entities, a few lines of which unpack to gigabytes."""
+
+    def refuse(*_: object) -> None:
+        raise WorldFileError("declares XML entities; must be plain XML")
+
+    parser = expat.ParserCreate()
+    parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise WorldFileError(
+            f"is not whole XML (line {error.lineno}); it may be torn: get it again"
+        ) from error
 
 
 def _osmium() -> Any:

@@ -150,7 +150,7 @@ def test_the_command_and_the_scenario_say_it_with_status_2(
     path.write_text("{")
     assert main(["world", str(path), "--altitude-m", "300", "--out", str(out)]) == 2
     assert not out.exists()
-    assert f"{path}: is not whole JSON" in capsys.readouterr().err.splitlines()[-1]
+    assert f"{path}: line 1: is not whole JSON" in capsys.readouterr().err.splitlines()[-1]
     scenario = tmp_path / "s.yaml"
     scenario.write_text(
         "schema: wayproof/scenario/1\nname: s\narea: {bounds_m: [0, 0, 9000, 9000]}\n"
@@ -159,7 +159,7 @@ def test_the_command_and_the_scenario_say_it_with_status_2(
     )
     assert main(["validate", str(scenario)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"{scenario}:5: obstacles[0].file: a.geojson is not whole JSON")
+    assert line.startswith(f"{scenario}:5: obstacles[0].file: a.geojson line 1: is not whole JSON")
 
 
 def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
