@@ -27,13 +27,7 @@ from harness.recording.layout import NOT_THIN, blueprint
 from harness.recording.moving import Changing, Tracked
 from harness.recording.plans import send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
-from harness.recording.scene import (
-    lines_2d,
-    log_end,
-    log_scene,
-    log_summary,
-    quaternions,
-)
+from harness.recording.scene import lines_2d, log_end, log_scene, log_summary, quaternions
 from harness.recording.sensed import Sensed, returns_m
 from harness.recording.series import curves, send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_3d

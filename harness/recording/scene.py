@@ -15,15 +15,7 @@ import rerun as rr
 from harness.flight.record import FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
-from harness.recording.solids import (
-    CIRCLE_POINTS,
-    circle,
-    log_ground,
-    log_solids,
-    outlines,
-    rims,
-    strips_2d,
-)
+from harness.recording.solids import CIRCLE_POINTS, circle, log_ground, log_solids, outlines, rims, strips_2d
 from harness.recording.summary import colours, summary
 
 LEAST_CIRCLE_POINTS, THIN_CIRCLE_POINTS, POINTS_OF_ALL = 12, 24, 400_000

@@ -31,11 +31,7 @@ def check_local_plane(area: Area) -> None:
 
 
 def check_start_and_goal(
-    area: Area,
-    obstacles: Sequence[Obstacle],
-    mission: MissionSpec,
-    clearance_m: float,
-    names: Sequence[str],
+    area: Area, obstacles: Sequence[Obstacle], mission: MissionSpec, clearance_m: float, names: Sequence[str]
 ) -> None:
     """Start and goal lie in the area and, as far as it can be told, clear of obstacles.
 

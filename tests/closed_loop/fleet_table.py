@@ -120,11 +120,7 @@ def scaled(frame: Airframe, law: str, air: str, seed: int, range_radii: float = 
             {"circle": {"center_m": at(east, north), "radius_m": metres(radius)[0]}}
             for east, north, radius in discs(seed)
         ],
-        "mission": {
-            "start_m": at(2.0, 0.5 * HIGH),
-            "course_deg": 90.0,
-            "goal_m": at(WIDE - 2.0, 0.5 * HIGH),
-        },
+        "mission": {"start_m": at(2.0, 0.5 * HIGH), "course_deg": 90.0, "goal_m": at(WIDE - 2.0, 0.5 * HIGH)},
         "aircraft": {"model": frame.name, "airspeed_mps": frame.cruise_mps},
         "sensor": {"range_m": round(range_radii * with_law_m, 2)},
         "planner": {"clearance_m": metres(CLEARANCE)[0]},

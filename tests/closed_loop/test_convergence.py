@@ -310,17 +310,3 @@ def verdicts(seeds: range) -> Iterator[tuple[str, bool]]:
     for seed in seeds:
         world = drawn(seed)
         yield world.family, world.reachable
-
-
-@pytest.mark.flights
-def test_every_family_and_both_verdicts_are_drawn() -> None:
-    found = set(verdicts(range(24)))
-    assert {family for family, _ in found} == set(FAMILIES)
-    assert {family for family, verdict in found if not verdict} == set(FAMILIES)
-    assert {family for family, verdict in found if verdict} == set(FAMILIES)
-
-
-@pytest.mark.parametrize(("gap_m", "verdict"), [(0.0, False), (79.0, False), (200.0, None), (500.0, True)])
-def test_a_world_is_told_apart_by_the_width_of_its_gap(gap_m: float, verdict: bool | None) -> None:
-    walls = chain([(0.0, 2500.0), (SIDE_M, 2500.0)], gap_m, 0)
-    assert reachable((2500.0, 1000.0), (2500.0, 4000.0), walls, 110.0) is verdict

@@ -114,26 +114,6 @@ def test_what_it_says_between_steps_ends_the_flight_there(
     assert flight.sim_s == pytest.approx(1.0 + 0.5 * STEP_S)
 
 
-def test_scans_and_plans_that_are_late_by_whole_steps_come_in_at_those(
-    answering: Install, small_world: SmallWorld
-) -> None:
-    asked: list[float] = []
-
-    def answer(mission: Mission, request: PlanRequest) -> Plan:
-        asked.append(request.time_s)
-        row = (*request.position_m, *request.direction, 0.0, 5000.0)
-        return Plan(PlanStatus.FOUND, "found", np.array([row[:2]]), Path(np.array([row])))
-
-    answering(answer)
-    late = {"sensor": {"rate_hz": 10.0, "latency_s": STEP_S}, "mission": {"time_limit_s": 3.0}}
-    fly(make_loop(small_world(planner={"kind": "stand_in"}, **late), PointMass))
-    assert asked == pytest.approx(np.arange(1, 30) * STEP_S)
-    asked.clear()
-    keys = {"kind": "stand_in", "compute_latency_s": STEP_S}
-    flight = fly(make_loop(small_world(planner=keys, **late), PointMass))
-    assert [each.time_s for each in flight.plans] == pytest.approx(np.array(asked[:-1]) + STEP_S)
-
-
 def test_why_nothing_is_found_is_told_once_and_ends_the_reason_of_a_timeout(
     answering: Install, small_world: SmallWorld
 ) -> None:

@@ -19,7 +19,6 @@ from harness.flight.closed_loop import Loop, fly
 from harness.flight.observer import Caution, Observer
 from harness.flight.record import BELIEVED_FIELDS, TRACK_FIELDS, Flight, Outcome, digest
 from harness.flight.state_estimator import PerfectEstimator
-from harness.mapping.sensed_map import SensedMap
 from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run, tables
 from harness.scenario.performance import mission_of
@@ -63,13 +62,6 @@ def test_perfect_navigation_changes_no_bit(small_world: SmallWorld) -> None:
     }
     for error in ("total_system_error_m", "flight_technical_error_m"):
         assert figures[error] == pytest.approx(by_hand), "believed is true"
-
-
-@pytest.mark.flights
-def test_it_is_seeded(scenario: Scenario, flight: Flight) -> None:
-    assert digest(flown(scenario).track) == digest(flight.track)
-    other = flown(scenario.with_({"seed": scenario.seed + 1}))
-    assert digest(other.track) != digest(flight.track)
 
 
 def test_truth_and_belief_are_in_the_track(flight: Flight) -> None:
@@ -120,20 +112,6 @@ def test_the_plan_keeps_the_margin_beyond_the_clearance(scenario: Scenario) -> N
     assert flight_limits(scenario).clearance_m == wanted
     given = scenario.with_({"navigation.margin_m": 3.0})
     assert mission_of(given).clearance_m == pytest.approx(wanted + 3.0)
-
-
-def test_the_plan_keeps_the_margin_from_the_border_of_the_area(scenario: Scenario) -> None:
-    given = scenario.with_({"navigation.margin_m": 30.0})
-    xmin, ymin, xmax, ymax = given.area.bounds_m
-    inset_m = 30.0 + mission_of(given).tracking_error_m
-    assert mission_of(given).bounds_m == (xmin + inset_m, ymin + inset_m, xmax - inset_m, ymax - inset_m)
-    east, north = xmin + 10.0, ymax - 20.0
-    near = given.with_({"mission.start_m": [east, ymin + 200.0], "mission.goal_m": [xmax - 200.0, north]})
-    assert mission_of(near).bounds_m == (east, ymin + inset_m, xmax - inset_m, north)
-    exact = near.with_({"navigation": {"kind": "perfect"}})
-    inset_m = mission_of(exact).tracking_error_m
-    assert 0.0 < inset_m < 1.0
-    assert mission_of(exact).bounds_m == (xmin, ymin + inset_m, xmax - inset_m, ymax)
 
 
 class Jumping:
@@ -219,26 +197,6 @@ def test_after_a_jump_the_plan_is_checked_against_the_shifted_world(small_world:
     assert len(later) > 100
     for edges in later:  # nothing of what was entered from elsewhere
         assert np.hypot(*(edges - (3000.0, 3000.0)).T) == pytest.approx(300.0, abs=5.0)
-
-
-def test_a_map_that_starts_over_is_empty_and_goes_on_counting(small_world: SmallWorld) -> None:
-    loop = make_loop(small_world(TREE), PointMass)
-    seen = loop.seen
-    assert isinstance(seen, SensedMap)
-    assert loop.sensor is not None
-    scan = loop.sensor.scan(2000.0, 2000.0, 0.0, 0.0)
-    seen.update(scan)
-    edges, revision = seen.edges_since(-1), seen.revision
-    assert len(edges) > 10
-    assert seen.seen_free(np.array([[2100.0, 2100.0]])).all()
-    seen.start_over(7.0)
-    assert len(seen.edges_since(-1)) == 0
-    assert seen.revision > revision
-    assert seen.last_removal_revision > revision
-    assert seen.last_contradiction_s == 7.0
-    assert not seen.seen_free(np.array([[2100.0, 2100.0]])).any()
-    seen.update(scan)  # the same scan is news again
-    np.testing.assert_array_equal(seen.edges_since(revision), edges)
 
 
 @pytest.mark.flights

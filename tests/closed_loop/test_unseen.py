@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from harness.flight.record import COLUMNS, Flight, FloatArray, Outcome
 from harness.run.scenario_flight import make_loop
@@ -62,24 +59,6 @@ def test_an_obstacle_ahead_changes_nothing_before_it_is_in_range(
     first_in_range = int((distance_to(with_it, *hidden) <= RANGE_M).argmax())
     assert first_in_range > 600
     assert first_in_range <= rows_alike(without, with_it) < len(with_it.track)
-
-
-@pytest.mark.flights
-@given(
-    east=st.integers(500, 5500), north=st.integers(500, 5500), radius=st.integers(30, 400), side=st.booleans()
-)
-@settings(max_examples=10, derandomize=True)
-def test_nor_does_one_anywhere(
-    small_world: SmallWorld, flown_by_point_mass: FlyPointMass, east: int, north: int, radius: int, side: bool
-) -> None:
-    hidden = (float(east), float(north), float(radius))
-    ends = shapely.MultiPoint([(300.0, 300.0), (5700.0, 5700.0)])
-    if ends.distance(shapely.Point(hidden[:2])) < radius + 100.0:
-        hidden = (5300.0, 700.0, 200.0) if side else (700.0, 5300.0, 200.0)
-    without = flown_by_point_mass(small_world(*COMMON))
-    with_it = flown_by_point_mass(small_world(*COMMON, circle(*hidden)))
-    seen = distance_to(without, *hidden) <= RANGE_M
-    assert rows_alike(without, with_it) >= (int(seen.argmax()) if seen.any() else len(without.track))
 
 
 def reachable(roots: list[object]) -> list[object]:

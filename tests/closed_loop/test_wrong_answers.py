@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from operator import methodcaller
 from pathlib import Path as FilePath
@@ -142,11 +141,6 @@ def test_a_wrong_answer_ends_the_flight_with_a_sentence_and_a_whole_folder(name:
     assert told in fails(wrongly)
 
 
-def test_a_flight_ends_alike_whether_or_not_it_is_recorded(fails: Any) -> None:
-    wrongly, told = WRONG["picture"]
-    assert told in fails(wrongly, recording=True)
-
-
 def test_edges_that_a_planner_is_handed_are_read_only(
     answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
 ) -> None:
@@ -186,24 +180,9 @@ def test_a_planner_gets_its_own_plan_back_and_cannot_change_the_one_that_is_flow
     assert np.isfinite(flight.track.cross_track_m[1:]).all()
 
 
-class LeavesOnPaper(ValueError):
-    """Ends the process when it is asked what it says."""
-
-    def __str__(self) -> str:
-        raise SystemExit(0)
-
-
 class Endless(ValueError):
     def __str__(self) -> str:
         return "no end " * 5_000_000
-
-
-def test_an_error_that_would_end_the_process_when_it_is_told(fails: Fails) -> None:
-    def raises(*_: object) -> Plan:
-        raise LeavesOnPaper
-
-    told = r"the planner raised LeavesOnPaper: it cannot be told what \(conftest\.py:\d+\)"
-    assert re.fullmatch(told, fails(raises)), "the file of the planner's class"
 
 
 def test_an_error_that_says_very_much_is_cut(fails: Fails, tmp_path: FilePath) -> None:

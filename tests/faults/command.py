@@ -63,12 +63,7 @@ def start(folder: Path, *arguments: str, file_bytes: int | None = None, **keys: 
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         preexec_fn=limit if file_bytes is not None else None,
         text=True,
-        **{
-            "stdin": subprocess.DEVNULL,
-            "stdout": subprocess.PIPE,
-            "stderr": subprocess.PIPE,
-            **keys,
-        },
+        **{"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **keys},
     )
 
 

@@ -153,7 +153,7 @@ def test_a_value_beyond_reason_is_refused(
                 ("planner.clearance_m", "0"),
                 ("seed", "9007199254740992"),
             ]
-        ),
+        )
     ],
 )
 def test_the_outermost_values_are_flown(key: str, value: str, tmp_path: Path) -> None:

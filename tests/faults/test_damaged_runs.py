@@ -64,12 +64,7 @@ def test_export_and_report_of_a_damaged_run(
     del manifest["sha256"]
     formats = ("plan", "waypoints", "geojson", "kml")
 
-    @settings(
-        max_examples=cases,
-        derandomize=True,
-        database=None,
-        suppress_health_check=list(HealthCheck),
-    )
+    @settings(max_examples=cases, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
     @given(
         damage(a_run, name),
         st.booleans(),
@@ -125,12 +120,7 @@ def test_view_of_a_damaged_recording(
     shutil.copytree(a_run, copy)
     whole = (copy / "flight.rrd").read_bytes()
 
-    @settings(
-        max_examples=cases,
-        derandomize=True,
-        database=None,
-        suppress_health_check=list(HealthCheck),
-    )
+    @settings(max_examples=cases, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
     @given(damage(a_run, "flight.rrd").filter(lambda data: data != whole))
     def each(data: bytes) -> None:
         (copy / "flight.rrd").write_bytes(data)

@@ -210,12 +210,7 @@ def fuzzed(cases: int, strategy: st.SearchStrategy[Any], holds: Callable[[Any], 
     """Tries a property on so many cases, the same ones every time."""
     tried = 0
 
-    @settings(
-        max_examples=cases,
-        derandomize=True,
-        database=None,
-        suppress_health_check=list(HealthCheck),
-    )
+    @settings(max_examples=cases, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
     @given(strategy)
     def each(case: Any) -> None:
         nonlocal tried

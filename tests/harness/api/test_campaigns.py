@@ -85,11 +85,6 @@ def test_a_script_needs_no_guard(tmp_path: Path) -> None:
     assert done.stdout.splitlines() == ["begun", "{'reached': 2}", "True"]
 
 
-def test_objects_are_not_compared() -> None:
-    with pytest.raises(wayproof.InputError, match="list of names"):
-        wayproof.compare(small(), [object()])  # type: ignore[list-item]
-
-
 def test_what_is_compared_is_named_in_a_list() -> None:
     with pytest.raises(wayproof.InputError, match="planners as a list of names"):
         wayproof.compare(small(), "rolling_window")

@@ -13,7 +13,7 @@ from aircraft.interface import AircraftState
 from harness.flight.record import AcceptedPlan, Track
 from harness.mapping.scan import RangeScan
 from tests.harness.api.worlds import Beeline, small
-from wayproof import Mission, Path, Plan, PlanRequest, PlanStatus
+from wayproof import Path, Plan, PlanRequest, PlanStatus
 
 
 def flown(flight: wayproof.SteppedFlight) -> wayproof.FlightResult:
@@ -131,11 +131,3 @@ def test_misuse_is_told() -> None:
         flight.step()
     with pytest.raises(RuntimeError, match=r"step\(\) after the end"):
         flight.step()
-
-
-def test_what_cannot_be_made_is_told_by_reset() -> None:
-    def none(mission: Mission) -> Mission:
-        return mission
-
-    with pytest.raises(wayproof.PlannerError, match="has no method plan"):
-        wayproof.make(small(), planner=none).reset()

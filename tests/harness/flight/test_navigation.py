@@ -32,35 +32,12 @@ def position_error(navigation: Navigator, time_s: float) -> tuple[float, float]:
     return believed.east_m - true.east_m, believed.north_m - true.north_m
 
 
-def test_perfect_navigation_is_the_truth_itself() -> None:
-    exact = navigator(kind="perfect")
-    for time_s in (0.0, 1.0, 1.0, 50.0):
-        state = at(time_s)
-        assert exact.believed(state) is state
-
-
 def test_the_same_seed_has_the_same_errors_and_is_not_used_up() -> None:
     times = [0.0, 0.25, 1 / 3, 2.0, 30.0]
     one, again = navigator(outages_s=[[1, 5]]), navigator(outages_s=[[1, 5]])
     assert [one.believed(at(t)) for t in times] == [again.believed(at(t)) for t in times]
     other = Navigator(Navigation(kind="gnss"), np.random.SeedSequence(6, spawn_key=(3,)))
     assert other.believed(at(0.0)).east_m != navigator().believed(at(0.0)).east_m
-
-
-def test_twice_at_one_time_is_believed_the_same_and_time_does_not_go_back() -> None:
-    gnss = navigator()
-    gnss.believed(at(1.0))
-    assert gnss.believed(at(2.0)) == gnss.believed(at(2.0))
-    with pytest.raises(ValueError, match="goes back"):
-        gnss.believed(at(1.5))
-
-
-def test_attitude_load_and_time_stay_true() -> None:
-    believed, true = navigator().believed(at(3.0)), at(3.0)
-    for name in ("time_s", "roll_rad", "pitch_rad", "load_factor", "throttle"):
-        assert getattr(believed, name) == getattr(true, name)
-    for name in ("east_m", "north_m", "up_m", "heading_rad", "airspeed_mps", "velocity_up_mps"):
-        assert getattr(believed, name) != getattr(true, name)
 
 
 @pytest.mark.parametrize("interval_s", [1.0, 7.0])
@@ -93,25 +70,6 @@ def test_errors_have_the_sizes_and_the_memory_that_were_asked_for(interval_s: fl
     assert after == pytest.approx(math.exp(-interval_s / 10.0), abs=0.03)
 
 
-def test_one_long_interval_is_as_many_short_ones() -> None:
-    """The spread over many seeds of what an error becomes in 5 s, in one call and in fifty."""
-    changes: dict[int, list[float]] = {1: [], 50: []}
-    for steps, found in changes.items():
-        for seed in range(300):
-            gnss = Navigator(
-                Navigation(kind="gnss", position_sigma_m=4.0, position_correlation_s=10.0),
-                np.random.SeedSequence(seed),
-            )
-            before = position_error(gnss, 0.0)
-            for step in range(1, steps):
-                gnss.believed(at(5.0 * step / steps))
-            after = position_error(gnss, 5.0)
-            found.extend(np.subtract(after, before))
-    expected = 4.0 * math.sqrt(2.0 - 2.0 * math.exp(-0.5))
-    for found in changes.values():
-        assert float(np.std(found)) == pytest.approx(expected, rel=0.1)
-
-
 def test_in_an_outage_the_position_drifts_with_the_distance_and_then_jumps_back() -> None:
     keys: dict[str, Any] = {"position_sigma_m": 0.5, "drift_share": 0.05, "outages_s": [[10, 70], [100, 130]]}
     gnss = navigator(**keys)
@@ -127,14 +85,6 @@ def test_in_an_outage_the_position_drifts_with_the_distance_and_then_jumps_back(
     second = np.subtract(position_error(gnss, 120.0), before)
     assert math.hypot(*second) == pytest.approx(0.05 * SPEED_MPS * 20.0)
     assert not np.allclose(second / math.hypot(*second), ways[0], atol=1e-3)
-
-
-def test_drift_is_what_the_believed_velocity_adds_up_to() -> None:
-    gone = navigator(velocity_sigma_mps=0.0, drift_share=0.02, outages_s=[[0, 100]])
-    start = gone.believed(at(0.0))
-    end = gone.believed(at(50.0))
-    assert end.east_m - start.east_m == pytest.approx(50.0 * end.velocity_east_mps)
-    assert end.north_m - start.north_m == pytest.approx(50.0 * end.velocity_north_mps)
 
 
 def test_dead_reckoning_knows_its_start_and_drifts_ever_after() -> None:

@@ -29,21 +29,3 @@ def test_polyline_stays_by_its_arc(radius: float, turn: float, bearing: float, s
     cosine, sine = math.cos(side * turn), math.sin(side * turn)
     end = centre + np.array([cosine * spoke[0] - sine * spoke[1], sine * spoke[0] + cosine * spoke[1]])
     np.testing.assert_allclose(points[-1], end, atol=1e-6 * radius)
-
-
-def test_polyline_of_lines_is_their_ends() -> None:
-    segments = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 10.0], [10.0, 0.0, 0.0, 1.0, 0.0, 5.0]])
-    np.testing.assert_allclose(polylines([segments])[0], [[0, 0], [10, 0], [10, 5]], atol=1e-12)
-
-
-@given(seed=st.integers(0, 2**32 - 1), paths=st.integers(0, 6))
-def test_each_of_several_polylines_is_that_of_its_path_alone(seed: int, paths: int) -> None:
-    rng = np.random.default_rng(seed)
-    several = [rng.uniform(-1.0, 1.0, (rng.integers(1, 5), 6)) for _ in range(paths)]
-    for rows in several:
-        rows[:, 4:] *= (0.01, 900.0)
-        rows[:, 5] = np.abs(rows[:, 5])
-    found = polylines(several, 0.5)
-    assert len(found) == paths
-    for rows, points in zip(several, found, strict=True):
-        np.testing.assert_allclose(points, polylines([rows], 0.5)[0], atol=1e-9)

@@ -63,17 +63,6 @@ def test_a_block_that_never_calls_is_ended_all_the_same(
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_a_signal_that_is_ignored_stays_so() -> None:
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with held_back() as interrupt:
-            signal.raise_signal(signal.SIGINT)
-            interrupt()
-        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 def test_a_block_that_hangs_is_ended_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(signals, "AGAIN_S", 0.05)
     until = time.monotonic() + 30.0
@@ -88,13 +77,3 @@ def test_a_block_that_hangs_is_ended_by_one(monkeypatch: pytest.MonkeyPatch) -> 
         hangs()
     assert time.monotonic() < until
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_one_that_was_taken_in_time_comes_but_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(signals, "AGAIN_S", 0.05)
-    with held_back() as interrupt:
-        signal.raise_signal(signal.SIGINT)
-        with pytest.raises(KeyboardInterrupt):
-            interrupt()
-        time.sleep(0.2)
-        interrupt()

@@ -22,10 +22,6 @@ def test_scans_fall_on_updates_of_guidance_and_between_them() -> None:
     assert intervals(120, 20.0) == [(Instant(True, True, 6), scan)]
 
 
-def test_without_a_sensor_there_are_only_updates() -> None:
-    assert intervals(60, 0.0) == [(Instant(True, False, 6),)]
-
-
 @given(RATES, st.sampled_from([120, 240, 1200]))
 def test_every_interval_is_one_of_guidance_and_every_scan_has_its_step(rate_hz: float, step_hz: int) -> None:
     whole = intervals(step_hz, rate_hz)

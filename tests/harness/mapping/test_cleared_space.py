@@ -72,24 +72,6 @@ def test_cells_are_looked_through_where_all_beams_that_meet_them_went_beyond(
             assert seen[column, row]
 
 
-def test_a_beam_that_returns_hides_all_cells_that_it_meets_and_no_others() -> None:
-    spacing = math.tau / 12
-    ranges = np.full(12, math.inf)
-    ranges[3] = 100.0  # from 75 to 105 degrees: east
-    seen = through(ranges, spacing, spacing, (-400.0, -400.0), 0.0)
-    east, north = np.meshgrid(*[np.arange(16) * 50.0 - 375.0] * 2, indexing="ij")
-    away, bearing = np.hypot(east, north), np.arctan2(east, north)
-    near = away + 42.5 < 450.0
-    sure = near & (away > 150.0) & (np.abs(bearing - math.pi / 2) < math.radians(15.0))
-    other = near & (
-        np.abs(bearing - math.pi / 2) > math.radians(15.0) + np.arcsin(37.5 / np.maximum(away, 37.5))
-    )
-    assert sure.sum() > 5
-    assert other.sum() > 50
-    assert not seen[sure].any()
-    assert seen[other].all()
-
-
 def test_where_returns_get_lost_several_looks_in_a_row_are_needed() -> None:
     spacing = math.tau / 12
     nothing, something = np.full(12, math.inf), np.full(12, math.inf)

@@ -39,11 +39,3 @@ def test_a_planner_asks_for_the_nearest_edge() -> None:
     for points, found in seen[:: len(seen) // 5]:
         every = np.hypot(*(PROBES[:, None] - points[None]).transpose(2, 0, 1)).min(axis=1)
         assert found == pytest.approx(every)
-
-
-def test_without_edges_the_nearest_is_infinitely_far() -> None:
-    Asking.asked.clear()
-    scenario = wayproof.load_scenario("aerosonde_forest")
-    bare = scenario.with_({"obstacles": [], "mission.time_limit_s": 5})
-    wayproof.fly(bare, planner=Asking)
-    assert all(np.isinf(found).all() for _, found in Asking.asked)

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
-from numpy.typing import NDArray
 
-from harness.mapping.free_space import FreeSpace
 from harness.mapping.obstacle_map import ObstacleMap
 from harness.mapping.scan import RangeScan
 from harness.world.world import Circle, Obstacle, Polygon, World
@@ -31,8 +29,6 @@ from tests.harness.looking import (
     sensor,
     world_of,
 )
-
-IntArray = NDArray[np.intp]
 
 SPACING = CLEARANCE / 4.0
 
@@ -101,13 +97,6 @@ def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
             assert gap.max() <= SPACING * math.sqrt(2.0) + 1e-6
 
 
-def test_edges_of_lone_obstacles_lie_on_them() -> None:
-    world = world_of(WALL, Circle((5000.0, 3000.0), 500.0))
-    points = edges(fed(scans(sensor(world), on_circle(40))))
-    assert len(points) > 30
-    assert np.abs(distance_to(world, points)).max() < 0.5 * SPACING
-
-
 def test_a_sensor_that_returns_nothing_false_is_believed_at_once() -> None:
     eye = sensor(world_of(WALL))
     first, second = scans(eye, [MIDDLE, MIDDLE])
@@ -155,37 +144,6 @@ def test_one_false_return_makes_no_wall_in_any_later_scan(at_m: float) -> None:
     np.testing.assert_array_equal(edges(seen), edges(truth))
 
 
-def test_false_returns_of_one_in_a_thousand_are_mostly_taken_back() -> None:
-    world = world_of(WALL)
-    seen = fed(scans(sensor(world, false_return=0.001), on_circle(400, 1500.0)))
-    off = np.abs(distance_to(world, edges(seen)))
-    assert (off > 2.0 * SPACING).mean() < 0.03
-
-
-def ray_at(scan: RangeScan, east_m: float, north_m: float) -> int:
-    """The ray that passes nearest to a place."""
-    to = np.array([east_m - scan.east_m, north_m - scan.north_m])
-    return int((scan.directions @ to).argmax())
-
-
-@pytest.mark.parametrize("scan_number", [0, 1, 3, 7, 11])
-def test_one_lost_return_opens_no_wall(scan_number: int) -> None:
-    taken = scans(sensor(world_of(WALL)), on_circle(40, 100.0))
-    lost = [
-        edited(scan, ray_at(scan, 5000.0, 6000.0), math.inf) if i == scan_number else scan
-        for i, scan in enumerate(taken)
-    ]
-    seen = empty_map()
-    for scan in lost[: scan_number + 1]:
-        seen.update(scan)
-    before = cells(edges(seen))
-    assert seen.last_removal_revision == 0
-    for scan in lost[scan_number + 1 :]:
-        seen.update(scan)
-        assert before <= cells(edges(seen))
-    assert cells(edges(seen)) == cells(edges(fed(taken)))
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_with_a_fifth_of_the_returns_lost_walls_stay_closed(seed: int) -> None:
     world, seen = world_of(WALL), empty_map()
@@ -195,13 +153,6 @@ def test_with_a_fifth_of_the_returns_lost_walls_stay_closed(seed: int) -> None:
             along = np.sort(np.concatenate((edges(seen)[:, 0], [4000.0, 6000.0])))
             assert np.diff(along).max() < 2.0 * CLEARANCE
     assert np.diff(np.sort(edges(seen)[:, 0])).max() < 2.0 * SPACING + 1.0
-
-
-def test_range_noise_leaves_walls_where_they_are() -> None:
-    world = world_of(WALL)
-    seen = fed(scans(sensor(world, range_noise_m=10.0), on_circle(80)))
-    assert np.abs(distance_to(world, edges(seen))).max() < 50.0 + SPACING
-    assert np.diff(np.sort(edges(seen)[:, 0])).max() < 2.0 * SPACING
 
 
 @pytest.mark.parametrize("doubtful", [True, False])
@@ -234,23 +185,6 @@ def test_an_obstacle_that_moves_leaves_no_trail(doubtful: bool) -> None:
     assert off.max() < 3.0 * 180.0
 
 
-@pytest.mark.parametrize("doubtful", [True, False])
-def test_what_comes_back_is_an_edge_again_and_only_once(doubtful: bool) -> None:
-    comes_and_goes = [
-        Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(200.0 * i, 200.0 * i + 60.0)) for i in range(4)
-    ]
-    eye, seen = sensor(World(comes_and_goes, BOUNDS)), empty_map(doubtful)
-    for i in range(4):
-        for scan in scans(eye, on_circle(60), 200.0 * i):
-            seen.update(scan)
-        points = edges(seen)
-        assert len(points) > 10
-        assert len(cells(points)) == len(points)
-        for scan in scans(eye, on_circle(60) * 3, 200.0 * i + 61.0):
-            seen.update(scan)
-        assert len(edges(seen)) == 0
-
-
 def test_the_same_loop_again_and_again_adds_nothing() -> None:
     world = world_of(WALL, Circle((5000.0, 3000.0), 500.0), Circle((3000.0, 5000.0), 300.0))
     taken = scans(sensor(world), on_circle(50, 800.0))
@@ -261,19 +195,6 @@ def test_the_same_loop_again_and_again_adds_nothing() -> None:
             seen.update(scan)
     assert seen.revision == revision
     np.testing.assert_array_equal(edges(seen), points)
-
-
-def test_points_never_outnumber_the_cells() -> None:
-    tiny = ObstacleMap((0.0, 0.0, 1000.0, 1000.0), CLEARANCE, RANGE)
-    rng = np.random.default_rng(1)
-    base = sensor(world_of()).scan(500.0, 500.0, 0.0, 0.0)
-    for _ in range(300):
-        tiny.update(replace(base, ranges_m=rng.uniform(0.0, RANGE, 720)))
-    # The area and a border of twice the clearance and a cell, in cells of 50 m.
-    assert 0 < len(edges(tiny)) <= MOST_IN_A_CELL * (1000 + 2 * 450) ** 2 / 50**2
-    low, high = edges(tiny).min(), edges(tiny).max()
-    assert low >= -500.0
-    assert high <= 1500.0
 
 
 def test_edges_since_tells_each_edge_once_in_order() -> None:
@@ -313,45 +234,6 @@ def test_what_is_taken_back_is_told_by_the_revision() -> None:
             assert seen.revision == before
         size = len(edges(seen))
     assert size == 0
-
-
-@pytest.mark.parametrize("bounds", [(-7000.0, -333.3, 4000.0, 9000.0), (1e6, -1e6, 1.01e6, -0.99e6)])
-def test_areas_may_lie_anywhere(bounds: tuple[float, float, float, float]) -> None:
-    place = ((bounds[0] + bounds[2]) / 2, (bounds[1] + bounds[3]) / 2)
-    world = World([Obstacle(Circle((place[0] + 1500.0, place[1]), 500.0))], bounds)
-    seen, free = ObstacleMap(bounds, CLEARANCE, RANGE), FreeSpace(bounds, CLEARANCE, RANGE)
-    for scan in scans(sensor(world), [place] * 4):
-        seen.update(scan)
-        free.update(scan)
-    points = edges(seen)
-    assert len(points) > 10
-    assert np.abs(world.clearance(points, np.zeros(len(points)))).max() < SPACING
-    assert free.contains(np.array([place])).all()
-    assert not free.contains(np.array([(place[0] + 2500.0, place[1])])).any()
-
-
-def test_what_is_certain_is_forgotten_within_twenty_seconds_of_clear_sight() -> None:
-    there = Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(0.0, 30.0))
-    taken = scans(sensor(World([there], BOUNDS)), [(5000.0 + 15.0 * (i % 20), 5000.0) for i in range(61)])
-    seen = fed(taken)
-    assert len(edges(seen)) > 10
-    nothing = replace(taken[0], ranges_m=np.full(len(taken[0].ranges_m), math.inf))
-    scans_to_go = 0
-    while len(edges(seen)) and scans_to_go < 100:
-        seen.update(nothing)
-        scans_to_go += 1
-    # Two scans a second.
-    assert len(edges(seen)) == 0
-    assert 8 < scans_to_go <= 2 * 20
-
-
-def test_an_outline_is_kept_in_detail_where_the_wall_is_certain_already() -> None:
-    def outline(places: list[tuple[float, float]]) -> int:
-        seen = fed(scans(sensor(world_of(Circle((5000.0, 6500.0), 200.0))), [(5000.0, 4000.0)] * 20 + places))
-        return len(edges(seen)) - len(cells(edges(seen)))
-
-    assert outline([]) == 0
-    assert outline([(5000.0 + 20.0 * i, 6000.0) for i in range(10)]) > 2
 
 
 @pytest.mark.parametrize("off_m", [0.0, 13.0, 29.0, 41.0])

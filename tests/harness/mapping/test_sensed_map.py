@@ -15,7 +15,6 @@ from harness.mapping.scan import RangeScan
 from harness.mapping.sensed_map import SensedMap
 from harness.world.obstacle import Circle, Obstacle
 from harness.world.world import World
-from planner.interface import MapView
 from tests.examples import examples
 from tests.harness.sensing import (
     BOUNDS,
@@ -49,19 +48,6 @@ def fed(scans: Iterable[RangeScan]) -> SensedMap:
 def lattice() -> FloatArray:
     """Places all about, a quarter of a cell of free space apart at least."""
     return np.random.default_rng(1).uniform(1500.0, 4500.0, (20_000, 2))
-
-
-def test_it_is_all_that_a_planner_may_know() -> None:
-    seen: MapView = empty_world()
-    assert (seen.revision, seen.last_removal_revision, seen.moving, seen.last_contradiction_s) == (
-        0,
-        0,
-        (),
-        -math.inf,
-    )
-    assert seen.spacing_m == CLEARANCE / 4.0
-    assert seen.edges_since(-1).shape == (0, 2)
-    assert not seen.seen_free(np.array([START])).any()
 
 
 @pytest.mark.parametrize("corners", [0, 4])
@@ -106,40 +92,6 @@ def test_of_what_moves_also_that_is_known_to_which_comes_into_view_as_one_passes
     assert looks > 80
 
 
-def test_free_space_is_taken_back_where_something_appears_and_in_its_shadow_only() -> None:
-    pops = Obstacle(Circle((3100.0, 2200.0), 60.0), active_s=(20.0, 500.0))
-    eye = sensor(world_of(pops))
-    before = fed(flight(eye, 20.0, START))
-    last = [*flight(eye, 20.0, START)][-1]
-    place = complex(last.east_m, last.north_m)
-    points = lattice()
-    points = points[before.seen_free(points)]
-    assert before.last_contradiction_s == -math.inf
-    # A scan from there at the time.
-    after = fed(
-        [*flight(eye, 20.0, START), *flight(eye, 1.0, (place.real, place.imag), start_s=20.0, speed=0.0)]
-    )
-    gone = points[~after.seen_free(points)]
-    away = gone[:, 0] - 3100.0 + 1j * (gone[:, 1] - 2200.0)
-    towards = complex(3100.0, 2200.0) - place
-    along, across = (
-        (away * towards.conjugate() / abs(towards)).real,
-        (away * towards.conjugate() / abs(towards)).imag,
-    )
-    widening = 60.0 * (1.0 + np.maximum(along, 0.0) / abs(towards))
-    assert after.last_contradiction_s == 20.0
-    assert along.min() > -60.0 - 3.0 * FREE_CELL
-    assert (np.abs(across) < widening + 3.0 * FREE_CELL * (1.0 + np.maximum(along, 0.0) / abs(towards))).all()
-    # Within and right behind it all of it.
-    inside = np.hypot(points[:, 0] - 3100.0, points[:, 1] - 2200.0) < 60.0
-    offset = points[:, 0] - place.real + 1j * (points[:, 1] - place.imag)
-    turned = offset * towards.conjugate() / abs(towards)
-    shadow = (turned.real > abs(towards)) & (np.abs(turned.imag) < 50.0) & (np.abs(turned) < RANGE)
-    assert inside.any()
-    assert shadow.any()
-    assert not after.seen_free(points[inside | shadow]).any()
-
-
 @settings(max_examples=examples(10))
 @given(seed=st.integers(0, 2**32 - 1), appears_s=st.sampled_from([5.0, 10.0, 15.0]))
 def test_what_is_seen_free_is_free_of_what_has_appeared_in_view(seed: int, appears_s: float) -> None:
@@ -165,13 +117,6 @@ def test_nothing_surprises_in_a_still_world() -> None:
     )
     for turn in (0.0, 0.1, -0.1):
         assert fed(flight(sensor(world), 30.0, START, turn_rad_s=turn)).last_contradiction_s == -math.inf
-
-
-@pytest.mark.parametrize("latency_s", [0.0, 2.0])
-def test_it_is_surprised_when_the_scan_is_there(latency_s: float) -> None:
-    pops = Obstacle(regular(3000.0, 2300.0, 60.0, 4), active_s=(12.0, 500.0))
-    seen = fed(flight(sensor(world_of(pops), latency_s=latency_s), 13.0, START))
-    assert seen.last_contradiction_s == 12.0 + latency_s
 
 
 def test_what_moves_takes_free_space_back_and_gives_it_again() -> None:
@@ -213,41 +158,6 @@ def test_with_much_noise_what_moves_is_followed(
                 assert math.dist(each.velocity_mps, velocity) < (4.0 if scan.time_s < 30.0 else 2.0)
     assert known_s[0] < 25.0
     assert known_s[-1] > 40.0
-
-
-@pytest.mark.parametrize("east", [2785.0, 2790.0, 2795.0])
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_with_much_noise_what_stands_is_not_taken_for_a_part_of_what_passes_by(
-    east: float, seed: int
-) -> None:
-    """It all but touches three that stand in a row."""
-    moves = Obstacle(Circle((east, 2750.0), 60.0), velocity_mps=(0.0, -8.0))
-    row = [Circle(place, 40.0) for place in ((2890.0, 2350.0), (2940.0, 2430.0), (2990.0, 2490.0))]
-    world, seen = world_of(moves, *row), empty_world(noise_m=NOISE, false_returns=True)
-    mover, told = World(world.obstacles[:1], BOUNDS), 0
-    for scan in flight(sensor(world, seed, **FLAWS), 75.0, (3250.0, 1900.0), speed=5.0):
-        seen.update(scan)
-        for each in seen.moving:
-            told += 1
-            if each.velocity_mps == (0.0, 0.0):  # what has just come into view
-                assert np.median(np.abs(off(world, each.points_m, scan.time_s))) < 2.0 * NOISE
-            else:
-                assert np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 2.0 * NOISE
-    assert told > 10
-
-
-def test_with_much_noise_what_appears_is_told_at_once_and_what_it_hides_is_not_free() -> None:
-    pops = Obstacle(Circle((3050.0, 2200.0), 60.0), active_s=(20.0, 500.0))
-    seen, told_s = empty_world(noise_m=NOISE, false_returns=True), []
-    for scan in flight(sensor(world_of(pops), **FLAWS), 40.0, START, speed=10.0):
-        seen.update(scan)
-        told_s += [scan.time_s] if seen.moving else []
-        assert all(each.velocity_mps == (0.0, 0.0) for each in seen.moving)
-    assert 20.0 <= told_s[0] <= 21.0
-    assert seen.last_contradiction_s >= 20.0
-    assert not seen.seen_free(np.array([(3050.0, 2150.0), (3055.0, 2200.0)])).any()
-    # By then the map has it.
-    assert np.abs(off(world_of(pops.shape), seen.edges_since(-1))).min() < 0.5 * NOISE
 
 
 @pytest.mark.flights

@@ -37,15 +37,6 @@ def test_a_wall_is_no_further_off_than_the_heading_misplaces_it_a_clearance_away
     assert beyond_m.min() > -2.0 * TURNED_RAD * CLEARANCE
 
 
-def test_else_it_stays_within_its_cells_where_it_was_seen_first() -> None:
-    """What the map would hold if poses were taken to be exact."""
-    assert nearest_m(False, -TURNED_RAD).max() > 2.0 * TURNED_RAD * CLEARANCE
-
-
-def test_by_exact_poses_it_stays_where_it_is() -> None:
-    assert np.abs(nearest_m(True, 0.0)).max() < 1e-9
-
-
 def test_what_has_moved_comes_in_anew_and_is_taken_back_where_it_was() -> None:
     seen = ObstacleMap(BOUNDS, CLEARANCE, RANGE, doubtful=False, shifted=True)
     way = [(3000.0, NORTH_M - CLEARANCE), (4000.0, NORTH_M - CLEARANCE)]

@@ -59,12 +59,6 @@ def test_steps_stay_where_they_are() -> None:
     np.testing.assert_array_equal(kept, steps)
 
 
-def test_what_is_narrower_than_half_the_width_and_stands_alone_is_lost() -> None:
-    (exact,) = scans(Circle((3000.0, 2250.0), 3.0), count=1)
-    assert np.isfinite(exact.ranges_m).sum() > 1
-    assert np.isinf(smoothed(exact, CLEARANCE).ranges_m).all()
-
-
 def test_medians_are_those_of_what_was_returned() -> None:
     rng = np.random.default_rng(3)
     ring = np.where(rng.random(400) < 0.4, math.inf, rng.uniform(0.0, 100.0, 400).round())

@@ -38,13 +38,7 @@ from harness.recording.overlay import runs_in, write_overlay
 from harness.recording.scene import quaternions, scale_bar_m
 from harness.recording.states import mode_of
 from harness.recording.summary import summary
-from harness.recording.viewer import (
-    NO_DRIVER,
-    ViewerError,
-    _executable,
-    open_viewer,
-    run_names,
-)
+from harness.recording.viewer import NO_DRIVER, ViewerError, _executable, open_viewer, run_names
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from planner.interface import Mission, MovingEdges, Plan, PlanPicture, PlanStatus
 from planner.interface import Path as PlannedPath

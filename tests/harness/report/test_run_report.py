@@ -104,33 +104,6 @@ def page_with(run: Path, folder: Path, **figures: Any) -> str:
 
 
 @pytest.mark.flights
-def test_rows_that_some_flights_have_are_shown_where_they_do(run: Path, tmp_path: Path) -> None:
-    assert "navigation error" not in (run / "report.html").read_text()
-    assert "navigation error" not in (run / "report.md").read_text()
-    copy = tmp_path / "run"
-    shutil.copytree(run, copy)
-    figures = json.loads((copy / "metrics.json").read_text())
-    figures["navigation_error_m"] = {"rms": 3.0, "p95": 6.25, "max": 41.5}
-    figures |= {"navigation_jump_m": 33.25, "navigation_margin_m": 9.0}
-    figures["plan_delay_s"] = {"p50": 0.5, "p99": 2.5, "max": 2.75}
-    figures["lost_returns"] = {"share": 0.125, "max": 0.5}
-    rewrite(copy / "metrics.json", json.dumps(figures))
-    assert main(["report", str(copy)]) == 0
-    markdown = (copy / "report.md").read_text()
-    for label, value in (
-        ("navigation error p95, m", "6.25"),
-        ("navigation error max, m", "41.5"),
-        ("jump of the believed position max, m", "33.2"),
-        ("plan delay max, s", "2.75"),
-        ("returns lost by the sensor, %", "12.5"),
-    ):
-        assert f"| {label} | {value} |" in markdown
-        assert label in (copy / "report.html").read_text()
-    (row,) = csv.DictReader((copy / "report.csv").read_text().splitlines())
-    assert float(row["navigation_error_max_m"]) == 41.5
-
-
-@pytest.mark.flights
 def test_the_report_of_a_campaigns_run_says_how_to_fly_it_again(tmp_path: Path) -> None:
     (tmp_path / "ring.yaml").write_text(SCENARIO)
     campaign = f"schema: wayproof/campaign/1\nname: c\nseed: 1\nscenarios: [{tmp_path}/ring.yaml]\nrecordings: thin\n"
@@ -155,8 +128,7 @@ def test_report_escapes_what_it_is_told(run: Path, tmp_path: Path) -> None:
     text = (copy / "metrics.json").read_text()
     reason = load_run(run).metrics["reason"]
     rewrite(
-        copy / "metrics.json",
-        text.replace(reason, "<script>alert(1)</script>\\n<img src=x> \\u001b[31m"),
+        copy / "metrics.json", text.replace(reason, "<script>alert(1)</script>\\n<img src=x> \\u001b[31m")
     )
     assert main(["report", str(copy)]) == 0
     page = (copy / "report.html").read_text()
@@ -174,14 +146,6 @@ def test_flying_anew_removes_the_report_of_the_run_before(run: Path, tmp_path: P
     again = ["fly", str(copy / "scenario.yaml"), "--out", str(copy), "--no-recording", "--quiet"]
     assert main(again) == 0
     assert not {path.name for path in copy.iterdir()} & set(REPORT_FILES)
-
-
-def test_a_folder_without_a_complete_run_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["report", str(tmp_path)]) == 2
-    assert "is not a run folder" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("command", [[None], [7], [], None, "", ["'"]])
@@ -245,20 +209,6 @@ def test_the_page_of_a_given_path_has_no_figures_of_a_planner(tmp_path: Path, ch
     narrow = "[...document.querySelectorAll('table.one th')].map(each => each.getBoundingClientRect().width)"
     assert min(page.evaluate(narrow)) > 110
     page.close()
-
-
-@pytest.mark.flights
-def test_a_browser_would_tell_what_is_wrong(tmp_path: Path, chromium: Any) -> None:
-    page = tmp_path / "bad.html"
-    page.write_text(
-        "<link rel=icon href='data:,'><div style='width:800px'>wide</div><img src='none.png'>"
-        "<script>console.log('hm')</script>"
-    )
-    bad = shown(chromium, page, 390)
-    assert bad.overflow_px > 0
-    assert bad.missing == bad.figures == 1
-    assert bad.asked_for == ((tmp_path / "none.png").as_uri(),)
-    assert "hm" in bad.said
 
 
 def test_the_estimate_beside_the_optimum_turns_onto_it() -> None:

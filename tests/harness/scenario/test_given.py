@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from aircraft.guidance.interface import GuidanceLimits
-from aircraft.guidance.preview import PreviewLaw
-from harness.scenario.given import GUIDANCE, NoKeys, kind_of, registered
+from harness.scenario.given import NoKeys, registered
 from planner import registry
 from planner.interface import Mission, Plan, PlanRequest, PlanStatus
 from planner.registry import BUILT_IN, PlannerKind, planner_kinds, register
@@ -37,19 +35,6 @@ def made(name: str) -> Waits:
     planner = planner_kinds()[name].make(NoKeys(), MISSION)
     assert isinstance(planner, Waits)
     return planner
-
-
-def test_a_class_is_made_for_every_flight_and_told_the_mission() -> None:
-    name = registered(Waits)
-    assert name == f"{__name__}:Waits"
-    assert (made(name).mission, made(name).patience) == (MISSION, 3)
-    assert made(name) is not made(name)
-    assert planner_kinds()[name].summary == "Finds nothing."
-
-
-def test_an_object_is_itself() -> None:
-    waits = Waits(patience=7)
-    assert made(registered(waits)) is waits
 
 
 def test_a_class_that_is_defined_anew_replaces_the_first() -> None:
@@ -99,21 +84,3 @@ def test_what_cannot_be_imported_is_told_in_a_sentence(source: str, said: str, t
     (tmp_path / "leaves.py").write_text("import sys\nsys.exit(0)\n")
     with pytest.raises(ValueError, match=said):
         registered(source.format(folder=tmp_path))
-
-
-def test_a_guidance_law_is_given_in_the_same_ways() -> None:
-    def law(limits: GuidanceLimits) -> PreviewLaw:
-        raise AssertionError(limits)
-
-    assert kind_of(law, GUIDANCE).kind.endswith(":test_a_guidance_law_is_given_in_the_same_ways.law")
-    assert registered("preview", GUIDANCE) == "preview"
-    with pytest.raises(ValueError, match="update\\(state\\) and follow"):
-        kind_of(3, GUIDANCE)
-
-
-def test_what_needs_more_than_the_mission_is_refused() -> None:
-    def make(mission: Mission, gain: float) -> Waits:
-        return Waits(mission)
-
-    with pytest.raises(ValueError, match="needs mission, gain; must need the mission alone, or nothing"):
-        kind_of(make)

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from harness.files.strict_yaml import InputError
-from harness.scenario.navigation import PRESETS, Navigation, planning_margin_m
-from harness.scenario.scenario import dump_scenario, parse_scenario
+from harness.scenario.navigation import Navigation, planning_margin_m
+from harness.scenario.scenario import parse_scenario
 
 LEAST = """\
 schema: wayproof/scenario/1
@@ -17,13 +17,6 @@ name: least
 area: {bounds_m: [0, 0, 40000, 40000]}
 mission: {start_m: [1000, 1000], goal_m: [31000, 1000]}
 """
-
-
-@pytest.mark.parametrize("kind", PRESETS)
-def test_a_kind_fills_in_every_key(kind: str) -> None:
-    found = Navigation.model_validate({"kind": kind})
-    assert {name: getattr(found, name) for name in PRESETS[kind]} == PRESETS[kind]
-    assert set(PRESETS[kind]) == set(Navigation.model_fields) - {"kind", "margin_m"}
 
 
 def test_what_is_given_goes_before_the_preset_and_only_that_counts_as_given() -> None:
@@ -78,14 +71,6 @@ def test_faults_name_line_key_and_what_would_be_right(keys: str, sentence: str) 
     with pytest.raises(InputError) as refused:
         parse_scenario(f"{LEAST}navigation: {{{keys}}}\n")
     assert str(refused.value).startswith(f"scenario:5: {sentence}")
-
-
-def test_perfect_is_the_default_and_comes_back_from_a_dump() -> None:
-    scenario = parse_scenario(LEAST)
-    assert scenario == parse_scenario(
-        LEAST + "navigation: {kind: perfect, position_sigma_m: 0, outages_s: []}\n"
-    )
-    assert parse_scenario(dump_scenario(scenario)) == scenario
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 import re
@@ -11,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyproj
 import pytest
 import yaml
 from hypothesis import given
@@ -20,13 +18,10 @@ from hypothesis import strategies as st
 import aircraft
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
-from aircraft.frames import LocalPlane
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError
 from harness.run.scenario_flight import make_loop
-from harness.scenario.keys import ScenarioKeys
 from harness.scenario.performance import LEAST_CLEARANCE, mission_of, performance_of
-from harness.scenario.resolving import resolve
 from harness.scenario.scenario import (
     Scenario,
     dump_scenario,
@@ -87,22 +82,6 @@ def test_fills_in_every_default() -> None:
     assert None not in scenario.planner.own.values()
 
 
-@pytest.mark.parametrize(
-    ("goal", "course_deg"),
-    [((1000, 9000), 0.0), ((9000, 9000), 45.0), ((1000, 500), 180.0), ((500, 1000), 270.0)],
-)
-def test_course_is_towards_the_goal(goal: tuple[float, float], course_deg: float) -> None:
-    scenario = parse_scenario(LEAST.replace("[31000, 1000]", str(list(goal))))
-    assert scenario.mission.course_deg == pytest.approx(course_deg, abs=1e-12)
-
-
-def test_wind_widens_what_follows_from_the_turn_radius() -> None:
-    windy = parse_scenario(LEAST + "environment: {wind: {speed_mps: 10, from_deg: 0}}\n")
-    calm = parse_scenario(LEAST)
-    assert windy.planner.clearance_m > calm.planner.clearance_m
-    assert windy.mission.time_limit_s > calm.mission.time_limit_s
-
-
 def test_mission_of_tells_the_planner_what_the_scenario_says() -> None:
     scenario = parse_scenario(WITH_PLANNER)
     mission = mission_of(scenario)
@@ -127,14 +106,6 @@ def test_numbers_are_those_of_yaml_1_2() -> None:
     assert parse_scenario(text) == parse_scenario(LEAST)
 
 
-def test_a_closing_vertex_is_dropped() -> None:
-    polygon = "obstacles: [{polygon: {vertices_m: [[5000, 5000], [6000, 5000], [6000, 6000]%s]}}]\n"
-    closed = parse_scenario(LEAST + polygon % ", [5000, 5000]")
-    assert closed == parse_scenario(LEAST + polygon % "")
-    assert closed.obstacles[0].polygon
-    assert len(closed.obstacles[0].polygon.vertices_m) == 3
-
-
 @pytest.mark.parametrize(
     "ring",
     [
@@ -154,20 +125,6 @@ def test_an_area_where_the_plane_may_be_off_by_a_metre_is_refused() -> None:
         InputError, match=r"3: area\.bounds_m: reaches 849 km from area\.origin; .* up to 400 km"
     ):
         parse_scenario(in_area("{latitude_deg: 0, longitude_deg: 8}", "[-1000, -1000, 600000, 600000]"))
-
-
-@pytest.mark.parametrize(
-    "origin", ["{latitude_deg: -85, longitude_deg: 8}", "{latitude_deg: 0, longitude_deg: -180}"]
-)
-def test_a_large_area_where_the_plane_is_right_is_taken(origin: str) -> None:
-    area = parse_scenario(in_area(origin, "[-280000, -280000, 280000, 280000]")).area
-    plane = LocalPlane(area.origin.latitude_deg, area.origin.longitude_deg)
-    geod = pyproj.Geod(ellps="WGS84")
-    for east, north in itertools.product(np.linspace(-280e3, 280e3, 7), repeat=2):
-        lat, lon = plane.geodetic(east, north)
-        azimuth, _, length = geod.inv(area.origin.longitude_deg, area.origin.latitude_deg, lon, lat)
-        assert length * math.sin(math.radians(azimuth)) == pytest.approx(east, abs=1.0)
-        assert length * math.cos(math.radians(azimuth)) == pytest.approx(north, abs=1.0)
 
 
 def in_area(origin: str, bounds: str) -> str:
@@ -202,21 +159,6 @@ def test_nobody_starts_or_ends_inside_an_obstacle_however_little_clearance_is_wa
     east = 1000 if key == "start_m" else 31000
     with pytest.raises(InputError, match=rf"mission\.{key}: lies inside obstacles\[0\]"):
         parse_scenario(LEAST + f"obstacles: [{{{shape % east}}}]\nplanner: {{clearance_m: 0}}\n")
-
-
-def test_what_pops_up_later_may_lie_on_the_start() -> None:
-    there = "obstacles: [{circle: {center_m: [1000, 1000], radius_m: 300}, active_s: [%d, 120]}]\n"
-    assert parse_scenario(LEAST + there % 1).obstacles
-    with pytest.raises(InputError, match=r"mission\.start_m: lies inside obstacles\[0\]"):
-        parse_scenario(LEAST + there % 0)
-
-
-def test_is_frozen() -> None:
-    scenario = parse_scenario(LEAST)
-    with pytest.raises(ValueError, match="frozen"):
-        scenario.seed = 2
-    with pytest.raises(ValueError, match="frozen"):
-        scenario.mission.altitude_m = 2.0
 
 
 @pytest.mark.parametrize("name", ["on", "1e3", "0.1", "null", "0x1f", "yes", "-", "_", "2001-01-01", "1.-"])
@@ -361,18 +303,21 @@ def described_keys(schema: dict[str, Any], defs: dict[str, Any]) -> list[tuple[s
         resolved = defs[choice["$ref"].rpartition("/")[2]] if "$ref" in choice else choice
         for name, key in resolved.get("properties", {}).items():
             section = defs[key["$ref"].rpartition("/")[2]] if "$ref" in key else {}
-            found += [(name, {**section, **key}), *described_keys(key, defs)]
+            told = {**section, **key, "needed": name in resolved.get("required", ())}
+            found += [(name, told), *described_keys(key, defs)]
         if "items" in resolved:
             found += described_keys(resolved["items"], defs)
     return found
 
 
-def test_the_schema_describes_every_key_with_its_unit() -> None:
+def test_the_schema_describes_every_key_with_its_unit_and_default() -> None:
     schema = scenario_schema()
     keys = described_keys(schema, schema["$defs"])
     assert len(keys) > 45
     for name, key in keys:
         assert key.get("description"), name
+        told = key.get("default") is not None or "default:" in key["description"].lower()
+        assert key["needed"] or told or "$ref" in str(key) or "properties" in str(key), name
         if name.endswith(("_m", "_mps", "_s", "_deg", "_hz")):
             assert key["unit"] == {"mps": "m/s", "hz": "Hz"}.get(name.rsplit("_")[-1], name.rsplit("_")[-1])
     assert schema["required"] == ["schema", "name", "area", "mission"]
@@ -397,66 +342,6 @@ def bounded(key: dict[str, Any]) -> bool:
 
 def bounded_items(key: dict[str, Any]) -> bool:
     return ("prefixItems" in key or "items" in key) and bounded(key)
-
-
-def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
-    schema = scenario_schema()
-    keys = described_keys(schema, schema["$defs"])
-    holders = {"area", "origin", "obstacles", "circle", "polygon", "mission", "aircraft", "sensor", "planner"}
-    holders |= {"guidance", "navigation", "file", "ground", "sources", "start", "goal"}
-    holders |= {"uncertainty", "deviation", "vertical_gusts"}
-    values = [
-        (name, key)
-        for name, key in keys
-        if name
-        not in holders
-        | {
-            "environment",
-            "wind",
-            "turbulence",
-            "trackability",
-            "simulation",
-            "actuators",
-            "autopilot",
-        }
-    ]
-    required = {
-        "schema",
-        "name",
-        "bounds_m",
-        "center_m",
-        "radius_m",
-        "vertices_m",
-        "start_m",
-        "goal_m",
-        "kind",
-        "speed_mps",
-        *("path", "corner_m", "spacing_m", "rows", "columns", "lowest_m", "heights", "sha256", "polygons"),
-        *("latitude_deg", "longitude_deg"),
-        *("duration_s", "every_s"),
-    }
-    words = {
-        "schema",
-        "name",
-        "kind",
-        "model",
-        "turn",
-        "intensity",
-        "shape",
-        "path",
-        "crs",
-        "holes",
-        "nodata",
-        "unknown",
-    }
-    words |= {"conditions", "changes", "heights", "sha256", "notes", "follow", "shield"}
-    assert len(values) > 40
-    for name, key in values:
-        switch = key.get("type") == "boolean"
-        assert switch or bounded(key), name
-        assert switch or name in words or key.get("unit"), name
-        told = key.get("default") is not None or "default:" in key["description"].lower()
-        assert told or name in required, name
 
 
 def test_editors_find_the_schema_beside_the_scenarios() -> None:
@@ -501,23 +386,6 @@ def test_a_scenario_with_other_keys_is_derived_anew_and_the_first_one_stays() ->
     assert other.planner.own["margin_m"] == pytest.approx(1.5 * first.planner.own["margin_m"])
     assert dump_scenario(first) == before
     assert other.with_({"planner.clearance_m": 40, "seed": 1, "sensor": first.sensor}) == first
-
-
-def test_a_scenario_can_be_changed_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tests.harness.world_files.making import feature, geojson
-
-    (tmp_path / "town").mkdir()
-    geojson(tmp_path / "town" / "houses.geojson", feature({"building": "yes", "height": 400}))
-    (tmp_path / "town" / "s.yaml").write_text(
-        "{schema: wayproof/scenario/1, name: a, area: {bounds_m: [-3000, -3000, 3000, 3000]},"
-        " obstacles: [{file: {path: houses.geojson, ground_m: 0}}],"
-        " mission: {start_m: [-2000, -2000], goal_m: [2000, -2000]}}"
-    )
-    monkeypatch.chdir(tmp_path)
-    scenario = load_scenario("town/s.yaml")
-    monkeypatch.chdir("/")
-    assert scenario.with_({"seed": 2}).obstacles == scenario.obstacles
-    assert len(scenario.obstacles) == 1
 
 
 def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
@@ -574,17 +442,6 @@ def test_obstacles_from_a_file_are_cut_anew_at_another_altitude(tmp_path: Path) 
     assert high.with_({"mission.altitude_m": 80}) == low
 
 
-def test_reading_a_file_flies_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def flown(*_: object) -> None:
-        raise AssertionError("an aircraft was flown")
-
-    monkeypatch.setattr("harness.scenario.resolving.performance_of", flown)
-    keys = ScenarioKeys.model_validate(strict_yaml.parse(LEAST, "least").plain())
-    assert "clearance_m" not in keys.planner.model_dump(exclude_none=True)
-    with pytest.raises(AssertionError, match="flown"):
-        resolve(keys)
-
-
 @pytest.mark.parametrize("altitude_m", [7300, 9000, 20000])
 def test_an_altitude_without_level_flight_is_refused_where_it_stands(altitude_m: int, tmp_path: Path) -> None:
     """Before anything is flown: `wayproof validate` says it, too; the altitude that is named can be flown."""
@@ -604,25 +461,3 @@ def test_an_altitude_without_level_flight_is_refused_where_it_stands(altitude_m:
     assert bound is not None
     path.write_text(text.replace("HIGH", bound[1]))
     make_loop(load_scenario(path))  # trims the aircraft as a flight does
-
-
-@pytest.mark.parametrize(
-    ("altitude_m", "airspeed_mps", "trims"), [(300, 25, 0), (20, 25, 1), (1200, 25, 1), (300, 32, 1)]
-)
-def test_an_aircraft_is_trimmed_only_where_its_survey_does_not_tell(
-    altitude_m: int, airspeed_mps: float, trims: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[object] = []
-    monkeypatch.setattr("harness.scenario.start._fault", lambda *start: asked.append(start))
-    text = yaml.safe_load(LEAST)
-    text["mission"]["altitude_m"] = altitude_m
-    text["aircraft"] = {"airspeed_mps": airspeed_mps}
-    scenario_from(text)
-    assert len(asked) == trims
-
-
-def test_the_scenario_of_a_run_is_read_without_a_flight_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reports and exports read it: it was flown."""
-    text = dump_scenario(scenario_from(yaml.safe_load(LEAST)))
-    monkeypatch.setattr("harness.scenario.resolving.check_level_flight", lambda _: pytest.fail("trimmed"))
-    assert parse_scenario(text, as_flown=True).mission.altitude_m == 300.0

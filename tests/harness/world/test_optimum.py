@@ -78,22 +78,6 @@ def test_round_a_square(clearance: float) -> None:
     assert found.length_m == pytest.approx(exact, rel=1e-12)
 
 
-def test_the_border_closes_the_side_where_the_clearance_does_not_fit() -> None:
-    wall = block(-5.0, -20.0, 5.0, 94.0)
-    over, under = way(wall, clearance=5.0), way(wall, clearance=7.0)
-    assert over.length_m is not None
-    assert under.length_m is not None
-    start, goal = (-50.0, 80.0), (50.0, 80.0)
-    near, far = (
-        way(wall, clearance=5.0, start=start, goal=goal),
-        way(wall, clearance=7.0, start=start, goal=goal),
-    )
-    assert near.length_m is not None
-    assert far.length_m is not None
-    assert near.points_m[:, 1].max() == pytest.approx(99.0)
-    assert far.points_m[:, 1].min() == pytest.approx(-27.0)
-
-
 @pytest.mark.parametrize(
     ("obstacles", "reason"),
     [

@@ -27,12 +27,6 @@ def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
     return RangeSensor(world, Sensor(**{"range_m": 1000.0} | keys), np.random.SeedSequence(seed))
 
 
-def ahead(world: World, heading_rad: float = 0.0) -> float:
-    """What a ray along the heading returns."""
-    scan = sensor(world, field_of_view_deg=1.0, rays=3, beam_deg=0.0).scan(0.0, 0.0, heading_rad, 0.0)
-    return float(scan.ranges_m[1])
-
-
 def bits(scan: RangeScan) -> bytes:
     return scan.ranges_m.tobytes() + scan.directions.tobytes()
 
@@ -110,46 +104,6 @@ def test_ranges_lie_between_those_of_slightly_larger_and_smaller_shapes(
     assert ((scan.ranges_m <= 1000.0) | np.isinf(scan.ranges_m)).all()
 
 
-@given(
-    bearing=st.floats(0.0, math.tau),
-    away=st.floats(10.0, 900.0),
-    share=st.floats(0.01, 0.99),
-    heading=st.floats(0.0, math.tau),
-)
-def test_hits_of_rays_on_a_circle_lie_exactly_on_it_and_fill_its_width(
-    bearing: float, away: float, share: float, heading: float
-) -> None:
-    center, radius = np.array([away * math.sin(bearing), away * math.cos(bearing)]), share * away
-    eye = sensor(World([Obstacle(Circle(tuple(center), radius))], BOUNDS), beam_deg=0.0)
-    scan = eye.scan(0.0, 0.0, heading, 0.0)
-    hit = np.isfinite(scan.ranges_m)
-    points = scan.directions[hit] * scan.ranges_m[hit, None]
-    np.testing.assert_allclose(np.hypot(*(points - center).T), radius, rtol=0, atol=1e-9)
-    width = 2 * math.asin(share) / scan.spacing_rad
-    assert math.floor(width - 1e-6) <= hit.sum() <= math.ceil(width + 1e-6)
-
-
-def test_known_distances_ahead() -> None:
-    assert ahead(World([Obstacle(Circle((0.0, 500.0), 100.0))], BOUNDS)) == 400.0
-    assert ahead(World([Obstacle(square(500.0, 10.0, 100.0))], BOUNDS), math.pi / 2) == pytest.approx(400.0)
-    assert ahead(World([Obstacle(Circle((0.0, -500.0), 100.0))], BOUNDS)) == math.inf
-    assert ahead(World([Obstacle(square(0.0, -500.0, 100.0))], BOUNDS)) == math.inf
-
-
-def test_a_ray_that_just_passes_a_circle_does_not_hit_it() -> None:
-    assert ahead(World([Obstacle(Circle((100.001, 500.0), 100.0))], BOUNDS)) == math.inf
-    # Half the chord is sqrt(100^2 - 99.999^2).
-    assert ahead(World([Obstacle(Circle((99.999, 500.0), 100.0))], BOUNDS)) == pytest.approx(
-        500.0 - 0.4472125
-    )
-
-
-def test_inside_an_obstacle_a_ray_returns_the_way_out() -> None:
-    assert ahead(World([Obstacle(Circle((0.0, 50.0), 100.0))], BOUNDS)) == 150.0
-    assert ahead(World([Obstacle(Circle((0.0, 50.0), 100.0))], BOUNDS), math.pi) == pytest.approx(50.0)
-    assert ahead(World([Obstacle(square(0.0, 50.0, 100.0))], BOUNDS)) == pytest.approx(150.0)
-
-
 @pytest.mark.parametrize("edge_m", [1e-14, 1e-170])
 def test_an_edge_shorter_than_places_are_told_apart_hides_nothing(edge_m: float) -> None:
     house = Polygon(((-100.0, 300.0), (0.0, 200.0), (edge_m, 200.0), (100.0, 300.0)))
@@ -222,17 +176,6 @@ def test_a_scan_does_not_depend_on_where_the_sensor_was_before(seed: int) -> Non
     for number in range(60):
         pose = (20.0 * number, 7.0 * number, 0.1 * number, 1.7 * number)
         assert bits(flown.scan(*pose)) == bits(sensor(world).scan(*pose))
-
-
-def test_a_scan_cannot_be_changed_and_keeps_no_array_of_others() -> None:
-    scan = sensor(EMPTY, rays=3).scan(0.0, 0.0, 0.0, 0.0)
-    for array in (scan.ranges_m, scan.directions):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 1.0
-    given_m = np.array([1.0, 2.0, 3.0])
-    copied = dataclasses.replace(scan, ranges_m=given_m)
-    given_m[0] = 9.0
-    assert copied.ranges_m.tolist() == [1.0, 2.0, 3.0]
 
 
 @given(st.integers(0, 10_000), st.sampled_from([360.0, 90.0]))

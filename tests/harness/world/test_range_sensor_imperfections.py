@@ -86,12 +86,3 @@ def test_each_imperfection_has_a_stream_of_its_own() -> None:
     np.testing.assert_array_equal(every, expected)
     chances = [(noisy > 600.0).ravel(), lost.ravel(), np.isfinite(false).ravel()]
     assert np.abs(np.corrcoef(chances) - np.eye(3)).max() < 5 / math.sqrt(noisy.size)
-
-
-def test_a_perfect_sensor_draws_nothing_and_repeats_itself() -> None:
-    source = sensor(ROOM)
-    streams = (source._noise, source._dropout, source._false_return)
-    before = [stream.bit_generator.state for stream in streams]
-    first, second = (source.scan(0.0, 0.0, 0.3, time).ranges_m for time in (0.0, 0.5))
-    np.testing.assert_array_equal(first, second)
-    assert [stream.bit_generator.state for stream in streams] == before

@@ -4,7 +4,6 @@ import importlib.util
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import harness.world.world
-from harness.scenario import obstacles as scenario_obstacles
-from harness.scenario import sections
 from harness.world.world import Circle, Obstacle, Polygon, World
 from tests.examples import examples
 
@@ -83,24 +80,6 @@ def true_distance(obstacle: Obstacle, east: float, north: float, time: float) ->
     polygon = shapely.Polygon(obstacle.shape.vertices_m)
     distance = float(polygon.exterior.distance(point))
     return -distance if polygon.contains(point) else distance
-
-
-@given(
-    center=st.tuples(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5)),
-    radius=st.floats(1.0, 2e4),
-    outwards=st.floats(-1.0, 1e5),
-    bearing=st.floats(0.0, math.tau),
-)
-def test_clearance_of_a_circle_is_exact(
-    center: tuple[float, float], radius: float, outwards: float, bearing: float
-) -> None:
-    world = World([Obstacle(Circle(center, radius))], BOUNDS)
-    east, north = (
-        center[0] + (radius + outwards) * math.sin(bearing),
-        center[1] + (radius + outwards) * math.cos(bearing),
-    )
-    assert world.clearance_at(east, north, 0.0) == pytest.approx(outwards, abs=1e-9)
-    assert world.clearance(np.array([[east, north]]), np.zeros(1))[0] == pytest.approx(outwards, abs=1e-9)
 
 
 @pytest.mark.parametrize("edge_m", [1e-14, 1e-170])
@@ -197,74 +176,6 @@ def test_the_boundary_belongs_to_the_area() -> None:
     assert all(world.inside_bounds(*point) for point in ((0.0, 10.0), (100.0, 200.0), (50.0, 50.0)))
     outside = ((-0.001, 50.0), (100.001, 50.0), (50.0, 9.999), (50.0, 200.001), (math.nan, 50.0))
     assert not any(world.inside_bounds(*point) for point in outside)
-
-
-@settings(max_examples=examples(25))
-@given(seed=st.integers(0, 2**32), radius=st.floats(0.0, 8000.0), time=st.floats(0.0, 300.0))
-def test_near_are_the_obstacles_within_the_radius(seed: int, radius: float, time: float) -> None:
-    rng = np.random.default_rng(seed)
-    obstacles = random_obstacles(rng, 30, changing=True)
-    east, north = rng.uniform(0.0, 20_000.0, 2)
-    distances = [true_distance(o, east, north, time) for o in obstacles]
-    near = World(obstacles, BOUNDS).near(east, north, radius, time)
-    assert near == tuple(i for i, distance in enumerate(distances) if distance <= radius)
-
-
-@settings(max_examples=examples(25))
-@given(seed=st.integers(0, 2**32), radius=st.floats(100.0, 8000.0))
-def test_surroundings_hold_every_face_within_the_radius(seed: int, radius: float) -> None:
-    rng = np.random.default_rng(seed)
-    obstacles = random_obstacles(rng, 30, changing=True)
-    world = World(obstacles, BOUNDS)
-    east, north = rng.uniform(0.0, 20_000.0, 2)
-    surroundings = world.surroundings(east, north, radius, 50.0, 90.0)
-    for time in (50.0, 63.0, 90.0):
-        faces = surroundings.faces(time)
-        circles = {tuple(circle) for circle in faces.circles_m.T.round(6)}
-        edges = {tuple(edge) for edge in faces.edges_m.T.round(6)}
-        for obstacle in obstacles:
-            if not obstacle.interval_s[0] <= time <= obstacle.interval_s[1]:
-                continue
-            shift = np.array(obstacle.displacement_m(time))
-            if isinstance(obstacle.shape, Circle):
-                circle = (
-                    *(np.array(obstacle.shape.center_m) + shift).round(6),
-                    round(obstacle.shape.radius_m, 6),
-                )
-                assert circle in circles or true_distance(obstacle, east, north, time) > radius
-                continue
-            corners = np.array(obstacle.shape.vertices_m) + shift
-            for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-                edge = tuple(np.concatenate((start, end)).round(6))
-                line = shapely.LineString([start, end])
-                assert edge in edges or line.distance(shapely.Point(east, north)) > radius
-
-
-def test_from_scenario_takes_shape_motion_and_window() -> None:
-    circle = scenario_obstacles.Circle(center_m=(1.0, 2.0), radius_m=3.0)
-    polygon = scenario_obstacles.Polygon(vertices_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
-    scenario: Any = SimpleNamespace(
-        area=sections.Area(bounds_m=BOUNDS),
-        obstacles=(
-            scenario_obstacles.Obstacle(circle=circle, velocity_mps=(4.0, 5.0), active_s=(6.0, 7.0)),
-            scenario_obstacles.Obstacle(polygon=polygon),
-        ),
-        ground=None,
-    )
-    world = World.from_scenario(scenario)
-    assert world.bounds_m == BOUNDS
-    assert world.obstacles == (
-        Obstacle(Circle((1.0, 2.0), 3.0), (4.0, 5.0), (6.0, 7.0)),
-        Obstacle(Polygon(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))),
-    )
-
-
-@pytest.mark.parametrize("vertices", [((0.0, 0.0), (1.0, 0.0)), ((0.0, 0.0), (1.0, 0.0), (math.nan, 1.0))])
-def test_a_polygon_without_three_finite_vertices_is_an_error(
-    vertices: tuple[tuple[float, float], ...],
-) -> None:
-    with pytest.raises(ValueError, match="three finite vertices"):
-        Polygon(vertices)
 
 
 @pytest.mark.skipif(not REFEREE.exists(), reason="the independent referee is not beside this repository")
