@@ -11,7 +11,6 @@ from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import AircraftState, Route
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight, Outcome
-from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import make_loop
 from planner.interface import Plan, PlanRequest
 from tests.closed_loop.conftest import SmallWorld
@@ -95,15 +94,3 @@ def test_altitude_and_airspeed_that_are_held_are_believed_ones(
     track = flown[0].track
     np.testing.assert_allclose(track.up_m[1:], 300.0 - UP_M)
     np.testing.assert_allclose(track.airspeed_mps[1:], 25.0 - AIRSPEED_MPS)
-
-
-def test_a_scan_taken_from_elsewhere_has_the_same_ranges() -> None:
-    fan = np.exp(1j * np.radians([90.0, 0.0, -90.0]))
-    scan = RangeScan(1.0, 1.5, 10.0, 20.0, 0.5, 0.2, np.radians(90.0), fan, np.array([5.0, 7.0, 9.0]), 50.0)
-    moved = scan.taken_from(110.0, 220.0, 0.6)
-    assert (moved.time_s, moved.available_s, moved.max_range_m) == (1.0, 1.5, 50.0)
-    assert (moved.east_m, moved.north_m, moved.heading_rad) == (110.0, 220.0, 0.6)
-    assert moved.start_rad == pytest.approx(0.3)
-    rays = np.arange(3)
-    turned = scan.from_sensor_m(rays) * np.exp(-0.1j)
-    np.testing.assert_allclose(moved.ends_m(rays), turned + 110.0 + 220.0j)

@@ -6,9 +6,8 @@ import re
 
 import pytest
 
-from aircraft.airframes import aircraft_names, airframe
-from harness.scenario.scenario import Scenario
-from tests.closed_loop.fleet_table import DISCS, HIGH, WIDE, discs, flown, scaled
+from aircraft.airframes import aircraft_names
+from tests.closed_loop.fleet_table import flown
 
 
 @pytest.mark.slow
@@ -23,21 +22,3 @@ def test_a_range_that_is_too_short_is_refused_with_the_one_that_is_needed() -> N
     flight = flown("T38", "preview", "calm", seed=1, range_radii=2.2)
     assert (flight.outcome, flight.good) == ("refused", False)
     assert re.search(r"must be at least \d+, to see room for a safe turn ahead", flight.reason)
-
-
-def test_worlds_are_the_same_in_turn_radii() -> None:
-    def shape(scenario: Scenario) -> list[float]:
-        wide_m = scenario.area.bounds_m[2] - scenario.area.bounds_m[0]
-        return [
-            WIDE * value / wide_m
-            for each in scenario.obstacles
-            if each.circle
-            for value in (*each.circle.center_m, each.circle.radius_m)
-        ]
-
-    small, large = (scaled(airframe(name), "preview", "calm", 1) for name in ("aerosonde", "c172p"))
-    assert small.area.bounds_m[2] < large.area.bounds_m[2]
-    assert shape(small) == pytest.approx(shape(large), abs=1e-3)
-    assert len(discs(1)) == DISCS
-    assert discs(1) != discs(2)
-    assert large.area.bounds_m[3] == pytest.approx(0.5 * HIGH * large.area.bounds_m[2] / (0.5 * WIDE))

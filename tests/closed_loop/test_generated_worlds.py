@@ -10,7 +10,6 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from harness.analysis.metrics import clearance_violation_s
 from harness.flight.record import Flight, Outcome
 from harness.scenario.scenario import Scenario
 
@@ -53,20 +52,6 @@ def fields(draw: st.DrawFn, most_corners: int = 7) -> list[dict[str, Any]]:
     taken = draw(st.lists(st.booleans(), min_size=CELLS**2, max_size=CELLS**2))
     cells = [(east, north) for east in places for north in places]
     return [draw(obstacles(*cell, most_corners)) for cell, full in zip(cells, taken, strict=True) if full]
-
-
-@pytest.mark.flights
-@given(field=fields(most_corners=2))
-@BOUNDED
-def test_reaches_the_goal_among_circles_and_keeps_the_clearance(
-    small_world: SmallWorld, flown_by_point_mass: FlyPointMass, field: list[dict[str, Any]]
-) -> None:
-    scenario = small_world(*field)
-    flight = flown_by_point_mass(scenario)
-    assert flight.outcome is Outcome.REACHED, flight.reason
-    track = flight.track
-    assert clearance_violation_s(track.time_s, track.clearance_m, scenario.planner.clearance_m) == 0.0
-    assert flight.sim_s * 25.0 <= 1.1 * math.dist(scenario.mission.start_m, scenario.mission.goal_m)
 
 
 @pytest.mark.flights

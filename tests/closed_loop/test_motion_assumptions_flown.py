@@ -68,12 +68,6 @@ def test_a_fast_wall_no_wider_than_the_sensing_range_is_flown_round(seed: int) -
 
 
 @pytest.mark.flights
-def test_a_wider_wall_lies_outside_the_assumptions() -> None:
-    (said,) = scenario_outside_assumptions(wall(1, width_share=1.1))
-    assert "wide across its motion" in said
-
-
-@pytest.mark.flights
 @pytest.mark.skipif(not WORLDS.is_dir(), reason="the shared worlds are not beside this checkout")
 @pytest.mark.parametrize("name", HIT)
 def test_the_worlds_whose_flights_hit_something_lie_outside_the_assumptions(name: str) -> None:

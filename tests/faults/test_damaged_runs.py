@@ -13,10 +13,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from harness.cli.app import main
-from harness.files.errors import RunFolderError
-from harness.recording.file import end_of_whole
-from harness.recording.overlay import write_overlay
-from harness.run_files.run_folder import recording_of
 from tests.faults.hostile import JSON_SNIPPETS, KEYS, as_json, spoilt, spoilt_bytes
 from tests.longer import longer
 
@@ -99,19 +95,6 @@ def read_or_refused(arguments: list[str], folder: Path, capsys: pytest.CaptureFi
     assert all(str(folder) in line and len(line) < 800 for line in lines) or "leave --what out" in said.err
 
 
-@pytest.mark.parametrize("name", ["track.parquet", "plans.parquet", "metrics.json", "scenario.yaml"])
-def test_one_bit_of_a_file_is_enough(
-    name: str, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    copy = tmp_path / "run"
-    shutil.copytree(a_run, copy)
-    data = bytearray((copy / name).read_bytes())
-    data[len(data) // 2] ^= 1
-    (copy / name).write_bytes(data)
-    assert main(["report", str(copy)]) == 2
-    assert f"{copy} is damaged: {name} is not what was written" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("cases", [10, pytest.param(300, marks=pytest.mark.slow)])
 def test_view_of_a_damaged_recording(
     cases: int, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -133,29 +116,6 @@ def test_view_of_a_damaged_recording(
         )
 
     each()
-
-
-@pytest.mark.parametrize("pieces", [1, 7, 4096, 1 << 20])
-def test_a_recording_of_which_only_a_part_has_come_ends_with_a_whole_message(
-    pieces: int, a_run: Path, tmp_path: Path
-) -> None:
-    """What a killed process leaves: rerun cannot read a recording that ends in the middle of a message."""
-    data = (a_run / "flight.rrd").read_bytes()[:300_000]
-    begin, waiting, written = 12, bytearray(), bytearray()
-    for first in range(0, len(data), pieces):
-        waiting += data[first : first + pieces]
-        end = end_of_whole(waiting, begin)
-        written += waiting[:end]
-        del waiting[:end]
-        begin = max(begin - end, 0)
-    assert data.startswith(written)
-    assert 100_000 < len(written) < len(data)
-    cut = tmp_path / "flight.rrd"
-    cut.write_bytes(written)
-    write_overlay([recording_of(a_run), cut], ["whole", "cut"], tmp_path / "overlay.rrd")
-    cut.write_bytes(data)
-    with pytest.raises(RunFolderError, match="cannot read the recording"):
-        write_overlay([recording_of(a_run), cut], ["whole", "cut"], tmp_path / "overlay.rrd")
 
 
 def pipe(path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -14,7 +13,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from harness.cli.app import main
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.run_files.run_folder import load_run
@@ -175,17 +173,6 @@ def test_a_disk_that_is_full_for_the_track_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.flights
-def test_a_disk_that_is_full_for_a_report(a_run: Path, tmp_path: Path) -> None:
-    shutil.copytree(a_run, tmp_path / "run")
-    status, _, err = run(tmp_path, "report", "run", file_bytes=20_000)
-    assert status == 2
-    assert err.startswith("wayproof: cannot write the report in run: ")
-    assert err.endswith(": File too large\n")
-    assert not (tmp_path / "run" / "report.html").exists()
-    assert run_here(tmp_path, "report", "run")[0] == 0
-
-
-@pytest.mark.flights
 def test_two_flights_into_one_folder(tmp_path: Path) -> None:
     first = start(tmp_path, *LONG)
     wait_until((tmp_path / "run" / "scenario.yaml").exists, first)
@@ -199,16 +186,6 @@ def test_two_flights_into_one_folder(tmp_path: Path) -> None:
     first.communicate()
     assert run_here(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1, "a killed process leaves no lock"
     assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
-
-
-@pytest.mark.flights
-def test_two_comparisons_into_one_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "c").mkdir()
-    lock = FolderLock(tmp_path / "c")
-    assert main(["compare", str(FOREST), "--planners", "bug2", "--out", str(tmp_path / "c")]) == 2
-    assert "another wayproof is writing to" in capsys.readouterr().err
-    lock.release()
-    assert list((tmp_path / "c").iterdir()) == []
 
 
 @pytest.mark.flights
@@ -232,22 +209,6 @@ def test_output_that_nobody_takes(tmp_path: Path) -> None:
     os.close(writer)
     assert (status, err) == (1, "")
     assert load_run(tmp_path / "run").manifest["complete"] is True
-
-
-@pytest.mark.flights
-@pytest.mark.parametrize("words", [("list", "planners"), ("fly", "my.yaml", "--no-recording")])
-def test_the_status_is_that_of_what_was_done_though_nobody_reads_of_it(
-    words: tuple[str, ...], tmp_path: Path
-) -> None:
-    (tmp_path / "my.yaml").write_text(
-        "{schema: wayproof/scenario/1, name: my, area: {bounds_m: [0, 0, 3000, 3000]}, "
-        "mission: {start_m: [500, 500], goal_m: [1500, 1500], goal_radius_m: 200}}"
-    )
-    reader, writer = os.pipe()
-    os.close(reader)
-    status, _, err = run(tmp_path, *words, stdout=writer)
-    os.close(writer)
-    assert (status, err) == (0, "")
 
 
 @pytest.mark.flights

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import signal
 from pathlib import Path
 
@@ -64,28 +63,6 @@ def test_a_full_disk(size: int, status: int, said: str, place: Path, unbroken: b
         assert pq.read_table(place / "out" / "results.parquet").num_rows < 3
     assert run_here(place, *SWEEP, "--resume") == (0, "", "")
     assert results(place) == unbroken
-
-
-@pytest.mark.flights
-def test_a_disk_that_is_full_for_the_summary_alone(place: Path, whole: Path, unbroken: bytes) -> None:
-    shutil.copytree(whole, place / "out")
-    (place / "out" / "summary.html").unlink()
-    status, out, err = run(place, *SWEEP, "--resume", file_bytes=60_000)
-    assert (status, out) == (1, "")
-    assert err == (
-        "wayproof: cannot write the summary in out: summary.html: File too large; the results are whole, and "
-        "`wayproof report out` makes it from them\n"
-    )
-    assert not list((place / "out").glob("summary.html*"))
-    assert results(place) == unbroken
-
-
-@pytest.mark.parametrize("folder", ["/proc/campaign", "/sys/campaign"])
-def test_a_file_system_that_takes_nothing(folder: str, place: Path) -> None:
-    status, out, err = run_here(place, *SWEEP[:3], folder, *SWEEP[4:])
-    assert (status, out) == (2, "")
-    assert err.startswith(f"wayproof: cannot write the campaign {folder}: ")
-    assert len(err.splitlines()) == 1
 
 
 @pytest.mark.flights

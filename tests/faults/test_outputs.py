@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli.app import main
-from harness.files.whole_file import PARTIAL, append_to, fresh, replace_text
+from harness.files.whole_file import PARTIAL
 from tests.faults.command import FOREST
 
 OUTPUTS = ("report.html", "report.csv", "report.md", "path.svg", "path.png")
@@ -110,22 +110,6 @@ def test_a_run_that_finds_no_room_at_its_start_leaves_nothing(
     assert status == 2
     assert not (tmp_path / "some").exists()
     assert ": " in capsys.readouterr().err
-
-
-def test_what_lies_in_the_place_of_a_file_is_replaced_or_refused(tmp_path: Path) -> None:
-    (tmp_path / "target").write_text("kept")
-    (tmp_path / "a").symlink_to(tmp_path / "target")
-    (tmp_path / f"a{PARTIAL}").write_text("stale")
-    replace_text(tmp_path / "a", "new")
-    assert ((tmp_path / "a").read_text(), (tmp_path / "a").is_symlink()) == ("new", False)
-    assert (tmp_path / "target").read_text() == "kept"
-    assert not (tmp_path / f"a{PARTIAL}").exists()
-    (tmp_path / "j").symlink_to(tmp_path / "target")
-    with pytest.raises(OSError, match="j: is a link"):
-        append_to(tmp_path / "j")
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(IsADirectoryError, match="folder"):
-        fresh(tmp_path / "folder")
 
 
 def test_control_characters_of_a_planners_text_are_spelt_out(sent: Path) -> None:

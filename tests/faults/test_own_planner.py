@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from harness.cli.app import main
-from harness.files.errors import RunFolderError
 from harness.run_files.run_folder import load_run
 from tests.faults.command import ROOT, TIMEOUT_S, wait_until
 from tests.longer import longer
@@ -185,21 +184,6 @@ def test_a_config_that_exits_is_bad_input(place: Path) -> None:
     assert (status, out) == (2, "")
     assert "planner.kind: cannot be configured: SystemExit: 0" in err
     assert not (place / "run").exists()
-
-
-@pytest.mark.flights
-def test_a_module_that_exits_when_it_is_loaded_is_no_success(place: Path) -> None:
-    (place / "site" / "own_plugin.py").write_text("import sys\nsys.exit(0)\n")
-    status, out, err = flown(place, "talks", "--quiet")
-    assert (status, out) == (1, "")
-    assert err == "wayproof: code that was loaded, a planner's perhaps, called sys.exit; nothing is done\n"
-
-
-@pytest.mark.flights
-def test_a_planner_that_ends_the_process_leaves_a_folder_that_is_marked(place: Path) -> None:
-    flown(place, "gone", "--quiet")
-    with pytest.raises(RunFolderError, match="incomplete"):
-        load_run(place / "run")
 
 
 @pytest.mark.slow

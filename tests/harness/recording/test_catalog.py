@@ -18,11 +18,9 @@ from harness.analysis.metrics import metrics
 from harness.campaign.table import recordings_of
 from harness.cli.app import main
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
-from harness.recording import catalog as catalogs
-from harness.recording.blueprint import Frame
 from harness.recording.catalog import catalog
 from harness.recording.log import RerunLog
-from harness.recording.properties import properties_of, run_properties, severity
+from harness.recording.properties import properties_of, run_properties
 from harness.recording.viewer import NO_DRIVER, ViewerError, free_port, viewer_process
 from harness.scenario.scenario import parse_scenario
 from tests.harness.recording.test_rerun_log import LIMITS, SCENE
@@ -198,14 +196,6 @@ def test_a_campaign_without_recordings_says_how_to_get_some(
     assert "no such folder; give a run folder" in capsys.readouterr().err
 
 
-def test_who_came_too_near_is_no_better_than_who_was_not_tracked() -> None:
-    """Where navigation errs hardly any run is tracked, and a near miss would be lost below them all."""
-    figures = [severity("reached", *each) for each in ((True, 0.14), (False, 0.9), (False, 1.2), (True, 1.0))]
-    assert figures == sorted(figures, reverse=True)
-    assert severity("unreachable", True, 9.0) > figures[0]
-    assert severity("reached", True, None) < figures[-1]
-
-
 def test_a_campaign_is_one_table_worst_first(campaign: Path) -> None:
     pytest.importorskip("datafusion")
     with catalog("small", recordings_of(campaign)) as served:
@@ -216,19 +206,6 @@ def test_a_campaign_is_one_table_worst_first(campaign: Path) -> None:
     assert table["property:run:min_clearance_m"] == [[-3.0], [120.0], [250.0]]
     varied = next(name for name in table if name.startswith("property:varied:"))
     assert table[varied] == [[5.0], [6.0], [4.0]]
-
-
-def test_the_layout_of_all_runs_is_framed_on_all_of_them() -> None:
-    import pyarrow as pa
-
-    runs = pa.table(
-        {
-            "property:frame:bounds_m": [[0.0, -50.0, 100.0, 200.0], [-10.0, 0.0, 50.0, 300.0], None],
-            "property:frame:altitude_m": [[300.0], [350.0], None],
-            "property:frame:clearance_m": [[40.0], [30.0], None],
-        }
-    )
-    assert catalogs.common_frame(runs) == Frame((-10.0, -50.0, 100.0, 300.0), 350.0, 40.0)
 
 
 @contextlib.contextmanager

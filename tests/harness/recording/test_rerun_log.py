@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
 import subprocess
 import sys
@@ -31,12 +30,10 @@ from harness.flight.observer import Caution, ShieldState
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
 from harness.recording import viewer
-from harness.recording.blueprint import ERROR_COLOURS, Scene, apart
-from harness.recording.layout import series_views
+from harness.recording.blueprint import ERROR_COLOURS, Scene
 from harness.recording.log import RerunLog
 from harness.recording.overlay import runs_in, write_overlay
-from harness.recording.scene import quaternions, scale_bar_m
-from harness.recording.states import mode_of
+from harness.recording.scene import quaternions
 from harness.recording.summary import summary
 from harness.recording.viewer import NO_DRIVER, ViewerError, _executable, open_viewer, run_names
 from harness.world.obstacle import Circle, Obstacle, Polygon
@@ -322,29 +319,6 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Calla
     assert (start, cause == "trackable") == (1.0, False)
 
 
-@pytest.mark.parametrize(
-    ("reason", "mode"),
-    [
-        ("obstacle ahead at 9.8 km, passing left", "obstacle ahead at … km, passing left"),
-        ("way to the goal in view, 56.2 km to go", "way to the goal in view, … km to go"),
-        ("following a boundary, 1.3 km from the hit point", "following a boundary, … km from the hit point"),
-        ("turning away", "turning away"),
-        ("3 ways, 1,234.5 m to go", "… ways, … m to go"),
-    ],
-)
-def test_a_mode_is_a_reason_without_its_numbers(reason: str, mode: str) -> None:
-    assert mode_of(reason) == mode
-
-
-def test_scan_before_a_plan_is_drawn(tmp_path: Path, make_plan: Callable[..., AcceptedPlan]) -> None:
-    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
-    for time_s in (0.0, 3.0, 3.5):
-        log.on_scan(scan(time_s), STATE)
-    log.on_plan(make_plan([(0, 0, 0, 1, 0.0, 100.0)], time_s=3.7), STATE)
-    log.close()
-    assert seconds(read(tmp_path / "a.rrd"), "/plan/scan") == [0.0, 3.0, 3.5]
-
-
 def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     assert seconds(entities, "/plan/chosen") == [0.0, 50.0]
@@ -365,12 +339,6 @@ def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) ->
     ):
         assert seconds(entities, f"/plan/{entity}") == [0.0, 50.0]
         assert column(entities, f"/plan/{entity}", part)[1] == [], "cleared where the planner shows nothing"
-
-
-def test_where_moving_obstacles_are_expected_to_be_met_is_shown(recording: tuple[Path, Flight]) -> None:
-    entities = read(recording[0])
-    assert seconds(entities, "/plan/met") == [0.0, 50.0]
-    assert column(entities, "/plan/met", "positions") == [[[100.0, 300.0], [110.0, 300.0]], []]
 
 
 def test_what_the_map_takes_to_move_is_shown_until_it_is_lost(
@@ -398,13 +366,6 @@ def test_what_the_map_takes_to_move_is_shown_until_it_is_lost(
         assert column(entities, f"/plan/{entity}", part)[-1] == [], "cleared when it is lost"
 
 
-def test_events_of_one_time_have_times_of_their_own() -> None:
-    times = apart([0.0, 5.0, 5.0, 5.0, 6.0])
-    assert times[[0, 1, 4]].tolist() == [0.0, 5.0, 6.0]
-    assert np.diff(np.round(times * 1e9)).min() == 1.0
-    assert np.round((apart([6.0], after_s=6.0)[0] - 6.0) * 1e9) == 1.0
-
-
 def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     texts = [str(text) for (text,) in column(entities, "/events", "text")]
@@ -430,35 +391,6 @@ def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Pat
     page = summary(SCENE, figures)
     assert page.index("**Flown as given: no: turn radius too tight (2 legs)**") < page.index("**reached**")
     assert "as given" not in summary(SCENE, metrics(recording[1], LIMITS))
-
-
-def test_the_summary_says_how_late_plans_were_and_what_the_sensor_lost(
-    recording: tuple[Path, Flight],
-) -> None:
-    figures = metrics(recording[1], LIMITS) | {
-        "plan_delay_s": {"p50": 0.2, "p99": 2.9, "max": 3.0},
-        "lost_returns": {"share": 0.348, "max": 0.446},
-    }
-    page = summary(SCENE, figures)
-    assert "| plan delay max | 3 s |" in page
-    assert "| returns lost in the worst scan | 44.6 % |" in page
-    figures |= {
-        "plan_delay_s": dict.fromkeys(("p50", "p99", "max")),
-        "lost_returns": {"share": None, "max": None},
-    }
-    assert not any(name in summary(SCENE, figures) for name in ("plan delay", "returns lost"))
-
-
-def test_the_summary_says_for_how_long_it_was_too_near_only_where_it_was(
-    recording: tuple[Path, Flight],
-) -> None:
-    """The view at 1366 pixels cuts a longer cell before its end."""
-    figures = metrics(recording[1], LIMITS) | {"min_clearance_m": 150.0, "clearance_violation_s": 0.0}
-    assert "| least clearance | 150.0 m of 100 m |" in summary(SCENE, figures)
-    figures |= {"min_clearance_m": 62.8, "clearance_violation_s": 3.24}
-    assert "| least clearance | 62.8 m of 100 m; 3.2 s below |" in summary(SCENE, figures)
-    figures |= {"min_clearance_m": None}
-    assert "| least clearance | no obstacle |" in summary(SCENE, figures)
 
 
 def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) -> None:
@@ -521,45 +453,6 @@ os._exit(9)
     shown = tmp_path / "overlay.rrd"
     write_overlay([tmp_path / "a.rrd", tmp_path / "a.rrd"], ["one", "two"], shown)
     assert rerun("rrd", "verify", str(shown)).returncode == 0
-
-
-@pytest.mark.flights
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
-@pytest.mark.parametrize("ended", [True, False])
-def test_the_fork_of_a_process_that_records_can_record(tmp_path: Path, ended: bool) -> None:
-    script = f"""
-import os, signal, sys
-sys.path[:0] = {[str(Path(__file__).parents[3])]!r}
-from pathlib import Path
-from tests.harness.conftest import track
-from tests.harness.recording.test_rerun_log import SCENE
-from harness.recording.layout import series_views
-from harness.recording.log import RerunLog
-def log(name):
-    log = RerunLog(Path({str(tmp_path)!r}, name), SCENE, "a")
-    log.on_block(track(600, plan_index=-1))
-    return log
-first = log("parent.rrd")
-if {ended}:
-    first.end()
-child = os.fork()
-if not child:
-    signal.alarm(60)
-    log("one.rrd").end()
-    log("two.rrd").end()
-    os._exit(0)
-assert os.waitpid(child, 0)[1] == 0
-first.end()
-"""
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    for name in ("parent.rrd", "one.rrd", "two.rrd"):
-        assert len(column(read(tmp_path / name), "/series/bank/flown", "scalars")) == 600
-
-
-def test_missing_folder_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="no folder"):
-        RerunLog(tmp_path / "none" / "a.rrd", SCENE, "a")
 
 
 def test_overlay_keeps_every_track_and_one_world(
@@ -719,23 +612,6 @@ def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
     assert int.from_bytes(png.read_bytes()[16:20]) == 1200
 
 
-def test_every_line_of_a_plot_is_named(recording: tuple[Path, Flight]) -> None:
-    """By its colour in the title: there is no legend."""
-    drawn = {str(name) for name in read(recording[0]) if str(name).startswith("/series/bank/")}
-    assert drawn == {f"/series/bank/{line}" for line in ("commanded", "flown", "limit", "pitch")}
-    titles = {str(view.origin).strip("/"): view.name for view in series_views(SCENE.frame, ("",))}
-    assert titles["series/bank"] == "Bank, deg; blue: command, red: limit 44.7, violet: pitch"
-    assert titles["series/cross_track"] == "Cross-track, m; blue: believed"
-    assert "believed" not in str(series_views(SCENE.frame, ("",), without=["navigation_error"])[0].name)
-
-
-@pytest.mark.parametrize(
-    ("span_m", "bar_m"), [(400, 100), (399, 50), (5000, 1000), (100_000, 20_000), (81, 20)]
-)
-def test_a_scale_bar_has_a_round_length(span_m: float, bar_m: float) -> None:
-    assert scale_bar_m(span_m) == pytest.approx(bar_m)
-
-
 def test_wind_is_drawn_along_its_way_and_named(tmp_path: Path) -> None:
     """From 300 deg it blows towards 120 deg: 0.866 east, -0.5 north."""
     log = RerunLog(tmp_path / "flight.rrd", replace(SCENE, wind=(8.0, 300.0)), "a")
@@ -746,25 +622,6 @@ def test_wind_is_drawn_along_its_way_and_named(tmp_path: Path) -> None:
     assert along / np.hypot(*along) == pytest.approx([0.866, -0.5], abs=1e-3)
     assert column(entities, "/plan/wind", "LineStrips2D:labels") == [["wind 8.0 m/s from 300°"]]
     assert "Wind 8.0 m/s from 300°" in summary(replace(SCENE, wind=(8.0, 300.0)), None)
-
-
-def test_no_peak_of_a_curve_is_averaged_away(recording: tuple[Path, Flight]) -> None:
-    entities = read(recording[0])
-    policies = {
-        entity: column(entities, entity, "aggregation_policy")
-        for entity, columns in entities.items()
-        if any(name.endswith("SeriesLines:names") for name in columns)
-    }
-    least_and_greatest = rr.components.AggregationPolicy.MinMax.value
-    assert len(policies) > 8
-    assert {entity: value for entity, value in policies.items() if value != [[least_and_greatest]]} == {}
-
-
-def test_a_missing_driver_is_said(recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
-        monkeypatch.setenv(name, "/nowhere")
-    with pytest.raises(ViewerError, match="mesa-vulkan-drivers"):
-        screenshot(recording[0], recording[0].with_suffix(".png"))
 
 
 @given(heading=st.floats(0.0, 360.0), pitch=st.floats(-80.0, 80.0), roll=st.floats(-180.0, 180.0))

@@ -45,6 +45,7 @@ SPEED = "airspeed_mps: 25"
 SQUARE = "[[12000, 3000], [14000, 3000], [14000, 5000], [12000, 5000]]"
 
 # what is replaced, by what, then the line and the key that must be named, and a part of the sentence.
+# fmt: off
 BROKEN = {
     "wrong schema": ("scenario/1", "scenario/2", "1: schema", "must be 'wayproof/scenario/1'"),
     "no schema": ("schema: wayproof/scenario/1\n", "", "1: schema", "is missing"),
@@ -58,12 +59,7 @@ BROKEN = {
     "name is a path": ("name: good", "name: a/b", "2: name", "must have only a-z, 0-9"),
     "negative seed": ("seed: 1", "seed: -1", "3: seed", "must be at least 0"),
     "fractional seed": ("seed: 1", "seed: 1.5", "3: seed", "must be a whole number"),
-    "seed with a point": (
-        "seed: 1",
-        "seed: 7.0",
-        "3: seed",
-        "is 7.0; must be a whole number without a point",
-    ),
+    "seed with a point": ("seed: 1", "seed: 7.0", "3: seed", "is 7.0; must be a whole number without a point"),
     "seed beyond floats": ("seed: 1", "seed: 1%s" % (20 * "0"), "3: seed", "of at most 9007199254740992"),
     "seed is true": ("seed: 1", "seed: true", "3: seed", "is true; must be a whole number"),
     "three bounds": (
@@ -74,21 +70,11 @@ BROKEN = {
     ),
     "two bounds": ("[0, 0, 20000, 10000]", "[0, 0]", "5: area.bounds_m", "is [0, 0]; must have 4 numbers"),
     "five bounds": ("20000, 10000]", "20000, 10000, 1]", "5: area.bounds_m", "has 5 items; must have 4"),
-    "bounds turned round": (
-        "[0, 0, 20000,",
-        "[20000, 0, 0,",
-        "5: area.bounds_m",
-        "with xmin < xmax and ymin < ymax",
-    ),
+    "bounds turned round": ("[0, 0, 20000,", "[20000, 0, 0,", "5: area.bounds_m", "with xmin < xmax and ymin < ymax"),
     "flat bounds": ("20000, 10000]", "20000, 0]", "5: area.bounds_m", "with xmin < xmax and ymin < ymax"),
     "bounds beyond the plane": ("20000, 10000]", "2e7, 10000]", "5: area.bounds_m[2]", "at most 1000000"),
     "latitude": ("latitude_deg: 47.0", "latitude_deg: 91", "6: area.origin.latitude_deg", "at most 85"),
-    "section left empty": (
-        "{model: aerosonde, airspeed_mps: 25}",
-        "",
-        "17: aircraft",
-        "is empty; must be a mapping",
-    ),
+    "section left empty": ("{model: aerosonde, airspeed_mps: 25}", "", "17: aircraft", "is empty; must be a mapping"),
     "no shape": ("- circle: {center_m: [8000, 5000], radius_m: 900}", "- {}", "8: obstacles[0]", "neither"),
     "two shapes": (
         "  - polygon: {",
@@ -142,19 +128,9 @@ BROKEN = {
     "goal near a circle": ("[19000, 5000]", "[9000, 5000]", "14: mission.goal_m", "100 m from obstacles[0]"),
     "goal at the start": ("[19000, 5000]", "[1100, 5000]", "14: mission.goal_m", "inside goal_radius_m"),
     "course": ("course_deg: 90", "course_deg: 900", "13: mission.course_deg", "at most 360"),
-    "course is empty": (
-        "course_deg: 90",
-        "course_deg:",
-        "13: mission.course_deg",
-        "is empty; must be a number",
-    ),
+    "course is empty": ("course_deg: 90", "course_deg:", "13: mission.course_deg", "is empty; must be a number"),
     "below ground": ("altitude_m: 300", "altitude_m: 0", "16: mission.altitude_m", "at least 5"),
-    "misspelt key": (
-        "altitude_m: 300",
-        "altitud_m: 300",
-        "16: mission.altitud_m",
-        "did you mean altitude_m?",
-    ),
+    "misspelt key": ("altitude_m: 300", "altitud_m: 300", "16: mission.altitud_m", "did you mean altitude_m?"),
     "unknown section": ("aircraft:", "aircaft:", "17: aircaft", "did you mean aircraft?"),
     "unknown aircraft": ("aerosonde", "concorde", "17: aircraft.model", "'concorde'; known are: aerosonde"),
     "too fast": (SPEED, "airspeed_mps: 90", "17: aircraft.airspeed_mps", "cannot hold 90 m/s"),
@@ -165,12 +141,7 @@ BROKEN = {
     "seventh rate": ("rate_hz: 2", "rate_hz: 7", "18: sensor.rate_hz", "does not divide 120 Hz"),
     "too few rays": ("rays: 360", "rays: 2", "18: sensor.rays", "at least 3"),
     "rays are fractional": ("rays: 360", "rays: 360.5", "18: sensor.rays", "a whole number"),
-    "sensor is a list": (
-        "{range_m: 3000, rays: 360, rate_hz: 2}",
-        "[3000]",
-        "18: sensor",
-        "must be a mapping",
-    ),
+    "sensor is a list": ("{range_m: 3000, rays: 360, rate_hz: 2}", "[3000]", "18: sensor", "must be a mapping"),
     "dropout": ("rays: 360", "dropout: 1.5", "18: sensor.dropout", "at most 1"),
     "unknown planner": ("rolling_window", "astar", "20: planner.kind", "must be one of rolling_window"),
     "negative clearance": ("clearance_m: 200", "clearance_m: -1", "21: planner.clearance_m", "at least 0"),
@@ -184,12 +155,7 @@ BROKEN = {
         "3000",
     ),
     "storm": ("speed_mps: 5", "speed_mps: 23", "24: environment.wind.speed_mps", "below 0.9 of the airspeed"),
-    "wind direction": (
-        "from_deg: 270",
-        "from_deg: west",
-        "24: environment.wind.from_deg",
-        "must be a number",
-    ),
+    "wind direction": ("from_deg: 270", "from_deg: west", "24: environment.wind.from_deg", "must be a number"),
     "turbulence model": ("tustin", "dryden", "25: environment.turbulence.model", "'tustin' or 'milspec'"),
     "intensity": ("light", "mild", "25: environment.turbulence.intensity", "'light', 'moderate' or 'severe'"),
     "no tolerance": (
@@ -217,12 +183,7 @@ BROKEN = {
         "27: trackability.crosstrack_m",
         "did you mean cross_track_m?",
     ),
-    "gusts without end": (
-        "duration_s: 5",
-        "duration_s: 61",
-        "26: environment.vertical_gusts.duration_s",
-        "at most",
-    ),
+    "gusts without end": ("duration_s: 5", "duration_s: 61", "26: environment.vertical_gusts.duration_s", "at most"),
     "key given twice": ("seed: 1", "seed: 1\nseed: 2", "4: seed", "is given twice, first in line 3"),
     "nested key given twice": ("rays: 360", "rays: 3, rays: 4", "18: sensor.rays", "is given twice"),
     "anchor": ("seed: 1", "seed: &one 1", "3: seed", "has the anchor &one"),
@@ -232,23 +193,14 @@ BROKEN = {
     "python tag": ("seed: 1", "seed: !!python/name:os.system x", "3: seed", "has the tag"),
     "list as a key": ("seed: 1", "[1, 2]: 1", "3: has a key that is not plain text", ""),
     "tab": ("  course_deg: 90", "\tcourse_deg: 90", "13: mission", "has a tab; indent with spaces"),
-    "tab elsewhere": (
-        "  course_deg: 90",
-        "  course_deg: 90: 5  # a\tb",
-        "13: mission",
-        "is not YAML (mapping",
-    ),
+    "tab elsewhere": ("  course_deg: 90", "  course_deg: 90: 5  # a\tb", "13: mission", "is not YAML (mapping"),
     "bad indentation": ("  goal_m", "   goal_m", "14: mission", "is not YAML"),
     "open bracket": ("[0, 0, 20000, 10000]", "[0, 0, 20000, 10000", "5: area.bounds_m", "is not YAML"),
     "open quote": ("name: good", "name: 'good", "2: name", "is not YAML"),
     "control character": ("name: good", "name: go\aod", "2: has the control character 0x07", ""),
-    "too deep": (
-        "seed: 1",
-        f"seed: {'[' * 40}{']' * 40}",
-        "3: seed[0][0]",
-        "is nested deeper than 20 levels",
-    ),
+    "too deep": ("seed: 1", f"seed: {'[' * 40}{']' * 40}", "3: seed[0][0]", "is nested deeper than 20 levels"),
 }
+# fmt: on
 
 
 def faults_of(path: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
