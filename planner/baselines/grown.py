@@ -1,12 +1,14 @@
 """The known obstacles grown by the distance to be kept: what a BUG follows.
 
 Every edge point is the centre of a disc that must not be entered, and so is all that lies outside of the area. shapely
-unites them. Their outline is simplified by less than the margin: neighbouring discs leave no dents between them.
+unites them. Their outline is simplified by less than the margin: neighbouring discs leave no dents between them. An
+obstacle is united anew only when something has come to it, or has been taken back.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,17 +34,35 @@ CELL_SHARE = 0.35
 """Points in one square of this share of the kept distance are grown as one, with what lies between them."""
 
 
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """One obstacle, or the border of the area and what touches it.
+
+    Attributes:
+        discs: a polygon, the union of the discs as it came.
+        core: what must not be entered, prepared.
+        rings: its boundaries, the obstacle on the left.
+        border: it is the border.
+    """
+
+    discs: Any
+    core: Any
+    rings: tuple[Any, ...]
+    border: bool
+
+
 class GrownObstacles:
     """The obstacles of one flight: discs of the radius `keep_m`, clearance and margin; the border keeps the margin."""
 
     def __init__(self, mission: Mission, margin_m: float) -> None:
         self.keep_m, self._margin_m, self._mission = mission.clearance_m + margin_m, margin_m, mission
         self._memory = ObstacleMemory(mission.clearance_m)
-        self._points_m, self._united = NOWHERE, 0
-        self._discs: Any = None  # of the first `_united` points
-        self._core: Any = None  # what must not be entered
-        self._rings: list[Any] = []  # boundaries, the obstacle on the left
-        self._parts: IntArray = np.zeros(0, dtype=np.intp)  # which obstacle each ring belongs to
+        self._points_m = self._united_m = NOWHERE
+        self._stale = True
+        self._obstacles: list[Obstacle] = []
+        self._cores: Any = None  # (n,) of the obstacles
+        self._rings: list[Any] = []
+        self._owners: IntArray = np.zeros(0, dtype=np.intp)  # which obstacle each ring belongs to
 
     def take_in(self, seen: MapView) -> tuple[FloatArray, bool]:
         """Remembers what has come in.
@@ -50,13 +70,12 @@ class GrownObstacles:
         Returns the (k, 2) new edge points, and whether some were taken back: then everything may be different.
         """
         self._memory.take_in(seen)
-        # What moves comes last there: where it has moved, or new edges have come before it, all is united anew.
+        # What moves comes last there: where it has moved, or new edges have come before it, it is taken back.
         points, known = self._memory.points_m, len(self._points_m)
         taken_back = not np.array_equal(points[:known], self._points_m)
-        if taken_back:
-            self._discs, self._core, self._united, known = None, None, 0, 0
+        self._stale |= taken_back or len(points) > known
         self._points_m = points
-        return points[known:], taken_back
+        return points[0 if taken_back else known :], taken_back
 
     @property
     def taken_back(self) -> bool:
@@ -64,15 +83,58 @@ class GrownObstacles:
         return self._memory.ever_cleared
 
     def _unite(self) -> None:
-        """Brings the shapes up to date: only where a walk is asked for, which is seldom."""
+        """Brings the obstacles up to date to which something has come: only where a walk is asked for."""
         import shapely
 
-        fresh = self._points_m[self._united :]
-        if not len(fresh) and self._core is not None:
+        if not self._stale:
             return
+        self._stale = False
+        fresh, gone = self._changes()
+        known = self._obstacles or [self._obstacle(self._frame() - self._hole())]
+        lost = [each for each in known if len(gone) and shapely.intersects_xy(each.discs, gone).any()]
+        for each in lost:
+            known.remove(each)
+            inside = shapely.intersects_xy(each.discs, self._points_m)
+            fresh = np.concatenate((fresh, self._points_m[inside]))
+            known += [self._obstacle(self._frame() - self._hole())] if each.border else []
+        added = self._discs(fresh)
+        joined = [each for each in known if shapely.intersects(each.discs, added)]
+        united = shapely.union_all([added, *(each.discs for each in joined)])
+        self._obstacles = [each for each in known if each not in joined]
+        self._obstacles += [self._obstacle(each) for each in shapely.get_parts(united)]
+        self._united_m = self._points_m
+        self._cores = np.array([each.core for each in self._obstacles], dtype=object)
+        self._rings = [ring for each in self._obstacles for ring in each.rings]
+        counts = [len(each.rings) for each in self._obstacles]
+        self._owners = np.repeat(np.arange(len(counts)), counts)
+
+    def _changes(self) -> tuple[FloatArray, FloatArray]:
+        """(k, 2) points that have come and (j, 2) that have gone since the obstacles were brought up to date."""
+        known = len(self._united_m)
+        if np.array_equal(self._points_m[:known], self._united_m):
+            return self._points_m[known:], NOWHERE
+        now, before = (points @ (1.0, 1.0j) for points in (self._points_m, self._united_m))
+        return self._points_m[~np.isin(now, before)], self._united_m[~np.isin(before, now)]
+
+    def _frame(self) -> Any:
+        import shapely
+
+        return shapely.box(*(self._mission.bounds_m + 10.0 * self.keep_m * np.array((-1.0, -1.0, 1.0, 1.0))))
+
+    def _hole(self) -> Any:
+        """The area but for its border."""
+        import shapely
+
         goal, bounds = np.array(self._mission.goal_m), np.array(self._mission.bounds_m)
-        # The goal itself may lie nearer to an edge or the border than what is kept elsewhere.
-        room = np.hypot(*(fresh - goal).T) - 1e-3
+        inset = max(0.0, min(self._margin_m, float(np.abs(goal - bounds.reshape(2, 2)).min()) - 1e-3))
+        return shapely.box(*(bounds + inset * np.array((1.0, 1.0, -1.0, -1.0))))
+
+    def _discs(self, fresh: FloatArray) -> Any:
+        """The union of the discs about (k, 2) points."""
+        import shapely
+
+        # The goal itself may lie nearer to an edge than what is kept elsewhere.
+        room = np.hypot(*(fresh - self._mission.goal_m).T) - 1e-3
         radii = np.clip(room, min(self._mission.clearance_m, self.keep_m), self.keep_m)
         _, cells = np.unique(np.floor(fresh / (CELL_SHARE * self.keep_m)), axis=0, return_inverse=True)
         order = np.argsort(cells.ravel(), kind="stable")
@@ -80,24 +142,18 @@ class GrownObstacles:
         least = np.full(len(hulls), self.keep_m)
         np.minimum.at(least, cells.ravel(), radii)
         discs = shapely.buffer(hulls, least, quad_segs=QUARTER_CORNERS)
-        added = shapely.simplify(shapely.union_all(discs), SIMPLER * self._margin_m)
-        self._discs = added if self._discs is None else shapely.union(self._discs, added)
-        self._united = len(self._points_m)
-        inset = max(0.0, min(self._margin_m, float(np.abs(goal - bounds.reshape(2, 2)).min()) - 1e-3))
-        beyond = 10.0 * self.keep_m * np.array((-1.0, -1.0, 1.0, 1.0))
-        frame = shapely.box(*(bounds + beyond)) - shapely.box(*(bounds - inset * np.sign(beyond)))
-        parts = shapely.get_parts(
-            shapely.simplify(shapely.union(self._discs, frame), SIMPLER * self._margin_m)
-        )
-        self._core = shapely.buffer(shapely.multipolygons(parts), -GRAZED_M, join_style="mitre")
-        shapely.prepare(self._core)
-        self._rings, owners = [], []
-        for number, part in enumerate(shapely.orient_polygons(parts)):
-            holes = [hole for hole in part.interiors if shapely.Polygon(hole).area > self.keep_m**2 / 4.0]
-            outer = [] if part.bounds[0] < bounds[0] - 5.0 * self.keep_m else [part.exterior]
-            self._rings += [*outer, *holes]
-            owners += [number] * (len(outer) + len(holes))
-        self._parts = np.array(owners, dtype=np.intp)
+        return shapely.simplify(shapely.union_all(discs), SIMPLER * self._margin_m)
+
+    def _obstacle(self, discs: Any) -> Obstacle:
+        """What belongs to a polygon; no hole that is too small to be in."""
+        import shapely
+
+        shape = shapely.orient_polygons(shapely.simplify(discs, SIMPLER * self._margin_m))
+        border = shape.bounds[0] < self._mission.bounds_m[0] - 5.0 * self.keep_m
+        core = shapely.buffer(shape, -GRAZED_M, join_style="mitre")
+        shapely.prepare(core)
+        holes = [hole for hole in shape.interiors if shapely.Polygon(hole).area > self.keep_m**2 / 4.0]
+        return Obstacle(discs, core, (*(() if border else (shape.exterior,)), *holes), border)
 
     def first_hit(self, a: Point, b: Point) -> tuple[float, int]:
         """Where the line from a to b first enters an obstacle: distance (m) and obstacle; infinite and -1 for never.
@@ -107,14 +163,15 @@ class GrownObstacles:
         import shapely
 
         self._unite()
-        line, here = shapely.linestrings([a, b]), shapely.Point(a)
-        inside = shapely.get_parts(shapely.intersection(self._core, line))
-        begins = shapely.distance(inside, here)
+        line = shapely.linestrings([a, b])
+        met = np.flatnonzero(shapely.intersects(self._cores, line))
+        inside, which = shapely.get_parts(shapely.intersection(self._cores[met], line), return_index=True)
+        begins = shapely.distance(inside, shapely.Point(a))
         entered = (begins > 1e-6) | (shapely.length(inside) > 0.5 * self.keep_m)
         if not entered.any():
             return math.inf, -1
-        distance = float(begins[entered].min())
-        return distance, self.part_at(line.interpolate(distance).coords[0])
+        first = int(np.argmin(np.where(entered, begins, math.inf)))
+        return float(begins[first]), int(met[which[first]])
 
     def leads_inside(self, place: Point, target: Point) -> bool:
         """Whether the line from a place on the boundary to a target begins inside the obstacle."""
@@ -126,21 +183,20 @@ class GrownObstacles:
 
     def part_at(self, place: Point) -> int:
         """The obstacle next to a place; the border of the area is one."""
-        nearest = self._nearest(place)
-        return int(self._parts[nearest])
+        ring, _ = self._nearest(place)
+        return int(self._owners[ring])
 
     def off_m(self, place: Point) -> float:
-        """How far a place is from the next boundary; infinite where there is none."""
+        """How far a place is from the next boundary."""
+        return self._nearest(place)[1]
+
+    def _nearest(self, place: Point) -> tuple[int, float]:
+        """The ring next to a place, and how far it is."""
         import shapely
 
         self._unite()
-        return float(min((ring.distance(shapely.Point(place)) for ring in self._rings), default=math.inf))
-
-    def _nearest(self, place: Point) -> int:
-        import shapely
-
-        self._unite()
-        return int(np.argmin(shapely.distance(self._rings, shapely.Point(place))))
+        away = shapely.distance(self._rings, shapely.Point(place))
+        return int(np.argmin(away)), float(away.min())
 
     def boundary(self, place: Point, side: float, length_m: float) -> FloatArray:
         """(n, 2) at most so much of the boundary next to a place, from there on and at most once round.
@@ -149,13 +205,9 @@ class GrownObstacles:
         """
         import shapely
 
-        nearest = self._nearest(place)
+        nearest, off = self._nearest(place)
         ring = self._rings[nearest]
-        corners, at, off = (
-            shapely.get_coordinates(ring),
-            ring.project(shapely.Point(place)),
-            self.off_m(place),
-        )
+        corners, at = shapely.get_coordinates(ring), ring.project(shapely.Point(place))
         if side < 0.0:
             corners, at = corners[::-1], ring.length - at
         at = (at + (2.0 * off if off < 0.5 * self.keep_m else 0.0)) % ring.length  # no corner onto it
@@ -166,23 +218,25 @@ class GrownObstacles:
         import shapely
 
         self._unite()
-        each = shapely.get_parts(self._discs)
-        mine = each[shapely.distance(each, shapely.Point(place)) < TOUCH_SHARE * self.keep_m + self._margin_m]
-        goal = shapely.Point(self._mission.goal_m)
-        return float(min((shape.distance(goal) for shape in mine), default=math.inf))
+        beside_m = TOUCH_SHARE * self.keep_m + self._margin_m
+        away = shapely.distance([each.discs for each in self._obstacles], shapely.Point(place))
+        mine = [self._obstacles[i] for i in np.flatnonzero(away < beside_m)]
+        shapes = [each.discs & self._hole() if each.border else each.discs for each in mine]
+        away = shapely.distance(shapes, shapely.Point(self._mission.goal_m))
+        return float(np.nanmin(away, initial=math.inf))
 
     def tangents(self, place: Point, parts: set[int], reach_m: float) -> list[tuple[Point, float, bool]]:
         """The corners within reach at which lines from a place touch some obstacles, sides, and which are in sight.
 
-        Of side 1 are those that lie on the left of the line.
+        Lines that lead on to the same obstacle do not count. Of side 1 are those that lie on the left of the line.
         """
         import shapely
 
         self._unite()
         found: list[tuple[Point, float, bool]] = []
-        for ring, part in zip(self._rings, self._parts.tolist(), strict=True):
-            if part not in parts:
-                continue
+        for own, ring in (
+            (self._obstacles[i], ring) for i in sorted(parts) for ring in self._obstacles[i].rings
+        ):
             corners = shapely.get_coordinates(ring)[:-1]
             before, after = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
             to = corners - place
@@ -190,11 +244,13 @@ class GrownObstacles:
             away = np.hypot(*to.T)
             touched = (sides[0] * sides[1] >= 0.0) & (_cross(before, after) < 0.0)
             chosen = np.flatnonzero(touched & (away < reach_m) & (away > 1e-6))
-            lines = (
-                shapely.linestrings([[place, corner] for corner in corners[chosen]]) if len(chosen) else []
-            )
-            hidden = shapely.intersects(self._core, lines)
-            for i, out in zip(chosen.tolist(), np.atleast_1d(hidden).tolist(), strict=True):
+            if not own.border:  # beyond a dent there is the same obstacle again
+                beyond = place + reach_m * to[chosen] / away[chosen, None]
+                rays = shapely.linestrings(np.stack((corners[chosen], beyond), axis=1))
+                chosen = chosen[~shapely.intersects(own.core, rays)]
+            lines = shapely.linestrings(np.stack(np.broadcast_arrays(place, corners[chosen]), axis=1))
+            hidden = shapely.intersects(self._cores[:, None], lines).any(axis=0)
+            for i, out in zip(chosen.tolist(), hidden.tolist(), strict=True):
                 side = math.copysign(1.0, float(sides[:, i].sum()))
                 found.append(((float(corners[i, 0]), float(corners[i, 1])), side, not out))
         return found
@@ -204,7 +260,7 @@ class GrownObstacles:
         import shapely
 
         shape = shapely.Polygon(outline).buffer(-TOUCH_SHARE * self.keep_m) if len(outline) > 2 else None
-        return shape is None or not shapely.intersects(self._core, shape)
+        return shape is None or not shapely.intersects(self._cores, shape).any()
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -31,6 +31,7 @@ from planner.interface import (
     PlanStatus,
 )
 from planner.nearest_edge import distance_to_edges
+from planner.plan_checks import checked_plan
 from planner.world_stability import SETTLED_S
 from tests.longer import longer
 
@@ -451,3 +452,24 @@ def test_legs_are_joined_by_straight_lines_from_where_the_vehicle_is() -> None:
     np.testing.assert_array_equal(first.way, [(0.0, 0.0), *east])
     np.testing.assert_array_equal(second.way, [(100.0, 0.0), *north])
     assert (first.state, second.state) == ("one", "two")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_plans_begin_where_the_loop_allows_it_beside_the_path_too(kind: str, ring: MakePoints) -> None:
+    """An aircraft that cuts corners flies 41 m beside its path: no plan begins further from it than is taken."""
+    mission = replace(MISSION, speed_mps=15.0)
+    planner, seen = MAKE[kind](mission), Range(ring(8000.0, 5000.0, 1200.0, SPACING), mission.sensor_range_m)
+    flown, arc_length_m, place, direction, found = None, 0.0, START, (1.0, 0.0), 0
+    for n in range(600):
+        seen.look(place)
+        plan = planner.plan(PlanRequest(2.0 * n, place, direction, seen, flown, arc_length_m))
+        checked_plan(plan, place, mission)
+        if plan.status is PlanStatus.FOUND:
+            flown, arc_length_m, found = plan, 0.0, found + 1
+        assert flown is not None
+        assert flown.path is not None
+        arc_length_m += 30.0
+        x, y, ux, uy = pose_at(flown.path, arc_length_m)
+        aside = 41.0 if n % 2 else -41.0
+        place, direction = (x - aside * uy, y + aside * ux), (ux, uy)
+    assert found > 2

@@ -50,7 +50,7 @@ def covers(known: GrownObstacles, place: tuple[float, float]) -> bool:
     return known.first_hit((place[0], place[1] - 300.0), place)[0] < 300.0
 
 
-@settings(max_examples=20, derandomize=True)
+@settings(max_examples=20, derandomize=True, deadline=None)
 @given(
     points=st.lists(
         st.tuples(st.floats(4000.0, 5000.0), st.floats(4000.0, 5000.0)), min_size=1, max_size=14, unique=True
@@ -120,3 +120,46 @@ def test_tangents_touch_a_disc_on_either_side() -> None:
         assert math.dist((east, north), (4000.0, 5000.0)) == pytest.approx(
             math.sqrt(1000.0**2 - KEEP**2), abs=45.0
         )
+
+
+def test_a_line_that_only_passes_a_dent_of_an_obstacle_is_no_tangent() -> None:
+    """Two discs that overlap: the line north past the first one runs into the second one."""
+    known = grown(np.array([(5000.0, 5000.0), (5300.0, 5150.0)]))
+    place = (4000.0, 5000.0)
+    found = known.tangents(place, {known.part_at((4780.0, 5000.0))}, 3000.0)
+    lengths = {side: math.dist(corner, place) for corner, side, seen in found if seen}
+    assert sum(seen for _, _, seen in found) == 2
+    assert lengths[1.0] == pytest.approx(math.sqrt(1000.0**2 - KEEP**2), abs=45.0)
+    assert lengths[-1.0] == pytest.approx(math.sqrt(1300.0**2 + 150.0**2 - KEEP**2), abs=45.0)
+
+
+@pytest.mark.parametrize("what", ["comes", "goes"])
+def test_only_the_obstacle_that_something_comes_to_or_goes_from_is_united_anew(
+    what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 64 lone points one gets a neighbour, or is taken back: corners of a few discs are united, not of all."""
+    lone = np.array([(1000.0 * i, 1000.0 * j) for i in range(1, 9) for j in range(1, 9)])
+    more = np.array([(4100.0, 4100.0)])
+    before, after = (lone, np.concatenate((lone, more))) if what == "comes" else (lone, lone[1:])
+    known, seen = GrownObstacles(MISSION, KEEP - MISSION.clearance_m), Seen(before)
+    known.take_in(seen)
+    place = (4100.0, 3000.0)
+    assert known.part_at(place) == known.part_at((4000.0, 3100.0))
+    united, plain = [], shapely.union_all
+
+    def counted(shapes: object, *args: object) -> object:
+        united.append(int(shapely.get_num_coordinates(shapes).sum()))
+        return plain(shapes, *args)
+
+    monkeypatch.setattr(shapely, "union_all", counted)
+    known.part_at(place)
+    assert not united  # nothing has changed
+    gone = what == "goes"
+    seen.points, seen.revision, seen.last_removal_revision = after if gone else more, 2, 2 * gone
+    known.take_in(seen)
+    known.part_at(place)
+    assert united
+    assert sum(united) < 200  # a disc has 49 corners: all 64 have 3,136
+    fresh = grown(after)
+    for east, north in ((4100.0, 4330.0), (1000.0, 1230.0), (8000.0, 8230.0)):
+        assert covers(known, (east, north)) == covers(fresh, (east, north))
