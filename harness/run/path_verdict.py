@@ -13,7 +13,7 @@ import numpy as np
 from aircraft.guidance.altitude import slewed
 from harness.analysis.as_given import AsGiven, Corner
 from harness.analysis.breaches import CONTACT, Breach, Kept, crossings, inside_m, kept
-from harness.analysis.deviation import allowed_m, at_corner, deviation, distances_m
+from harness.analysis.deviation import allowed_m, at_corner, deviation
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import error_figures, metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
@@ -56,11 +56,15 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
     track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
     corners = [Corner(**vars(each), allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
     window_m = WINDOW_RADII * limits.turn_radius_m
-    found = deviation(track, way.given_m, SPACING_SHARE * tolerance, window_m)
+    found = believed = deviation(track, way.given_m, SPACING_SHARE * tolerance, window_m)
     off_m, allowed = np.nan_to_num(found.by_row_m), allowed_m(track, tolerance, corners)
-    believed_m = _believed_off_m(track, way.given_m, window_m)
     asked = _as_given(check.plan, track, corners, off_m, allowed)
-    figures = metrics(flight, limits, replace(asked, believed_off_m=believed_m))
+    if track.has_beliefs:
+        east, north = track.believed_m[:, :2].T
+        as_believed = replace(track, east_m=east, north_m=north)
+        believed = deviation(as_believed, way.given_m, SPACING_SHARE * tolerance, window_m)
+        asked = replace(asked, believed_off_m=believed.by_row_m)
+    figures = metrics(flight, limits, asked)
     others = layer_contacts(track, check.scenario, check.files)
     seen = kept(track, World.from_scenario(check.scenario), check.given.fences, check.bounded, others)
     if seen.contacts and flight.outcome is not Outcome.COLLISION:
@@ -100,7 +104,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
     return {
         **figures,
         "total_system_error_m": error_figures(found.rows_m),
-        "flight_technical_error_m": error_figures(found.rows_m if believed_m is None else believed_m),
+        "flight_technical_error_m": error_figures(believed.rows_m),
         **_kept_figures(seen),
         "deviation_from_given_m": found.figures(),
         "check": told,
@@ -199,18 +203,6 @@ def _sufficient_m(
         if limit_m > MOST_WIDER * needed_m:  # it is off where no corner is
             return None
     return None
-
-
-def _believed_off_m(track: Track, given_m: FloatArray, window_m: float) -> FloatArray | None:
-    """(n,) how far off the path as given the aircraft believed to be; None where navigation is perfect."""
-    if not track.has_beliefs:
-        return None
-    off = np.full(len(track), math.nan)
-    rows = np.flatnonzero(track.arc_length_m <= given_m[-1, 2])
-    if len(rows):
-        along = np.maximum.accumulate(track.arc_length_m[rows])
-        off[rows] = distances_m(np.column_stack((track.believed_m[rows, :2], along)), given_m, window_m)
-    return off
 
 
 def _line(plan: PathPlan) -> FloatArray:

@@ -117,6 +117,29 @@ def misled(draw: Draw) -> Asked:
     return np.array([(0.0, 0.0), (3000.0, 0.0)]), keys(navigation=navigation)
 
 
+def elevator_deg(speed_mps: float, bank_deg: float) -> float:
+    """Elevator that holds the Aerosonde level in a turn at 300 m, by Beard and McLain's coefficients."""
+    load, qbar = 1.0 / math.cos(math.radians(bank_deg)), 0.5 * 1.19 * speed_mps**2
+    alpha = (load * 11.0 * G / (qbar * 0.55) - 0.23) / 5.61
+    damping = -38.21 * 0.18994 / (2.0 * speed_mps) * G / speed_mps * (load - 1.0 / load)
+    return math.degrees((0.0135 - 2.74 * alpha + damping) / 0.99)
+
+
+def at_the_stop(draw: Draw) -> Asked:
+    """Turns that take more elevator than the 25 degrees there are, and less bank than the limit."""
+    speed, bank = draw(17.8, 19.0), draw(32.0, 40.0)
+    assert elevator_deg(speed, bank) < -26.5
+    radius = speed**2 / (G * math.tan(math.radians(bank)))
+    return circles(radius, 4.0), {"airspeed_mps": speed}
+
+
+def stalling(draw: Draw) -> Asked:
+    """A Cessna that flies level down to 24.8 m/s stalls here at 27.7, by the root of the load factor."""
+    speed, bank = draw(25.5, 27.0), draw(37.0, 39.0)
+    radius = speed**2 / (G * math.tan(math.radians(bank)))
+    return circles(radius, 3.0), {"aircraft": "c172p", "airspeed_mps": speed}
+
+
 def heavy(draw: Draw) -> Asked:
     return circles(draw(85.0, 110.0)), keys(trackability__load_factor=f"{draw(1.05, 1.12):.3f}")
 
@@ -150,6 +173,8 @@ FAMILIES: Mapping[str, tuple[Callable[[Draw], Asked], ...]] = {
     "descent too steep": (descending,),
     "navigation error": (misled,),
     "tracking error": (loose,),
+    "control saturation": (at_the_stop,),
+    "stall": (stalling,),
 }
 
 

@@ -64,6 +64,13 @@ def test_a_corner_is_rounded_as_the_aircraft_can_turn(tolerance_m: float, radius
     assert metrics["check"]["ok"] is ok
 
 
+def test_a_corner_that_is_cut_is_not_called_a_navigation_error() -> None:
+    """Positions are right to centimetres: the belief is as far off the corner, (sqrt 2 - 1) of the least radius."""
+    metrics, _ = flown(SQUARE_CORNER, corner_m=20.0, settings={"navigation.kind": "rtk"})
+    assert metrics["trackability"][0]["cause"] == "turn radius too tight"
+    assert metrics["check"]["worst"]["off_m"] == pytest.approx((math.sqrt(2.0) - 1.0) * LEAST_M, abs=4.0)
+
+
 def test_a_circle_tighter_than_the_bank_limit_gives_is_no_and_a_near_yes_can_be_seen() -> None:
     """60 m at 25 m/s, where the bank limit of 45 deg gives 63.7 m."""
     angle = np.linspace(0.0, math.tau, 200)
