@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
 from planner.paper.config import ImprovedBugConfig
-from planner.paper.definitions import crosses, guide_vector
+from planner.paper.definitions import crosses, guide_vector, within
 from planner.paper.sectors import (
     Sector,
     clip,
@@ -141,13 +141,27 @@ def directions(
         if window.free(here, (x, y)):
             yield units
             return
-    free = fan_shaped_sectors(window.points_m, window.keep_m, here)
-    parts = [part for sector in free for part in clip(sector, course, most_rad)]
-    for part in select(parts, guide_rad, config.sectors):
+    for part in select(sectors_at(window, track, most_rad), guide_rad, config.sectors):
         direction = refine(part, guide_m, guide_rad, step_m, math.radians(config.refinement_deg))
         units_in = whole_units(part, direction, course, unit_rad)
-        if units_in is not None:
-            yield units_in
+        assert units_in is not None
+        yield units_in
+
+
+def sectors_at(window: Window, track: Track, most_rad: float) -> list[Sector]:
+    """Section 3.2, (1): the parts of free sectors at the end of a track that a step can turn to by a whole Delta.
+
+    Where all directions meet something in the window, only obstacles count that a step can meet; the paper is silent on
+    that.
+    """
+    here, course, config = track.nodes[-1], track.course_rad, window.config
+    for reach_m in (math.inf, config.resolved_step_m + window.keep_m):
+        free = fan_shaped_sectors(within(window.points_m, here, reach_m), window.keep_m, here)
+        parts = [part for sector in free for part in clip(sector, course, most_rad)]
+        parts = [part for part in parts if whole_units(part, course, course, config.unit_rad) is not None]
+        if parts:
+            return parts
+    return []
 
 
 def along_guide(window: Window, here: Point, guide_m: float, guide_rad: float) -> Point:

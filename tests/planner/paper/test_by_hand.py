@@ -198,6 +198,16 @@ def test_one_obstacle_is_passed_beside_its_tangents() -> None:
         assert np.hypot(*(line - (400.0, 0.0)).T).min() >= 60.0 - 1e-9
 
 
+def test_where_all_directions_are_closed_only_what_a_step_can_meet_counts() -> None:
+    """In a ring of 700 m, closed to 60 m from its points, steps of 100 m lead to its far side, and none beyond it."""
+    angle = np.arange(0.0, math.tau, 0.1)
+    ring = 700.0 * np.column_stack((np.cos(angle), np.sin(angle)))
+    assert fan_shaped_sectors(ring, 60.0, (0.0, 0.0)) == []
+    best = multi_step_search(window(ring), (0.0, 0.0), 0.0)[0]
+    np.testing.assert_allclose(best.nodes[:6], [(100.0 * k, 0.0) for k in range(6)], atol=1e-9)
+    assert max(math.hypot(*node) for node in best.nodes) <= 640.0
+
+
 def test_no_step_leads_out_of_the_window() -> None:
     (track,) = multi_step_search(window(NOTHING, r1=450.0), (0.0, 0.0), 0.0)
     assert track.nodes[-1] == pytest.approx((400.0, 0.0))
