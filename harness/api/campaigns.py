@@ -32,16 +32,11 @@ def compare(
     kinematic: bool = False,
     workers: int | None = None,
 ) -> ComparisonResult:
-    """Flies every planner (under every guidance law) through every scenario: tables, figures, a report.
+    """Flies every planner (under every guidance law) through every scenario: tables, figures, a report in `out`.
 
-    Args:
-        scenarios: one or more: scenarios, files, or names of those that come with wayproof.
-        planners: kinds, in order; or `FILE.py:NAME`, `MODULE:NAME`.
-        out: the comparison's folder.
-        recording: whether to record each flight and an overlay of all.
-        guidance: guidance laws, likewise; default: the scenario's own.
-        kinematic: a point that follows every plan exactly flies in place of the aircraft.
-        workers: flights at a time; default: one a processor.
+    Scenarios are objects, files, or names of those that come with wayproof; planners and laws are kinds, or
+    `FILE.py:NAME`, `MODULE:NAME`. `recording` records each flight and an overlay of all. `kinematic`: a point that
+    follows every plan exactly flies in place of the aircraft. `workers` flights are flown at a time, one a processor.
 
     Raises:
         InputError: a scenario, planner, law or the folder cannot be used; nothing was flown.
@@ -189,8 +184,8 @@ def certify(
         runs: number of days, at most.
         vary: what is drawn anew every day: texts as `KEY=LO:HI`, `KEY=MEAN~SIGMA`, `KEY=A,B`; or by key path
             `(low, high)`, such a text without its key, or a distribution as a campaign file has it.
-        conditions: replaces the scenario's `conditions`.
-        aircraft: replaces the scenario's `aircraft.model`; of a path by default `aerosonde`.
+        conditions: replaces the scenario's.
+        aircraft: likewise; of a path by default `aerosonde`.
         scenario: of a path: the world with obstacles, bounds and air.
         settings: further keys to replace, by key path; values as YAML.
         out: the folder; default: `runs/NAME/certify-CLAIM`.

@@ -33,18 +33,13 @@ def fly(
 
     Args:
         scenario: a scenario, its file, or the name of one that comes with wayproof.
-        planner: replaces the scenario's planner: a kind that `wayproof list planners` prints,
-            `FILE.py:NAME` or `MODULE:NAME`, a class or function that takes the mission or nothing and makes the
-            planner, or an object with the method `plan(request)`. None: as the scenario says.
-        guidance: replaces the scenario's guidance law: a kind that `wayproof list guidance` prints, a
-            `GuidanceKind`, a class or function that takes the `GuidanceLimits` or nothing and makes the law, or an
-            object with the methods `follow(route, arc_length_m)` and `update(state)`. None: as the scenario says.
+        planner: replaces the scenario's: a kind, `FILE.py:NAME` or `MODULE:NAME`, a class or function that takes the
+            mission or nothing and makes the planner, or an object with the method `plan(request)`.
+        guidance: replaces the scenario's law: likewise; a class or function takes the `GuidanceLimits` or nothing, an
+            object has the methods `follow(route, arc_length_m)` and `update(state)`.
         out: the run folder to write, in place of an earlier run there; None: no folder.
         recording: whether to record the flight for rerun (`run.show()`).
         progress: called every few simulated seconds with simulated time (s), distance to go (m) and the state.
-
-    Returns:
-        The result of the flight, whatever its outcome.
 
     Raises:
         InputError: the scenario, planner or folder cannot be used; nothing was flown.

@@ -41,17 +41,14 @@ def check(
         run.metrics.check.ok, run.metrics.check.verdict
 
     Args:
-        path: a file that `wayproof check` takes, or points (n, 2): east and north in metres; a third column is the
-            altitude.
+        path: a file that `wayproof check` takes, or points (n, 2 or 3): east, north, perhaps altitude, in metres.
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
-        scenario: gives obstacles, bounds, environment, seed, altitude and written limits; None: an empty world in calm
-            air.
+        scenario: gives obstacles, bounds, environment, seed, altitude and written limits; None: an empty calm world.
         airspeed_mps: true airspeed; None: the aircraft's cruising speed.
         altitude_m: above mean sea level; None: the path's, else the scenario's, else 300 m.
         wind: speed (m/s) and the direction it blows from (degrees); None: the scenario's, else calm.
-        tolerance_m: largest distance from the path; None: a tenth of the clearance where that is written, else 10 m.
-        corner_m: largest distance from corners; None: for a drawn path the cross-track limit, for a mission the
-            acceptance radius in the file, else 90 m.
+        tolerance_m: largest distance from the path; None: a tenth of a written clearance, else 10 m.
+        corner_m: largest distance from corners; None: as tolerance_m, of a mission its acceptance radius or 90 m.
         settings: further keys of a scenario, by key path; values as YAML.
         out: the run folder to write; None: no folder.
         recording: whether to record the flight for rerun.

@@ -71,15 +71,9 @@ def make(
     planner is asked after every scan, a guidance law at every step. `step(roll_command_rad=...)` steers for one step
     in place of the law.
 
-    Args:
-        scenario: a scenario, its file, or the name of one that comes with wayproof.
-        planner: as `fly` takes it. An object serves every flight; a class makes one for each.
-        guidance: as `fly` takes it; likewise.
-        observers: objects with the methods of `harness.flight.observer.Observer`, told of each scan, plan and event of
-            every flight, and of the track in blocks.
-
-    Returns:
-        The flight, not yet begun: `reset()` begins it.
+    Scenario, planner and law are as `fly` takes them; an object serves every flight, a class makes one for each.
+    `observers` are told of each scan, plan and event, and of the track in blocks (`harness.flight.observer.Observer`).
+    `reset()` begins the flight.
 
     Raises:
         InputError: the scenario or planner cannot be used.

@@ -65,7 +65,7 @@ def test_in_memory_and_into_a_folder_the_same_is_flown(
 def test_figures_are_attributes_and_keys_and_cannot_be_changed(run: wayproof.FlightResult) -> None:
     metrics = run.metrics
     assert metrics.trackability[0].cause is None
-    assert metrics["cross_track_m"].keys() == [*metrics.to_dict()["cross_track_m"]]
+    assert [*metrics["cross_track_m"]] == [*metrics.to_dict()["cross_track_m"]]
     assert metrics.navigation_error_m is None
     assert pickle.loads(pickle.dumps(metrics)) == metrics
     with pytest.raises(AttributeError, match="no figure 'cros_track_m'; there are outcome, "):
