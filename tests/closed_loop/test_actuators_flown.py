@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
-from harness.analysis.trackability import legs
 from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
-from harness.flight.record import Flight, Track
+from harness.flight.record import Flight
 from harness.run.scenario_flight import flight_limits, make_loop
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario
@@ -81,48 +79,6 @@ def test_altitude_lost_behind_a_slow_elevator_is_the_servo_s() -> None:
     assert causes(severe.with_({"aircraft.actuators": {"rate_limit_degps": 600.0}})) == set()
 
 
-LIMITS = FlightLimits(
-    300.0, 100.0, 0.78, 110.0, 25.0,
-    max_cross_track_m=5.0, max_altitude_error_m=5.0, max_airspeed_error_mps=2.0,
-)  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def flight() -> Flight:
     return fly(make_loop(scenario()))
-
-
-@pytest.mark.parametrize(
-    ("off", "servos", "throttle", "cause"),
-    [
-        ("cross_track_m", {}, 0.6, "tracking error"),
-        ("cross_track_m", {"actuator_limited_s": 0.5}, 0.6, "actuator"),
-        # The servos of elevator and throttle move no aircraft off its line.
-        (
-            "cross_track_m",
-            {"actuator_limited_s": 0.5, "vertical_actuator_limited_s": 0.5},
-            0.6,
-            "tracking error",
-        ),
-        ("up_m", {}, 0.6, "tracking error"),
-        ("up_m", {}, 1.0, "speed or throttle saturation"),
-        ("up_m", {"actuator_limited_s": 0.5}, 0.6, "tracking error"),
-        ("up_m", {"actuator_limited_s": 0.5, "vertical_actuator_limited_s": 0.5}, 0.6, "actuator"),
-        ("up_m", {"vertical_actuator_limited_s": 0.5}, 1.0, "speed or throttle saturation"),
-        ("airspeed_mps", {}, 0.6, "speed or throttle saturation"),
-        ("airspeed_mps", {"actuator_limited_s": 0.5}, 0.6, "speed or throttle saturation"),
-        ("airspeed_mps", {"vertical_actuator_limited_s": 0.5}, 0.6, "actuator"),
-        ("airspeed_mps", {"vertical_actuator_limited_s": 0.5}, 1.0, "speed or throttle saturation"),
-    ],
-)
-def test_a_servo_at_its_rate_limit_is_the_cause(
-    flight: Flight, off: str, servos: dict[str, float], throttle: float, cause: str
-) -> None:
-    track = flight.track
-    columns = {name: np.array(column) for name, column in vars(track).items()}
-    columns["throttle"] = np.full(len(track), throttle)
-    assert all(leg.trackable for leg in legs(Track(**columns), flight.plans, LIMITS))
-    columns[off] = columns[off] + np.where(track.time_s > 30.0, 9.0, 0.0)
-    columns |= {name: share * track.time_s for name, share in servos.items()}
-    told = {leg.cause for leg in legs(Track(**columns), flight.plans, LIMITS) if not leg.trackable}
-    assert told == {cause}

@@ -60,16 +60,6 @@ def test_is_found_by_name_and_by_path_from_anywhere(
     assert scenario_path(name) == scenario_path(f"scenarios/{name}.yaml") == SHIPPED[name]
 
 
-def test_a_file_of_ones_own_goes_before_a_shipped_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    own = Path("scenarios/paper_circles.yaml")
-    own.parent.mkdir()
-    own.write_text("")
-    assert scenario_path(str(own)) == own
-
-
 def test_paper_circles_is_the_papers_world() -> None:
     scenario = load_scenario(SHIPPED["paper_circles"])
     assert scenario.area.bounds_m == (0.0, 0.0, 100e3, 100e3)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,24 +16,19 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from typer import BadParameter
 
 from harness.campaign.campaign_file import CampaignFile, load_campaign
 from harness.campaign.runs import CampaignRuns
-from harness.cli.falsify import range_of
-from harness.falsify.keys import vary_of
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.run.path_check import asked
 from harness.run_files.path_files import read_path
-from harness.scenario.generators import GENERATORS, WorldSpec
-from harness.scenario.scenario import Scenario, dump_scenario, load_scenario, parse_scenario
+from harness.scenario.scenario import dump_scenario, load_scenario, parse_scenario
 from tests.faults.hostile import (
     CAMPAIGN_SNIPPETS,
     CELLS,
     JSON_SNIPPETS,
     KEYS,
-    NUMBERS,
     YAML_SNIPPETS,
     Raw,
     as_json,
@@ -305,66 +300,3 @@ def test_keys_set_on_the_command_line(cases: int, tmp_path: Path) -> None:
         taken_or_refused(path, lambda: dump_scenario(load_scenario(path, pairs)))
 
     fuzzed(cases, st.lists(st.tuples(name, value), min_size=1, max_size=2), holds)
-
-
-ENDS = (*NUMBERS, ".nan", "nan", "inf", "-inf", "", " 1", "a", "0:1", "1e-320", "\0", "\u0663", "12:30")
-VARIED = (
-    "environment.wind.speed_mps",
-    "sensor.latency_s",
-    "sensor.rays",
-    "sensor.range_m",
-    "planner.clearance_m",
-)
-
-
-@pytest.mark.parametrize("cases", [25, pytest.param(1500, marks=pytest.mark.slow)])
-def test_ranges_to_vary(cases: int, tmp_path: Path) -> None:
-    path = tmp_path / "s.yaml"
-    path.write_text(as_yaml(LEAST))
-    known = st.sampled_from((*VARIED, *filter(None, map(_dotted, places(EVERYTHING)))))
-    key = st.one_of(st.sampled_from(VARIED), known, st.sampled_from(KEYS), st.text(max_size=8))
-    end = st.one_of(st.sampled_from(ENDS), st.floats().map(str), st.integers(-10, 2000).map(str))
-    ranged = st.builds("{}={}:{}".format, key, end, end)
-
-    def load(replaced: Sequence[tuple[str, str]]) -> Scenario:
-        return load_scenario(path, replaced)
-
-    def vary(texts: list[str]) -> None:
-        try:
-            ranges = [range_of(text) for text in texts]
-        except BadParameter as error:
-            raise InputError(f"command line: {error}") from error
-        for each in vary_of(load, ranges):
-            assert (each.value(0.0), each.value(1.0)) == (each.mild, each.hard)
-
-    def holds(texts: list[str]) -> None:
-        taken_or_refused(path, lambda: vary(texts))
-
-    fuzzed(
-        cases, st.lists(st.one_of(ranged, ranged, ranged, st.text(max_size=8)), min_size=1, max_size=3), holds
-    )
-
-
-SIZES = st.sampled_from((0, 1, 2, 3, 0.1, 0.5, 10, 60, 300, 1000, 4000, 1e5, 1e6, 1e-9, 1e-300)) | st.floats(
-    0, 5000
-)
-
-
-def _keys_of(name: str) -> st.SearchStrategy[dict[str, Any]]:
-    """Some keys of a generator, each with a number or two of the right kind and any size."""
-    fields = type(getattr(WorldSpec.model_validate({name: {}}), name)).model_fields
-    pair = st.lists(SIZES, min_size=2, max_size=2).map(sorted)
-    each = {key: pair if isinstance(field.default, tuple) else SIZES for key, field in fields.items()}
-    return st.fixed_dictionaries({}, optional=each)
-
-
-@pytest.mark.parametrize("cases", [10, pytest.param(150, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", GENERATORS)
-def test_worlds_of_any_size(name: str, cases: int, tmp_path: Path) -> None:
-    path = tmp_path / "c.yaml"
-
-    def holds(keys: dict[str, Any]) -> None:
-        path.write_text(as_yaml({**SHORT_CAMPAIGN, "grid": {}, "random": {}, "worlds": [{name: keys}]}))
-        taken_or_refused(path, lambda: CampaignRuns(load_campaign(path)).scenario(0))
-
-    fuzzed(cases, _keys_of(name), holds)

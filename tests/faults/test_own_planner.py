@@ -178,14 +178,6 @@ def test_an_error_that_exits_when_it_is_told_is_a_planner_that_failed(place: Pat
     assert run.metrics["reason"] == told
 
 
-@pytest.mark.flights
-def test_a_config_that_exits_is_bad_input(place: Path) -> None:
-    status, out, err = flown(place, "unresolved", "--quiet")
-    assert (status, out) == (2, "")
-    assert "planner.kind: cannot be configured: SystemExit: 0" in err
-    assert not (place / "run").exists()
-
-
 @pytest.mark.slow
 def test_a_sweep_survives_a_planner_that_ends_its_process(place: Path) -> None:
     status, out, err = ran(place, "sweep", "campaign.yaml", "--workers", "1", "--out", "out", "--json")

@@ -109,20 +109,6 @@ def test_what_is_fast_is_found(speed: float, period_s: float) -> None:
     assert abs(complex(*found[-1].velocity_mps) - speed) < 0.5
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_long_walls_that_appear_are_not_told_to_move_where_ranges_err_a_little(seed: int) -> None:
-    """Neighbouring returns bend about: that is no outline that tells of motion along it."""
-    rng = np.random.default_rng(seed)
-    turn, north = rng.uniform(-0.6, 0.6), rng.uniform(1900.0, 2300.0)
-    along, across = (np.array([math.cos(a), math.sin(a)]) for a in (turn, turn + math.pi / 2))
-    ends = [
-        (3000.0, north) + along * i + across * j for i, j in ((-1500, 0), (1500, 0), (1500, 40), (-1500, 40))
-    ]
-    wall = Obstacle(Polygon(tuple((float(x), float(y)) for x, y in ends)), active_s=(15.0, 500.0))
-    found = watched(flight(sensor(world_of(wall), seed, range_noise_m=3.0), 60.0, START), noise_m=3.0)
-    assert not any(any(each.velocity_mps) for _, all_found in found for each in all_found)
-
-
 @pytest.mark.parametrize("corners", [0, 4])
 @pytest.mark.parametrize("flaws", [{}, {"dropout": 0.1, "false_return": 0.01}, {"field_of_view_deg": 180.0}])
 def test_it_is_where_it_is_told_to_be(corners: int, flaws: dict[str, Any]) -> None:

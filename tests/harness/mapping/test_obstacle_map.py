@@ -185,18 +185,6 @@ def test_an_obstacle_that_moves_leaves_no_trail(doubtful: bool) -> None:
     assert off.max() < 3.0 * 180.0
 
 
-def test_the_same_loop_again_and_again_adds_nothing() -> None:
-    world = world_of(WALL, Circle((5000.0, 3000.0), 500.0), Circle((3000.0, 5000.0), 300.0))
-    taken = scans(sensor(world), on_circle(50, 800.0))
-    seen = fed(taken, taken, taken)
-    points, revision = edges(seen), seen.revision
-    for _ in range(10):
-        for scan in taken:
-            seen.update(scan)
-    assert seen.revision == revision
-    np.testing.assert_array_equal(edges(seen), points)
-
-
 def test_edges_since_tells_each_edge_once_in_order() -> None:
     world = world_of(WALL, Circle((7000.0, 5000.0), 500.0))
     seen, known, revisions = empty_map(), np.zeros((0, 2)), [seen_revision := 0]
@@ -216,24 +204,6 @@ def test_edges_since_tells_each_edge_once_in_order() -> None:
     half = revisions[30]
     later = seen.edges_since(half)
     np.testing.assert_array_equal(later, known[len(known) - len(later) :])
-
-
-def test_what_is_taken_back_is_told_by_the_revision() -> None:
-    gone = Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(0.0, 10.0))
-    eye, seen = sensor(World([gone], BOUNDS)), empty_map()
-    for scan in scans(eye, [MIDDLE] * 20):
-        seen.update(scan)
-    assert seen.last_removal_revision == 0
-    size = len(edges(seen))
-    for scan in scans(eye, on_circle(100), 11.0):
-        before = seen.revision
-        seen.update(scan)
-        if len(edges(seen)) < size:
-            assert seen.last_removal_revision == seen.revision == before + 1
-        elif len(edges(seen)) == size:
-            assert seen.revision == before
-        size = len(edges(seen))
-    assert size == 0
 
 
 @pytest.mark.parametrize("off_m", [0.0, 13.0, 29.0, 41.0])

@@ -27,7 +27,6 @@ from tests.harness.sensing import (
 
 NOISE = 0.01 * RANGE
 CELL = CLEARANCE / 4.0
-WALL = block(2400.0, 2500.0, 3600.0, 2600.0)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -136,39 +135,3 @@ def test_edges_are_told_once_in_order_and_memory_is_bounded_by_the_area() -> Non
     assert len(known) <= ((600.0 + 2.0 * (2.0 * CLEARANCE + CELL)) / CELL + 1) ** 2
     assert known.min() > 2000.0 - 2.0 * CLEARANCE - CELL
     assert known.max() < 2600.0 + 2.0 * CLEARANCE + 2.0 * CELL
-
-
-def test_ignored_rays_and_forgotten_places_leave_nothing() -> None:
-    world, seen = world_of(WALL), empty_map()
-    for scan in flight(sensor(world, range_noise_m=NOISE), 20.0, (2600.0, 1900.0)):
-        seen.update(scan, ignored=scan.directions[:, 0] > 0.0)
-    points = edges(seen)
-    assert points[:, 0].max() < 2600.0 + 2.0 * CELL
-    assert points[:, 0].min() < 2420.0
-    revision = seen.revision
-    seen.forget(np.array([(9000.0, 9000.0)]), 100.0)
-    assert seen.revision == revision
-    seen.forget(np.array([(2400.0, 2500.0), (2400.0, 2550.0)]), 50.0)
-    assert seen.revision == seen.last_removal_revision == revision + 1
-    left = edges(seen)
-    assert 0 < len(left) < len(points)
-    assert np.hypot(*(left - (2400.0, 2500.0)).T).min() > 50.0
-
-
-def test_what_has_long_stood_is_told_from_what_has_just_come() -> None:
-    pops = Obstacle(Circle((3000.0, 2200.0), 60.0), active_s=(28.0, 500.0))
-    on_wall, on_circle = np.array([(2700.0, 2500.0), (3200.0, 2500.0)]), np.array([(2960.0, 2155.0)])
-    elsewhere = np.array([(2700.0, 2500.0 - 4.0 * NOISE), (100.0, 5900.0), (-50.0, 7000.0)])
-    seen, told_s = empty_map(), 0.0
-    assert not seen.stands(on_wall).any()
-    eye = sensor(World([Obstacle(WALL), pops], BOUNDS), range_noise_m=NOISE)
-    for scan in flight(eye, 60.0, (2600.0, 1500.0), speed=5.0):
-        seen.update(scan)
-        if not told_s and np.hypot(*(edges(seen) - on_circle).T).min(initial=np.inf) < NOISE:
-            told_s = scan.time_s
-            assert seen.stands(on_wall).all()
-            assert not seen.stands(np.concatenate((on_circle, elsewhere))).any()
-    assert told_s >= 28.0
-    assert seen.stands(np.concatenate((on_wall, on_circle))).all()
-    assert not seen.stands(elsewhere).any()
-    assert seen.stands(np.zeros((0, 2))).shape == (0,)

@@ -119,19 +119,6 @@ def test_nothing_surprises_in_a_still_world() -> None:
         assert fed(flight(sensor(world), 30.0, START, turn_rad_s=turn)).last_contradiction_s == -math.inf
 
 
-def test_what_moves_takes_free_space_back_and_gives_it_again() -> None:
-    moves = Obstacle(Circle((2700.0, 2200.0), 60.0), velocity_mps=(8.0, 0.0))
-    world, seen = world_of(moves), empty_world()
-    for scan in flight(sensor(world), 60.0, START, speed=3.0):
-        seen.update(scan)
-        place = moves.shape.center_m[0] + 8.0 * scan.time_s if isinstance(moves.shape, Circle) else 0.0
-        if scan.time_s > 20.0:
-            face = np.array([(place, 2200.0 - 50.0), (place, 2200.0)])
-            assert not seen.seen_free(face).any()
-    assert seen.seen_free(np.array([(2800.0, 2200.0), (2900.0, 2200.0)])).all()
-    assert seen.last_contradiction_s > 40.0
-
-
 NOISE = 0.01 * RANGE
 FLAWS: dict[str, Any] = {"range_noise_m": NOISE, "dropout": 0.1, "false_return": 0.01}
 

@@ -430,31 +430,6 @@ def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight
     assert (min(times), max(times)) == (0.0, 100.0)
 
 
-@pytest.mark.flights
-def test_killed_process_leaves_a_readable_recording(tmp_path: Path) -> None:
-    script = f"""
-import os, sys
-sys.path[:0] = {[str(Path(__file__).parents[3])]!r}
-from pathlib import Path
-from tests.harness.conftest import track
-from tests.harness.recording.test_rerun_log import SCENE
-from harness.recording.layout import series_views
-from harness.recording.log import RerunLog
-log = RerunLog(Path({str(tmp_path / "a.rrd")!r}), SCENE, "a")
-log.on_block(track(600, plan_index=-1))
-log.flush()
-os._exit(9)
-"""
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (9, "", "")
-    with pytest.warns(rr.error_utils.RerunWarning, match="no footer"):
-        entities = read(tmp_path / "a.rrd")
-    assert len(column(entities, "/series/bank/flown", "scalars")) == 600
-    shown = tmp_path / "overlay.rrd"
-    write_overlay([tmp_path / "a.rrd", tmp_path / "a.rrd"], ["one", "two"], shown)
-    assert rerun("rrd", "verify", str(shown)).returncode == 0
-
-
 def test_overlay_keeps_every_track_and_one_world(
     tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
 ) -> None:

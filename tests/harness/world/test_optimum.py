@@ -55,20 +55,6 @@ def test_the_goal_circle_ends_it_and_nothing_makes_it_longer_than_a_way_there(re
     assert shortest_path([], AREA, WEST, EAST, 0.0, 200.0).length_m == 0.0
 
 
-def test_between_two_circles_the_path_crosses_over() -> None:
-    radius, centre = 10.0, (-20.0, 6.0)
-    to_start = math.dist(centre, WEST)
-    to_middle = math.hypot(*centre)
-    between = math.acos(
-        ((WEST[0] - centre[0]) * -centre[0] + (WEST[1] - centre[1]) * -centre[1]) / (to_start * to_middle)
-    )
-    bend = between - math.acos(radius / to_start) - math.acos(radius / to_middle)
-    half = math.sqrt(to_start**2 - radius**2) + math.sqrt(to_middle**2 - radius**2) + radius * bend
-    found = way(disc(*centre, 10.0), disc(-centre[0], -centre[1], 10.0))
-    assert bend > 0
-    assert found.length_m == pytest.approx(2 * half, rel=1e-12)
-
-
 @pytest.mark.parametrize("clearance", [0.0, 5.0])
 def test_round_a_square(clearance: float) -> None:
     to_corner = math.hypot(50.0 - 15.0, 15.0)

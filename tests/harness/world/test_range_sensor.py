@@ -18,7 +18,6 @@ from harness.world.world import Circle, Obstacle, Polygon, World
 from tests.examples import examples
 
 BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
-EMPTY = World([], BOUNDS)
 
 FloatArray = NDArray[np.float64]
 
@@ -111,20 +110,6 @@ def test_an_edge_shorter_than_places_are_told_apart_hides_nothing(edge_m: float)
     scan = sensor(world, rays=4, beam_deg=0.0).scan(30.0, 0.0, math.pi / 4, 0.0)
     assert scan.nearest_m == pytest.approx(math.hypot(30.0, 200.0))
     np.testing.assert_allclose(scan.ranges_m, [math.inf, 230.0, math.inf, 400.0])
-
-
-@pytest.mark.parametrize(("field", "rays"), [(360.0, 720), (360.0, 7), (120.0, 60), (270.0, 31), (1.0, 3)])
-def test_rays_are_spread_evenly_about_the_nose(field: float, rays: int) -> None:
-    for heading in (0.0, 1.0, -2.0, 7.0):
-        scan = sensor(EMPTY, field_of_view_deg=field, rays=rays).scan(10.0, 20.0, heading, 0.0)
-        spacing = math.radians(field) / rays
-        bearings = heading - math.radians(field) / 2 + (np.arange(rays) + 0.5) * spacing
-        expected = np.column_stack((np.sin(bearings), np.cos(bearings)))
-        np.testing.assert_allclose(scan.directions, expected, rtol=0, atol=1e-12)
-        assert scan.spacing_rad == pytest.approx(spacing)
-        assert 0.0 <= scan.start_rad < math.tau
-        assert math.cos(scan.start_rad - bearings[0]) == pytest.approx(1.0)
-        assert (scan.east_m, scan.north_m, scan.max_range_m) == (10.0, 20.0, 1000.0)
 
 
 def test_what_lies_outside_the_field_of_view_is_not_seen() -> None:
