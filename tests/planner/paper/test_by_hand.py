@@ -199,13 +199,18 @@ def test_one_obstacle_is_passed_beside_its_tangents() -> None:
 
 
 def test_where_all_directions_are_closed_only_what_a_step_can_meet_counts() -> None:
-    """In a ring of 700 m, closed to 60 m from its points, steps of 100 m lead to its far side, and none beyond it."""
+    """In a closed ring of 700 m steps of 100 m lead to its far side, and no further.
+
+    Its points are 70 m apart: in between a disc of 60 m reaches sqrt(60^2 - 35^2) inwards.
+    """
     angle = np.arange(0.0, math.tau, 0.1)
     ring = 700.0 * np.column_stack((np.cos(angle), np.sin(angle)))
     assert fan_shaped_sectors(ring, 60.0, (0.0, 0.0)) == []
     best = multi_step_search(window(ring), (0.0, 0.0), 0.0)[0]
     np.testing.assert_allclose(best.nodes[:6], [(100.0 * k, 0.0) for k in range(6)], atol=1e-9)
-    assert max(math.hypot(*node) for node in best.nodes) <= 640.0
+    assert max(math.hypot(*node) for node in best.nodes) <= 700.0 * math.cos(0.05) - math.sqrt(
+        60.0**2 - 35.0**2
+    )
 
 
 def test_no_step_leads_out_of_the_window() -> None:
