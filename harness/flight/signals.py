@@ -76,6 +76,8 @@ def held_back() -> Iterator[Callable[[], None]]:
             timers[0].start()
 
     def let_through() -> None:
+        if not (timers or held):  # as nearly always
+            return
         for timer in timers:
             timer.cancel()
         timers.clear()
