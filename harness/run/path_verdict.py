@@ -15,6 +15,7 @@ from harness.analysis.as_given import AsGiven, Corner
 from harness.analysis.breaches import CONTACT, Breach, Kept, crossings, inside_m, kept
 from harness.analysis.deviation import allowed_m, at_corner, deviation
 from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.in_force import InForce, demand
 from harness.analysis.metrics import error_figures, metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.wording import tallied
@@ -90,6 +91,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         "limit_used": {
             "off_path": worst["off_m"] / worst["allowed_m"] if worst["allowed_m"] else None,
             "altitude": float(high_m) / limits.max_altitude_error_m,
+            "bank": _bank_used(check, flight, limits, asked),
         },
         "corner_m_that_would_do": _sufficient_m(track, off_m, tolerance, corners),
         "given": dataclasses.asdict(smoothness(polyline_profile(_line(check.plan), speed), speed)),
@@ -100,7 +102,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         else [],
         "notes": [*check.given.notes, *check.plan.notes],
     }
-    told["ok"], told["verdict"] = verdict(figures, told, seen, tolerance)
+    told["ok"], told["verdict"] = verdict(figures, told, seen, limits)
     return {
         **figures,
         "total_system_error_m": error_figures(found.rows_m),
@@ -112,7 +114,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
 
 
 def verdict(
-    figures: Mapping[str, Any], told: Mapping[str, Any], seen: Kept, tolerance_m: float
+    figures: Mapping[str, Any], told: Mapping[str, Any], seen: Kept, limits: FlightLimits
 ) -> tuple[bool, str]:
     """Whether a path can be flown as given, and a sentence that says so or why not."""
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
@@ -124,12 +126,33 @@ def verdict(
         faults.append("no leg was flown")
     if faults:
         return False, "no: " + "; ".join(faults)
-    used = told["limit_used"]
+    used, tolerance_m = told["limit_used"], limits.cross_track_threshold_m
     how = "as drawn" if told["drawn"] else "with its corners cut by no more than allowed"
     wide_m = max((corner["allowed_cut_m"] for corner in told["corners"]), default=0.0)
     corners = f", corners within {wide_m:.3g} m" if wide_m > tolerance_m else ""
     most = max(used["off_path"] or 0.0, used["altitude"])
-    return True, f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most"
+    limit_rad = limits.bank_limit_rad
+    bank_deg = math.degrees(math.atan((used["bank"] or 0.0) * math.tan(limit_rad)))
+    bank = (
+        f", turns take {bank_deg:.0f} of {math.degrees(limit_rad):.0f} deg of bank" if bank_deg >= 1.0 else ""
+    )
+    return (
+        True,
+        f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most{bank}",
+    )
+
+
+def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven) -> float | None:
+    """Lateral acceleration that the turns of the path ask for in that wind, over what the bank limit gives.
+
+    None where the aircraft flies to waypoints, on arcs of its own.
+    """
+    rows = np.flatnonzero(flight.track.plan_index >= 0)
+    if check.scenario.guidance.follow == "waypoints" or not len(rows):
+        return None
+    track = flight.track.part(int(rows[0]), int(rows[-1]) + 1)
+    force = InForce.of(flight.track, limits, asked.airspeed_mps).part(int(rows[0]), int(rows[-1]) + 1)
+    return demand(track, flight.plans, force).windy
 
 
 def _touched(seen: Kept) -> list[str]:
