@@ -110,7 +110,7 @@ def certify(
     """
     from harness.analysis.claims import CLAIMS
     from harness.certification.certification import MOST_RUNS, Terms
-    from harness.certification.subject import Asked, days_of, distributions
+    from harness.certification.subject import DEFAULT_AIRCRAFT, Asked, days_of, distributions, is_path
     from harness.scenario.shipped import scenario_path
 
     terms = Terms(probability, confidence)
@@ -123,6 +123,8 @@ def certify(
         raise typer.BadParameter(str(error), param_hint="--vary") from error
     if claim is not None and claim not in CLAIMS:
         raise typer.BadParameter(f"{claim[:60]!r} is not {', '.join(CLAIMS)}", param_hint="--claim")
+    if is_path(subject) and not any(key == "aircraft.model" for key, _ in replaced):
+        say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
     asked = Asked(subject, replaced, drawn, claim, runs or MOST_RUNS, (sources(planner), sources(guidance)))
     days = days_of(asked, None if world is None else scenario_path(world))
     days.check()

@@ -1,12 +1,14 @@
 """Hard conditions, each alone and all together, in public worlds: 30 % wind, moderate turbulence, the real aircraft.
 
 Besides the sensor's flaws: obstacles that appear ahead, and obstacles that come to the straight line to the goal
-when the aircraft does. `python -m tests.closed_loop.test_hard_conditions [MOST [FAMILY...]]` flies MOST worlds of each
-family, has each flight judged by the independent referee, and prints the table of planner/MEASURED.md.
+when the aircraft does. `python -m tests.closed_loop.test_hard_conditions [--most N] [--day typical|rough] [FAMILY...]`
+flies N worlds of each family, has each flight judged by the independent referee, and prints the table of
+planner/MEASURED.md: in the air above, or each world on a day of its own, whose table `--write` puts there.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import shutil
@@ -14,11 +16,12 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
+from harness.certification.bounds import clopper_pearson
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight, Outcome
 from harness.run.scenario_flight import fly_to_folder, make_loop
@@ -52,8 +55,16 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 }
 
 
-def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1) -> Scenario:
-    """The scenario of a world under a condition; what appears and what moves is drawn from the world's name."""
+def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1, day: str | None = None) -> Scenario:
+    """The scenario of a world under a condition; what appears and what moves is drawn from the world's name.
+
+    Args:
+        world: of the shared worlds.
+        condition: of `CONDITIONS`.
+        seed: of the flight.
+        day: `conditions` of the scenario, in place of a steady wind and turbulence.
+    """
+    air = condition.get("environment", WIND | TURBULENCE)
     range_m, clearance = float(world["sensor_range_m"]), float(world["clearance_m"])
     sensor = {"range_m": range_m} | condition.get("sensor", {})
     if "range_noise_m" in sensor:
@@ -83,7 +94,7 @@ def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1) -> Sce
             "sensor": sensor,
             "planner": {"clearance_m": clearance} | condition.get("planner", {}),
             "guidance": condition.get("guidance", {}),
-            "environment": condition.get("environment", WIND | TURBULENCE),
+            **({"environment": air} if day is None else {"conditions": day}),
         }
     )
 
@@ -164,36 +175,87 @@ def test_a_way_without_room_to_turn_that_is_hard_to_see_is_found_in_the_end() ->
     assert flight.outcome is Outcome.REACHED, flight.reason
 
 
-def _cell(family: str, condition: str, most: int, folder: Path) -> tuple[str, list[str]]:
-    """A cell of the table: goals reached, collisions, least clearance over the wanted one; and the referee's faults."""
-    ends, shares, faults = [], [], []
-    for path in worlds(family, most):
-        scenario = hard(json.loads(path.read_text()), CONDITIONS[condition])
+class Cell(NamedTuple):
+    """A cell of the table.
+
+    Attributes:
+        ends: how each flight ended.
+        shares: least clearance of each over the wanted one.
+        faults: what the referee found wrong.
+    """
+
+    ends: list[str]
+    shares: list[float]
+    faults: list[str]
+
+    def __str__(self) -> str:
+        """Goals reached, collisions and the bound of their share at 95 %, least clearance over the wanted one."""
+        hit = self.ends.count("collision")
+        reached = f"{self.ends.count('reached')}/{len(self.ends)}"
+        return f"{reached}, {hit} (< {most_share(hit, len(self.ends)):.0%}), {min(self.shares):.2f}"
+
+
+def most_share(hit: int, flights: int) -> float:
+    """Upper bound of the share of flights that hit, at 95 %."""
+    return 1.0 - clopper_pearson(flights - hit, flights, 0.95)[0]
+
+
+def _cell(family: str, condition: str, most: int, folder: Path, day: str | None) -> Cell:
+    cell = Cell([], [], [])
+    for number, path in enumerate(worlds(family, most)):
+        scenario = hard(
+            json.loads(path.read_text()), CONDITIONS[condition], 1 + number * (day is not None), day
+        )
         run = folder / path.stem
         metrics = fly_to_folder(scenario, run, recording=False)
-        ends.append(metrics["outcome"])
-        shares.append(metrics["min_clearance_m"] / (scenario.planner.clearance_m or math.nan))
-        faults += [f"{path.stem}, {condition}: {fault}" for fault in referee_faults(run)]
+        cell.ends.append(metrics["outcome"])
+        cell.shares.append(metrics["min_clearance_m"] / (scenario.planner.clearance_m or math.nan))
+        cell.faults.extend(f"{path.stem}, {condition}: {fault}" for fault in referee_faults(run))
         shutil.rmtree(run)
-    counts = f"{ends.count('reached')}/{len(ends)}, {ends.count('collision')}"
-    return f"{counts}, {min(shares):.2f}", faults
+    return cell
 
 
-def main(most: int, families: Sequence[str]) -> int:
+def main(arguments: Sequence[str]) -> int:
     """Prints the table, a row as soon as it is flown, then what the referee found wrong."""
-    wrong: list[str] = []
-    print(f"| condition | {' | '.join(families)} |")
+    parser = argparse.ArgumentParser()
+    parser.add_argument("families", nargs="*", default=FAMILIES)
+    parser.add_argument("--most", type=int, default=10_000)
+    parser.add_argument("--day", choices=("typical", "rough"))
+    parser.add_argument("--write", action="store_true")
+    asked = parser.parse_args(arguments)
+    cells: list[Cell] = []
+    lines: list[str] = []
+
+    def tell(*words: str) -> None:
+        lines.append(f"| {' | '.join(words)} |")
+        print(lines[-1], flush=True)
+
+    tell("condition", *asked.families)
+    tell("---", *["---"] * len(asked.families))
     with tempfile.TemporaryDirectory() as folder:
         for condition in CONDITIONS:
-            cells = [condition]
-            for family in families:
-                cell, faults = _cell(family, condition, most, Path(folder))
-                cells.append(cell)
-                wrong += faults
-            print("| " + " | ".join(cells) + " |", flush=True)
-    print("\n".join(wrong) or "no fault")
-    return 1 if wrong else 0
+            row = [_cell(each, condition, asked.most, Path(folder), asked.day) for each in asked.families]
+            cells += row
+            tell(condition, *map(str, row))
+    ends = [end for cell in cells for end in cell.ends]
+    hit, faults = ends.count("collision"), [fault for cell in cells for fault in cell.faults]
+    below = f"{hit} hit (below {most_share(hit, len(ends)):.2%} at 95 %)"
+    judged = " ".join(faults) or "the referee has no fault to find"
+    summary = f"{ends.count('reached')} of {len(ends)} flights reached the goal, {below}; {judged}."
+    print(summary)
+    if asked.write and asked.day:
+        write(asked.day, "\n".join([*lines, "", summary]))
+    return 1 if faults else 0
+
+
+def write(name: str, text: str) -> None:
+    """Puts a table between its two marks in planner/MEASURED.md."""
+    page = Path(__file__).parents[2] / "planner" / "MEASURED.md"
+    before, begin, rest = page.read_text("utf-8").partition(f"<!-- hard conditions: {name} -->\n")
+    _, end, after = rest.partition("<!-- end -->")
+    assert end, f"{page} has no place for {name}"
+    page.write_text(f"{before}{begin}{text}\n{end}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000, sys.argv[2:] or FAMILIES))
+    sys.exit(main(sys.argv[1:]))

@@ -111,6 +111,24 @@ def test_a_given_path_is_certified_as_given(tmp_path: Path) -> None:
     assert not kept.metrics.check.ok
 
 
+def test_who_flies_a_path_is_told_where_nobody_was_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "path.csv").write_text("east_m,north_m\n0,0\n1500,0\n")
+    words = [
+        "certify",
+        str(tmp_path / "path.csv"),
+        "--runs",
+        "1",
+        "--workers",
+        "1",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert main(words) == 1
+    assert "no --aircraft: the path is flown by the aerosonde" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
