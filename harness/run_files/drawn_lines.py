@@ -66,11 +66,7 @@ def _of_points(
     notes: Sequence[str],
     above_ground: bool = False,
 ) -> PathAsRead:
-    """A path in degrees.
-
-    Raises:
-        InputError: some of its points have an altitude, and others none.
-    """
+    """A path in degrees."""
     heights = tuple(altitude for *_, altitude in points if altitude is not None)
     if heights and len(heights) != len(points):
         raise InputError(

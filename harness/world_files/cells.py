@@ -1,8 +1,12 @@
-"""Cells of a raster as polygons: what is set in a mask, in columns and rows, and in the local plane."""
+"""Cells of a raster as polygons, in columns and rows and in the local plane; and simpler outlines that only grow.
+
+Notches of outlines are filled, nothing solid is ever cut away.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -14,16 +18,18 @@ MAX_RUNS: Final = 100_000
 """Cells of a mask with more runs along its rows are taken together two by two first."""
 LONGEST_EDGE_CELLS: Final = 64
 """Outlines of cells are bent into the plane with a point at least this often: to a hundredth of a cell."""
+MOST_GROWTH: Final = 0.005
+"""Share of a polygon's area that filling its notches may add."""
+PASSES: Final = 3
+STRAIGHT_M: Final = 1e-9
+"""A corner so near to the line through its neighbours is none."""
 
 
 def outlines(mask: BoolArray) -> tuple[list[Any], int]:
     """Polygons (with holes) round the cells that are set, and how many cells a side were taken together.
 
-    The cell in column i and row j covers i to i + 1 and j to j + 1. Of a mask so ragged that nobody could fly with its
-    outlines, coarser cells are taken, each set if any of its cells is.
-
-    Args:
-        mask: (rows, columns).
+    The cell in column i and row j of a (rows, columns) mask covers i to i + 1 and j to j + 1. Of a mask so ragged that
+    nobody could fly with its outlines, coarser cells are taken, each set if any of its cells is.
     """
     import shapely
 
@@ -54,13 +60,9 @@ def _runs(mask: BoolArray) -> tuple[Any, Any, Any]:
 
 
 def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -> tuple[list[Any], int]:
-    """Outlines in the plane of the cells of a raster that are solid; and how many a side were taken together.
+    """Outlines in the plane of the cells of a raster that are solid, (rows, columns), those outside of a box left out.
 
-    Args:
-        raster: gives the places of the cells.
-        solid: (rows, columns) which are solid.
-        mapping: of the file's coordinates to the plane.
-        box: cells that lie outside are left out.
+    Also how many cells a side were taken together.
     """
     import shapely
 
@@ -90,3 +92,75 @@ def window_of(raster: Raster, mapping: Mapping, box: Box) -> tuple[slice, slice]
         begin = min(max(math.floor(low) - 2, 0), size)
         spans.append(slice(begin, max(min(math.ceil(high) + 2, size), begin)))
     return spans[0], spans[1]
+
+
+def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
+    """Polygons with fewer corners that cover the given ones, which are valid.
+
+    A corner that points into the solid is left out where the notch that it makes is not deeper than the tolerance,
+    small notches first, until `MOST_GROWTH` of the polygon's area has been added; corners on a straight line are
+    left out as well. Each of at most `PASSES` passes moves an edge by no more than the tolerance.
+    """
+    import shapely
+
+    given = shapely.orient_polygons(np.array(polygons, dtype=object))
+    convex = shapely.area(shapely.convex_hull(given)) <= shapely.area(given) * (1.0 + 1e-12)
+    result = list(given[convex])
+    for polygon in given[~convex]:
+        budget = MOST_GROWTH * polygon.area / PASSES
+        rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
+        corners = sum(map(len, rings))
+        for _ in range(PASSES):
+            rings, before = [_filled(ring, tolerance_m, budget) for ring in rings], sum(map(len, rings))
+            if sum(map(len, rings)) == before:
+                break
+        if before == corners:
+            result.append(polygon)
+            continue
+        grown = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) >= 4])
+        if not grown.is_valid:
+            grown = shapely.make_valid(grown, method="structure", keep_collapsed=False)
+        if not shapely.covers(grown, polygon):  # rounding, or a notch with something in it
+            grown = shapely.union(grown, polygon)
+        result += [each for each in shapely.get_parts(grown) if each.geom_type == "Polygon" and each.area > 0]
+    return result
+
+
+def _filled(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatArray:
+    """One pass over a closed ring with the solid on its left; corners next to one another are not both left out."""
+    points = ring[:-1]
+    turn, base, on, forward = _bends(points)
+    straight = forward & (np.abs(turn) <= STRAIGHT_M * on)
+    if 3 <= len(points) - straight.sum() < len(points):
+        points = points[~straight]
+        turn, base, on, forward = _bends(points)
+    if len(points) <= 4:
+        return np.vstack((points, points[:1]))
+    notch = (turn < 0) & (np.abs(turn) / np.maximum(base, 1e-12) <= tolerance_m)
+    kept = points[~_apart(np.where(notch, 0.5 * np.abs(turn), np.inf), budget_m2)]
+    return np.vstack((kept, kept[:1])) if len(kept) >= 3 else ring
+
+
+def _bends(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Of each corner of a closed ring: twice the area that it adds, the base from neighbour to neighbour, the edge on.
+
+    The area is negative in a notch; the last is whether the ring goes on forwards.
+    """
+    before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+    into, on, base = points - before, after - points, after - before
+    turn = into[:, 0] * on[:, 1] - into[:, 1] * on[:, 0]
+    return turn, np.hypot(base[:, 0], base[:, 1]), np.hypot(on[:, 0], on[:, 1]), (into * on).sum(axis=1) > 0
+
+
+def _apart(cost: FloatArray, budget: float) -> BoolArray:
+    """Which to leave out: the cheapest first, never two neighbours, until the budget is used up."""
+    drop = np.zeros(len(cost), dtype=np.bool_)
+    spent = 0.0
+    for index in np.argsort(cost, kind="stable").tolist():
+        price = float(cost[index])
+        if not np.isfinite(price) or spent + price > budget:
+            break
+        if not (drop[index - 1] or drop[(index + 1) % len(cost)]):
+            drop[index] = True
+            spent += price
+    return drop

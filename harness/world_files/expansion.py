@@ -16,13 +16,11 @@ from harness.files.input_file import open_regular
 from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.bounded import uncollected
-from harness.world_files.cells import placed_cells
-from harness.world_files.growing import simplified
-from harness.world_files.height_field import HeightField
+from harness.world_files.cells import placed_cells, simplified
+from harness.world_files.height_field import HeightField, cell_sides, height_field
 from harness.world_files.parts import Box, Contents, FloatArray, Raster, Reading, WorldFileError
 from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.slicing import HeightBand, KnownGround, Solid, clipped, sliced_parts
-from harness.world_files.terrain import cell_sides, height_field
 
 MARGIN: Final = 0.02
 """What lies outside the area by more than this share of its longer side is left out."""
@@ -62,15 +60,9 @@ class FileSpec:
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What became of one file.
+    """What became of one file: shapely polygons in the plane, cut to the area and valid, and what was assumed.
 
-    Attributes:
-        spec: as asked.
-        kind: its format.
-        sha256: of its bytes.
-        polygons: shapely polygons in the plane, cut to the area and valid.
-        heights_m: bottom and top of each, above mean sea level; of terrain the height of the cut, twice.
-        notes: what was assumed or passed over.
+    `heights_m` has bottom and top of each, above mean sea level; of terrain the height of the cut, twice.
     """
 
     spec: FileSpec
@@ -103,28 +95,18 @@ def expanded(
     place: Place,
     bounds_m: Box,
     altitude_m: float,
-    progress: Callable[[str], None] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
     ground: HeightField | None = None,
 ) -> Expanded:
-    """Obstacles and ground of some files.
+    """Obstacles and ground of some files, in the plane of a place; a fault is a FileFault.
 
-    Args:
-        specs: the files.
-        place: where the plane touches the earth.
-        bounds_m: of the area; what lies outside is left out.
-        altitude_m: of the flight, above mean sea level.
-        progress: told what is being done.
-        ground: where no file has terrain.
-
-    Raises:
-        FileFault: a file cannot be used.
+    What lies outside of the bounds is left out. `ground` is taken where no file has terrain.
     """
-    tell = progress or (lambda _: None)
     margin = MARGIN * max(bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1])
     box = bounds_m[0] - margin, bounds_m[1] - margin, bounds_m[2] + margin, bounds_m[3] + margin
     loaded: list[tuple[Contents, Mapping]] = []
     for index, spec in enumerate(specs):
-        with _blaming(index):
+        with blaming(index):
             contents = loaded_file(spec.path, spec.kind, spec.reading)
             loaded.append((contents, Mapping(contents.crs, place, spec.shift_m)))
             _check_place(*loaded[-1], box)
@@ -133,7 +115,7 @@ def expanded(
     sources: list[Source] = []
     for index, (spec, (contents, mapping)) in enumerate(zip(specs, loaded, strict=True)):
         tell(f"cutting {spec.path.name} at {altitude_m:g} m")
-        with _blaming(index):
+        with blaming(index):
             known = KnownGround(field, spec.ground_m, bounds_m)
             sources.append(_cut(spec, contents, mapping, known, box, altitude_m))
             _check_size(sources)
@@ -141,7 +123,7 @@ def expanded(
 
 
 @contextmanager
-def _blaming(index: int) -> Iterator[None]:
+def blaming(index: int) -> Iterator[None]:
     """Turns an error of a file into one that says which file."""
     try:
         yield
@@ -163,21 +145,21 @@ def _check_size(sources: Sequence[Source]) -> None:
 
 def loaded_file(path: Path, kind: str | None, reading: Reading) -> Contents:
     """Contents of a file; the last few are kept, for who flies the same files many times."""
+    return _loaded(*_as_it_is(path), kind, reading)
+
+
+def _as_it_is(path: Path) -> tuple[Path, tuple[int, int]]:
+    """A file by one path, however its folder is written, of a link by its name; and its size and time."""
     try:
         stamp = path.stat()
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise WorldFileError(f"cannot be read ({reason}); give the path of a file") from error
-    return _loaded(_plainly(path), kind, reading, (stamp.st_size, stamp.st_mtime_ns))
-
-
-def _plainly(path: Path) -> Path:
-    """The same file by the same path, however its folder is written; of a link the name is kept."""
-    return path.parent.resolve() / path.name
+    return path.parent.resolve() / path.name, (stamp.st_size, stamp.st_mtime_ns)
 
 
 @lru_cache(maxsize=4)
-def _loaded(path: Path, kind: str | None, reading: Reading, stamp: tuple[int, int]) -> Contents:
+def _loaded(path: Path, stamp: tuple[int, int], kind: str | None, reading: Reading) -> Contents:
     try:
         with uncollected():
             return kinds.read(path, kind, reading)
@@ -189,11 +171,8 @@ def _loaded(path: Path, kind: str | None, reading: Reading, stamp: tuple[int, in
 
 @lru_cache(maxsize=16)
 def _digest(path: Path, stamp: tuple[int, int]) -> str:
-    digest = hashlib.sha256()
     with open_regular(path) as file:
-        while piece := file.read(1 << 20):
-            digest.update(piece)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
 
 
 def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
@@ -236,7 +215,7 @@ def _cut(
     spec: FileSpec, contents: Contents, mapping: Mapping, ground: KnownGround, box: Box, altitude_m: float
 ) -> Source:
     """The polygons of one file."""
-    stamp, notes = spec.path.stat(), list(contents.notes)
+    notes = list(contents.notes)
     band = HeightBand(altitude_m - spec.vertical_clearance_m, altitude_m + spec.vertical_clearance_m)
     if ground.flat_m is None and ground.field is None and any(part.rigid for part in contents.parts):
         ground = KnownGround(None, 0.0, ground.known_in)
@@ -245,10 +224,9 @@ def _cut(
         )
     solids = sliced_parts(contents.parts, mapping, band, ground, box)
     tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
-    for raster, solid in _solid_cells(contents, spec, band, notes):
+    for raster, solid, heights_m in _solid_cells(contents, spec, band, notes):
         found, factor = placed_cells(raster, solid, mapping, box)
-        low, high = HEIGHTS_M if raster is contents.occupied else (band.low_m, band.low_m)
-        solids += [Solid(shape, low, high) for shape in found]
+        solids += [Solid(shape, *heights_m) for shape in found]
         if factor > 1:
             notes.append(
                 f"its cells were taken together {factor} by {factor}: they are too many, or too ragged"
@@ -263,8 +241,27 @@ def _cut(
     else:
         notes.append(f"nothing of it is solid in the area between {band.low_m:g} and {band.high_m:g} m")
     heights = tuple(_heights(polygons, solids))
-    digest = _digest(_plainly(spec.path), (stamp.st_size, stamp.st_mtime_ns))
+    digest = _digest(*_as_it_is(spec.path))
     return Source(spec, contents.kind, digest, tuple(polygons), heights, tuple(notes))
+
+
+def _solid_cells(
+    contents: Contents, spec: FileSpec, band: HeightBand, notes: list[str]
+) -> Iterator[tuple[Raster, Any, tuple[float, float]]]:
+    """Rasters of a file with those of their cells that are solid, and between which heights."""
+    if (terrain := contents.terrain) is not None:
+        missing = np.isnan(terrain.values)
+        if missing.any():
+            notes.append(
+                f"{counted(int(missing.sum()), 'cell')} without a height taken as {spec.nodata} (nodata)"
+            )
+        solid = (terrain.values >= band.low_m) | (missing & (spec.nodata == "solid"))
+        yield terrain, solid, (band.low_m, band.low_m)
+    if (occupied := contents.occupied) is not None:
+        missing = np.isnan(occupied.values)
+        if missing.any():
+            notes.append(f"{counted(int(missing.sum()), 'unknown cell')} taken as {spec.unknown} (unknown)")
+        yield occupied, (occupied.values >= 0.5) | (missing & (spec.unknown == "occupied")), HEIGHTS_M
 
 
 def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
@@ -288,29 +285,6 @@ def _heights(polygons: Sequence[Any], solids: Sequence[Solid]) -> Iterator[tuple
         low = min((each.low_m for each in inside), default=HEIGHTS_M[0])
         high = max((each.high_m for each in inside), default=HEIGHTS_M[1])
         yield max(low, HEIGHTS_M[0]), min(high, HEIGHTS_M[1])
-
-
-def _solid_cells(
-    contents: Contents, spec: FileSpec, band: HeightBand, notes: list[str]
-) -> Iterator[tuple[Raster, Any]]:
-    """Rasters of a file with those of their cells that are solid."""
-    for raster, least, is_solid, what, word in (
-        (
-            contents.terrain,
-            band.low_m,
-            spec.nodata == "solid",
-            "cell",
-            "without a height taken as {} (nodata)",
-        ),
-        (contents.occupied, 0.5, spec.unknown == "occupied", "unknown cell", "taken as {} (unknown)"),
-    ):
-        if raster is None:
-            continue
-        missing = np.isnan(raster.values)
-        if missing.any():
-            state = spec.nodata if raster is contents.terrain else spec.unknown
-            notes.append(f"{counted(int(missing.sum()), what)} {word.format(state)}")
-        yield raster, (raster.values >= least) | (missing & is_solid)
 
 
 def _rounded(polygons: Sequence[Any]) -> list[Any]:

@@ -31,17 +31,14 @@ LARGEST_SCALE: Final = 1e5
 """A world is enlarged by at most this factor."""
 
 Ends = tuple[tuple[float, float], tuple[float, float]]
+"""Start and goal, east and north."""
 
 
 @dataclass(frozen=True, eq=False)
 class FreeRoom:
     """Distance from the middle of each cell of a grid to what is solid and to the border, at least.
 
-    Attributes:
-        corner_m: south-western corner of the grid.
-        cell_m: side of a cell.
-        room_m: (rows, columns) from south to north.
-        allowed: (rows, columns) where start and goal may lie.
+    The corner is the south-western one; room and where start and goal may lie are (rows, columns) from south to north.
     """
 
     corner_m: tuple[float, float]
@@ -61,13 +58,7 @@ class FreeRoom:
 
 
 def free_room(polygons: Sequence[Any], bounds_m: Box, forbidden: Sequence[Any] = ()) -> FreeRoom:
-    """Distances in an area from polygons and from its border.
-
-    Args:
-        polygons: what is solid.
-        bounds_m: of the area.
-        forbidden: polygons in which neither start nor goal may lie.
-    """
+    """Distances in an area from solid polygons and from its border; neither start nor goal may lie in `forbidden`."""
     from scipy import ndimage
 
     xmin, ymin, xmax, ymax = bounds_m
@@ -106,11 +97,7 @@ def _covered(
 def ends(room: FreeRoom, turn_radius_m: float, clearance_m: float, corridor_turns: float) -> Ends | None:
     """Start and goal: two places far apart with room to turn, joined by a corridor; None where there are none.
 
-    Args:
-        room: of the area.
-        turn_radius_m: of the aircraft.
-        clearance_m: that its planner keeps.
-        corridor_turns: room to both sides of the middle of the corridor beyond the clearance, in turn radii.
+    The corridor has room to both sides of its middle beyond the clearance, in turn radii of the aircraft.
     """
     from scipy import ndimage
 

@@ -52,16 +52,11 @@ NO_TOP: Final = Limit(math.inf)
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A solid: a footprint between two heights.
+    """A solid: a shapely Polygon or MultiPolygon in the coordinates of the file, between two heights.
 
-    Attributes:
-        footprint: shapely Polygon or MultiPolygon, in the coordinates of the file.
-        bottom: where it begins.
-        top: where it ends.
-        name: for messages.
-        keep_in: the footprint is what is free: all outside is solid (an inclusion fence).
-        rigid: stands level on the ground below it, as a building does; limits above ground of others, those of an
-            airspace, follow the ground.
+    Where `keep_in`, the footprint is what is free, and all outside is solid (an inclusion fence). What is `rigid`
+    stands level on the ground below it, as a building does; limits above ground of others, those of an airspace, follow
+    the ground. The name is for messages.
     """
 
     footprint: Any
@@ -127,13 +122,7 @@ class Contents:
 
 @dataclass(frozen=True)
 class Reading:
-    """How a file is to be read, where it leaves that open.
-
-    Attributes:
-        metres_per_cell: side of a cell of an occupancy map, or of terrain without a place on earth.
-        crs: coordinate reference system.
-        default_height_m: of a building that gives neither height nor levels.
-    """
+    """How a file is to be read where it leaves that open: side of a cell, coordinates, height of a building without."""
 
     metres_per_cell: float | None = None
     crs: str | None = None

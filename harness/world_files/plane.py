@@ -1,7 +1,8 @@
 """From the coordinates of a file to the local ENU plane of a scenario, and back, by pyproj.
 
 Axis order is always x, y (longitude, latitude), and grid north of a national grid is turned to true north at the
-origin. The plane is the azimuthal equidistant one of `aircraft.frames`.
+origin. The plane is the azimuthal equidistant one of `aircraft.frames`. A coordinate reference system that pyproj does
+not know raises WorldFileError.
 """
 
 from __future__ import annotations
@@ -26,12 +27,9 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Mapping:
-    """Coordinates of one file in the plane of a scenario.
+    """Coordinates of one file in the plane of a scenario that lies at a place.
 
-    Attributes:
-        crs: of the file; None: metres in a plane of its own.
-        place: where the scenario lies.
-        shift_m: east and north that are added to the metres of a file without a CRS.
+    `crs` is that of the file; None: metres in a plane of its own, to which `shift_m` east and north are added.
     """
 
     crs: str | None
@@ -50,11 +48,8 @@ class Mapping:
     ) -> tuple[FloatArray, FloatArray]:
         """X and y in the file of places of the plane.
 
-        Args:
-            east: of the places.
-            north: of the places.
-            about_x: in the middle of what the file has; longitudes are given by the turn that is nearest to it, since
-                files write those across the antimeridian in several ways.
+        Longitudes are given by the turn that is nearest to `about_x`, the middle of what the file has: files write
+        those across the antimeridian in several ways.
         """
         if self.crs is None:
             return east - self.shift_m[0], north - self.shift_m[1]
@@ -67,9 +62,7 @@ class Mapping:
         """Shapely geometries of the file in the plane."""
         import shapely
 
-        return shapely.transform(
-            shapes, lambda points: np.column_stack(self.to_plane(points[:, 0], points[:, 1]))
-        )
+        return shapely.transform(shapes, lambda p: np.column_stack(self.to_plane(p[:, 0], p[:, 1])))
 
     @cached_property
     def _transformer(self) -> Any:
@@ -82,13 +75,7 @@ class Mapping:
 
 
 class AxisUnits(NamedTuple):
-    """Units of a coordinate reference system, in metres.
-
-    Attributes:
-        height_m: of heights; None where it has none.
-        plane_m: of its plane; 1 in degrees.
-        plane: name of that unit.
-    """
+    """Units of a coordinate reference system in metres: of heights, None without; of its plane, 1 in degrees."""
 
     height_m: float | None
     plane_m: float
@@ -96,11 +83,7 @@ class AxisUnits(NamedTuple):
 
 
 def axis_units(name: str) -> AxisUnits:
-    """The units of a coordinate reference system.
-
-    Raises:
-        WorldFileError: there is none of that name.
-    """
+    """The units of a coordinate reference system."""
     axes = _system(name).axis_info
     height_m = next((float(axis.unit_conversion_factor) for axis in axes if axis.direction == "up"), None)
     plane_m = 1.0 if in_degrees(name) else float(axes[0].unit_conversion_factor)
@@ -108,11 +91,7 @@ def axis_units(name: str) -> AxisUnits:
 
 
 def in_degrees(name: str | None) -> bool:
-    """Whether coordinates of a coordinate reference system are longitude and latitude in degrees.
-
-    Raises:
-        WorldFileError: there is none of that name.
-    """
+    """Whether coordinates of a coordinate reference system are longitude and latitude in degrees."""
     return name is not None and bool(_system(name).to_2d().is_geographic)
 
 

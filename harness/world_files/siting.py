@@ -14,11 +14,20 @@ from typing import Any, Final
 import numpy as np
 
 from harness.world_files.cells import placed_cells
-from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners_of, expanded, loaded_file
+from harness.world_files.expansion import (
+    Expanded,
+    FileFault,
+    FileSpec,
+    blaming,
+    corners_of,
+    expanded,
+    loaded_file,
+)
 from harness.world_files.free_room import (
     CORRIDORS,
     LEAST_WAY,
     TURNS,
+    Ends,
     FreeRoom,
     ends,
     free_room,
@@ -37,8 +46,6 @@ PAD_TURNS: Final = 12.0
 """The area reaches this many turn radii beyond buildings and zones, which leaves room around them."""
 TRIES: Final = 6
 """Parts of a large file that are tried before there is said to be no room."""
-Ends = tuple[tuple[float, float], tuple[float, float]]
-"""Start and goal."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +88,16 @@ class _Files:
     contents: tuple[Contents, ...]
     craft: Craft
     altitude_m: float
-    tell: Callable[[str], None] | None
+    tell: Callable[[str], None]
 
-    def mappings(self, place: Place | None) -> list[Mapping]:
-        """From each file to the plane of a place."""
+    def placed(self, place: Place | None) -> list[tuple[Contents, Mapping]]:
+        """What each file holds, with the mapping of its coordinates to the plane of a place."""
         each = zip(self.specs, self.contents, strict=True)
-        return [Mapping(contents.crs, place or ANY_PLACE, spec.shift_m) for spec, contents in each]
+        return [(held, Mapping(held.crs, place or ANY_PLACE, spec.shift_m)) for spec, held in each]
+
+
+Area = tuple[Place | None, Box]
+"""The origin of a plane, and the bounds of an area in it."""
 
 
 def site(
@@ -94,7 +105,7 @@ def site(
     altitude_m: float,
     craft: Craft,
     given: Ends | None = None,
-    tell: Callable[[str], None] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> Site:
     """Chooses an area with start and goal in what some files hold.
 
@@ -114,14 +125,14 @@ def site(
     files = _Files(tuple(specs), _read(specs, tell), craft, altitude_m, tell)
     place = None if files.contents[0].crs is None else _origin(files.contents, given)
     if given is not None and place is not None:
-        (south, west), (north, east) = given
-        x, y = Mapping(WGS84, place).to_plane(np.array([west, east]), np.array([south, north]))
-        given = (float(x[0]), float(y[0])), (float(x[1]), float(y[1]))
+        latitude, longitude = np.array(given).T
+        start, goal = np.column_stack(Mapping(WGS84, place).to_plane(longitude, latitude)).tolist()
+        given = (start[0], start[1]), (goal[0], goal[1])
     areas, notes = _areas(files, place, given)
     faults: list[WorldFileError] = []
-    for own_place, area in areas:
+    for area in areas:
         try:
-            found = _in_area(files, own_place, area, given)
+            found = _in_area(files, area, given)
             return replace(found, notes=(*notes, *found.notes))
         except FileFault:
             raise
@@ -130,16 +141,13 @@ def site(
     raise faults[0]
 
 
-def _read(specs: Sequence[FileSpec], tell: Callable[[str], None] | None) -> tuple[Contents, ...]:
+def _read(specs: Sequence[FileSpec], tell: Callable[[str], None]) -> tuple[Contents, ...]:
     """What the files hold; either all have a place on earth or none."""
     contents: list[Contents] = []
     for index, spec in enumerate(specs):
-        if tell is not None:
-            tell(f"reading {spec.path.name}")
-        try:
+        tell(f"reading {spec.path.name}")
+        with blaming(index):
             contents.append(loaded_file(spec.path, spec.kind, spec.reading))
-        except WorldFileError as error:
-            raise FileFault(index, str(error)) from error
     local = [each.crs is None for each in contents]
     if any(local) and not all(local):
         raise FileFault(
@@ -169,7 +177,7 @@ def _covered(files: _Files, place: Place | None) -> tuple[list[Box], list[Box]]:
     """Boxes of rasters and of fences to stay inside of, beyond which nothing is known or free; and of all others."""
     inside: list[Box] = []
     around: list[Box] = []
-    for each, mapping in zip(files.contents, files.mappings(place), strict=True):
+    for each, mapping in files.placed(place):
         raster = each.terrain or each.occupied
         east, north = mapping.to_plane(*corners_of(each if raster is None else replace(each, parts=())))
         known = np.isfinite(east) & np.isfinite(north)
@@ -177,37 +185,32 @@ def _covered(files: _Files, place: Place | None) -> tuple[list[Box], list[Box]]:
             # Of a raster the largest upright rectangle within its four corners, which may lie askew.
             first, last = (1, 2) if raster is not None else (0, -1)
             x, y = np.sort(east[known]).tolist(), np.sort(north[known]).tolist()
-            fenced = any(part.keep_in for part in each.parts)
-            box = x[first], y[first], x[last], y[last]
-            (inside if raster is not None or fenced else around).append(box)
+            bound = raster is not None or any(part.keep_in for part in each.parts)
+            (inside if bound else around).append((x[first], y[first], x[last], y[last]))
     return inside, around
 
 
-def _common(boxes: Sequence[Box]) -> Box | None:
+def _common(*boxes: Box) -> Box | None:
     """What lies in all of some boxes; None where nothing does."""
-    if not boxes:
-        return None
     (xmin, ymin), (xmax, ymax) = np.max(boxes, axis=0)[:2].tolist(), np.min(boxes, axis=0)[2:].tolist()
     return (xmin, ymin, xmax, ymax) if xmin < xmax and ymin < ymax else None
 
 
-def _areas(
-    files: _Files, place: Place | None, given: Ends | None
-) -> tuple[list[tuple[Place | None, Box]], tuple[str, ...]]:
-    """Areas with their origins, the first the best, and what is to be said of them.
+def _areas(files: _Files, place: Place | None, given: Ends | None) -> tuple[list[Area], tuple[str, ...]]:
+    """Areas, the first the best, and what is to be said of them.
 
     There is one about a start and a goal that are given, and one where the files are small. Of large ones there are
     several parts, the most crowded first, the corners last.
     """
     inside, around = _covered(files, place)
     turn_m = files.craft.turn_radius_m
-    if given is not None:
-        reach = max(PAD_TURNS * turn_m, 0.25 * math.dist(*given))
-        box = (*(np.min(given, axis=0) - reach).tolist(), *(np.max(given, axis=0) + reach).tolist())
-        return [(place, _common([*inside, box]) or box)], ()
     pad = PAD_TURNS * turn_m
+    if given is not None:
+        reach = max(pad, 0.25 * math.dist(*given))
+        box = (*(np.min(given, axis=0) - reach).tolist(), *(np.max(given, axis=0) + reach).tolist())
+        return [(place, _common(*inside, box) or box)], ()
     low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
-    whole = _common([*inside, (*low.tolist(), *high.tolist())])
+    whole = _common(*inside, (*low.tolist(), *high.tolist()))
     if whole is None:
         raise WorldFileError("nothing of these files lies in one area; must overlap")
     sides, largest = (whole[2] - whole[0], whole[3] - whole[1]), min(LARGEST_TURNS * turn_m, LARGEST_M)
@@ -215,7 +218,7 @@ def _areas(
         told = f"the area reaches {pad:,.0f} m beyond what the file holds, to leave room to turn"
         return [(place, whole)], () if inside else (told,)
     half = [min(side, largest) / 2 for side in sides]
-    areas: list[tuple[Place | None, Box]] = []
+    areas: list[Area] = []
     for x, y in _crowded(files, place, whole, half):
         if place is None:
             areas.append((None, (x - half[0], y - half[1], x + half[0], y + half[1])))
@@ -223,7 +226,7 @@ def _areas(
             longitude, latitude = Mapping(WGS84, place).from_plane(np.array([x]), np.array([y]), 0.0)
             own = _place(float(latitude[0]), float(longitude[0]))
             box = (-half[0], -half[1], half[0], half[1])
-            areas.append((own, _common([box, *_covered(files, own)[0]]) or box))
+            areas.append((own, _common(box, *_covered(files, own)[0]) or box))
     told = (
         f"the files reach over {sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km; the area is a part of that"
     )
@@ -237,18 +240,18 @@ def _crowded(
     import shapely
 
     middles: list[FloatArray] = [np.zeros((0, 2))]
-    for each, mapping in zip(files.contents, files.mappings(place), strict=True):
+    for each, mapping in files.placed(place):
         solid = [part.footprint for part in each.parts if _may_reach(part, files.altitude_m)]
         if solid:
             points = shapely.get_coordinates(shapely.centroid(np.array(solid, dtype=object)))
             middles.append(np.column_stack(mapping.to_plane(points[:, 0], points[:, 1])))
-    axes = [
-        np.linspace(low + width, high - width, math.ceil((high - low) / width))
-        for low, high, width in zip(whole[:2], whole[2:], half, strict=True)
-    ]
     places = np.concatenate(middles)
-    within = [np.abs(places[:, k] - axes[k][:, None]) <= half[k] for k in (0, 1)]
-    count = within[0].astype(np.float64) @ within[1].T.astype(np.float64)
+    axes, within = [], []
+    for k in (0, 1):
+        low, high, width = whole[k], whole[k + 2], half[k]
+        axes.append(np.linspace(low + width, high - width, math.ceil((high - low) / width)))
+        within.append((np.abs(places[:, k] - axes[k][:, None]) <= width).astype(np.float64))
+    count = within[0] @ within[1].T
     x, y = np.meshgrid(*axes, indexing="ij")
     away = np.hypot(x - (whole[0] + whole[2]) / 2, y - (whole[1] + whole[3]) / 2)
     order = np.lexsort((away.ravel(), -count.ravel())).tolist()
@@ -262,22 +265,22 @@ def _may_reach(part: Part, altitude_m: float) -> bool:
     return begins and (part.top.datum is Datum.GROUND or part.top.height_m >= altitude_m)
 
 
-def _in_area(files: _Files, place: Place | None, bounds: Box, given: Ends | None) -> Site:
+def _in_area(files: _Files, area: Area, given: Ends | None) -> Site:
     """A mission in an area, or a sentence with the numbers that say why there is none."""
+    place, bounds = area
     if place is None:
         east, north = -bounds[0], -bounds[1]
         moved = (replace(s, shift_m=(s.shift_m[0] + east, s.shift_m[1] + north)) for s in files.specs)
         files = replace(files, specs=tuple(moved))
         bounds = (0.0, 0.0, bounds[2] + east, bounds[3] + north)
-        given = None if given is None else tuple((x + east, y + north) for x, y in given)  # type: ignore[assignment]
+        if given is not None:
+            (x, y), (u, v) = given
+            given = (x + east, y + north), (u + east, v + north)
     # Inwards to whole metres, or to a tenth of a small area.
     step = 1.0 if min(bounds[2] - bounds[0], bounds[3] - bounds[1]) > 100 else 0.1
-    rounds = (math.ceil, math.ceil, math.floor, math.floor)
-    xmin, ymin, xmax, ymax = (
-        round(way(side / step + nudge) * step, 1)
-        for way, side, nudge in zip(rounds, bounds, (-1e-9, -1e-9, 1e-9, 1e-9), strict=True)
-    )
-    bounds = xmin, ymin, xmax, ymax
+    low = [round(math.ceil(side / step - 1e-9) * step, 1) for side in bounds[:2]]
+    high = [round(math.floor(side / step + 1e-9) * step, 1) for side in bounds[2:]]
+    bounds = (*low, *high)  # type: ignore[assignment]
     found = expanded(files.specs, place or ANY_PLACE, bounds, files.altitude_m, files.tell)
     notes: tuple[str, ...] = ()
     if given is None:
@@ -289,29 +292,22 @@ def _in_area(files: _Files, place: Place | None, bounds: Box, given: Ends | None
 def _ends(files: _Files, place: Place | None, bounds: Box, found: Expanded) -> tuple[Ends, tuple[str, ...]]:
     """Start and goal in free room, and what is to be said of the way; or the numbers that say why there are none."""
     craft, forbidden = files.craft, list[Any]()
-    for each, mapping in zip(files.contents, files.mappings(place), strict=True):
+    for each, mapping in files.placed(place):
         if each.occupied is not None:
-            unknown = np.isnan(each.occupied.values)
-            forbidden += placed_cells(each.occupied, unknown, mapping, bounds)[0]
+            forbidden += placed_cells(each.occupied, np.isnan(each.occupied.values), mapping, bounds)[0]
     room = free_room([each for source in found.sources for each in source.polygons], bounds, forbidden)
-    for corridor in CORRIDORS:
-        chosen = ends(room, craft.turn_radius_m, craft.clearance_m, corridor)
-        if chosen is not None and corridor == CORRIDORS[0]:
-            return chosen, ()
-        if chosen is not None:
-            wide_m = 2.0 * (craft.clearance_m + CORRIDORS[0] * craft.turn_radius_m)
-            cell_m = _cell_that_fits(files, room)
-            return chosen, (
-                f"every way from start to goal is somewhere narrower than {wide_m:,.0f} m, where {craft.name} cannot "
-                "turn round: the goal may be proved unreachable"
-                + (f"; with --metres-per-cell {cell_m:g} it can" if cell_m else ""),
-            )
-    cell_m = _cell_that_fits(files, room)
-    would = (
-        f"--metres-per-cell {cell_m:g}"
-        if cell_m
-        else "another altitude, a smaller clearance or aircraft, or a larger file"
-    )
+    chosen = ends(room, craft.turn_radius_m, craft.clearance_m, CORRIDORS[0])
+    if chosen is not None:
+        return chosen, ()
+    cell = f"--metres-per-cell {cell_m:g}" if (cell_m := _cell_that_fits(files, room)) else ""
+    chosen = ends(room, craft.turn_radius_m, craft.clearance_m, CORRIDORS[1])
+    if chosen is not None:
+        wide_m = 2.0 * (craft.clearance_m + CORRIDORS[0] * craft.turn_radius_m)
+        return chosen, (
+            f"every way from start to goal is somewhere narrower than {wide_m:,.0f} m, where {craft.name} cannot turn "
+            "round: the goal may be proved unreachable" + (f"; with {cell} it can" if cell else ""),
+        )
+    would = cell or "another altitude, a smaller clearance or aircraft, or a larger file"
     raise WorldFileError(
         f"{bounds[2] - bounds[0]:,.0f} x {bounds[3] - bounds[1]:,.0f} m, {room.free_share:.0%} free, are too small for "
         f"{craft.name}: its start and goal need {craft.clearance_m + TURNS[-1] * craft.turn_radius_m:,.0f} m of free "

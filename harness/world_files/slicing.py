@@ -8,18 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from harness.files.wording import counted
 from harness.world_files.cells import outlines
 from harness.world_files.height_field import HeightField
-from harness.world_files.parts import Box, Datum, FloatArray, Limit, Part, WorldFileError
+from harness.world_files.parts import Box, Datum, FloatArray, Part, WorldFileError
 from harness.world_files.plane import Mapping
-
-PROBES: Final = 5
-"""Places a side at which the ground below a building is looked up, besides its corners."""
 
 
 class Solid(NamedTuple):
@@ -39,12 +36,9 @@ class HeightBand(NamedTuple):
 
 @dataclass(frozen=True)
 class KnownGround:
-    """What is known of the ground.
+    """What is known of the ground: terrain of the files, and the height where there is none.
 
-    Attributes:
-        field: terrain of the files, None without.
-        flat_m: height where there is no terrain; None: not known.
-        known_in: the area: zones with limits above ground are cut to it where there is terrain.
+    Zones with limits above ground are cut to the area `known_in` where there is terrain.
     """
 
     field: HeightField | None
@@ -121,7 +115,10 @@ def _solid(part: Part, shape: Any, band: HeightBand, ground: KnownGround) -> lis
     heights, corner = _ground_below(part, shape, ground) if on_ground else (np.zeros((1, 1)), (0.0, 0.0))
     if not heights.size or not np.isfinite(heights).all():
         return None
-    lows, tops = _heights(part.bottom, heights), _heights(part.top, heights)
+    lows, tops = (
+        limit.height_m + (heights if limit.datum is Datum.GROUND else 0.0 * heights)
+        for limit in (part.bottom, part.top)
+    )
     solid = Solid(shape, float(lows.min()), float(tops.max()))
     mask = (lows <= band.high_m) & (tops >= band.low_m)
     if part.rigid:  # it stands level, as low and as high as its limits are anywhere
@@ -139,18 +136,17 @@ def _is_out(part: Part, band: HeightBand) -> bool:
     return above or (part.top.datum is Datum.SEA and part.top.height_m < band.low_m)
 
 
-def _heights(limit: Limit, ground_m: FloatArray) -> FloatArray:
-    """A limit above mean sea level, wherever the ground is known."""
-    return limit.height_m + (ground_m if limit.datum is Datum.GROUND else np.zeros(ground_m.shape))
-
-
 def _ground_below(part: Part, shape: Any, ground: KnownGround) -> tuple[FloatArray, tuple[float, float]]:
-    """Heights of the ground below a part, NaN where it is not known; and the first corner of their cells."""
+    """Heights of the ground below a part, NaN where it is not known; and the first corner of their cells.
+
+    Of what is rigid at its corners, of which some may lie outside of the terrain.
+    """
     import shapely
 
     heights, corner = np.array([[math.nan]]), (0.0, 0.0)
     if ground.field is not None and part.rigid:
-        heights = _probed(ground.field, shape)
+        heights = ground.field.at(*shapely.get_coordinates(shape).T)
+        heights = heights[np.isfinite(heights)]
     elif ground.field is not None:
         heights, corner = _nodes_under(ground.field, shapely.bounds(shape).tolist())
     if ground.flat_m is not None:
@@ -167,16 +163,3 @@ def _nodes_under(field: HeightField, bounds: list[float]) -> tuple[FloatArray, t
     )
     heights = field.at(*np.meshgrid(east + right * columns, north + up * rows))
     return heights, (east + (columns[0] - 0.5) * right, north + (rows[0] - 0.5) * up)
-
-
-def _probed(field: HeightField, shape: Any) -> FloatArray:
-    """Heights of the ground below a small shape: at its corners and at places inside."""
-    import shapely
-
-    xmin, ymin, xmax, ymax = shapely.bounds(shape)
-    grid = np.meshgrid(np.linspace(xmin, xmax, PROBES), np.linspace(ymin, ymax, PROBES))
-    east, north = grid[0].ravel(), grid[1].ravel()
-    inside = shapely.contains_xy(shape, east, north)
-    corners = shapely.get_coordinates(shape)
-    heights = field.at(np.append(corners[:, 0], east[inside]), np.append(corners[:, 1], north[inside]))
-    return heights[np.isfinite(heights)]  # a building may stand half outside of the terrain

@@ -35,9 +35,6 @@ def read(path: Path, reading: Reading) -> Contents:
     """Reads the buildings and bridges of a CityJSON file, or of a sequence of them (CityJSONSeq), a feature a line.
 
     A building that is flat, as those of level of detail 0 are, is as high as its attributes say.
-
-    Raises:
-        WorldFileError: it is not CityJSON, or has nothing solid.
     """
     contents = json_of(path, lines=True)
     if not all(isinstance(each, dict) and isinstance(each.get("CityObjects"), dict) for each in contents):

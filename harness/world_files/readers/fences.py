@@ -21,11 +21,7 @@ MAX_BYTES: Final = 10_000_000
 
 
 def read_plan(path: Path, reading: Reading) -> Contents:
-    """Reads the geoFence of a QGroundControl plan.
-
-    Raises:
-        WorldFileError: it has none, or it cannot be read.
-    """
+    """Reads the geoFence of a QGroundControl plan."""
     content = json_of(path)
     if not isinstance(content, dict) or not isinstance(content.get("geoFence"), dict):
         raise WorldFileError("has no geoFence; must be a QGroundControl plan with one")
@@ -37,11 +33,7 @@ def read_plan(path: Path, reading: Reading) -> Contents:
 
 
 def read_ardupilot(path: Path, reading: Reading) -> Contents:
-    """Reads an ArduPilot fence: lines of latitude and longitude, the return point first; or a waypoint file.
-
-    Raises:
-        WorldFileError: it cannot be read, or has no fence.
-    """
+    """Reads an ArduPilot fence: lines of latitude and longitude, the return point first; or a waypoint file."""
     text = text_of(read_bytes(path, MAX_BYTES))
     if text.startswith(WPL):
         items = wpl_items(text, "")

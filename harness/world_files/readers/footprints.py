@@ -24,13 +24,7 @@ Place = tuple[float, float]
 
 
 def finished(contents: Contents) -> Contents:
-    """Contents whose footprints are valid, have an area, and go the short way round the earth.
-
-    Footprints without an area are passed over and counted.
-
-    Raises:
-        WorldFileError: a coordinate is not finite or not on earth, or no footprint is left.
-    """
+    """Contents whose footprints are valid, on earth, have an area (others are counted), and go the short way round."""
     import shapely
 
     if contents.terrain is not None or contents.occupied is not None:
@@ -121,11 +115,7 @@ def corridor(line: Sequence[Place], width_m: float) -> Any:
 
 
 def on_earth(longitude: float, latitude: float) -> Place:
-    """The place, if it is one.
-
-    Raises:
-        WorldFileError: it is not on earth.
-    """
+    """The place, which must be on earth."""
     if not (abs(longitude) <= TURN_DEG and abs(latitude) <= 90.0):
         raise WorldFileError(
             f"has a place at latitude {latitude:g}, longitude {longitude:g}; must be degrees, WGS84"

@@ -14,11 +14,7 @@ from harness.world_files.readers import limits
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads the polygons of a GeoJSON file; points and lines are passed over and counted.
-
-    Raises:
-        WorldFileError: it is not GeoJSON, or has no polygon.
-    """
+    """Reads the polygons of a GeoJSON file; points and lines are passed over and counted."""
     content = whole(path)
     shapes = [
         (tags, polygon_of(each)) for tags, geometry in features_of(content) for each in simple(geometry)
@@ -40,11 +36,7 @@ def whole(path: Path) -> Any:
 
 
 def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any]]:
-    """Attributes and geometry of each feature; its `id` is an attribute where it has no name.
-
-    Raises:
-        WorldFileError: it is no GeoJSON.
-    """
+    """Attributes and geometry of each feature; its `id` is an attribute where it has no name."""
     kind = content.get("type") if isinstance(content, dict) else None
     features = content.get("features") if kind == "FeatureCollection" else [content]
     if not isinstance(features, list) or not all(isinstance(each, dict) for each in features):
@@ -70,11 +62,7 @@ def simple(geometry: Any) -> Iterator[dict[str, Any]]:
 
 
 def polygon_of(geometry: dict[str, Any]) -> Any:
-    """The shapely geometry of a Polygon or MultiPolygon; None of anything else.
-
-    Raises:
-        WorldFileError: it has fewer than three corners, or positions that are not two numbers.
-    """
+    """The shapely geometry of a Polygon or MultiPolygon; None of anything else."""
     import shapely
     from shapely.geometry import shape
 

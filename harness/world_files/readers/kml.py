@@ -8,7 +8,17 @@ from typing import Any, Final
 from harness.files.kml import Shape, read_kml
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes
-from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Datum, Limit, Part, Reading
+from harness.world_files.parts import (
+    NO_BOTTOM,
+    NO_TOP,
+    WGS84,
+    Contents,
+    Datum,
+    Limit,
+    Part,
+    Reading,
+    WorldFileError,
+)
 from harness.world_files.readers import limits
 
 DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
@@ -22,9 +32,6 @@ def read(path: Path, reading: Reading) -> Contents:
 
     Each is solid from the ground up to its highest corner; on the ground it is solid at every altitude. Limits in its
     ExtendedData go before altitudes.
-
-    Raises:
-        WorldFileError: the file is not whole.
     """
     found = read_kml(read_bytes(path, MAX_TREE_BYTES), "", MAX_TREE_BYTES)
     notes = list(found.notes)
@@ -57,8 +64,6 @@ def _part(shape: Shape, notes: list[str]) -> Part:
 
 def _polygon(rings: list[list[tuple[float, float]]], name: str) -> Any:
     import shapely
-
-    from harness.world_files.parts import WorldFileError
 
     try:
         return shapely.Polygon(rings[0], [ring for ring in rings[1:] if ring])

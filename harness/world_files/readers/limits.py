@@ -95,11 +95,14 @@ def limit_of(text: str, unit_m: float | None = FOOT_M, datum: Datum | None = Dat
     if len(numbers) != 1 or not set(words) <= set(_WORDS):
         return None
     value = float(numbers[0].replace(" ", ""))
-    datum = next((_DATUMS[each] for each in words if _DATUMS.get(each) is Datum.GROUND), datum)
+    own = [_DATUMS[each] for each in words if each in _DATUMS]
+    datum = Datum.GROUND if Datum.GROUND in own else Datum.SEA if own else datum
     if value <= _NOT_KNOWN or (datum is Datum.GROUND and value < 0.0):
         return None  # as in SFC-2500, which says where a zone begins as well
+    if "FL" in words:
+        return Limit(value * _UNITS["FL"])
     factor = next((_UNITS[each] for each in words if each in _UNITS), unit_m)
-    return Limit(value * (factor or 1.0), Datum.SEA if "FL" in words else datum or Datum.SEA)
+    return Limit(value * (factor or 1.0), datum or Datum.SEA)
 
 
 def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | None:
@@ -117,11 +120,9 @@ def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | No
     apart = re.findall(r"[A-Z]+", said)
     unit_m = next((_UNITS[each] for each in apart if each in _UNITS), None)
     datum = next((_DATUMS[each] for each in apart if each in _DATUMS), None)
-    limit = limit_of(text, unit_m, datum)
     own = set(_TOKEN.findall(text.upper()))
     is_level = "FL" in own or (unit_m == _UNITS["FL"] and not own & set(_UNITS))
-    if limit is not None and is_level:
-        limit = Limit(limit.height_m)
+    limit = limit_of(text, unit_m, Datum.SEA if is_level else datum)
     if limit is None or not re.search(r"[1-9]", text):  # the surface, or nothing that is known
         return limit
     told = []

@@ -16,18 +16,14 @@ from harness.world_files.readers import raster
 
 FREE, BLOCKED = b".GS", b"@OTW"
 """Ground and shallow water; out of bounds, trees and deep water of the MovingAI format (Sturtevant, 2012)."""
-MODES: Final = ("trinary", "scale", "raw")
-"""Ways of ROS map_server to tell occupied, free and unknown from a grey."""
-IMAGES: Final = {b"P": "PNM", b"\x89": "PNG", b"B": "BMP", b"\xff": "JPEG"}
+MODES: Final = ("trinary", "scale")
+"""Ways of ROS map_server to tell occupied, free and unknown from a grey; `raw` is not read."""
+IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}
 """GDAL's driver of an image by its first byte."""
 
 
 def read_moving_ai(path: Path, reading: Reading) -> Contents:
-    """Reads a MovingAI map; a cell is as large as `metres_per_cell` says, else one metre.
-
-    Raises:
-        WorldFileError: it is not whole.
-    """
+    """Reads a MovingAI map; a cell is as large as `metres_per_cell` says, else one metre."""
     lines = text_of(read_bytes(path)).splitlines()
     head = dict(line.split(None, 1) for line in lines[:3] if len(line.split()) == 2)
     try:
@@ -55,11 +51,7 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     """Reads a map of ROS map_server: a YAML file and the image that it names.
 
     Occupied and free are told as map_server does: p = (255 - grey) / 255, or grey / 255 if `negate`; above
-    `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown. In mode `raw` p = grey / 100, and
-    above 100 nothing is known; a cell that is not opaque is unknown.
-
-    Raises:
-        WorldFileError: it is not such a map, or its image cannot be read.
+    `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown.
     """
     try:
         keys = strict_yaml.parse(text_of(read_bytes(path, 100_000)), "map").plain()
@@ -70,22 +62,22 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     mode, size = str(keys.get("mode", "trinary")).lower(), keys.get("resolution", 0.0)
     origin = keys.get("origin", (0.0, 0.0, 0.0))
     over, under = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
-    shares = all(_is_number(each) and 0.0 <= each <= 1.0 for each in (over, under))
     for is_right, fault in (
         (mode in MODES, f"the mode {mode[:20]!r}; must be one of {', '.join(MODES)}"),
         (_is_number(size) and 0 < size < 1e6, "no positive resolution; must be a map of ROS map_server"),
-        (isinstance(origin, tuple) and len(origin) in (2, 3), "an origin that is not [x, y, yaw]"),
-        (shares, f"the thresholds {over} and {under}; must be shares between 0 and 1"),
+        (
+            isinstance(origin, tuple) and len(origin) in (2, 3) and all(map(_is_number, origin)),
+            "an origin that is not [x, y, yaw]",
+        ),
+        (
+            all(_is_number(each) and 0.0 <= each <= 1.0 for each in (over, under)),
+            f"the thresholds {over} and {under}; must be shares between 0 and 1",
+        ),
     ):
         if not is_right:
             raise WorldFileError(f"has {fault}")
-    if not all(map(_is_number, origin)):
-        raise WorldFileError("has an origin that is not [x, y, yaw]")
-    grey = _greys(path.parent / keys["image"])
-    share = grey / (100.0 if mode == "raw" else 255.0)
-    if mode == "raw":
-        share[share > 1.0] = np.nan
-    elif not keys.get("negate", 0):
+    share = _greys(path.parent / keys["image"])
+    if not keys.get("negate", 0):
         share = 1.0 - share
     solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
     # The lower left corner is given, and the map is turned counter-clockwise about it by `yaw` radians.
@@ -98,28 +90,18 @@ def read_ros(path: Path, reading: Reading) -> Contents:
 
 
 def _greys(path: Path) -> FloatArray:
-    """(rows, columns) greys of an image from 0 to 255, of colours their mean, NaN where it is not opaque."""
+    """(rows, columns) greys of an image from 0 to 1, of colours their mean."""
     try:
-        read_bytes(path, first=1)
         with raster.opened(path, IMAGES.get(read_bytes(path, first=1), "PNM")) as source:
-            bands = source.read().astype(np.float64)
-            full = 255.0 if source.dtypes[0] == "uint8" else 65_535.0
-            if source.colorinterp[0].name == "palette":
-                colours = source.colormap(1)
-                table = np.array([colours[index] for index in range(len(colours))], dtype=np.float64)
-                bands = np.moveaxis(table[bands[0].astype(np.int64)], 2, 0)
+            if source.colorinterp[0].name == "palette" or source.count in (2, 4):
+                raise WorldFileError("has a palette or is not opaque; save it as plain grey PGM or PNG")
+            greys: FloatArray = source.read().astype(np.float64).mean(axis=0)
+            return greys / (255.0 if source.dtypes[0] == "uint8" else 65_535.0)
     except WorldFileError as error:
         if "pip install" in str(error):
             raise
         said = str(error).partition(";")[0]
-        raise WorldFileError(
-            f"names the image {path.name}, which {said}; must be PGM, PNG, BMP or JPEG"
-        ) from error
-    has_alpha = len(bands) in (2, 4)
-    greys: FloatArray = bands[: len(bands) - has_alpha].mean(axis=0) * 255.0 / full
-    if has_alpha:
-        greys[bands[-1] < full] = np.nan
-    return greys
+        raise WorldFileError(f"names the image {path.name}, which {said}; must be grey PGM or PNG") from error
 
 
 def _is_number(value: Any) -> bool:

@@ -93,11 +93,7 @@ class _Airspace:
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads every airspace, whatever its class.
-
-    Raises:
-        WorldFileError: a coordinate or a radius cannot be read (with its line), or there is no airspace.
-    """
+    """Reads every airspace, whatever its class."""
     spaces: list[_Airspace] = []
     ignored = Counter[str]()
     for number, line in enumerate(text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines(), 1):

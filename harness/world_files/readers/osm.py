@@ -28,11 +28,7 @@ TALL: Final = frozenset(
 
 
 def read_xml(path: Path, reading: Reading) -> Contents:
-    """Reads an OpenStreetMap XML file.
-
-    Raises:
-        WorldFileError: it is not whole, has no building, or osmium is not installed.
-    """
+    """Reads an OpenStreetMap XML file."""
     data = read_bytes(path, MAX_BYTES)
     _check_xml(data)
     if re.search(rb"<nd [^>]*\blat=", data):
@@ -81,11 +77,7 @@ def _osmium() -> Any:
 
 
 def read_pbf(path: Path, reading: Reading) -> Contents:
-    """Reads an OpenStreetMap PBF file.
-
-    Raises:
-        WorldFileError: it is damaged, has no building, or osmium is not installed.
-    """
+    """Reads an OpenStreetMap PBF file."""
     read_bytes(path, first=1)
     osmium = _osmium()
     keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")

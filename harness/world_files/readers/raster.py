@@ -1,10 +1,11 @@
-"""Terrain from rasters that rasterio reads (`wayproof[maps]`): GeoTIFF, ESRI ASCII grid, SRTM .hgt."""
+"""Terrain from rasters that rasterio reads (`wayproof[maps]`): GeoTIFF, ESRI ASCII grid, SRTM .hgt; and from NumPy."""
 
 from __future__ import annotations
 
 import math
 import re
 import warnings
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from harness.files.zip_archive import member_path
+from harness.files.zip_archive import DAMAGES, member_path
 from harness.world_files.bounded import read_bytes
 from harness.world_files.parts import FOOT_M, WGS84, Contents, FloatArray, Raster, Reading, WorldFileError
 from harness.world_files.plane import axis_units
@@ -21,8 +22,8 @@ MAX_CELLS: Final = 60_000_000
 """Most cells of a raster: half a gigabyte of heights."""
 CACHE_MB: Final = 64
 """Size of GDAL's cache, which is a twentieth of the machine's memory otherwise."""
-MAX_TILE_BYTES: Final = 30_000_000
-"""An archive with an SRTM tile unpacks to at most this."""
+MAX_TILE_BYTES, MAX_NUMPY_BYTES = 30_000_000, 500_000_000
+"""An archive with an SRTM tile, and one with NumPy arrays, unpacks to at most this."""
 VOIDS: Final = (-9999.0, -32767.0, -32768.0)
 """Values of cells without a height in files that do not say so."""
 HEIGHTS_M: Final = (-12_000.0, 9_000.0)
@@ -37,11 +38,7 @@ UNITS_M: Final = {
 
 @contextmanager
 def opened(path: Path | str, driver: str) -> Iterator[Any]:
-    """A raster of rasterio; no other driver of GDAL than the one that is named may open it.
-
-    Raises:
-        WorldFileError: rasterio is not installed, or the file cannot be read, or has too many cells.
-    """
+    """A raster of rasterio; no other driver of GDAL than the one that is named may open it."""
     try:
         import rasterio
         from rasterio.errors import RasterioError
@@ -67,11 +64,7 @@ def opened(path: Path | str, driver: str) -> Iterator[Any]:
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads a raster of one band of heights; an SRTM tile may be packed as .zip or .gz.
-
-    Raises:
-        WorldFileError: it cannot be read, has no place on earth where it must have one, or is too large.
-    """
+    """Reads a raster of one band of heights; an SRTM tile may be packed as .zip or .gz."""
     read_bytes(path, first=1)
     notes: list[str] = []
     with opened(*_inside(path)) as source:
@@ -169,14 +162,35 @@ def _to_metres(values: FloatArray, source: Any, crs: str) -> list[str]:
 
 
 def _placed(source: Any) -> tuple[float, float, float, float, float, float]:
-    """Where a raster of rasterio lies, by its transformation.
-
-    Raises:
-        WorldFileError: it has none, or one that is singular.
-    """
+    """Where a raster of rasterio lies, by its transformation."""
     a, b, c, d, e, f = tuple(source.transform)[:6]
     if source.transform.is_identity:
         raise WorldFileError("says not where it lies (no transformation); warp it with gdalwarp")
     if not math.isfinite(a + b + c + d + e + f) or a * e == b * d:
         raise WorldFileError("has cells of no size; must be terrain")
     return a, b, c, d, e, f
+
+
+def read_numpy(path: Path, reading: Reading) -> Contents:
+    """Reads an archive of NumPy: what matplotlib's wheel brings along as `jacksboro_fault_dem.npz`.
+
+    It has `elevation` in rows from the north, and its edges in degrees: of `ymin` and `ymax` the larger is north.
+    """
+    read_bytes(path, first=1)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(each.file_size for each in archive.infolist()) > MAX_NUMPY_BYTES:
+                raise WorldFileError(f"unpacks to more than {MAX_NUMPY_BYTES // 10**6} MB")
+        with np.load(path, allow_pickle=False) as arrays:
+            values = arrays["elevation"].astype(np.float64)
+            west, east, south, north = (float(arrays[name]) for name in ("xmin", "xmax", "ymin", "ymax"))
+    except WorldFileError:
+        raise
+    except (KeyError, TypeError, *DAMAGES) as error:
+        raise WorldFileError("must have numbers `elevation`, `xmin`, `xmax`, `ymin`, `ymax`") from error
+    south, north = min(south, north), max(south, north)
+    if values.ndim != 2 or not values.size or not (-180 <= west < east <= 180 and -90 <= south < north <= 90):
+        raise WorldFileError("must have rows and columns of elevation, and edges in degrees around an area")
+    rows, columns = values.shape
+    affine: Any = ((east - west) / columns, 0.0, west, 0.0, -(north - south) / rows, north)
+    return Contents("numpy_dem", reading.crs or WGS84, terrain=Raster(values, affine))

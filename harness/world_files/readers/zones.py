@@ -15,11 +15,7 @@ from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import circle
 from harness.world_files.readers.geo_json import features_of, polygon_of, simple, whole
 
-UNITS: Final = {
-    **dict.fromkeys(("", "m", "metre", "metres", "meter", "meters"), "m"),
-    **dict.fromkeys(("ft", "f", "foot", "feet"), "ft"),
-    "fl": "fl",
-}
+UNITS: Final = {"": "m", "m": "m", "ft": "ft", "feet": "ft", "fl": "fl"}
 """Units of limits by the names that files use."""
 PASSED: Final = (
     ("empty", "zone", "without a geometry passed over"),
@@ -31,11 +27,7 @@ PASSED: Final = (
 
 
 def read_ed269(path: Path, reading: Reading) -> Contents:
-    """Reads all zones of ED-269 but those without restriction, whatever the time.
-
-    Raises:
-        WorldFileError: it is not ED-269, or has no zone.
-    """
+    """Reads all zones of ED-269 but those without restriction, whatever the time."""
     content = json_of(path)
     if isinstance(content, dict):
         content = content.get("features", content.get("UASZoneList"))
@@ -74,11 +66,7 @@ def _ed269_part(volume: Any, name: str, notes: list[str]) -> Part:
 
 
 def read_ed318(path: Path, reading: Reading) -> Contents:
-    """Reads all zones of ED-318: each geometry has a layer, and a circle is a point with an extent.
-
-    Raises:
-        WorldFileError: it is not ED-318, or has no zone.
-    """
+    """Reads all zones of ED-318: each geometry has a layer, and a circle is a point with an extent."""
     notes: list[str] = []
     parts: list[Part] = []
     told = Counter[str]()

@@ -12,6 +12,7 @@ import pytest
 import shapely
 
 from aircraft.frames import LocalPlane
+from harness.world_files.cells import simplified
 from harness.world_files.expansion import (
     Expanded,
     FileFault,
@@ -20,7 +21,6 @@ from harness.world_files.expansion import (
     expanded,
     loaded_file,
 )
-from harness.world_files.growing import simplified
 from harness.world_files.plane import Mapping, Place, geodetic
 from tests.harness.world_files.making import SHARED, SQUARE, feature, geojson, geotiff
 from tests.longer import longer

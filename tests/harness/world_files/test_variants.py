@@ -335,6 +335,10 @@ def test_a_sequence_of_city_features_has_vertices_a_line(tmp_path: Path) -> None
             Limit(10.0, Datum.GROUND), Limit(500.0),
         ),
         ({"lower": "GND", "upper": "UNLTD"}, NO_BOTTOM, NO_TOP),
+        (
+            {"lower": "200 ft AMSL", "lowerReference": "AGL", "upper": "FL 65", "upperReference": "AGL"},
+            Limit(200 * FOOT_M), Limit(6500 * FOOT_M),
+        ),
     ],
 )  # fmt: skip
 def test_limits_of_zones_by_the_names_that_authorities_use(
