@@ -133,12 +133,8 @@ def error_colours(share: FloatArray) -> np.ndarray[Any, np.dtype[np.uint8]]:
 class Frame:
     """What the views are framed on; kept in every recording, so that several can be shown in one.
 
-    Attributes:
-        bounds_m: xmin, ymin, xmax, ymax of the area.
-        altitude_m: altitude to be held, above mean sea level.
-        clearance_m: wanted distance from every obstacle edge.
-        bank_limit_deg: largest bank command of the guidance; None where several flights are shown.
-        world: hash of the obstacles; empty where they are not known.
+    `bank_limit_deg` is None where several flights are shown; `world` is a hash of the obstacles, empty where they are
+    not known.
     """
 
     bounds_m: tuple[float, float, float, float]
@@ -176,15 +172,15 @@ class Scene:
     Attributes:
         name: of the recording, for example "paper_circles, rolling_window, aerosonde, seed 1".
         mission: goal, bounds, clearance and sensing range.
-        start_m: (east, north) of the start.
+        start_m: (east, north).
         limits: altitude to be held, bank limit, and the error from which on a plan is not tracked.
-        obstacles: the true obstacles.
-        scenario_yaml: the scenario as flown, for the summary.
+        obstacles: the true ones.
+        scenario_yaml: as flown, for the summary.
         searches: whether a planner searches; not where a given path is flown.
         ground: heights of the true ground, where they are known.
         believes: whether the aircraft does not know its state exactly.
         profile: altitudes to be held at places along the path, above mean sea level; None: one all along.
-        wind: speed (m/s) of the steady wind, and the direction (deg clockwise from north) that it blows from.
+        wind: speed (m/s), and the direction (deg clockwise from north) that it blows from.
     """
 
     name: str

@@ -32,12 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ReportedFlight:
-    """One planner on one scenario and what came of it.
-
-    Attributes:
-        row: its figures.
-        run: what was flown; None if the software failed.
-    """
+    """The figures of one planner on one scenario, and what was flown; None if the software failed."""
 
     row: Row
     run: Run | None = None

@@ -1,6 +1,6 @@
 """Figures of a comparison for papers and reports: the paper's Figures 2 and 3 from our own runs.
 
-Drawn without a screen. The same values give the same files: SVG carries no date and its ids no chance.
+The style of all figures stands in `figure_style`.
 """
 
 from __future__ import annotations
@@ -45,14 +45,7 @@ SPARE = 1.35
 
 @dataclass(frozen=True, eq=False)
 class DrawnRun:
-    """One planner's flight, ready to be drawn.
-
-    Attributes:
-        planner: its kind.
-        outcome: how it ended.
-        track: what was flown.
-        plans: the plan of rows with `plan_index` i is `plans[i]`.
-    """
+    """One planner's flight, ready to be drawn; the plan of rows with `plan_index` i is `plans[i]`."""
 
     planner: str
     outcome: str
@@ -72,21 +65,10 @@ class DrawnRun:
 
 @dataclass(frozen=True, eq=False)
 class FigureScene:
-    """What all flights of a scenario have in common.
+    """What all flights of a scenario have in common, the true obstacles among it.
 
-    Attributes:
-        name: the scenario's.
-        bounds_m: xmin, ymin, xmax, ymax.
-        obstacles: the true ones.
-        start_m: (east, north).
-        goal_m: (east, north).
-        goal_radius_m: of the goal circle.
-        clearance_m: wanted.
-        turn_radius_m: smallest radius of the aircraft.
-        optimum_m: (k, 2) the clairvoyant shortest path; empty where there is none.
-        turning_optimum_m: its estimated length for an aircraft that turns; None where there is none.
-        wind: speed in m/s and where it blows from in degrees; speed 0 without wind.
-        navigation_margin_m: kept beyond the clearance, for the navigation error.
+    `optimum_m` is the clairvoyant shortest path (k, 2), empty where there is none; `turning_optimum_m` its estimated
+    length for an aircraft that turns. `wind` has its speed (m/s) and where it blows from (degrees).
     """
 
     name: str

@@ -15,13 +15,7 @@ from harness.analysis.rows import DASH, Row, shown_figures
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure in the report.
-
-    Attributes:
-        svg: the file's content.
-        alt: what it shows, for those who cannot see it.
-        caption: a sentence below it.
-    """
+    """A figure in the report: its SVG, what it shows for those who cannot see it, and a sentence below it."""
 
     svg: bytes
     alt: str
@@ -35,15 +29,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Chapter:
-    """One scenario.
-
-    Attributes:
-        name: the scenario's.
-        facts: what was asked, name and value.
-        rows: one a planner.
-        pictures: in order.
-        note: a sentence where something is missing, else empty.
-    """
+    """One scenario: what was asked (name and value), a row a planner, and a note where something is missing."""
 
     name: str
     facts: Mapping[str, str]

@@ -29,14 +29,7 @@ def campaign_path(text: str) -> Path:
     Raises:
         InputError: there is neither such a file nor such a shipped campaign.
     """
-    path, shipped = Path(text), shipped_campaigns()
-    if path.is_file():
-        return path
-    inside = path.parent in (Path(), Path("scenarios/campaigns")) and path.suffix in ("", ".yaml")
-    if inside and path.stem in shipped and not path.exists():
-        return shipped[path.stem]
-    what = "is not a file" if path.exists() else "no such file"
-    raise InputError(f"{text}: {what}; give a campaign file or one of {', '.join(shipped)}")
+    return _named(text, shipped_campaigns(), Path("scenarios/campaigns"), "a campaign file")
 
 
 def scenario_path(text: str) -> Path:
@@ -48,23 +41,25 @@ def scenario_path(text: str) -> Path:
     Raises:
         InputError: there is neither such a file nor such a shipped scenario.
     """
-    path, shipped = Path(text), shipped_scenarios()
+    return _named(text, shipped_scenarios(), Path("scenarios"), "a scenario file")
+
+
+def _named(text: str, shipped: dict[str, Path], folder: Path, what: str) -> Path:
+    path, wanted = Path(text), f"give {what} or one of {', '.join(shipped)}"
     try:
         if path.is_file():
             return path
-        path.exists()
+        there = path.exists()
     except OSError as error:
-        raise InputError(
-            f"{text}: cannot be read ({error.strerror}); give a scenario file or one of {', '.join(shipped)}"
-        ) from error
-    inside = path.parent in (Path(), Path("scenarios")) and path.suffix in ("", ".yaml")
-    if inside and path.stem in shipped and not path.exists():
+        raise InputError(f"{text}: cannot be read ({error.strerror}); {wanted}") from error
+    if there:
+        raise InputError(f"{text}: is not a file; {wanted}")
+    if path.parent in (Path(), folder) and path.suffix in ("", ".yaml") and path.stem in shipped:
         return shipped[path.stem]
-    if not path.exists() and text in (worlds := shipped_worlds()):
-        return worlds[text]
-    if path.exists():
-        raise InputError(f"{text}: is not a file; give a scenario file or one of {', '.join(shipped)}")
-    raise InputError(f"{text}: no such file; give a scenario file or one of {', '.join(shipped)}")
+    world = shipped_worlds().get(text) if folder == Path("scenarios") else None
+    if world is None:
+        raise InputError(f"{text}: no such file; {wanted}")
+    return world
 
 
 def summary(path: Path) -> str:
