@@ -1,8 +1,9 @@
-"""Shielded flights among trees and walls: `python -m tests.closed_loop.shield_table ROWS.csv [FLIGHTS]`.
+"""Shielded flights among trees and walls: `python -m tests.closed_loop.shield_table ROWS.csv FLIGHTS`.
 
 Flight number n takes planner n modulo their count, and one world of 2.0 x 1.4 km for all planners of a round. Each row
 goes into the CSV as it is flown; a second call goes on after the last. Contact and departure are judged by shapely from
 the track and the true obstacles. Those that people use are flown bare in the same world too. Prints the table.
+`ROWS.csv FLIGHTS 0 2` flies the first of two parts, for two processors; `ROWS0.csv ROWS1.csv` prints the table of both.
 """
 
 from __future__ import annotations
@@ -148,22 +149,29 @@ def upper(hits: int, flights: int) -> float:
 def table(rows: pd.DataFrame) -> str:
     """A row a planner, in Markdown, and the bounds over all."""
     told = [
-        "| planner | flights | reached | contacts | departures | least distance, m | length over bare: median (n) "
-        "| refused, share of calls | own time p50, p99, ms |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| planner | flights | reached | of those without a wall | contacts, departures | bare: contacts "
+        "| length over bare: median, p95 (n) | refused, share of calls | on the backup, s a flight "
+        "| shield alone, p50, p99 of the median flight, ms |",
+        "|" + " --- |" * 10,
     ]
     safe, bare = rows[rows.shield == "loiter"], rows[rows.shield == "none"]
     for name in PLANNERS:
         mine = safe[safe.planner == name]
         pair = mine.merge(bare[bare.planner == name], on="world", suffixes=("", "_bare"))
         pair = pair[(pair.outcome == "reached") & (pair.outcome_bare == "reached")]
-        ratio = f"{(pair.length_m / pair.length_m_bare).median():.3f} ({len(pair)})" if len(pair) else "-"
-        refused = mine.refused.sum() / max(mine.calls.sum(), 1)
+        over = pair.length_m / pair.length_m_bare
+        ratio = f"{over.median():.3f}, {over.quantile(0.95):.2f} ({len(pair)})" if len(pair) else "-"
+        flown_bare = bare[bare.planner == name]
+        bare_hits = f"{flown_bare.contact.sum()} of {len(flown_bare)}" if len(flown_bare) else "-"
+        refused = f"{100 * mine.refused.sum() / mine.calls.sum():.1f} %" if mine.calls.sum() else "-"
+        open_ = mine[mine.world % 3 != 0]
         own = f"{mine.own_p50_ms.median():.1f}, {mine.own_p99_ms.median():.1f}" if mine.calls.sum() else "-"
         told.append(
-            f"| `{name}` | {len(mine)} | {(mine.outcome == 'reached').sum()} | {mine.contact.sum()} | "
-            f"{mine.departed.sum()} | {mine.away_m.min():.1f} | {ratio} | {refused:.3f} | {own} |"
+            f"| `{name}` | {len(mine)} | {(mine.outcome == 'reached').sum()} | "
+            f"{(open_.outcome == 'reached').sum()} of {len(open_)} | {mine.contact.sum()}, {mine.departed.sum()} | "
+            f"{bare_hits} | {ratio} | {refused} | {mine.backup_s.mean():.1f} | {own} |"
         )
+    told += [f"least distance: {safe.away_m.min():.1f} m"]
     for what in ("contact", "departed"):
         hits, flights = int(safe[what].sum()), len(safe)
         bound = f"below {100 * upper(hits, flights):.2f} % at 95 %"
@@ -171,10 +179,10 @@ def table(rows: pd.DataFrame) -> str:
     return "\n".join(told)
 
 
-def main(file: Path, flights: int) -> None:
+def main(file: Path, flights: int, part: int = 0, parts: int = 1) -> None:
     """Flies on from what a file has already, and prints the table of all."""
     done = len(pd.read_csv(file).query("shield == 'loiter'")) if file.exists() else 0
-    for n in range(done, flights):
+    for n in range(part, flights, parts)[done:]:
         name, number = PLANNERS[n % len(PLANNERS)], n // len(PLANNERS)
         for shield in ("none", "loiter") if name in PAIRED else ("loiter",):
             row = flown(name, number, shield)
@@ -188,4 +196,8 @@ def main(file: Path, flights: int) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 2000)
+    given = sys.argv[1:]
+    if all(each.endswith(".csv") for each in given):
+        print(table(pd.concat([pd.read_csv(each) for each in given])))
+    else:
+        main(Path(given[0]), *map(int, given[1:]))

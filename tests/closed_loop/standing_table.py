@@ -85,7 +85,9 @@ def pairs(rows: pd.DataFrame) -> list[str]:
         least = max(least, min(1.0, p * (len(found) - place)))
         mean = mean_estimate(log.to_numpy(), log.index.to_numpy())
         low, high = np.exp((mean.low or 0.0, mean.high or 0.0))
-        told.append(f"| `{name}` | {len(log)} | {np.exp(log.mean()):.3f} [{low:.3f}, {high:.3f}] | {least:.2g} |")
+        told.append(
+            f"| `{name}` | {len(log)} | {np.exp(log.mean()):.3f} [{low:.3f}, {high:.3f}] | {least:.2g} |"
+        )
     return told
 
 
