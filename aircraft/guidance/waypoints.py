@@ -1,20 +1,27 @@
-"""A plan flown as a mission of waypoints: the law follows the straight leg to the next waypoint, then the leg after it.
+"""A plan or a mission flown leg by leg: the law follows the straight leg to the next waypoint, then the leg after it.
 
-This is how the aircraft of ArduPilot and PX4 fly: they know nothing of the arcs of a plan. The waypoints are where the
+This is how the aircraft of ArduPilot and PX4 fly: they know nothing of the arcs of a plan. Its waypoints are where the
 lines of the plan meet: the corners that its arcs round. A closing loiter is flown as a circle. A waypoint counts as
-reached within an acceptance radius, or when the aircraft is past it (ArduPilot, "Mission planning", WP_RADIUS; PX4,
-"Fixed-wing mission mode"; Beard and McLain, algorithm 5).
+reached within an acceptance radius, its own or that of the law's autopilot, or when the aircraft is past it (ArduPilot,
+"Mission planning", WP_RADIUS; PX4, "Fixed-wing mission mode"; Beard and McLain, algorithm 5).
+
+A mission's loiter is left when the aircraft has gone round far enough. Autopilots that head for the centre of a loiter
+and then join its circle are flown so: PX4 (`navigateLoiter`: far from the circle the bearing is that to its nearest
+point, which is towards the centre) and ArduPilot (ArduPlane's mission mode: the line to the centre is followed until
+three radii from it, then `update_loiter` captures the circle).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits, GuidanceOutput
+from aircraft.guidance.mission_legs import MissionLeg, straight
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import GRAVITY_MPS2, AircraftState, FloatArray, Route
 from aircraft.route import arc_point
@@ -34,6 +41,9 @@ LEAST_LEG_M = 1.0
 
 BANK_KEPT_RAD = math.radians(15.0)
 """Bank kept back where a law has no rule of its own: it turns at each waypoint as the fillet of a plan would."""
+
+L1_CAPTURE_RADII = 3.0
+"""ArduPlane follows the line to the centre of a loiter down to so many radii from it."""
 
 FAR_M = 1e5
 """Beyond the last waypoint a law that flies to points heads for one so far on."""
@@ -86,24 +96,44 @@ def mission_waypoints(route: Route) -> FloatArray:
     return np.array([*kept, last])
 
 
-class WaypointLaw:
-    """Flies a route's waypoints with another law. Implements `GuidanceLaw`.
+class Along(NamedTuple):
+    """Where the aircraft is along and beside a route; as in `PathPoint`."""
 
-    Cross-track error and arc length are those on the route, not on the leg.
+    cross_track_m: float
+    arc_length_m: float
+    past_end: bool
+
+
+class WaypointLaw:
+    """Flies a route leg by leg with another law. Implements `GuidanceLaw`.
+
+    The legs are those of a mission as its file has them, or else those between the waypoints of the route. Cross-track
+    error and arc length are those on the route, not on the leg.
     """
 
-    def __init__(self, law: GuidanceLaw, acceptance_m: Acceptance, by_passing: bool = True) -> None:
-        self.law, self.acceptance_m, self.by_passing = law, acceptance_m, by_passing
+    def __init__(
+        self,
+        law: GuidanceLaw,
+        kind: str,
+        acceptance_m: Acceptance,
+        by_passing: bool = True,
+        legs: Sequence[MissionLeg] = (),
+    ) -> None:
+        self.law, self._kind, self._acceptance_m, self._by_passing = law, kind, acceptance_m, by_passing
+        self._mission = legs
         self._progress: RouteProgress | None = None
         self._leg = -1
 
+    def flying(self, legs: Sequence[MissionLeg]) -> WaypointLaw:
+        """The same law on the legs of a mission."""
+        return WaypointLaw(self.law, self._kind, self._acceptance_m, self._by_passing, legs)
+
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         """Takes a new route; the first leg is the first that ends ahead of the place on it."""
-        self._progress = RouteProgress(route, arc_length_m)
-        self._points: list[tuple[float, float]] = [tuple(p) for p in mission_waypoints(route).tolist()]
-        self._circle = Route(route.segments[-1:], loiter=True) if route.loiter else None
-        self._leg = -1
-        self._next_leg()
+        self._progress, self._leg = RouteProgress(route, arc_length_m), -1
+        self._legs = self._mission or legs_between_waypoints(route)
+        self._last = len(self._legs) - (1 if self._mission else 2)
+        self._begin_next()
 
     @property
     def leg(self) -> int:
@@ -114,73 +144,117 @@ class WaypointLaw:
         """Decides the roll command for the next update interval."""
         if self._progress is None:
             raise RuntimeError("follow() a route before update()")
-        while self._leg < len(self._points) - 1 and self._reached(state):
-            self._next_leg()
-        roll_rad, _, _, saturated, _, airspeed_mps = self.law.update(state)
-        place = self._progress.nearest(state.east_m, state.north_m)
-        return GuidanceOutput(
-            roll_rad, place.cross_track_m, place.arc_length_m, saturated, place.past_end, airspeed_mps
+        while self._leg < len(self._legs) - 1 and self._is_over(state):
+            self._begin_next()
+        decided, place = self.law.update(state), self.along(state)
+        return decided._replace(
+            cross_track_m=place.cross_track_m, arc_length_m=place.arc_length_m, past_end=place.past_end
         )
 
-    def _next_leg(self) -> None:
-        """Goes on to the next leg; beyond the last one to the loiter, or straight on."""
+    def along(self, state: AircraftState) -> Along:
+        """Where an aircraft is along the route, and how far beside it; at its start before there is one.
+
+        A route with arcs would be lost by an aircraft that turns to the other side; the leg of a mission is known.
+        """
+        if self._progress is None:
+            return Along(0.0, 0.0, False)
+        if not self._mission:
+            place = self._progress.nearest(state.east_m, state.north_m)
+            return Along(place.cross_track_m, place.arc_length_m, place.past_end)
+        leg = self._legs[self._leg]
+        first, last = leg.stations_m
+        past_end = False
+        if leg.centre_m is not None:
+            share = self._round_rad / leg.swept_rad if self._bearing_rad is not None else 0.0
+            past_end = share >= 1.0
+        else:
+            on_leg = self._on_leg.nearest(state.east_m, state.north_m)
+            share = on_leg.arc_length_m / (float(leg.route.segments[:, 5].sum()) - leg.captured_radius_m)
+            past_end = on_leg.past_end
+        station_m = first + min(max(share, 0.0), 1.0) * (last - first)
+        self._progress.restart(station_m)
+        beside = self._progress.nearest(state.east_m, state.north_m)
+        return Along(beside.cross_track_m, station_m, past_end and self._leg == len(self._legs) - 1)
+
+    def _begin_next(self) -> None:
         self._leg += 1
-        if self._leg < len(self._points) - 1:
-            start, end = self._points[self._leg], self._points[self._leg + 1]
-            self._along = end[0] - start[0], end[1] - start[1]
-            self._turn_rad = self._turn_at_end_rad()
-            self.law.follow(_line(start, end))
-            if isinstance(self.law, PointLaw):
-                self.law.fly_to(*end)
-        elif self._circle is not None:
-            self.law.follow(self._circle)
-        elif isinstance(self.law, PointLaw):
-            end, share = self._points[-1], FAR_M / math.hypot(*self._along)
-            self.law.fly_to(end[0] + share * self._along[0], end[1] + share * self._along[1])
+        leg = self._legs[self._leg]
+        self.law.follow(leg.route)
+        if isinstance(self.law, PointLaw) and leg.end_m is not None:
+            self.law.fly_to(*leg.end_m)
+        self._on_leg = RouteProgress(leg.route)
+        self._turn_rad = self._turn_after(leg)
+        self._bearing_rad: float | None = None
 
-    def _reached(self, state: AircraftState) -> bool:
-        """Whether the leg's end counts as reached: near enough, or passed."""
-        end_east, end_north = self._points[self._leg + 1]
-        east, north = end_east - state.east_m, end_north - state.north_m
-        if self.by_passing and east * self._along[0] + north * self._along[1] <= 0.0:
+    def _is_over(self, state: AircraftState) -> bool:
+        """Whether the leg's end counts as reached: near enough, passed, or gone round."""
+        leg = self._legs[self._leg]
+        if leg.centre_m is not None:
+            return self._gone_round_rad(leg, state) >= leg.swept_rad
+        if leg.end_m is None:
+            return self._on_leg.nearest(state.east_m, state.north_m).past_end
+        east, north = leg.end_m[0] - state.east_m, leg.end_m[1] - state.north_m
+        away_m = math.hypot(east, north)
+        if leg.captured_radius_m > 0.0:
+            return away_m <= self._capture_m(leg.captured_radius_m, state.groundspeed_mps)
+        ahead, by_passing = leg.direction, self._by_passing or leg.acceptance_m == 0.0
+        if by_passing and east * ahead[0] + north * ahead[1] <= 0.0:
             return True
-        turn = self._turn_rad
-        if turn == 0.0 and self.by_passing:
+        if by_passing and self._turn_rad == 0.0:
             return False
-        return math.hypot(east, north) <= self.acceptance_m(state.groundspeed_mps, turn)
+        if leg.acceptance_m is not None:
+            return away_m <= leg.acceptance_m
+        return away_m <= self._acceptance_m(state.groundspeed_mps, self._turn_rad)
 
-    def _turn_at_end_rad(self) -> float:
-        """By how much the leg after this one is turned from it, at least 0; 0 where there is none."""
-        if self._leg + 2 >= len(self._points):
+    def _capture_m(self, radius_m: float, ground_speed_mps: float) -> float:
+        """How far from the centre of a circle it begins to be joined."""
+        if self._kind == "l1":
+            return L1_CAPTURE_RADII * radius_m
+        return radius_m + self._acceptance_m(ground_speed_mps, 0.5 * math.pi)
+
+    def _gone_round_rad(self, leg: MissionLeg, state: AircraftState) -> float:
+        """How far round a circle the aircraft is from where its route begins."""
+        assert leg.centre_m is not None
+        east, north = leg.centre_m
+        bearing = math.atan2(state.north_m - north, state.east_m - east)
+        row = leg.route.segments[0]
+        side = math.copysign(1.0, row[4])
+        if self._bearing_rad is None:
+            begin = math.atan2(row[1] - north, row[0] - east)
+            self._round_rad = math.remainder(side * (bearing - begin), math.tau)
+        else:
+            self._round_rad += math.remainder(side * (bearing - self._bearing_rad), math.tau)
+        self._bearing_rad = bearing
+        return self._round_rad
+
+    def _turn_after(self, leg: MissionLeg) -> float:
+        """By how much the next leg is turned from the end of this one, at least 0; 0 at the last waypoint."""
+        if self._leg >= self._last:
             return 0.0
-        (end_east, end_north), (next_east, next_north) = self._points[self._leg + 1 : self._leg + 3]
-        after_east, after_north = next_east - end_east, next_north - end_north
-        along_east, along_north = self._along
-        return abs(
-            math.atan2(
-                along_east * after_north - along_north * after_east,
-                along_east * after_east + along_north * after_north,
-            )
-        )
+        (east, north), after = leg.direction, self._legs[self._leg + 1].route.segments[0, 2:4]
+        return abs(math.atan2(east * after[1] - north * after[0], east * after[0] + north * after[1]))
+
+
+def legs_between_waypoints(route: Route) -> list[MissionLeg]:
+    """The legs between the waypoints of a route, and what is flown after the last: the loiter, or straight on."""
+    places = [complex(*point) for point in mission_waypoints(route).tolist()]
+    legs = [straight(ends, (0.0, 0.0), None) for ends in pairwise(places)]
+    if route.loiter:
+        return [*legs, MissionLeg(Route(route.segments[-1:], loiter=True), (0.0, 0.0))]
+    beyond = places[-1] + FAR_M * complex(*legs[-1].direction)
+    return [*legs, straight((places[-1], beyond), (0.0, 0.0), None)]
 
 
 def waypoint_law(
     law: GuidanceLaw, kind: str, config: Any, limits: GuidanceLimits, radius_m: float | None = None
 ) -> WaypointLaw:
     """A law of its kind that flies the waypoints of routes; arguments as of `acceptance`."""
-    return WaypointLaw(law, acceptance(kind, config, limits, radius_m), by_passing(config))
+    return WaypointLaw(law, kind, acceptance(kind, config, limits, radius_m), by_passing(config))
 
 
 def by_passing(config: Any) -> bool:
     """Whether a waypoint counts as reached when the aircraft is past it; so it does where a law has no such key."""
     return bool(getattr(config, "switch_by_passing", True))
-
-
-def _line(start: tuple[float, float], end: tuple[float, float]) -> Route:
-    length = math.dist(start, end)
-    return Route(
-        np.array([[*start, (end[0] - start[0]) / length, (end[1] - start[1]) / length, 0.0, length]])
-    )
 
 
 def acceptance(kind: str, config: Any, limits: GuidanceLimits, radius_m: float | None = None) -> Acceptance:

@@ -298,7 +298,7 @@ def fly_check(
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
         RunFolderError: the folder holds something else or cannot be written.
     """
-    flown_by = partial(fly_along, check.plan, check.scenario.guidance.kind)
+    flown_by = partial(fly_along, check.plan)
     make = partial(_loop, check.plan.climb_limit_mps)
     if out is None:
         flight = flown_by(make(check.scenario), (), progress)

@@ -14,9 +14,9 @@ import numpy as np
 from aircraft.airframe import Airframe
 from aircraft.climb import climb_rates
 from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat
-from aircraft.guidance.mission_legs import HEADING_FOR_CENTRES, Along, MissionLaw, MissionLeg, straight
+from aircraft.guidance.mission_legs import HEADING_FOR_CENTRES, MissionLeg, straight
 from aircraft.guidance.progress import PathPoint, RouteProgress
-from aircraft.guidance.waypoints import WaypointLaw
+from aircraft.guidance.waypoints import Along, WaypointLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
 from harness.files.input_file import InputError
@@ -241,7 +241,6 @@ def _turn_radius_of(given: PathAsGiven, scenario: Scenario) -> Callable[[float],
 
 def fly_along(
     plan: PathPlan,
-    kind: str,
     loop: Loop,
     observers: Sequence[Observer] = (),
     progress: Progress | None = None,
@@ -256,7 +255,7 @@ def fly_along(
         return progress_of.nearest(state.east_m, state.north_m)
 
     if isinstance(guidance, WaypointLaw):
-        guidance = MissionLaw(guidance, kind, plan.legs)
+        guidance = guidance.flying(plan.legs)
         where = guidance.along
     along = replace(
         loop,

@@ -74,7 +74,7 @@ def test_a_route_of_next_to_no_length_is_a_leg_all_the_same(length: float) -> No
 
 def test_goes_on_to_the_next_leg_within_the_acceptance_radius_and_where_it_has_passed() -> None:
     law = Watched()
-    legs = WaypointLaw(law, lambda speed, turn: 60.0)
+    legs = WaypointLaw(law, "preview", lambda speed, turn: 60.0)
     legs.follow(RIGHT_ANGLE)
     assert law.routes[-1].segments.tolist() == [[0.0, 0.0, 0.0, 1.0, 0.0, 500.0]]
     legs.update(at(0.0, 435.0))
@@ -86,7 +86,7 @@ def test_goes_on_to_the_next_leg_within_the_acceptance_radius_and_where_it_has_p
     assert (output.arc_length_m, output.past_end) != (9.0, True)
     left_m = math.hypot(100.0, 45.0) - 100.0
     assert output.cross_track_m == pytest.approx(-left_m, abs=1e-6)
-    passed = WaypointLaw(Watched(), lambda speed, turn: 1.0)
+    passed = WaypointLaw(Watched(), "preview", lambda speed, turn: 1.0)
     passed.follow(RIGHT_ANGLE)
     passed.update(at(-80.0, 501.0))
     assert passed._leg == 1
@@ -94,7 +94,7 @@ def test_goes_on_to_the_next_leg_within_the_acceptance_radius_and_where_it_has_p
 
 def test_a_loiter_is_flown_as_a_circle() -> None:
     law = Watched()
-    legs = WaypointLaw(law, lambda speed, turn: 60.0)
+    legs = WaypointLaw(law, "preview", lambda speed, turn: 60.0)
     legs.follow(joined((0.0, 400.0), (0.01, 200.0 * math.pi), loiter=True))
     legs.update(at(0.0, 399.0))
     assert [route.loiter for route in law.routes] == [False]
@@ -127,4 +127,4 @@ def test_acceptance_is_that_of_the_autopilot() -> None:
 
 def test_needs_a_route() -> None:
     with pytest.raises(RuntimeError, match=r"follow\(\) a route"):
-        WaypointLaw(Watched(), lambda speed, turn: 1.0).update(at(0.0, 0.0))
+        WaypointLaw(Watched(), "preview", lambda speed, turn: 1.0).update(at(0.0, 0.0))
