@@ -194,13 +194,14 @@ def _at_a_limit(lead: Track, limits: FlightLimits, force: InForce, rolls_too_fas
     """The limit that the aircraft was at while it came off a plan that asks for no more than is in force."""
     if _stalled(lead, limits):
         return "stall"
-    if _surface_share(lead, SURFACES) >= SATURATED_SHARE:
-        return "control saturation"
     rolling = _rolling(lead, force.roll_rate_radps) if len(lead) > 1 else np.zeros(len(lead), bool)
     rolled = float(rolling.mean())
     banked = float((saturated(lead, force.bank_limit_rad) & ~rolling).mean())
-    if rolls_too_fast and rolled >= ROLLED_SHARE:
+    full_aileron = _surface_share(lead, ("aileron",)) >= SATURATED_SHARE
+    if rolls_too_fast and (full_aileron or rolled >= ROLLED_SHARE):
         return "roll rate"
+    if _surface_share(lead, SURFACES) >= SATURATED_SHARE:
+        return "control saturation"
     if banked >= max(SATURATED_SHARE, rolled):
         return "bank limit"
     drift = _wind_from_left_mps(lead)

@@ -119,6 +119,16 @@ def test_roll_rate(check: Check) -> None:
     assert causes(check(weave(700.0, 0.7, 4), **limits)) == set()
 
 
+def test_roll_rate_with_the_ailerons_at_their_stops(check: Check) -> None:
+    """A sine of 40 deg of bank at 150 deg/s, where a T-38 rolls at 88: full aileron is how it tries."""
+    bank, speed = math.radians(40.0), 150.0
+    wave_m = speed * bank / math.radians(150.0)
+    east = np.arange(0.0, 4000.0, 6.0)
+    north = wave_m**2 * 9.80665 * math.tan(bank) / speed**2 * (np.cos(east / wave_m) - 1.0)
+    line = np.vstack(([[-2000.0, 0.0]], np.column_stack((east, north))))
+    assert causes(check(line, "T38", trackability__cross_track_m=0.5)) == {"roll rate"}
+
+
 def test_load_factor(check: Check) -> None:
     assert causes(check(turn(90.0), trackability__load_factor=1.2)) == {"load factor"}
     assert causes(check(turn(112.0), trackability__load_factor=1.2)) == set()
