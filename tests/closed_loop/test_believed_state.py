@@ -13,7 +13,7 @@ from harness.flight.closed_loop import fly
 from harness.flight.record import Flight, Outcome
 from harness.run.scenario_flight import make_loop
 from planner.interface import Plan, PlanRequest
-from tests.closed_loop.conftest import SmallWorld
+from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
 
 EAST_M, NORTH_M, UP_M, AIRSPEED_MPS = 30.0, -40.0, 7.0, 2.0
@@ -47,7 +47,7 @@ class Asked:
 
 
 @pytest.fixture(scope="module")
-def flown(small_world: SmallWorld) -> tuple[Flight, Asked, np.ndarray]:
+def flown() -> tuple[Flight, Asked, np.ndarray]:
     loop = make_loop(small_world(TREE), PointMass)
     asked = Asked(loop.planner)
     flight = fly(replace(loop, planner=asked, navigator=Shifted()))

@@ -21,10 +21,10 @@ from harness.run_files.path_files import given_points
 from harness.scenario.scenario import Scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from tests.closed_loop.cause_table import confusion, table
+from tests.closed_loop.small import small_world
 
 Check = Callable[..., dict[str, Any]]
 Install = Callable[[Callable[[Mission, PlanRequest], Plan]], None]
-SmallWorld = Callable[..., Scenario]
 
 
 def turn(radius_m: float, turn_rad: float = 6.0) -> FloatArray:
@@ -171,7 +171,7 @@ def causes_in_the_loop(scenario: Scenario) -> set[str | None]:
     return {leg["cause"] for leg in flown["trackability"] if not leg["trackable"]}
 
 
-def test_planner_too_late(answering: Install, small_world: SmallWorld) -> None:
+def test_planner_too_late(answering: Install) -> None:
     answering(north_then_left)
 
     def after(latency_s: float) -> Scenario:
@@ -202,7 +202,7 @@ def round_the_wall(mission: Mission, request: PlanRequest) -> Plan:
     return Plan(PlanStatus.FOUND, "right", np.array([(x, y), mission.goal_m]), Path(np.array(rows)))
 
 
-def test_sensor_horizon(answering: Install, small_world: SmallWorld) -> None:
+def test_sensor_horizon(answering: Install) -> None:
     """The turn along the wall ends 40 m from it: with 1.5 km of sight it is wide, with 80 m too tight."""
     answering(round_the_wall)
     wall = {"polygon": {"vertices_m": [[100.0, 2500.0], [5900.0, 2500.0], [5900.0, 2600.0], [100.0, 2600.0]]}}

@@ -13,7 +13,7 @@ from harness.flight.record import Outcome
 from harness.run.scenario_flight import make_loop
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario
-from tests.closed_loop.conftest import SmallWorld
+from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
 
 INNER_M = (1500.0, 4500.0)
@@ -22,7 +22,7 @@ BENT_M = [(50.0, 50.0), (INNER_M[0], 50.0), INNER_M, (5950.0, INNER_M[1]), (5950
 
 
 @pytest.fixture
-def fenced(small_world: SmallWorld, tmp_path: Path) -> Scenario:
+def fenced(tmp_path: Path) -> Scenario:
     plane = LocalPlane(47.0, 8.0)
     corners = [list(plane.geodetic(east, north)) for east, north in BENT_M]
     fence = {"polygons": [{"polygon": corners, "inclusion": True, "version": 1}], "circles": [], "version": 2}

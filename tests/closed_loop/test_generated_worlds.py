@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from harness.flight.record import Flight, Outcome
-from harness.scenario.scenario import Scenario
+from harness.flight.record import Outcome
+from tests.closed_loop.small import flown_by_point_mass, small_world
 
 CELL_M, CELLS = 1100.0, 4
 FIRST_CENTRE_M = 1350.0
 LARGEST_M, SHIFT_M = 280.0, 120.0
 """Neighbours are at least 1100 - 2 (280 + 120) = 300 m apart, three turn radii of the aircraft."""
-
-
-SmallWorld = Callable[..., Scenario]
-FlyPointMass = Callable[[Scenario], Flight]
 
 
 BOUNDED = settings(
@@ -58,10 +53,7 @@ def fields(draw: st.DrawFn, most_corners: int = 7) -> list[dict[str, Any]]:
 @given(field=fields(), wind_from_deg=st.none() | st.integers(0, 359))
 @BOUNDED
 def test_reaches_the_goal_among_corners_in_any_wind(
-    small_world: SmallWorld,
-    flown_by_point_mass: FlyPointMass,
-    field: list[dict[str, Any]],
-    wind_from_deg: int | None,
+    field: list[dict[str, Any]], wind_from_deg: int | None
 ) -> None:
     wind = {"speed_mps": 5.0, "from_deg": float(wind_from_deg or 0)}
     scenario = small_world(*field, environment={} if wind_from_deg is None else {"wind": wind})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -12,12 +11,10 @@ from harness.analysis.smoothness import flown_lengths
 from harness.flight.closed_loop import fly
 from harness.flight.record import Outcome
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario
 from planner.geometry.clearance import inside_bounds
 from planner.geometry.curves import end_of
+from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
-
-SmallWorld = Callable[..., Scenario]
 
 SIDE_M, START, ROUNDING_M = 4000.0, (600.0, 600.0), 1e-6
 BLUR = 0.25
@@ -50,7 +47,6 @@ def test_it_is_reached_by_the_shortest_way(
     clearance_m: float,
     obstacles: list[dict[str, Any]],
     air: dict[str, Any],
-    small_world: SmallWorld,
 ) -> None:
     scenario = small_world(
         *obstacles,

@@ -12,11 +12,10 @@ from harness.flight.closed_loop import fly
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
 
-SmallWorld = Callable[..., Scenario]
 Install = Callable[[Callable[[Mission, PlanRequest], Plan]], None]
 
 SCAN_S, STEP_S = 0.5, 0.1
@@ -36,9 +35,7 @@ class Events:
 
 
 @pytest.fixture
-def thinking(
-    answering: Install, small_world: SmallWorld
-) -> Callable[..., tuple[Flight, list[float], Events]]:
+def thinking(answering: Install) -> Callable[..., tuple[Flight, list[float], Events]]:
     """Flies ten seconds with a planner that goes on from one time to another, at which it finds a plan."""
 
     def flown(begins_s: float, found_s: float, latency_s: float = 0.0) -> tuple[Flight, list[float], Events]:
@@ -96,7 +93,7 @@ def test_a_plan_that_is_on_its_way_is_waited_for(
 
 @pytest.mark.parametrize(("fails", "outcome"), [(False, Outcome.UNREACHABLE), (True, Outcome.PLANNER_FAILED)])
 def test_what_it_says_between_steps_ends_the_flight_there(
-    fails: bool, outcome: Outcome, answering: Install, small_world: SmallWorld
+    fails: bool, outcome: Outcome, answering: Install
 ) -> None:
     def answer(mission: Mission, request: PlanRequest) -> Plan:
         if request.time_s < 1.0 + 0.4 * STEP_S:
@@ -112,26 +109,3 @@ def test_what_it_says_between_steps_ends_the_flight_there(
     flight = fly(make_loop(small_world(planner={"kind": "stand_in"}), PointMass))
     assert flight.outcome is outcome
     assert flight.sim_s == pytest.approx(1.0 + 0.5 * STEP_S)
-
-
-def test_why_nothing_is_found_is_told_once_and_ends_the_reason_of_a_timeout(
-    answering: Install, small_world: SmallWorld
-) -> None:
-    said = ["nothing is seen\nto be free", "looks for a way"]
-
-    def answer(mission: Mission, request: PlanRequest) -> Plan:
-        second = round(request.time_s)
-        if request.flown is None or second == 30:
-            row = (*request.position_m, *request.direction, 0.0, 5000.0)
-            return Plan(PlanStatus.FOUND, "found", np.array([row[:2]]), Path(np.array([row])))
-        if second % 2:
-            return Plan(PlanStatus.KEPT, "serves")
-        return Plan(PlanStatus.NO_PATH, said[second // 2 % 2])
-
-    answering(answer)
-    events = Events()
-    keys = {"planner": {"kind": "stand_in"}, "sensor": {"rate_hz": 1}, "mission": {"time_limit_s": 56.5}}
-    flight = fly(make_loop(small_world(**keys), PointMass), [events])
-    # Once for each plan that is in effect meanwhile.
-    assert [text for _, text in events.told[:-1]] == [said[1], said[0], said[0], said[1]]
-    assert flight.reason.endswith(" m from the goal; the planner's last reason: nothing is seen to be free")

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from harness.flight.record import Flight, Outcome
 from harness.mapping.sensed_map import NOISY
-from harness.scenario.scenario import Scenario
 from tests.closed_loop.moving_worlds import TURNED_DEG, moving, popping_up
+from tests.closed_loop.small import flown_by_point_mass, small_world
 from tests.longer import longer
-
-SmallWorld = Callable[..., Scenario]
-FlyPointMass = Callable[[Scenario], Flight]
 
 WORLD: tuple[dict[str, Any], ...] = (
     {"circle": {"center_m": [1800.0, 1900.0], "radius_m": 250.0}},
@@ -38,13 +34,7 @@ WORLD: tuple[dict[str, Any], ...] = (
     ids=lambda value: value if isinstance(value, str) else "-".join(value),
 )
 @pytest.mark.parametrize("seed", [1, *longer([2])])
-def test_is_reached_and_safe(
-    section: str,
-    keys: dict[str, float],
-    seed: int,
-    small_world: SmallWorld,
-    flown_by_point_mass: FlyPointMass,
-) -> None:
+def test_is_reached_and_safe(section: str, keys: dict[str, float], seed: int) -> None:
     scenario = small_world(*WORLD, **{section: keys}).model_copy(update={"seed": seed})
     flight = flown_by_point_mass(scenario)
     assert flight.outcome is Outcome.REACHED, flight.reason
@@ -52,9 +42,7 @@ def test_is_reached_and_safe(
     assert flight.track.clearance_m.min() >= 0.8 * scenario.planner.clearance_m - noise_m
 
 
-def test_a_late_scan_and_a_late_plan_take_effect_late(
-    small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_a_late_scan_and_a_late_plan_take_effect_late() -> None:
     late = small_world(*WORLD, sensor={"latency_s": 0.7}, planner={"compute_latency_s": 0.5})
     at_once = small_world(*WORLD)
     assert flown_by_point_mass(at_once).plans[0].time_s == 0.0
@@ -70,9 +58,7 @@ def assert_reached(flight: Flight, clearance_m: float) -> None:
 @pytest.mark.flights
 @pytest.mark.parametrize("seed", [0, *longer(range(1, 4))])
 @pytest.mark.parametrize("flaws", [{}, {"dropout": 0.1, "false_return": 0.01}], ids=["noise", "all"])
-def test_with_noise_of_a_hundredth_of_the_range_edges_are_weighed(
-    flaws: dict[str, float], seed: int, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_with_noise_of_a_hundredth_of_the_range_edges_are_weighed(flaws: dict[str, float], seed: int) -> None:
     noisy = small_world(*WORLD, sensor={"range_noise_m": 15.0, **flaws}, planner={"clearance_m": 60.0})
     assert noisy.sensor.range_noise_m > NOISY * noisy.planner.clearance_m
     flight = flown_by_point_mass(noisy.model_copy(update={"seed": seed}))
@@ -82,41 +68,10 @@ def test_with_noise_of_a_hundredth_of_the_range_edges_are_weighed(
 
 @pytest.mark.parametrize("seed", [*range(3), *longer(range(3, 6))])
 @pytest.mark.parametrize("kind", TURNED_DEG)
-def test_what_moves_is_kept_clear_of(
-    kind: str, seed: int, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_what_moves_is_kept_clear_of(kind: str, seed: int) -> None:
     assert_reached(flown_by_point_mass(small_world(WORLD[0], moving(seed, kind))), 0.9 * 40.0)
 
 
 @pytest.mark.parametrize("seed", [*range(3), *longer(range(3, 6))])
-def test_what_appears_ahead_is_kept_clear_of(
-    seed: int, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_what_appears_ahead_is_kept_clear_of(seed: int) -> None:
     assert_reached(flown_by_point_mass(small_world(WORLD[0], popping_up(seed))), 0.9 * 40.0)
-
-
-@pytest.mark.parametrize(
-    "seed", [0, *longer(range(1, 4)), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 8))]
-)
-@pytest.mark.parametrize(
-    ("sensor", "planner"),
-    [
-        ({}, {}),
-        (
-            {"range_noise_m": 3.0, "dropout": 0.1, "false_return": 0.01, "latency_s": 0.5},
-            {"compute_latency_s": 0.5},
-        ),
-    ],
-    ids=["exact", "flawed"],
-)
-def test_among_all_of_them_at_once_the_goal_is_reached(
-    sensor: dict[str, float],
-    planner: dict[str, float],
-    seed: int,
-    small_world: SmallWorld,
-    flown_by_point_mass: FlyPointMass,
-) -> None:
-    """Searches take several scans, and meanwhile three obstacles move and one appears."""
-    obstacles = (*WORLD, *(moving(seed, kind) for kind in TURNED_DEG), popping_up(seed))
-    scenario = small_world(*obstacles, sensor=sensor, planner=planner)
-    assert_reached(flown_by_point_mass(scenario.model_copy(update={"seed": seed})), 0.5 * 40.0)

@@ -5,12 +5,10 @@ from __future__ import annotations
 import pytest
 
 from harness.flight.record import Flight
-from tests.closed_loop.conftest import FlyPointMass, SmallWorld
+from tests.closed_loop.small import flown_by_point_mass, small_world
 
 
-def flown(
-    small_world: SmallWorld, flown_by_point_mass: FlyPointMass, width_m: float, length_m: float
-) -> Flight:
+def flown(width_m: float, length_m: float) -> Flight:
     """5.2 km to the east and the length of the lane, which begins 1,600 m ahead of the start."""
     x0, x1, half = 2000.0, 2000.0 + length_m, 0.5 * width_m
     blocks = [
@@ -34,18 +32,16 @@ def flown(
 
 @pytest.mark.parametrize(("width_m", "length_m"), [(250.0, 600.0), (400.0, 1000.0)])
 def test_a_lane_is_flown_through_where_room_for_a_turn_is_seen_beyond_it(
-    width_m: float, length_m: float, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+    width_m: float, length_m: float
 ) -> None:
-    flight = flown(small_world, flown_by_point_mass, width_m, length_m)
+    flight = flown(width_m, length_m)
     assert flight.outcome.value == "reached", flight.reason
     assert flight.track.time_s[-1] * 25.0 < 1.01 * (3200.0 + length_m)
     assert abs(flight.track.north_m - 2000.0).max() < 0.5 * width_m - 50.0
 
 
-def test_a_lane_whose_end_is_out_of_sight_is_not_called_a_proof(
-    small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
-    flight = flown(small_world, flown_by_point_mass, 250.0, 2000.0)
+def test_a_lane_whose_end_is_out_of_sight_is_not_called_a_proof() -> None:
+    flight = flown(250.0, 2000.0)
     assert flight.outcome.value == "planner_failed"
     assert "no way with room to turn is left" in flight.reason
     assert "That does not prove the goal unreachable" in flight.reason

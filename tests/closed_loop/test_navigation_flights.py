@@ -24,7 +24,7 @@ from harness.run_files.run_folder import load_run, tables
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, parse_scenario
 from planner.interface import Plan, PlanRequest
-from tests.closed_loop.conftest import SmallWorld
+from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
 
 TREE = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}
@@ -36,7 +36,7 @@ def flown(scenario: Scenario) -> Flight:
 
 
 @pytest.fixture(scope="module")
-def scenario(small_world: SmallWorld) -> Scenario:
+def scenario() -> Scenario:
     return small_world(TREE, navigation=GNSS)
 
 
@@ -45,7 +45,7 @@ def flight(scenario: Scenario) -> Flight:
     return flown(scenario)
 
 
-def test_perfect_navigation_changes_no_bit(small_world: SmallWorld) -> None:
+def test_perfect_navigation_changes_no_bit() -> None:
     scenario = small_world(TREE)
     loop = make_loop(scenario, PointMass)
     without = replace(make_loop(scenario, PointMass), navigator=PerfectEstimator())
@@ -165,7 +165,7 @@ class Told(Observer):
     ],
 )
 def test_events_say_when_a_fix_is_lost_and_when_it_is_back(
-    navigation: dict[str, Any], told: list[tuple[float, str, bool]], small_world: SmallWorld
+    navigation: dict[str, Any], told: list[tuple[float, str, bool]]
 ) -> None:
     scenario = small_world(TREE, navigation=navigation)
     events = Told()
@@ -186,7 +186,7 @@ class Watched:
         return self._plan(request)  # type: ignore[no-any-return]
 
 
-def test_after_a_jump_the_plan_is_checked_against_the_shifted_world(small_world: SmallWorld) -> None:
+def test_after_a_jump_the_plan_is_checked_against_the_shifted_world() -> None:
     loop = make_loop(small_world(TREE, sensor={"latency_s": 1.2}), PointMass)
     watched = Watched(loop.planner)
     flight = fly(replace(loop, planner=watched, navigator=Jumping()))

@@ -16,14 +16,12 @@ from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import AircraftState
 from aircraft.start import Atmosphere, StartConditions
 from harness.cli.app import main
-from harness.flight.record import Flight
 from harness.run import scenario_flight as run
 from harness.scenario.scenario import Scenario, dump_scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+from tests.closed_loop.small import flown_by_point_mass, small_world
 from tests.point_mass import PointMass
 
-SmallWorld = Callable[..., Scenario]
-FlyPointMass = Callable[[Scenario], Flight]
 Answer = Callable[[Mission, PlanRequest], Plan]
 Install = Callable[[Answer], None]
 Fly = Callable[[Scenario], tuple[int, dict[str, Any]]]
@@ -88,15 +86,13 @@ def fly(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> Fly:
     return command
 
 
-def test_reached(fly: Fly, small_world: SmallWorld) -> None:
+def test_reached(fly: Fly) -> None:
     status, metrics = fly(small_world(IN_THE_WAY))
     assert (status, metrics["outcome"]) == (0, "reached")
     assert metrics["reason"].startswith("inside the goal circle after ")
 
 
-def test_collision_ends_the_flight_at_the_edge(
-    fly: Fly, answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_collision_ends_the_flight_at_the_edge(fly: Fly, answering: Install) -> None:
     answering(straight_on)
     scenario = small_world(IN_THE_WAY, planner={"kind": "stand_in"})
     status, metrics = fly(scenario)
@@ -110,7 +106,7 @@ def test_collision_ends_the_flight_at_the_edge(
 @pytest.mark.parametrize("east_m", [3000.0, 3000.4, 3000.8, 3001.2, 3001.6])
 @pytest.mark.parametrize("velocity_mps", [None, [-20.0, 0.0]])
 def test_a_wall_thinner_than_a_step_is_not_flown_through_unnoticed(
-    fly: Fly, answering: Install, small_world: SmallWorld, east_m: float, velocity_mps: list[float] | None
+    fly: Fly, answering: Install, east_m: float, velocity_mps: list[float] | None
 ) -> None:
     answering(straight_on)
     corners = [[east_m, 900.0], [east_m + 0.3, 900.0], [east_m + 0.3, 5900.0], [east_m, 5900.0]]
@@ -120,9 +116,7 @@ def test_a_wall_thinner_than_a_step_is_not_flown_through_unnoticed(
     assert -0.15 <= metrics["min_clearance_m"] < 0.0
 
 
-def test_an_obstacle_that_pops_up_around_the_aircraft_is_hit_at_once(
-    answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_an_obstacle_that_pops_up_around_the_aircraft_is_hit_at_once(answering: Install) -> None:
     answering(straight_on)
     pops_up = {"circle": {"center_m": [1800.0, 1800.0], "radius_m": 200.0}, "active_s": [84.0, 90.0]}
     flight = flown_by_point_mass(small_world(pops_up, planner={"kind": "stand_in"}))
@@ -130,7 +124,7 @@ def test_an_obstacle_that_pops_up_around_the_aircraft_is_hit_at_once(
     assert 84.0 <= flight.sim_s <= 84.05
 
 
-def test_a_flight_without_any_plan_says_so(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
+def test_a_flight_without_any_plan_says_so(fly: Fly, answering: Install) -> None:
     answering(finds_nothing)
     status, metrics = fly(small_world(IN_THE_WAY, planner={"kind": "stand_in"}))
     assert (status, metrics["outcome"]) == (1, "collision")
@@ -141,9 +135,7 @@ def test_a_flight_without_any_plan_says_so(fly: Fly, answering: Install, small_w
     ("course_deg", "left_at"),
     [(270.0, "(2998, 3400)"), (90.0, "(4002, 3400)"), (180.0, "(3600, 2998)"), (0.0, "(3600, 4002)")],
 )
-def test_leaving_the_area(
-    course_deg: float, left_at: str, fly: Fly, answering: Install, small_world: SmallWorld
-) -> None:
+def test_leaving_the_area(course_deg: float, left_at: str, fly: Fly, answering: Install) -> None:
     answering(straight_on)
     status, metrics = fly(
         small_world(
@@ -156,7 +148,7 @@ def test_leaving_the_area(
     assert metrics["reason"] == f"left the area at {left_at} m"
 
 
-def test_timeout(fly: Fly, small_world: SmallWorld) -> None:
+def test_timeout(fly: Fly) -> None:
     status, metrics = fly(small_world(mission={"time_limit_s": 60.0}))
     assert (status, metrics["outcome"]) == (1, "timeout")
     left_m = math.hypot(5400.0, 5400.0) - 60.0 * 25.0
@@ -164,7 +156,7 @@ def test_timeout(fly: Fly, small_world: SmallWorld) -> None:
     assert metrics["flight_time_s"] == 60.0
 
 
-def test_planner_that_raises(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
+def test_planner_that_raises(fly: Fly, answering: Install) -> None:
     answering(breaks)
     status, metrics = fly(small_world(planner={"kind": "stand_in"}))
     assert (status, metrics["outcome"]) == (1, "planner_failed")
@@ -183,7 +175,7 @@ def test_planner_that_raises(fly: Fly, answering: Install, small_world: SmallWor
     ],
 )
 def test_planner_whose_path_cannot_be_flown(
-    fly: Fly, answering: Install, small_world: SmallWorld, curvature_1pm: float, length_m: float, fault: str
+    fly: Fly, answering: Install, curvature_1pm: float, length_m: float, fault: str
 ) -> None:
     def nowhere(mission: Mission, request: PlanRequest) -> Plan:
         row = (*request.position_m, *request.direction, curvature_1pm, length_m)
@@ -195,20 +187,6 @@ def test_planner_whose_path_cannot_be_flown(
     assert metrics["reason"] == f"the planner gave a path that cannot be flown: {fault}"
 
 
-@pytest.mark.parametrize("status", [0, 3, "bye\n\udcff bye"])
-def test_planner_that_would_end_the_process(
-    fly: Fly, answering: Install, small_world: SmallWorld, status: int | str
-) -> None:
-    def leaves(mission: Mission, request: PlanRequest) -> Plan:
-        raise SystemExit(status)
-
-    answering(leaves)
-    ended, metrics = fly(small_world(planner={"kind": "stand_in"}))
-    assert (ended, metrics["outcome"]) == (1, "planner_failed")
-    told = str(status).encode("utf-8", "backslashreplace").decode().replace("\n", " ")
-    assert metrics["reason"].startswith(f"the planner raised SystemExit: {told} (conftest.py:")
-
-
 class Unspeakable(BaseException):
     """As a panic of compiled code or a cancelled task: no Exception; and it cannot say what it is."""
 
@@ -217,9 +195,7 @@ class Unspeakable(BaseException):
 
 
 @pytest.mark.parametrize("error", [Unspeakable(), GeneratorExit(), BaseExceptionGroup("g", [Unspeakable()])])
-def test_whatever_a_planner_raises_is_its_failure(
-    fly: Fly, answering: Install, small_world: SmallWorld, error: BaseException
-) -> None:
+def test_whatever_a_planner_raises_is_its_failure(fly: Fly, answering: Install, error: BaseException) -> None:
     def panics(mission: Mission, request: PlanRequest) -> Plan:
         raise error
 
@@ -230,21 +206,7 @@ def test_whatever_a_planner_raises_is_its_failure(
     assert metrics["error"].rstrip().splitlines()
 
 
-def test_an_interrupt_while_it_plans_is_none(
-    fly: Fly, answering: Install, small_world: SmallWorld, tmp_path: FilePath
-) -> None:
-    def is_interrupted(mission: Mission, request: PlanRequest) -> Plan:
-        raise KeyboardInterrupt
-
-    answering(is_interrupted)
-    with pytest.raises(FileNotFoundError):
-        fly(small_world(planner={"kind": "stand_in"}))
-    assert not (tmp_path / "run" / "metrics.json").exists()
-
-
-def test_an_interrupt_lets_the_planner_finish_first(
-    answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_an_interrupt_lets_the_planner_finish_first(answering: Install) -> None:
     """Machine code in its first calls does not stand one."""
     asked, answered = [], []
 
@@ -262,7 +224,7 @@ def test_an_interrupt_lets_the_planner_finish_first(
     assert asked[-1] == 5.0
 
 
-def test_unreachable(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
+def test_unreachable(fly: Fly, answering: Install) -> None:
     answering(gives_up)
     status, metrics = fly(small_world(planner={"kind": "stand_in"}))
     assert (status, metrics["outcome"]) == (3, "unreachable")
@@ -270,7 +232,7 @@ def test_unreachable(fly: Fly, answering: Install, small_world: SmallWorld) -> N
     assert metrics["min_clearance_m"] is None
 
 
-def test_lost_control(fly: Fly, small_world: SmallWorld, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lost_control(fly: Fly, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "jsbsim_aircraft", lambda _, start, air: Failing(start, air))
     status, metrics = fly(small_world())
     assert (status, metrics["outcome"]) == (1, "lost_control")
@@ -280,7 +242,7 @@ def test_lost_control(fly: Fly, small_world: SmallWorld, monkeypatch: pytest.Mon
 
 
 def test_a_state_that_is_not_finite_is_no_row(
-    fly: Fly, small_world: SmallWorld, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
+    fly: Fly, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(run, "jsbsim_aircraft", lambda _, start, air: Diverging(start, air))
     status, metrics = fly(small_world())

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -25,17 +24,16 @@ from harness.flight.closed_loop import fly
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.flight.termination import MissionEnd
 from harness.mapping.scan import RangeScan
-from harness.mapping.sensed_map import SensedMap
 from harness.run.scenario_flight import make_loop
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.world.world import World
 from planner.geometry.clearance import distances
 from planner.geometry.curves import on_loiter, pose_at, sample
 from planner.interface import Path
+from tests.closed_loop.small import small_world
 from tests.examples import examples
 from tests.point_mass import PointMass
 
-SmallWorld = Callable[..., Scenario]
 Obstacles = list[dict[str, Any]]
 
 SIDE_M, CELLS = 4500.0, 6
@@ -96,19 +94,6 @@ class Invariant:
         pass
 
 
-class Events(Invariant):
-    """Only listens."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        """Plans may be unsafe here."""
-
-    def on_event(self, time_s: float, text: str) -> None:
-        self.texts.append(text)
-
-
 def watched(scenario: Scenario) -> tuple[Flight, Invariant]:
     """A point-mass flight, every plan of which keeps the invariant."""
     loop = make_loop(scenario, lambda start, air: PointMass(start, air, step_rate_hz=20))
@@ -165,7 +150,7 @@ def mazes(draw: st.DrawFn) -> Obstacles:
     return found
 
 
-def scenario_with(small_world: SmallWorld, obstacles: Obstacles, **mission: Any) -> Scenario:
+def scenario_with(obstacles: Obstacles, **mission: Any) -> Scenario:
     corner = 0.5 * SIDE_M / CELLS
     return small_world(
         *obstacles,
@@ -184,73 +169,28 @@ def scenario_with(small_world: SmallWorld, obstacles: Obstacles, **mission: Any)
 @pytest.mark.flights
 @given(obstacles=separate() | mazes(), course_deg=st.integers(0, 359))
 @settings(BOUNDED, max_examples=examples(10))
-def test_every_plan_in_effect_is_safe_for_ever(
-    small_world: SmallWorld, obstacles: Obstacles, course_deg: int
-) -> None:
-    flight, invariant = watched(scenario_with(small_world, obstacles, course_deg=float(course_deg)))
+def test_every_plan_in_effect_is_safe_for_ever(obstacles: Obstacles, course_deg: int) -> None:
+    flight, invariant = watched(scenario_with(obstacles, course_deg=float(course_deg)))
     assert flight.outcome in (Outcome.REACHED, Outcome.UNREACHABLE, Outcome.TIMEOUT), flight.reason
     assert invariant.plans == len(flight.plans)
     assert flight.track.clearance_m.min() >= (1.0 - BLUR) * CLEARANCE_M
 
 
-def test_the_invariant_sees_a_plan_that_is_not_safe(small_world: SmallWorld) -> None:
+def test_the_invariant_sees_a_plan_that_is_not_safe() -> None:
     # The same plans, but a world that has something the planner was never shown.
     hidden = {"circle": {"center_m": [2000.0, 2250.0], "radius_m": 100.0}}
-    blind = make_loop(scenario_with(small_world, []), PointMass)
-    truth = make_loop(scenario_with(small_world, [hidden]), PointMass).world
+    blind = make_loop(scenario_with([]), PointMass)
+    truth = make_loop(scenario_with([hidden]), PointMass).world
     invariant = Invariant(truth, blind.mission.hold_radius_m, blind.mission.tracking_error_m)
     with pytest.raises(AssertionError, match="plan"):
         fly(replace(blind, termination=MissionEnd(blind.world, blind.mission, 120.0)), [invariant])
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_a_world_that_lies_ends_the_flight_as_a_fault_of_the_planner(
-    told: bool, small_world: SmallWorld, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # A ring appears that the aircraft has no room to turn in, within what was certified to be free. It is open
-    # behind the aircraft, so that nothing proves that there is no way.
-    at_s, count, radius, open_from, open_to = 20.0, 24, 75.0, 12, 19
-    start, along = 0.5 * SIDE_M / CELLS, 25.0 * at_s / math.sqrt(2.0)
-    middle = start + along
-    ring = [
-        {
-            "circle": {
-                "center_m": [
-                    middle + radius * math.cos(math.tau * i / count),
-                    middle + radius * math.sin(math.tau * i / count),
-                ],
-                "radius_m": 12.0,
-            },
-            "active_s": [at_s, 1000.0],
-        }
-        for i in range(count)
-        if not open_from <= i < open_to
-    ]
-    if not told:
-        never = property(lambda _: -math.inf, lambda *_: None)
-        monkeypatch.setattr(SensedMap, "last_contradiction_s", never, raising=False)
-    events = Events()
-    flight = fly(make_loop(scenario_with(small_world, ring), PointMass), [events])
-    if told:
-        # The map says that something appeared: no fault of the planner's, which goes on as best it can.
-        assert flight.outcome is Outcome.COLLISION
-        assert any("something is in the way" in text for text in events.texts)
-        return
-    assert flight.outcome is Outcome.PLANNER_FAILED, flight.reason
-    assert "CertificateBroken" in flight.reason
-    assert "certified to be free" in flight.reason
-    assert at_s <= flight.sim_s < at_s + 3.0
-
-
 @pytest.mark.parametrize(("range_m", "status"), [(255.0, 2), (270.0, 0)])
 def test_a_sensor_that_cannot_see_a_turn_is_refused_with_the_numbers(
-    small_world: SmallWorld,
-    tmp_path: FilePath,
-    capsys: pytest.CaptureFixture[str],
-    range_m: float,
-    status: int,
+    tmp_path: FilePath, capsys: pytest.CaptureFixture[str], range_m: float, status: int
 ) -> None:
-    text = dump_scenario(scenario_with(small_world, []))
+    text = dump_scenario(scenario_with([]))
     text = re.sub(r"rolling_step_m: [\d.]+,?\s*", "", text).replace(", }", "}")
     at = tmp_path / "short.yaml"
     at.write_text(text.replace("range_m: 1000.0", f"range_m: {range_m:g}"))

@@ -12,18 +12,16 @@ import pytest
 
 from harness.flight.record import COLUMNS, Flight, FloatArray, Outcome
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario
 from harness.world.obstacle import Obstacle
 from harness.world.world import World
 from planner.interface import Mission, Plan, PlanRequest
 from planner.registry import planner_kinds
+from tests.closed_loop.small import flown_by_point_mass, small_world
 
 RANGE_M = 1500.0
 TRUTH = "clearance_m"
 """The one column that knows of obstacles which have not been seen."""
 
-SmallWorld = Callable[..., Scenario]
-FlyPointMass = Callable[[Scenario], Flight]
 Answer = Callable[[Mission, PlanRequest], Plan]
 COMMON = ({"circle": {"center_m": [1500.0, 1600.0], "radius_m": 200.0}},)
 IMPERFECT = {"range_noise_m": 1.0, "dropout": 0.02, "false_return": 0.002, "latency_s": 0.1}
@@ -50,9 +48,7 @@ def rows_alike(one: Flight, other: Flight) -> int:
 
 
 @pytest.mark.parametrize("sensor", [{}, IMPERFECT], ids=["perfect", "imperfect"])
-def test_an_obstacle_ahead_changes_nothing_before_it_is_in_range(
-    sensor: dict[str, float], small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_an_obstacle_ahead_changes_nothing_before_it_is_in_range(sensor: dict[str, float]) -> None:
     hidden = (4000.0, 4050.0, 300.0)
     without = flown_by_point_mass(small_world(*COMMON, sensor=sensor))
     with_it = flown_by_point_mass(small_world(*COMMON, circle(*hidden), sensor=sensor))
@@ -80,7 +76,7 @@ def true_parts(things: list[object]) -> list[str]:
 
 
 def test_a_spy_in_the_planners_place_finds_nothing_of_the_true_world(
-    small_world: SmallWorld, flown_by_point_mass: FlyPointMass, answering: Callable[[Answer], None]
+    answering: Callable[[Answer], None],
 ) -> None:
     inner = planner_kinds()["rolling_window"]
     planners: list[Any] = []

@@ -11,15 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.flight.record import Flight, Outcome
+from harness.flight.record import Outcome
 from harness.run.scenario_flight import fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run
-from harness.scenario.scenario import Scenario
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from tests.closed_loop.small import flown_by_point_mass, small_world
 from tests.point_mass import PointMass
 
-SmallWorld = Callable[..., Scenario]
-FlyPointMass = Callable[[Scenario], Flight]
 Install = Callable[[Callable[[Mission, PlanRequest], Any]], None]
 Fails = Callable[[Callable[[Mission, PlanRequest], Any]], str]
 
@@ -34,7 +32,7 @@ def ahead(request: PlanRequest, *rows: tuple[float, ...], **keys: Any) -> Plan:
 
 
 @pytest.fixture
-def fails(answering: Install, small_world: SmallWorld, tmp_path: FilePath) -> Fails:
+def fails(answering: Install, tmp_path: FilePath) -> Fails:
     """Flies with a planner that answers rightly at first, then wrongly; returns the reason with which it failed."""
 
     def flown(wrongly: Callable[[Mission, PlanRequest], Any], recording: bool = False) -> str:
@@ -141,9 +139,7 @@ def test_a_wrong_answer_ends_the_flight_with_a_sentence_and_a_whole_folder(name:
     assert told in fails(wrongly)
 
 
-def test_edges_that_a_planner_is_handed_are_read_only(
-    answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_edges_that_a_planner_is_handed_are_read_only(answering: Install) -> None:
     near = {"circle": {"center_m": [900.0, 900.0], "radius_m": 100.0}}
 
     def writes(_: Mission, request: PlanRequest) -> Plan:
@@ -158,9 +154,7 @@ def test_edges_that_a_planner_is_handed_are_read_only(
     assert "read-only" in flight.reason
 
 
-def test_a_planner_gets_its_own_plan_back_and_cannot_change_the_one_that_is_flown(
-    answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
-) -> None:
+def test_a_planner_gets_its_own_plan_back_and_cannot_change_the_one_that_is_flown(answering: Install) -> None:
     own: list[Plan] = []
 
     def answer(_: Mission, request: PlanRequest) -> Plan:
@@ -194,10 +188,7 @@ def test_an_error_that_says_very_much_is_cut(fails: Fails, tmp_path: FilePath) -
 
 
 def test_what_a_planner_prints_goes_to_standard_error(
-    answering: Install,
-    small_world: SmallWorld,
-    flown_by_point_mass: FlyPointMass,
-    capsys: pytest.CaptureFixture[str],
+    answering: Install, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def talks(_: Mission, request: PlanRequest) -> Plan:
         print("a planner that talks")

@@ -95,29 +95,6 @@ def read_or_refused(arguments: list[str], folder: Path, capsys: pytest.CaptureFi
     assert all(str(folder) in line and len(line) < 800 for line in lines) or "leave --what out" in said.err
 
 
-@pytest.mark.parametrize("cases", [10, pytest.param(300, marks=pytest.mark.slow)])
-def test_view_of_a_damaged_recording(
-    cases: int, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    copy = tmp_path / "run"
-    shutil.copytree(a_run, copy)
-    whole = (copy / "flight.rrd").read_bytes()
-
-    @settings(max_examples=cases, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
-    @given(damage(a_run, "flight.rrd").filter(lambda data: data != whole))
-    def each(data: bytes) -> None:
-        (copy / "flight.rrd").write_bytes(data)
-        assert main(["view", str(copy), str(a_run)]) == 2
-        said = capsys.readouterr().err
-        assert (
-            said
-            == f"wayproof: the run in {copy} is damaged: flight.rrd is not what was written: its sha256 is not that in "
-            "manifest.json; fly it again\n"
-        )
-
-    each()
-
-
 def pipe(path: Path) -> None:
     os.mkfifo(path)
 

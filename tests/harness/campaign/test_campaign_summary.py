@@ -32,7 +32,7 @@ from harness.cli.summary_table import print_summary
 from harness.files.strict_yaml import InputError
 from harness.files.wording import printable
 from harness.run.scenario_flight import fly_to_folder, kinematic_loop
-from tests.closed_loop.conftest import world
+from tests.closed_loop.small import small_world as world
 from tests.examples import examples
 from tests.page import shown
 

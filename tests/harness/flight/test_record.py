@@ -55,19 +55,6 @@ def test_row_holds_the_state_in_the_units_of_the_file() -> None:
     assert (row["cross_track_m"], row["arc_length_m"], row["plan_index"]) == (-1.5, 77.0, 3)
 
 
-def test_blocks_come_while_flying_and_add_up() -> None:
-    blocks: list[Track] = []
-    log = TrackLog(none_near, [blocks.append], block_rows=4)
-    for tick in range(10):
-        log.add(state(tick / 10), steered(0.0, math.nan, math.nan), -1)
-        assert len(blocks) == (tick + 1) // 4
-    track = log.close()
-    assert [len(block) for block in blocks] == [4, 4, 2]
-    assert digest(Track.joined(blocks)) == digest(track)
-    assert track.plan_index.dtype == np.int64
-    np.testing.assert_array_equal(track.time_s, np.arange(10) / 10)
-
-
 @pytest.mark.parametrize("rows", [1, 2, 3])
 def test_a_state_that_is_not_finite_is_no_row_nor_a_block(rows: int) -> None:
     blocks: list[Track] = []

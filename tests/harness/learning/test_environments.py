@@ -22,7 +22,7 @@ from harness.learning.observation import STATE, ScanKeeper, state_of
 from harness.mapping.scan import RangeScan
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario
-from tests.closed_loop.conftest import world
+from tests.closed_loop.small import small_world as world
 from tests.harness.learning.steering import flown
 
 ROOT = Path(__file__).parents[3]

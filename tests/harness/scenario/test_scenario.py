@@ -21,7 +21,7 @@ from aircraft.envelope import performance
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError
 from harness.run.scenario_flight import make_loop
-from harness.scenario.performance import LEAST_CLEARANCE, mission_of, performance_of
+from harness.scenario.performance import mission_of, performance_of
 from harness.scenario.scenario import (
     Scenario,
     dump_scenario,
@@ -91,14 +91,6 @@ def test_mission_of_tells_the_planner_what_the_scenario_says() -> None:
     assert mission.bounds_m == pytest.approx((off_m, off_m, 40000.0 - off_m, 40000.0 - off_m))
     assert mission.turn_radius_m == performance(airframe("aerosonde"), 25.0).turn_radius_m
     assert mission.sensor_range_m == scenario.sensor.range_m
-
-
-@pytest.mark.parametrize("wanted_m", [0.0, 0.01])
-def test_planners_keep_a_share_of_the_turn_radius_at_the_least(wanted_m: float) -> None:
-    scenario = parse_scenario(WITH_PLANNER.replace("clearance_m: 70", f"clearance_m: {wanted_m}"))
-    mission = mission_of(scenario)
-    assert scenario.planner.clearance_m == wanted_m
-    assert mission.clearance_m == LEAST_CLEARANCE * mission.turn_radius_m
 
 
 def test_numbers_are_those_of_yaml_1_2() -> None:
@@ -286,14 +278,6 @@ def test_the_keys_of_a_guidance_law_are_checked_as_those_of_a_planner(tmp_path: 
     again = parse_scenario(dump_scenario(given))
     assert again == given
     assert performance_of(again) == performance_of(given)
-
-
-def test_a_law_that_tracks_worse_is_planned_for_with_more_room(tmp_path: Path) -> None:
-    preview = overridden(("guidance.kind", "preview"), text=LEAST, folder=tmp_path)
-    l1 = overridden(("guidance.kind", "l1"), text=LEAST, folder=tmp_path)
-    assert overridden(("seed", "1"), text=LEAST, folder=tmp_path).guidance.kind == "preview"
-    assert mission_of(l1).tracking_error_m > mission_of(preview).tracking_error_m + 4.0
-    assert l1.planner.own["margin_m"] >= preview.planner.own["margin_m"]
 
 
 def described_keys(schema: dict[str, Any], defs: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:

@@ -28,7 +28,7 @@ from harness.watching.live import LiveLog
 from harness.watching.pace import Pace
 from harness.watching.relay import Call, Opening, RelayProcess
 from harness.watching.watched_flight import Onlookers, fly_watched
-from tests.closed_loop.conftest import world
+from tests.closed_loop.small import small_world as world
 from tests.point_mass import PointMass
 
 SERVER = """

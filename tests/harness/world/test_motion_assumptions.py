@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,6 @@ from harness.scenario.scenario import Scenario, parse_scenario
 from harness.world.motion_assumptions import outside_assumptions, scenario_outside_assumptions
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.world import World
-
-SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 
 
 def told(*obstacles: Obstacle, until_s: float = 100.0) -> tuple[str, ...]:
@@ -63,42 +60,3 @@ def at(obstacle: Obstacle, times_s: FloatArray) -> tuple[Any, float]:
     if isinstance(obstacle.shape, Circle):
         return shapely.points(shifts + obstacle.shape.center_m), obstacle.shape.radius_m
     return shapely.polygons(shifts[:, None, :] + np.array(obstacle.shape.vertices_m)), 0.0
-
-
-def apart_m(one: Obstacle, other: Obstacle, times_s: FloatArray) -> float:
-    """The least distance at any of the times, 0 where they meet."""
-    (here, reach_m), (there, their_reach_m) = at(one, times_s), at(other, times_s)
-    return max(float(shapely.distance(here, there).min()) - reach_m - their_reach_m, 0.0)
-
-
-def test_contacts_are_those_of_positions_at_many_times() -> None:
-    rng = np.random.default_rng(5)
-    seen = set()
-    for _ in range(60):
-        pair = []
-        for _ in range(2):
-            centre, size, speed = (
-                rng.uniform(-400.0, 400.0, 2),
-                rng.uniform(10.0, 60.0),
-                rng.uniform(1.0, 15.0),
-            )
-            turn = rng.uniform(0.0, math.tau)
-            velocity = (speed * math.cos(turn), speed * math.sin(turn))
-            corners = [tuple(centre + size * np.array((math.cos(a), math.sin(a)))) for a in (0.2, 2.0, 4.5)]
-            circle = rng.random() < 0.5
-            begins = float(rng.uniform(0.0, 20.0))
-            pair.append(
-                Obstacle(
-                    Circle((float(centre[0]), float(centre[1])), size) if circle else Polygon(tuple(corners)),
-                    velocity,
-                    (begins, begins + 60.0),
-                )
-            )
-        first, last = max(each.epoch_s for each in pair), min(each.interval_s[1] for each in pair)
-        apart = apart_m(pair[0], pair[1], np.linspace(first, last, 2000))
-        if 0.0 < apart < 0.5:
-            continue  # too near to be told by samples
-        said = told(*pair)
-        assert (len(said) == 1) is (apart == 0.0)
-        seen.add(apart == 0.0)
-    assert seen == {True, False}

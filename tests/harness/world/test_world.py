@@ -160,17 +160,6 @@ def test_an_obstacle_is_there_from_the_first_to_the_last_moment_of_its_window() 
     assert [world.clearance_at(30.0, 0.0, time) for time in times] == clearance.tolist()
 
 
-@given(seed=st.integers(0, 2**32), gap=st.floats(0.0, 60.0))
-def test_clearance_shrinks_no_faster_than_the_speeds_allow(seed: int, gap: float) -> None:
-    rng = np.random.default_rng(seed)
-    world = World(random_obstacles(rng, 10, changing=True), BOUNDS)
-    east, north = rng.uniform(0.0, 20_000.0, 2)
-    time = rng.uniform(0.0, 100.0)
-    later = min(time + gap, math.nextafter(world.next_appearance(time), 0.0))
-    bound = world.clearance_at(east, north, time) - world.max_obstacle_speed_mps * (later - time)
-    assert world.clearance_at(east, north, later) >= bound - 1e-6
-
-
 def test_the_boundary_belongs_to_the_area() -> None:
     world = World([], (0.0, 10.0, 100.0, 200.0))
     assert all(world.inside_bounds(*point) for point in ((0.0, 10.0), (100.0, 200.0), (50.0, 50.0)))
