@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.closed_loop.conftest import FlyPointMass, SmallWorld
+from tests.closed_loop.small import flown_by_point_mass, small_world
 
 GONE_S = 100.0
 GOAL = (9600.0, 4000.0)
@@ -16,7 +16,7 @@ GOAL = (9600.0, 4000.0)
 
 @pytest.mark.parametrize("wind", [None, {"speed_mps": 8.0, "from_deg": 300.0}])
 def test_a_vanished_wall_is_cut_short_within_25_seconds(
-    wind: dict[str, Any] | None, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+    wind: dict[str, Any] | None,
 ) -> None:
     # When it vanishes, the end that the aircraft flies to is more than a kilometre away.
     wall = {
