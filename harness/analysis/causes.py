@@ -63,8 +63,8 @@ FINDINGS: Mapping[str, str] = {
     "aircraft was off downwind in a cross-wind with no limit reached",
     "bank limit": "the bank command was at its limit, on a radius that the limit allows in that wind: the aircraft was "
     "late or disturbed",
-    "roll rate": "the plan asks for a faster roll than the roll rate limit, or the aircraft rolled at that limit for "
-    "longer than the bank command was at its own",
+    "roll rate": "the plan asks for a faster roll than the roll rate limit, or the aircraft rolled at that limit, or "
+    "with full aileron, for longer than the bank command was at its own",
     "control saturation": "elevator, ailerons or rudder were at a stop",
     "stall": "the wing stalled: the angle of attack or the airspeed was beyond that of the stall",
     "actuator": "a servo was at its rate limit",
