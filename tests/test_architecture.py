@@ -115,7 +115,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
     "aircraft": (
         ("airframes", "climb", "law_cards"),
         ("card_cache", "survey"),
-        ("jsbsim_model", "kinematic_point"),
+        ("jsbsim_model",),
         ("envelope", "jsbsim_loading"),
         ("airframe", "injection", "start"),
         ("autopilot", "frames", "guidance", "model_files", "properties"),

@@ -95,7 +95,6 @@ def row_of(
     *,
     optimum_m: float | None,
     turn_radius_m: float,
-    kinematic: bool,
     guidance: str = "",
 ) -> Row:
     """The row of a flight that came to an end."""
@@ -108,8 +107,6 @@ def row_of(
         "tightest_turn": metrics["smoothness"]["planned"]["max_curvature_1pm"] * turn_radius_m,
         "tightest_flown_turn": metrics["smoothness"]["flown"]["max_curvature_1pm"] * turn_radius_m,
     }
-    if kinematic:
-        flown |= {"trackable": None, "cause": ""}
     return Row(scenario, planner, flown.pop("outcome"), metrics["reason"], guidance, **flown)
 
 

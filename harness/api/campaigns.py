@@ -29,21 +29,20 @@ def compare(
     recording: bool = False,
     *,
     guidance: Sequence[str] | None = None,
-    kinematic: bool = False,
     workers: int | None = None,
 ) -> ComparisonResult:
     """Flies every planner (under every guidance law) through every scenario: tables, figures, a report in `out`.
 
     Scenarios are objects, files, or names of those that come with wayproof; planners and laws are kinds, or
-    `FILE.py:NAME`, `MODULE:NAME`. `recording` records each flight and an overlay of all. `kinematic`: a point that
-    follows every plan exactly flies in place of the aircraft. `workers` flights are flown at a time, one a processor.
+    `FILE.py:NAME`, `MODULE:NAME`. `recording` records each flight and an overlay of all. `workers` flights are flown at
+    a time, by default one a processor.
 
     Raises:
         InputError: a scenario, planner, law or the folder cannot be used; nothing was flown.
     """
     import pyarrow as pa
 
-    from harness.comparison.comparison import Setup, fly_and_compare
+    from harness.comparison.comparison import fly_and_compare
     from harness.scenario.given import GUIDANCE, PLANNER, is_source
 
     given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
@@ -61,14 +60,10 @@ def compare(
         compared = fly_and_compare(
             [each.with_(keys) for each in loaded for keys in chosen],
             Path(out),
-            Setup(
-                recording=recording,
-                kinematic=kinematic,
-                workers=workers or os.cpu_count() or 1,
-                command=in_python(f"wayproof.compare({[each.name for each in loaded]}, {kinds}{of_laws})"),
-                sources=sources,
-                law_sources=law_sources,
-            ),
+            recording=recording,
+            workers=workers or os.cpu_count() or 1,
+            command=in_python(f"wayproof.compare({[each.name for each in loaded]}, {kinds}{of_laws})"),
+            sources=(sources, law_sources),
         )
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
 

@@ -152,9 +152,9 @@ class CampaignResult:
     @cached_property
     def table(self) -> pa.Table:
         """One row a run, with the columns of `results.parquet`."""
-        from harness.campaign.table import load_tables
+        from harness.campaign.table import results_of
 
-        return load_tables(self.folder)[0]
+        return results_of(self.folder)
 
     @cached_property
     def summary(self) -> Summary:

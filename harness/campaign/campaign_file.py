@@ -38,9 +38,8 @@ Keys = dict[str, Any]
 Values = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 
 
-def _named(name: str) -> BeforeValidator:
+def _bare(section: type[Section], name: str) -> BeforeValidator:
     """Takes bare text for a section with one key."""
-    section = PlannerSpec if name == "kind" else AircraftSpec
     return BeforeValidator(
         lambda value: {name: value} if isinstance(value, str) else value, json_schema_input_type=str | section
     )
@@ -66,15 +65,9 @@ class Campaign(Section):
     worlds: Annotated[tuple[WorldSpec, ...], Strict(False)] = ()
     """Generators; each makes area.bounds_m, obstacles, mission.start_m and mission.goal_m in place of the scenario's.
     Default: the scenarios' own worlds."""
-    planners: Annotated[
-        tuple[Annotated[PlannerSpec, _named("kind")], ...],
-        Strict(False),
-    ] = ()
+    planners: Annotated[tuple[Annotated[PlannerSpec, _bare(PlannerSpec, "kind")], ...], Strict(False)] = ()
     """Kinds, or a kind with keys of `planner`. Default: the scenario's own planner."""
-    aircraft: Annotated[
-        tuple[Annotated[AircraftSpec, _named("model")], ...],
-        Strict(False),
-    ] = ()
+    aircraft: Annotated[tuple[Annotated[AircraftSpec, _bare(AircraftSpec, "model")], ...], Strict(False)] = ()
     """Models, or a model with keys of `aircraft`. Default: the scenario's own."""
     set_: Keys = Field(default_factory=dict, alias="set")
     """Values by key path of a scenario, for every run."""
@@ -102,20 +95,15 @@ class Campaign(Section):
         for section, keys in (("set", self.set_), ("grid", self.grid), ("random", self.random)):
             for name in keys:
                 self._check_key((section, name), taken)
-        for section, entries in (("planners", self.planners), ("aircraft", self.aircraft)):
-            self._check_entries(section, entries, taken)
-        return self
-
-    @staticmethod
-    def _check_entries(section: str, entries: Sequence[Section], taken: dict[Loc, str]) -> None:
-        """Refuses an entry that stands there already, or whose key is given for every entry elsewhere."""
-        for index, entry in enumerate(entries):
-            if entry in entries[:index]:
+        lists: dict[str, Sequence[Section]] = {"planners": self.planners, "aircraft": self.aircraft}
+        for section, index, entry in ((s, i, each) for s in lists for i, each in enumerate(lists[s])):
+            if entry in lists[section][:index]:
                 raise KeyFault((section, index), "is there already; leave it out or give it another key")
             for name in entry.model_fields_set | (entry.model_extra or {}).keys():
                 named = taken.get((section.removesuffix("s"), name), "set")
                 if not named.startswith("set"):
                     raise KeyFault((section, index, name), f"is given under {named} too; keep one of them")
+        return self
 
     def _check_key(self, where: tuple[str, str], taken: dict[Loc, str]) -> None:
         """Refuses a key path that is none, is not for a campaign to give, or is given already."""
@@ -211,38 +199,43 @@ def load_campaign(
     Raises:
         InputError: a file cannot be read or is not a campaign; a line of its text names file, line and key.
     """
-    source, root = str(path), _with_options(strict_yaml.read(path), planners, settings)
-    root = _with_folders(_with_world_files(root, path.parent), path.parent)
-    campaign = _validated(root, source)
-    for index, each in enumerate(campaign.planners):
-        if is_source(each.kind) and each.kind not in planner_kinds():
-            name = each.kind[:80]
-            told = f"is {name!r}, which no file may name: give `wayproof sweep` --planners {name},..."
-            raise _fault(source, root, ("planners", index), f"{told}, which replaces all of `planners`")
-    if not campaign.scenarios:
-        line = root.line_of(("worlds",))
-        node = Node({"schema": Node("wayproof/scenario/1", line), "name": Node(campaign.name, line)}, line)
-        return CampaignFile(campaign, source, root, (Base(campaign.name, source, node),))
-    bases: dict[str, Base] = {}
-    for index, entry in enumerate(campaign.scenarios):
-        loc: Loc = ("scenarios", index)
-        for file in _files(entry, path.parent, partial(_fault, source, root, loc)):
-            found = absolute_paths(_mapping(file), file.parent)
-            base = Base(file.name, str(file), found)
-            if base.name in bases:
-                raise _fault(source, root, loc, f"is a second scenario called {base.name}; rename one")
-            bases[base.name] = base
-    return CampaignFile(campaign, source, root, tuple(bases.values()))
-
-
-def _with_options(root: Node, planners: Sequence[str], settings: Sequence[tuple[str, str]]) -> Node:
-    """A campaign's keys with what a command line replaces."""
+    source, root = str(path), strict_yaml.read(path)
     if planners:
         root = strict_yaml.replaced(root, ("planners",), node_of(tuple(planners), COMMAND_LINE))
     for name, text in settings:
         value = strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE)
         root = strict_yaml.replaced(root, ("seed",) if name == "seed" else ("set", name), value)
-    return root
+    root = _with_world_files(root, path.parent)
+    entries = root.at(("aircraft",))
+    for index, entry in enumerate(entries.value if entries and isinstance(entries.value, tuple) else ()):
+        inside = ("model",) if isinstance(entry.value, dict) else ()
+        root = _with_folder(root, ("aircraft", index, *inside), path.parent)
+    campaign = _validated(root, source)
+
+    def fault(loc: Loc, sentence: str) -> InputError:
+        return InputError(fault_line(source, root.line_of(loc), loc, sentence))
+
+    for index, each in enumerate(campaign.planners):
+        if is_source(each.kind) and each.kind not in planner_kinds():
+            name = each.kind[:80]
+            told = f"is {name!r}, which no file may name: give `wayproof sweep` --planners {name},..."
+            raise fault(("planners", index), f"{told}, which replaces all of `planners`")
+    if not campaign.scenarios:
+        line = root.line_of(("worlds",))
+        node = Node({"schema": Node("wayproof/scenario/1", line), "name": Node(campaign.name, line)}, line)
+        return CampaignFile(campaign, source, root, (Base(campaign.name, source, node),))
+    bases: dict[str, Base] = {}
+    for index, name in enumerate(campaign.scenarios):
+        loc: Loc = ("scenarios", index)
+        for file in _files(name, path.parent, partial(fault, loc)):
+            found = strict_yaml.read(file)
+            if not isinstance(found.value, dict):
+                raise InputError(f"{file}:{found.line}: must be a mapping that begins with `schema:`")
+            base = Base(file.name, str(file), absolute_paths(found, file.parent))
+            if base.name in bases:
+                raise fault(loc, f"is a second scenario called {base.name}; rename one")
+            bases[base.name] = base
+    return CampaignFile(campaign, source, root, tuple(bases.values()))
 
 
 def is_campaign(path: Path) -> bool:
@@ -276,17 +269,6 @@ def _validated(root: Node, source: str) -> Campaign:
         raise input_error(error, Campaign, root, source) from error
 
 
-def _fault(source: str, root: Node, loc: Loc, sentence: str) -> InputError:
-    return InputError(fault_line(source, root.line_of(loc), loc, sentence))
-
-
-def _mapping(file: Path) -> Node:
-    root = strict_yaml.read(file)
-    if not isinstance(root.value, dict):
-        raise InputError(f"{file}:{root.line}: must be a mapping that begins with `schema:`")
-    return root
-
-
 def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list[Path]:
     """The scenario files that an entry means: a file, those of a folder, or a shipped one."""
     path, shipped = folder / entry, shipped_scenarios()
@@ -294,7 +276,10 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
         if path.is_file():
             return [path]
         if path.is_dir():
-            if files := [file for file in sorted(path.glob("[!.]*.y*ml")) if _is_scenario(file)]:
+            found = sorted(path.glob("[!.]*.y*ml"))
+            if files := [
+                each for each in found if each.suffix in (".yaml", ".yml") and not is_campaign(each)
+            ]:
                 return files
             raise fault(f"is {entry!r}, a folder without scenario files (*.yaml, *.yml)")
     except OSError as error:
@@ -304,19 +289,6 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
     raise fault(
         f"is {entry[:200]!r}; must be a scenario file, a folder of them or one of {', '.join(shipped)}"
     )
-
-
-def _is_scenario(file: Path) -> bool:
-    return file.suffix in (".yaml", ".yml") and not is_campaign(file)
-
-
-def _with_folders(root: Node, folder: Path) -> Node:
-    """The campaign's keys with every aircraft that is a folder given from the root of the file system on."""
-    entries = root.at(("aircraft",))
-    for index, entry in enumerate(entries.value if entries and isinstance(entries.value, tuple) else ()):
-        inside = ("model",) if isinstance(entry.value, dict) else ()
-        root = _with_folder(root, ("aircraft", index, *inside), folder)
-    return root
 
 
 def absolute_paths(root: Node, folder: Path) -> Node:

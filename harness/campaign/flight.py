@@ -14,7 +14,7 @@ from harness.analysis.claims import Claim, holds
 from harness.campaign.results import ERROR, metric_cells, time_cells
 from harness.files.crash import PlannerError, sentence, trace
 from harness.files.errors import RunFolderError, WriteError
-from harness.scenario.given import GUIDANCE, PLANNER, LoopPart, registered_source
+from harness.scenario.given import GUIDANCE, PLANNER, registered_source
 from harness.scenario.scenario import Scenario, unpacked
 
 if TYPE_CHECKING:
@@ -40,7 +40,6 @@ class Job:
         path: a check, if a given path is flown in place of what a planner finds; `packed` is empty then.
         planners: planners that the process has to import, as FILE.py:NAME or MODULE:NAME.
         laws: guidance laws that it has to import, likewise.
-        kinematic: a point that follows the plans exactly flies in place of the aircraft.
         identity: of the recording among others; empty: as `fly_to_folder` has it.
     """
 
@@ -55,7 +54,6 @@ class Job:
     path: PathCheck | None = None
     planners: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()
-    kinematic: bool = False
     identity: str = ""
 
 
@@ -89,10 +87,9 @@ def fly_job(job: Job) -> Answer:
         RunFolderError: it cannot be made.
     """
     try:
-        for source in job.planners:
-            _imported(source, PLANNER)
-        for source in job.laws:
-            _imported(source, GUIDANCE)
+        for part, sources in ((PLANNER, job.planners), (GUIDANCE, job.laws)):
+            for source in sources:
+                _imported(source, part)
         scenario = unpacked(job.packed) if job.path is None else job.path.scenario
         metrics = _flown(job, scenario)
         optimum_m = _optimum_m(scenario) if job.optimum else None
@@ -110,10 +107,8 @@ def fly_job(job: Job) -> Answer:
     return Answer(job.run, cells, time_cells(metrics), holds(job.claim, metrics))
 
 
-@cache
-def _imported(source: str, part: LoopPart) -> str:
-    """Imports a planner or a law once in this process."""
-    return registered_source(source, part)
+_imported = cache(registered_source)
+"""Imports a planner or a law once in this process."""
 
 
 def _full(error: Exception) -> OSError | None:
@@ -124,13 +119,8 @@ def _full(error: Exception) -> OSError | None:
 
 def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
     """The metrics of a flight, its run folder kept as the job says."""
-    if job.recordings == "folders":
-        return _kept(job, scenario, recording=False)
-    if job.recordings in ("all", "thin"):
-        try:
-            return _kept(job, scenario, thin=job.recordings == "thin")
-        finally:
-            _give_memory_back()
+    if job.recordings in ("all", "thin", "folders"):
+        return _kept(job, scenario)
     found = _measured(job, scenario)
     if job.recordings == "failures" and not holds(job.claim, found):
         # Failures are few: to fly them again costs less than to record every flight.
@@ -151,31 +141,30 @@ def _measured(job: Job, scenario: Scenario) -> dict[str, Any]:
     return metrics(fly(make_loop(scenario)), flight_limits(scenario))
 
 
-def _kept(job: Job, scenario: Scenario, *, recording: bool = True, thin: bool = False) -> dict[str, Any]:
+def _kept(job: Job, scenario: Scenario) -> dict[str, Any]:
     """Flies into the job's run folder."""
+    recording, again = job.recordings != "folders", job.again or None
     if job.path is not None:
         from harness.run.path_check import fly_check
 
-        return fly_check(job.path, job.folder, recording, command=job.again or None).metrics
-    from harness.run.scenario_flight import fly_to_folder, kinematic_loop, make_loop
+        return fly_check(job.path, job.folder, recording, command=again).metrics
+    from harness.run.scenario_flight import fly_to_folder
 
-    return fly_to_folder(
-        scenario,
-        job.folder,
-        recording=recording,
-        thin=thin,
-        make=kinematic_loop if job.kinematic else make_loop,
-        identity=job.identity or None,
-        varied=job.varied,
-        command=job.again or None,
-    )
-
-
-def _give_memory_back() -> None:
-    """Gives what is free to the system, where C's library is glibc: a process that records keeps growing otherwise."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)
+    try:
+        return fly_to_folder(
+            scenario,
+            job.folder,
+            recording=recording,
+            thin=job.recordings == "thin",
+            identity=job.identity or None,
+            varied=job.varied,
+            command=again,
+        )
+    finally:
+        # What is free goes to the system, where C's library is glibc: a process that records keeps growing otherwise.
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+        if recording and trim is not None:
+            trim(0)
 
 
 def _optimum_m(scenario: Scenario) -> float | None:

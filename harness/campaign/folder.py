@@ -8,36 +8,60 @@ from __future__ import annotations
 
 import json
 import os
+import textwrap
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import IO, TYPE_CHECKING, Any, Final
+from typing import IO, Any, Final
 
 from aircraft.airframes import airframe
-from harness.campaign.journal import JOURNAL, Journal, read_journal, sealed
+from harness.campaign.journal import JOURNAL, read_journal, sealed
 from harness.campaign.results import INDEX, METRICS, RESULTS, RUN, TIMES, TIMINGS, table
 from harness.campaign.runs import CampaignRuns
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
-from harness.files.input_file import read_index
+from harness.files.input_file import MAX_JSON_BYTES, read_index
 from harness.files.versions import versions
 from harness.files.whole_file import PARTIAL, append_to, replace_text, replacing
 from harness.files.wording import counted
 from planner.registry import distribution_of
 
-if TYPE_CHECKING:
-    import pyarrow as pa
-
 LOCK: Final = "lock"
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/1"
 MAX_INDEX_BYTES: Final = 10**9
 
-ABSENT: Final = object()
 MAX_TOLD: Final = 3
-IN_ORDER: Final = ("campaign.grid", "campaign.random")
-"""What a run flies follows from the order of the keys there, too."""
+
+
+def claim_folder(
+    path: Path, what: str, index: str, schema: str, lock: str | None = None, most_bytes: int = MAX_JSON_BYTES
+) -> FolderLock:
+    """Holds the folder that a command writes, made where missing.
+
+    Args:
+        path: the folder.
+        what: is written there, a noun.
+        index: its file that says so.
+        schema: of that file.
+        lock: name of a file to lock in place of the folder.
+        most_bytes: the largest index that is read.
+
+    Raises:
+        RunFolderError: it is a file, holds something else, another process writes to it, or it cannot be made.
+    """
+    if path.exists() and not path.is_dir():
+        raise RunFolderError(f"{path} is a file, not a folder for a {what}")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        others = {each.name for each in path.iterdir() if not each.name.endswith(PARTIAL)} - {lock}
+        if others and read_index(path / index, schema, most_bytes) is None:
+            raise RunFolderError(
+                f"{path} is not empty and not a {what}: choose another folder or empty it first"
+            )
+        return FolderLock(path, lock)
+    except OSError as error:
+        raise RunFolderError(f"cannot write the {what} {path}: {error.strerror or error}") from error
 
 
 class CampaignFolder:
@@ -61,16 +85,17 @@ class CampaignFolder:
                 campaign, a damaged journal, another process is flying into it, or it cannot be written.
         """
         self.path, self._runs = path, runs
-        self._stack = ExitStack()
-        try:
-            self.done = self._claim(resume)
-            self._journal: IO[bytes] = self._stack.enter_context(append_to(path / JOURNAL))
-        except OSError as error:
-            self._stack.close()
-            raise RunFolderError(f"cannot write the campaign {path}: {error.strerror or error}") from error
-        except BaseException:
-            self._stack.close()
-            raise
+        with ExitStack() as stack:
+            held = claim_folder(path, "campaign", INDEX, FOLDER_SCHEMA, LOCK, MAX_INDEX_BYTES)
+            stack.callback(held.release)
+            try:
+                self.done = self._begin(resume)
+                self._journal: IO[bytes] = stack.enter_context(append_to(path / JOURNAL))
+            except OSError as error:
+                raise RunFolderError(
+                    f"cannot write the campaign {path}: {error.strerror or error}"
+                ) from error
+            self._stack = stack.pop_all()
 
     def append(self, run: int, row: Mapping[str, Any], times: Mapping[str, Any], held: bool = False) -> None:
         """Puts a run that is over on the disk."""
@@ -85,15 +110,17 @@ class CampaignFolder:
         Args:
             first: of so many runs, by their number; default: of all that are over.
         """
-        over = read_journal(self.path).runs
-        if first is not None:
-            over = {run: each for run, each in over.items() if run < first}
+        import pyarrow.parquet as pq
+
+        over = read_journal(self.path).runs.items()
+        kept = [(run, each) for run, each in over if first is None or run < first]
         about = {"runs": len(self._runs), **self._runs.plain()}
-        columns = RUN | self._runs.varied | METRICS
-        rows = [{**each.row, "run": run} for run, each in over.items()]
-        times = [{**each.times, "run": run} for run, each in over.items()]
-        self._write_table(RESULTS, table(rows, columns, about))
-        self._write_table(TIMINGS, table(times, TIMES, about))
+        for name, columns, rows in (
+            (RESULTS, RUN | self._runs.varied | METRICS, [{**each.row, "run": run} for run, each in kept]),
+            (TIMINGS, TIMES, [{**each.times, "run": run} for run, each in kept]),
+        ):
+            with replacing(self.path / name) as file:
+                pq.write_table(table(rows, columns, about), file, compression="zstd")
 
     def outcomes(self) -> dict[str, int]:
         """How many of the runs that are over ended how, the most frequent first."""
@@ -103,57 +130,11 @@ class CampaignFolder:
     def __enter__(self) -> CampaignFolder:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def _write_table(self, name: str, content: pa.Table) -> None:
-        import pyarrow.parquet as pq
-
-        with replacing(self.path / name) as file:
-            pq.write_table(content, file, compression="zstd")
-
-    def _claim(self, resume: bool) -> set[int]:
-        """Locks the folder, checks and writes its index; returns the runs that are over."""
-        path = self.path
-        if path.exists() and not path.is_dir():
-            raise RunFolderError(f"{path} is a file, not a folder for a campaign")
-        path.mkdir(parents=True, exist_ok=True)
-        if {each.name for each in path.iterdir()} - {LOCK, INDEX + PARTIAL} and _index(path) is None:
-            raise RunFolderError(
-                f"{path} is not empty and not a campaign's folder: choose another one or empty it first"
-            )
-        self._stack.callback(FolderLock(path, LOCK).release)
-        now, before = self._about(), _index(path)
-        journal = read_journal(path)
-        self._check(journal, before, now, resume=resume)
-        if before != now:
-            replace_text(path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
-        if journal.path.exists():
-            os.truncate(journal.path, journal.end)
-        return set(journal.runs)
-
-    def _check(
-        self, journal: Journal, before: dict[str, Any] | None, now: dict[str, Any], *, resume: bool
-    ) -> None:
-        """Refuses results without `resume`, and those of another campaign."""
-        has_any = bool(journal.runs) or _has_rows(self.path / RESULTS)
-        if has_any and not resume:
-            held = counted(len(journal.runs), "run") if journal.runs else RESULTS
-            raise RunFolderError(f"{self.path} holds {held}: go on with --resume, or choose another folder")
-        if has_any and before is not None and (changes := list(_changes(before, now))):
-            told = "; ".join(changes[:MAX_TOLD]) + ("; and more" if len(changes) > MAX_TOLD else "")
-            raise RunFolderError(
-                f"{self.path} is of another campaign: {told}; change it back or choose another folder"
-            )
-        if beyond := [run for run in journal.runs if run >= len(self._runs)]:
-            raise RunFolderError(
-                f"{journal.path}: tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
-            )
-
-    def _about(self) -> dict[str, Any]:
-        """The content of `campaign.json`, as it is read back."""
+    def _begin(self, resume: bool) -> set[int]:
+        """Checks and writes the index; returns the runs that are over."""
         about = {
             "schema": FOLDER_SCHEMA,
             "versions": versions(),
@@ -161,13 +142,29 @@ class CampaignFolder:
             "aircraft": {model: airframe(model).files.digest() for model in self._runs.aircraft},
             **self._runs.plain(),
         }
-        read: dict[str, Any] = json.loads(json.dumps(about))
-        return read
-
-
-def _index(path: Path) -> dict[str, Any] | None:
-    """The index of a campaign's folder, which holds all its scenarios; None where there is none that is ours."""
-    return read_index(path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES)
+        now = json.loads(json.dumps(about))
+        before = read_index(self.path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES)
+        journal = read_journal(self.path)
+        if journal.runs or _has_rows(self.path / RESULTS):
+            held = counted(len(journal.runs), "run") if journal.runs else RESULTS
+            if not resume:
+                raise RunFolderError(
+                    f"{self.path} holds {held}: go on with --resume, or choose another folder"
+                )
+            if changes := list(_changes(before or now, now)):
+                told = "; ".join(changes[:MAX_TOLD]) + ("; and more" if len(changes) > MAX_TOLD else "")
+                raise RunFolderError(
+                    f"{self.path} is of another campaign: {told}; change it back or choose another folder"
+                )
+        if beyond := [run for run in journal.runs if run >= len(self._runs)]:
+            raise RunFolderError(
+                f"{journal.path}: tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
+            )
+        if before != now:
+            replace_text(self.path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
+        if journal.path.exists():
+            os.truncate(journal.path, journal.end)
+        return set(journal.runs)
 
 
 def _has_rows(results: Path) -> bool:
@@ -183,22 +180,28 @@ def _has_rows(results: Path) -> bool:
         return True
 
 
-def _changes(before: Any, now: Any, where: str = "") -> Iterator[str]:
-    """What differs between two contents, a sentence each."""
-    if isinstance(before, dict) and isinstance(now, dict):
-        for name in dict.fromkeys([*before, *now]):
-            yield from _changes(
-                before.get(name, ABSENT), now.get(name, ABSENT), f"{where}.{name}".lstrip(".")
+def _changes(before: dict[str, Any], now: dict[str, Any]) -> Iterator[str]:
+    """What differs between two indices, a sentence each; what a run flies follows from the order of some keys, too."""
+    was, is_now = dict(_leaves(before)), dict(_leaves(now))
+    for name in {**was, **is_now}:
+        if was.get(name) != is_now.get(name):
+            texts = (
+                textwrap.shorten(each.get(name, "not there"), 60, placeholder="...") for each in (was, is_now)
             )
-        if where in IN_ORDER and before.keys() == now.keys() and list(before) != list(now):
-            yield f"{where} had its keys in the order {', '.join(before)}, has {', '.join(now)}"
-    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        for index, pair in enumerate(zip(before, now, strict=True)):
-            yield from _changes(*pair, f"{where}[{index}]")
-    elif before != now:
-        yield f"{where} was {_shown(before)}, is {_shown(now)}"
+            yield "{} was {}, is {}".format(name, *texts)
+    for name in ("grid", "random"):
+        orders = [list(each["campaign"].get(name, ())) for each in (before, now)]
+        if orders[0] != orders[1] and sorted(orders[0]) == sorted(orders[1]):
+            yield "campaign.{} had its keys in the order {}, has {}".format(name, *map(", ".join, orders))
 
 
-def _shown(value: Any) -> str:
-    text = "not there" if value is ABSENT else json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+def _leaves(content: Any, where: str = "") -> Iterator[tuple[str, str]]:
+    """The values in a content as JSON, by where they stand."""
+    if content and isinstance(content, dict):
+        for name, each in content.items():
+            yield from _leaves(each, f"{where}.{name}".lstrip("."))
+    elif isinstance(content, list) and any(isinstance(each, dict | list) for each in content):
+        for index, each in enumerate(content):
+            yield from _leaves(each, f"{where}[{index}]")
+    else:
+        yield where, json.dumps(content)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -58,24 +58,26 @@ def read_journal(folder: Path) -> Journal:
         OSError: it cannot be read.
     """
     path = folder / JOURNAL
+    *lines, torn = path.read_bytes().split(b"\n") if path.exists() else (b"",)
+    if lines and not torn and not lines[-1].endswith(b"}"):
+        lines.pop()
     runs: dict[int, Over] = {}
-    end = 0
-    for number, (text, is_last) in enumerate(_texts(path), start=1):
-        line = _line(text)
-        if line is None and is_last and not text.endswith(b"}\n"):
-            break
-        told = "" if line is None else "something else than was written: its sha256 is another"
-        if line is None or sealed(line) != text:
-            told = told or "no run"
-        else:
+    for number, text in enumerate(lines, start=1):
+        try:
+            line = json.loads(text)
             run, over = line["run"], Over(line["row"], line["times"], line["held"])
-            told = "" if runs.setdefault(run, over) == over else f"run {run} otherwise than a line before it"
+            told = "" if type(run) is int else "no run"
+            if sealed(line) != text + b"\n":
+                told = "something else than was written: its sha256 is another"
+            elif runs.setdefault(run, over) != over:
+                told = f"run {run} otherwise than a line before it"
+        except (ValueError, RecursionError, KeyError, TypeError):
+            told = "no run"
         if told:
             raise RunFolderError(
                 f"{path}:{number}: is damaged: it tells of {told}; delete that line, and what it told of is flown again"
             )
-        end += len(text)
-    return Journal(path, runs, end)
+    return Journal(path, runs, sum(len(each) + 1 for each in lines))
 
 
 def sealed(told: Mapping[str, Any]) -> bytes:
@@ -83,27 +85,3 @@ def sealed(told: Mapping[str, Any]) -> bytes:
     text = json.dumps({key: value for key, value in told.items() if key != SEAL}, allow_nan=False)
     digest = hashlib.sha256(text.encode()).hexdigest()
     return f'{text[:-1]}, "{SEAL}": "{digest}"}}\n'.encode()
-
-
-def _texts(path: Path) -> Iterator[tuple[bytes, bool]]:
-    """The lines of a file, and whether each is the last."""
-    if not path.exists():
-        return
-    with path.open("rb") as file:
-        text = next(file, b"")
-        for following in file:
-            yield text, False
-            text = following
-        if text:
-            yield text, True
-
-
-def _line(text: bytes) -> dict[str, Any] | None:
-    """What a line tells; None where it does not tell of a run."""
-    try:
-        line = json.loads(text) if text.endswith(b"\n") else None
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(line, dict) or not {"run", "row", "times", "held"} <= line.keys():
-        return None
-    return line if type(line["run"]) is int and line["run"] >= 0 else None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -22,11 +22,8 @@ CONFIDENCE: Final = 0.95
 RESAMPLES: Final = 1999
 MIN_CASES: Final = 4
 """Below this many cases there is no interval: more than a fortieth of all resamples would hold one case only."""
-BATCH: Final = 500
-"""The bootstrap holds this many resamples in memory at a time."""
 SEED: Final = 1
 """Seed of the resampling: the same runs give the same interval."""
-
 RATIO: Final = "ratio"
 """Name of the length over the optimum, which counts only where both planners reached the goal."""
 
@@ -38,31 +35,24 @@ TESTED: Final[tuple[Metric, ...]] = tuple(
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure and its 95 % interval.
-
-    Attributes:
-        value: None where no pair gives one.
-        low: lower end; None where there are fewer than `MIN_CASES`, or one value alone.
-        high: upper end, likewise.
-    """
+    """A mean with its bootstrap interval; None where there is none."""
 
     value: float | None = None
     low: float | None = None
     high: float | None = None
 
-    def text(self, factor: float = 1.0) -> str:
-        """Value and interval, with signs, as a person reads them; empty where there is no value."""
-        if self.value is None:
-            return ""
-        told = _signed(self.value * factor)
-        if self.low is None or self.high is None:
-            return told
-        return f"{told} ({_signed(self.low * factor)} to {_signed(self.high * factor)})"
+    def text(self) -> str:
+        """As people are shown it."""
+        value, *ends = (
+            "" if each is None else f"{'+' if each > 0 else ''}{number(each)}"
+            for each in (self.value, self.low, self.high)
+        )
+        return f"{value} ({' to '.join(ends)})" if all(ends) else value
 
 
 @dataclass(frozen=True)
 class Tested:
-    """One figure of two planners in pairs.
+    """One figure of two planners on the cases of which both have it.
 
     Attributes:
         figure: its label, with the unit.
@@ -117,73 +107,47 @@ def duels(
     flown: dict[str, dict[Any, int]] = {}
     for row, (planner, case) in enumerate(zip(planners, cases, strict=True)):
         flown.setdefault(planner, {})[case] = row
-    return tuple(
-        _duel(first, second, flown, np.array(reached, dtype=np.float64), figures)
-        for first, second in itertools.combinations(flown, 2)
-    )
-
-
-def _duel(
-    first: str,
-    second: str,
-    flown: Mapping[str, Mapping[Any, int]],
-    reached: FloatArray,
-    figures: Mapping[str, FloatArray],
-) -> Duel:
-    common = [case for case in flown[first] if case in flown[second]]
-    ours, theirs = (
-        np.array([flown[name][case] for case in common], dtype=np.int64) for name in (first, second)
-    )
-    numbers: dict[Any, int] = {}
-    cases = np.array([numbers.setdefault(case[0], len(numbers)) for case in common], dtype=np.int64)
-    won, lost = reached[ours] > 0.0, reached[theirs] > 0.0
-    tested = [_tested("goals reached, %", 100.0 * reached[ours], 100.0 * reached[theirs], cases)]
+    every = {"goals reached, %": 100.0 * np.array(reached, dtype=np.float64)}
     for metric in TESTED:
-        values = figures.get(metric.name, np.full(len(reached), np.nan)) * metric.factor
-        among = np.isfinite(values[ours]) & np.isfinite(values[theirs])
-        among &= won & lost if metric.name == RATIO else True
-        if among.any():
-            label = f"{metric.label}, %" if metric.kind == "bool" else metric.label
-            scale = 100.0 if metric.kind == "bool" else 1.0
-            tested.append(
-                _tested(label, scale * values[ours][among], scale * values[theirs][among], cases[among])
-            )
-    return Duel(
-        first,
-        second,
-        pairs=len(common),
-        only_first=int((won & ~lost).sum()),
-        only_second=int((lost & ~won).sum()),
-        both_reached=int((won & lost).sum()),
-        figures=_corrected(tested) if common else (),
-    )
+        if metric.name in figures:
+            is_share = metric.kind == "bool"
+            label = f"{metric.label}, %" if is_share else metric.label
+            every[label] = figures[metric.name] * metric.factor * (100.0 if is_share else 1.0)
+    ratio = next(each.label for each in TESTED if each.name == RATIO)
+    found = []
+    for first, second in itertools.combinations(flown, 2):
+        common = [case for case in flown[first] if case in flown[second]]
+        ours, theirs = (np.array([flown[name][case] for case in common], int) for name in (first, second))
+        _, numbers = np.unique([str(case[0]) for case in common], return_inverse=True)
+        won, lost = (np.array(reached, dtype=bool)[rows] for rows in (ours, theirs))
+        tested = []
+        for label, values in every.items():
+            among = np.isfinite(values[ours]) & np.isfinite(values[theirs])
+            among &= won & lost if label == ratio else True
+            if among.any():
+                tested.append(_tested(label, values[ours][among], values[theirs][among], numbers[among]))
+        counts = (len(common), int((won & ~lost).sum()), int((lost & ~won).sum()), int((won & lost).sum()))
+        found.append(Duel(first, second, *counts, _corrected(tested)))
+    return tuple(found)
 
 
 def _tested(label: str, ours: FloatArray, theirs: FloatArray, cases: IntArray) -> Tested:
     from scipy import stats
 
-    if not len(ours):
-        return Tested(label, 0, 0.0, 0.0, Estimate(), None)
-    estimate = mean_estimate(ours - theirs, cases)
     _, index = np.unique(cases, return_inverse=True)
     means = np.bincount(index, ours - theirs) / np.bincount(index)
     tells = len(means) >= MIN_CASES and bool(np.any(means != 0.0))
     p = float(stats.wilcoxon(means).pvalue) if tells else None
+    estimate = mean_estimate(ours - theirs, cases)
     return Tested(label, len(ours), float(ours.mean()), float(theirs.mean()), estimate, p)
 
 
 def _corrected(tested: Sequence[Tested]) -> tuple[Tested, ...]:
     """The same with the p-values corrected by Holm's method (Scandinavian Journal of Statistics 6, 1979)."""
     order = sorted((each.p, place) for place, each in enumerate(tested) if each.p is not None)
-    corrected: dict[int, float] = {}
-    least = 0.0
-    for rank, (p, place) in enumerate(order):
-        least = max(least, min(1.0, (len(order) - rank) * p))
-        corrected[place] = least
-    return tuple(
-        Tested(each.figure, each.pairs, each.first, each.second, each.difference, corrected.get(place))
-        for place, each in enumerate(tested)
-    )
+    raised = (min(1.0, (len(order) - rank) * p) for rank, (p, _) in enumerate(order))
+    corrected = dict(zip((place for _, place in order), itertools.accumulate(raised, max), strict=True))
+    return tuple(replace(each, p=corrected.get(place)) for place, each in enumerate(tested))
 
 
 def mean_estimate(differences: FloatArray, cases: IntArray) -> Estimate:
@@ -196,27 +160,13 @@ def mean_estimate(differences: FloatArray, cases: IntArray) -> Estimate:
         differences: (n,) one a pair, all finite.
         cases: (n,) case of each.
     """
-    if not len(differences):
-        return Estimate()
     mean = float(differences.mean())
     different, index = np.unique(cases, return_inverse=True)
     if np.ptp(differences) == 0.0 or len(different) < MIN_CASES:
         return Estimate(mean)
-    from scipy import stats
-
-    interval = stats.bootstrap(
-        (np.bincount(index, differences), np.bincount(index)),
-        lambda sums, counts, axis: sums.sum(axis=axis) / counts.sum(axis=axis),
-        paired=True,
-        vectorized=True,
-        confidence_level=CONFIDENCE,
-        n_resamples=RESAMPLES,
-        batch=BATCH,
-        method="percentile",
-        rng=np.random.default_rng(SEED),
-    ).confidence_interval
-    return Estimate(mean, float(interval.low), float(interval.high))
-
-
-def _signed(value: float) -> str:
-    return f"{'+' if value > 0 else ''}{number(value)}"
+    sums, counts = np.bincount(index, differences), np.bincount(index)
+    rng = np.random.default_rng(SEED)
+    drawn = [rng.integers(len(sums), size=len(sums)) for _ in range(RESAMPLES)]
+    means = [sums[each].sum() / counts[each].sum() for each in drawn]
+    low, high = np.quantile(means, (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE))
+    return Estimate(mean, float(low), float(high))

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 from harness.analysis.causes import FINDINGS
 from harness.analysis.metric import number
-from harness.campaign.questions import QUESTIONS, shade
-from harness.campaign.summary import Summary, Table
-from harness.campaign.table import Runs, load_tables
+from harness.campaign.cell import QUESTIONS
+from harness.campaign.summary import Summary
+from harness.campaign.table import Runs
 from harness.files.errors import WriteError
 from harness.files.whole_file import replace_text
 from harness.report.page import Picture, rendered
 
 PAGE = "summary.html"
 PLAIN = "summary.json"
-SCHEMA = "wayproof/campaign-summary/4"
+SCHEMA = "wayproof/campaign-summary/5"
 
 
 def write_summary(summary: Summary, folder: Path) -> Path:
@@ -28,8 +28,6 @@ def write_summary(summary: Summary, folder: Path) -> Path:
     Raises:
         WriteError: they could not be written.
     """
-    page = folder / PAGE
-    again = shlex.join(["wayproof", "report", str(folder)])
     try:
         plain = {"schema": SCHEMA, **asdict(summary)}
         replace_text(folder / PLAIN, json.dumps(plain, indent=2, allow_nan=False) + "\n")
@@ -37,59 +35,45 @@ def write_summary(summary: Summary, folder: Path) -> Path:
             "campaign.html",
             summary=summary,
             questions=QUESTIONS,
-            pictures=list(_pictures(summary, folder)) if summary.total.runs else [],
+            pictures=_pictures(folder, summary.varied) if summary.total.runs else [],
             findings=FINDINGS,
-            command=shlex.join(["wayproof", "report", "--run-reports", str(folder)]),
             number=number,
-            shade=shade,
         )
-        replace_text(page, text)
+        replace_text(folder / PAGE, text)
     except OSError as error:
+        again = shlex.join(["wayproof", "report", str(folder)])
         raise WriteError(
             f"cannot write the summary in {folder}: {error.strerror or error}; the results are whole, and "
             f"`{again}` makes it from them"
         ) from error
-    return page
+    return folder / PAGE
 
 
-def _pictures(summary: Summary, folder: Path) -> Iterator[Picture]:
-    from harness.campaign import figures
+def _pictures(folder: Path, varied: Sequence[str]) -> list[Picture]:
+    """Every run against what was varied, where numbers were."""
+    from harness.campaign.figures import scatter
     from harness.report.figure_style import svg
 
-    for table in summary.curves:
-        if len(table.rows.labels) > 1:  # one value is no plot
-            yield Picture(
-                svg(figures.success(table)),
-                f"Share of goals reached against {table.rows.key}",
-                f"Goals reached against {table.rows.key}, with Wilson's 95 % intervals.",
-            )
-    if any(len({*ratios}) > 1 for ratios in summary.lengths.values()):
-        yield Picture(
-            svg(figures.lengths(summary.lengths)),
-            "Distribution of the flown length over the clairvoyant optimum",
-            "Flown lengths: the share of the goals reached with at most this length over the clairvoyant optimum.",
-        )
-    scattered = figures.scatter(Runs(*load_tables(folder)), summary.varied)
-    if scattered is not None:
-        yield Picture(
-            svg(scattered),
-            "Figures of every run against each number that was varied",
-            "Every run: clearance over the wanted one, largest cross-track error and length over the optimum, against "
-            "each number that was varied. Crosses: the goal was not reached. Triangles at an edge: beyond it.",
-        )
+    figure = scatter(Runs.of(folder), varied)
+    title = "Figures of every run against each number that was varied"
+    caption = (
+        "Every run: clearance over the wanted one, largest cross-track error and length over the optimum, against each "
+        "number that was varied. Crosses: the goal was not reached. Triangles at an edge: beyond it."
+    )
+    return [] if figure is None else [Picture(svg(figure), title, caption)]
 
 
 def rows_for_paper(summary: Summary) -> tuple[list[str], list[list[str]]]:
     """Headings and rows of the table for a paper: the groups of the first table, and all runs."""
+    table = summary.tables[0] if summary.tables else None
+    keys = [axis.key for axis in (table.rows, table.columns) if axis] if table else [""]
     found: list[list[str]] = []
-    tables: tuple[Table, ...] = summary.tables[:1]
-    keys = [axis.key for table in tables for axis in (table.rows, table.columns) if axis]
-    for table in tables:
+    if table:
         for label, cells in zip(table.rows.labels, table.cells, strict=True):
-            names = table.columns.labels if table.columns else (None,)
-            for name, cell in zip(names, cells, strict=True):
+            names = [[label, name] for name in table.columns.labels] if table.columns else [[label]]
+            for named, cell in zip(names, cells, strict=True):
                 answers = [each.text(cell) if cell.runs else "" for each in QUESTIONS]
-                found.append([*filter(None, (label, name)), str(cell.runs), *answers])
+                found.append([*named, str(cell.runs), *answers])
     total = [str(summary.total.runs), *(each.text(summary.total) for each in QUESTIONS)]
     found.append(["all runs", *("" for _ in keys[1:]), *total])
-    return [*(keys or [""]), "runs", *(each.short for each in QUESTIONS)], found
+    return [*keys, "runs", *(each.short for each in QUESTIONS)], found

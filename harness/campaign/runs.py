@@ -7,17 +7,18 @@ planner and aircraft `r % pairs`. A case's streams are children of the campaign'
 
 from __future__ import annotations
 
-import itertools
+import json
 import math
-from collections.abc import Callable, Sequence
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
-from harness.campaign.cells import PlannedRun, cell_of, entry_columns, kind_of
 from harness.campaign.flight import Job
 from harness.campaign.results import LAW, RESULTS, RUNS, fly_again, read_table
 from harness.campaign.sampling import takes_whole_numbers
@@ -31,7 +32,7 @@ from harness.files.strict_yaml import (
     key_path,
     loc_of,
     node_of,
-    replaced,
+    without,
 )
 from harness.scenario.generators import generated
 from harness.scenario.overrides import overridden, with_key
@@ -44,8 +45,11 @@ SEED, WORLD, DRAW = range(3)
 MOST_KEPT: Final = 100_000_000
 """Bytes of scenarios that are kept from the check on: to make one takes some six times as long as to unpack it."""
 
-DEFAULT_PLANNER: Final = "rolling_window"
-DEFAULT_AIRCRAFT: Final = "aerosonde"
+ENTRIES: Final = (
+    ("planners", "planner", "kind", "rolling_window"),
+    ("aircraft", "aircraft", "model", "aerosonde"),
+)
+"""Lists of a campaign, the section of a scenario that an entry replaces, its key of a bare entry, and its default."""
 
 
 class _Change(NamedTuple):
@@ -60,13 +64,56 @@ class _Place(NamedTuple):
     """Where in the campaign a run lies: indices."""
 
     case: int
-    draw: int
-    combination: int
     base: int
     world: int
     grid: tuple[int, ...]
-    planner: int
-    aircraft: int
+    entries: dict[str, int]
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run of a campaign, before it is flown.
+
+    Attributes:
+        run: its number.
+        case: runs of one case fly the same world with the same seed and draws.
+        scenario: name of the scenario.
+        world: name of its file, or of the generator.
+        planner: kind.
+        aircraft: model.
+        seed: the scenario's.
+        varied: grid and drawn values, and those of its entries, by key path; lists and mappings as JSON text.
+    """
+
+    run: int
+    case: int
+    scenario: str
+    world: str
+    planner: str
+    aircraft: str
+    seed: int
+    varied: dict[str, Scalar]
+
+    def cells(self) -> dict[str, Scalar]:
+        """Its first columns in `results.parquet`."""
+        about = asdict(self)
+        return {**about, **about.pop("varied")}
+
+
+def kind_of(values: Sequence[Any]) -> str:
+    """What a column of these values holds, nulls aside."""
+    kinds = {type(value) for value in values if value is not None}
+    for name, of in (("bool", {bool}), ("int", {int}), ("number", {int, float}), ("text", {str})):
+        if kinds <= of:
+            return name
+    return "json"
+
+
+def _cell(value: Any, kind: str) -> Scalar:
+    """A value as its column has it."""
+    if kind == "json":
+        return json.dumps(value)
+    return float(value) if kind == "number" and value is not None else value
 
 
 class CampaignRuns:
@@ -84,45 +131,46 @@ class CampaignRuns:
         self._sources = planners, laws
         self.file, self.campaign = file, file.campaign
         campaign = file.campaign
-        grids = [range(len(values)) for values in campaign.grid.values()]
-        worlds = range(len(campaign.worlds)) or range(1)
-        sizes = [len(file.bases), len(worlds), *map(len, grids)]
-        self._pairs = list(
-            itertools.product(range(len(campaign.planners) or 1), range(len(campaign.aircraft) or 1))
-        )
-        self._combinations = math.prod(sizes)
-        self._number = campaign.draws * self._combinations * len(self._pairs)
-        self._sizes = sizes
-        self._last_world: tuple[int, list[_Change]] = (-1, [])
+        grids = [len(values) for values in campaign.grid.values()]
+        self._sizes = [len(file.bases), len(campaign.worlds) or 1, *grids]
+        self._entry_sizes = [len(getattr(campaign, listed)) or 1 for listed, *_ in ENTRIES]
         self._made: dict[int, bytes] = {}  # by `check`
-        if self._number > MAX_RUNS:
-            sentence = f"makes {self._number} runs with what is combined; must be at most {MAX_RUNS}"
+        self._world = lru_cache(maxsize=1)(self._generated)  # runs of one case follow each other
+        self.cases = campaign.draws * math.prod(self._sizes)
+        if len(self) > MAX_RUNS:
+            sentence = f"makes {len(self)} runs with what is combined; must be at most {MAX_RUNS}"
             raise InputError(self._line(("draws",) if campaign.draws > 1 else ("grid",), sentence))
 
     def __len__(self) -> int:
-        return self._number
+        return self.cases * math.prod(self._entry_sizes)
 
     @property
-    def cases(self) -> int:
-        """How many cases there are."""
-        return self._number // len(self._pairs)
-
-    @cached_property
     def planners(self) -> list[str]:
         """The kinds of planners that fly."""
-        named = [each.label for each in self.campaign.planners]
-        return named or [base.word(("planner", "kind"), DEFAULT_PLANNER) for base in self.file.bases]
+        return self._names["planners"]
 
-    @cached_property
+    @property
     def aircraft(self) -> list[str]:
         """The models of aircraft that fly."""
-        named = [each.model for each in self.campaign.aircraft]
-        return named or [base.word(("aircraft", "model"), DEFAULT_AIRCRAFT) for base in self.file.bases]
+        return self._names["aircraft"]
+
+    @cached_property
+    def _names(self) -> dict[str, list[str]]:
+        """Names of the entries of each list of `ENTRIES`; of one without entries, those of the scenarios."""
+        campaign = self.campaign
+        named = {
+            "planners": [each.label for each in campaign.planners],
+            "aircraft": [each.model for each in campaign.aircraft],
+        }
+        own = {
+            listed: [base.word((section, first), default) for base in self.file.bases]
+            for listed, section, first, default in ENTRIES
+        }
+        return {listed: named[listed] or own[listed] for listed in named}
 
     @cached_property
     def varied(self) -> dict[str, str]:
-        """Columns of `results.parquet` for the varied keys: number, int, bool or text by key path."""
-        entries = {name: kind_of(values) for name, values in self._of_entries.items()}
+        """Columns of `results.parquet` for the varied keys: number, int, bool, text or json by key path."""
         grid = {as_spelt(name): kind_of(values) for name, values in self.campaign.grid.items()}
         drawn = {
             as_spelt(name): kind_of(each.choice)
@@ -132,22 +180,40 @@ class CampaignRuns:
             else "number"
             for name, each in self.campaign.random.items()
         }
-        return grid | drawn | entries
+        return grid | drawn | {name: kind for name, (_, kind, _) in self._of_entries.items()}
+
+    @cached_property
+    def _of_entries(self) -> dict[str, tuple[str, str, list[Scalar]]]:
+        """The list, its column's kind and each entry's cell for a key that any of them gives, by key path."""
+        columns = {}
+        for listed, section, first, _ in ENTRIES:
+            plain = self.file.root.plain().get(listed, ())
+            given = [each if isinstance(each, dict) else {} for each in plain]
+            for name in dict.fromkeys(name for each in given for name in each if name != first):
+                kind = kind_of(values := [each.get(name) for each in given])
+                columns[f"{section}.{name}"] = (
+                    listed,
+                    kind,
+                    [None if value is None else _cell(value, kind) for value in values],
+                )
+        return columns
 
     @cached_property
     def _whole(self) -> set[str]:
         """Keys drawn at random that take whole numbers alone; an InputError where a range of theirs ends elsewhere."""
-        whole = [name for name in self.campaign.random if takes_whole_numbers(loc_of(name))]
-        for name in whole:
-            for within, end in self.campaign.random[name].ends():
+        drawn = {name: each for name, each in self.campaign.random.items() if not each.choice}
+        middle = [_Change(loc_of(name), Node(each.middle(), 0), ()) for name, each in drawn.items()]
+        whole: set[str] = set()
+        if drawn:
+            with suppress(InputError, KeyFaults):  # the check of the runs tells of their faults
+                scenario = scenario_from(self._root(0, middle)[0].plain())
+                whole = {name for name in drawn if takes_whole_numbers(scenario, loc_of(name))}
+        for name in sorted(whole):
+            for within, end in drawn[name].ends().items():
                 if not end.is_integer():
                     sentence = f"is {end:g}; must be a whole number, as {name} is"
                     raise InputError(self._line(("random", name, *within), sentence))
-        return set(whole)
-
-    @cached_property
-    def _of_entries(self) -> dict[str, tuple[Scalar, ...]]:
-        return entry_columns(self.file)
+        return whole
 
     def run(self, number: int) -> PlannedRun:
         """Run `number`, from 0."""
@@ -155,17 +221,23 @@ class CampaignRuns:
         base = self.file.bases[place.base]
         changes = [*self._grid(place), *self._drawn(place)]
         given = {key_path(each.loc): each.node.plain() for each in changes}
-        for name, values in self._of_entries.items():
-            given[name] = values[place.planner if name.startswith("planner.") else place.aircraft]
+        varied = {name: _cell(given[name], kind) for name, kind in self.varied.items() if name in given}
+        varied |= {
+            name: cells[place.entries[listed]] for name, (listed, _, cells) in self._of_entries.items()
+        }
+        planner, model = (
+            names[place.entries[listed] if getattr(self.campaign, listed) else place.base]
+            for listed, names in self._names.items()
+        )
         return PlannedRun(
             number,
             place.case,
             base.name,
             self.campaign.worlds[place.world].name if self.campaign.worlds else base.file,
-            self.planners[place.planner if self.campaign.planners else place.base],
-            self.aircraft[place.aircraft if self.campaign.aircraft else place.base],
+            planner,
+            model,
             self._seed(place.case),
-            {column: cell_of(given[column], kind) for column, kind in self.varied.items()},
+            varied,
         )
 
     def scenario(self, number: int, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
@@ -180,23 +252,29 @@ class CampaignRuns:
         """
         if number in self._made and not overrides:
             return unpacked(self._made[number])
-        place = self._place(number)
-        base = self.file.bases[place.base]
-        root, changes = base.root, self._changes(place)
-        if self.campaign.worlds:
-            root = _without_course(root)
-        for loc, node, origin in changes:
-            try:
-                root = with_key(root, loc, node)
-            except InputError as error:
-                sentence = str(error).removeprefix("command line: ")
-                raise InputError(self._line(origin, sentence)) from error
+        root, changes = self._root(number, self._drawn(self._place(number)))
         root = overridden(root, overrides)
         try:
             return scenario_from(root.plain())
         except KeyFaults as error:
             lines = [self._fault(number, root, changes, *fault) for fault in error.every]
             raise in_lines(lines, self.file.source) from error
+
+    def _root(self, number: int, drawn: Sequence[_Change]) -> tuple[Node, list[_Change]]:
+        """The keys of a run's scenario, and what was replaced in them."""
+        place = self._place(number)
+        seed = Node(self._seed(place.case), self.file.root.line_of(("seed",)))
+        changes = [*self._changes(place), *drawn, _Change(("seed",), seed, ("seed",))]
+        root = self.file.bases[place.base].root
+        if self.campaign.worlds:  # the course at the start is towards the goal of the generated world
+            root = without(root, ("mission", "course_deg"))
+        for loc, node, origin in changes:
+            try:
+                root = with_key(root, loc, node)
+            except InputError as error:
+                sentence = str(error).removeprefix("command line: ")
+                raise InputError(self._line(origin, sentence)) from error
+        return root, changes
 
     def packed(self, number: int) -> bytes:
         """The same as `harness.scenario.scenario.packed` has it."""
@@ -245,71 +323,66 @@ class CampaignRuns:
                 progress(number + 1)
 
     def _place(self, number: int) -> _Place:
-        case, pair = divmod(number, len(self._pairs))
-        draw, combination = divmod(case, self._combinations)
+        case, pair = divmod(number, math.prod(self._entry_sizes))
+        combination = case % math.prod(self._sizes)
         base, world, *grid = (int(index) for index in np.unravel_index(combination, self._sizes))
-        return _Place(case, draw, combination, base, world, tuple(grid), *self._pairs[pair])
+        indices = map(int, np.unravel_index(pair, self._entry_sizes))
+        return _Place(case, base, world, tuple(grid), dict(zip(self._names, indices, strict=True)))
 
-    def _stream(self, number: int, stream: int) -> np.random.SeedSequence:
-        return np.random.SeedSequence(self.campaign.seed, spawn_key=(number, stream))
+    def _stream(self, case: int, stream: int) -> np.random.SeedSequence:
+        return np.random.SeedSequence(self.campaign.seed, spawn_key=(case, stream))
 
     def _seed(self, case: int, stream: int = SEED) -> int:
         """A whole number of 53 bits, which every reader of JSON and YAML keeps."""
         return int(self._stream(case, stream).generate_state(1, np.uint64)[0] >> np.uint64(11))
 
     def _changes(self, place: _Place) -> list[_Change]:
-        """What a run replaces in its scenario, in order."""
+        """What a run replaces in its scenario, in order, before what is drawn at random."""
         return [
-            *self._world(place),
+            *(self._world(place.case, place.world) if self.campaign.worlds else ()),
             *(_Change(loc_of(name), self._at(("set", name)), ("set", name)) for name in self.campaign.set_),
-            *self._entry("aircraft", "model", place.aircraft),
-            *self._entry("planners", "kind", place.planner, section="planner"),
+            *(
+                change
+                for listed, section, first, _ in reversed(ENTRIES)
+                for change in self._entry((listed, place.entries[listed]), section, first)
+            ),
             *self._grid(place),
-            *self._drawn(place),
-            _Change(("seed",), Node(self._seed(place.case), self.file.root.line_of(("seed",))), ("seed",)),
         ]
 
-    def _world(self, place: _Place) -> list[_Change]:
-        """The generated world of a case; runs of one case follow each other, so that the last one is kept."""
-        if not self.campaign.worlds:
-            return []
-        if self._last_world[0] != place.case:
-            self._last_world = place.case, self._generated(place)
-        return self._last_world[1]
-
-    def _generated(self, place: _Place) -> list[_Change]:
-        spec = self.campaign.worlds[place.world]
-        world = generated(spec, self._seed(place.case, WORLD))
-        origin: Loc = ("worlds", place.world, spec.generator)
+    def _generated(self, case: int, index: int) -> list[_Change]:
+        """The generated world of a case."""
+        spec = self.campaign.worlds[index]
+        world = generated(spec, self._seed(case, WORLD))
+        origin: Loc = ("worlds", index, spec.generator)
+        made: Mapping[Loc, Any] = {
+            ("area", "bounds_m"): world.bounds_m,
+            ("obstacles",): world.obstacles,
+            ("mission", "start_m"): world.start_m,
+            ("mission", "goal_m"): world.goal_m,
+        }
         line = self.file.root.line_of(origin)
-        made: tuple[tuple[Loc, Any], ...] = (
-            (("area", "bounds_m"), world.bounds_m),
-            (("obstacles",), world.obstacles),
-            (("mission", "start_m"), world.start_m),
-            (("mission", "goal_m"), world.goal_m),
-        )
-        return [_Change(loc, node_of(plain, line), origin) for loc, plain in made]
+        return [_Change(loc, node_of(plain, line), origin) for loc, plain in made.items()]
 
-    def _entry(self, name: str, first: str, index: int, section: str | None = None) -> list[_Change]:
+    def _entry(self, origin: Loc, section: str, first: str) -> list[_Change]:
         """An entry of `planners` or `aircraft`: bare text, or keys of that section of a scenario."""
-        origin, into = (name, index), section or name
         entry = self.file.root.at(origin)
         if entry is None:
             return []
         if not isinstance(entry.value, dict):
-            return [_Change((into, first), entry, origin)]
+            return [_Change((section, first), entry, origin)]
         ordered = sorted(entry.value.items(), key=lambda pair: pair[0] != first)
-        return [_Change((into, key), node, (*origin, key)) for key, node in ordered]
+        return [_Change((section, key), node, (*origin, key)) for key, node in ordered]
 
     def _grid(self, place: _Place) -> list[_Change]:
-        return [
-            _Change(loc_of(name), self._at(("grid", name, index)), ("grid", name, index))
-            for name, index in zip(self.campaign.grid, place.grid, strict=True)
-        ]
+        pairs = zip(self.campaign.grid, place.grid, strict=True)
+        origins: list[Loc] = [("grid", name, index) for name, index in pairs]
+        return [_Change(loc_of(str(origin[1])), self._at(origin), origin) for origin in origins]
 
     def _drawn(self, place: _Place) -> list[_Change]:
+        """What is drawn for a case: each key by a number in [0, 1) of its stream."""
+        shares = np.random.default_rng(self._stream(place.case, DRAW)).random(len(self.campaign.random))
         changes = []
-        for (name, each), share in zip(self.campaign.random.items(), self._shares(place), strict=True):
+        for (name, each), share in zip(self.campaign.random.items(), shares.tolist(), strict=True):
             origin: Loc = ("random", name)
             if each.choice:
                 node = self._at((*origin, "choice", each.chosen(share)))
@@ -318,11 +391,6 @@ class CampaignRuns:
                 node = Node(number, self.file.root.line_of(origin))
             changes.append(_Change(loc_of(name), node, origin))
         return changes
-
-    def _shares(self, place: _Place) -> list[float]:
-        """A number in [0, 1) for each random key."""
-        rng = np.random.default_rng(self._stream(place.case, DRAW))
-        return list(rng.random(len(self.campaign.random)).tolist())
 
     def _at(self, loc: Loc) -> Node:
         node = self.file.root.at(loc)
@@ -346,15 +414,6 @@ class CampaignRuns:
         return fault_line(self.file.source, self.file.root.line_of(origin), origin, sentence)
 
 
-def _without_course(root: Node) -> Node:
-    """A scenario's keys for another world: the course at the start is towards its goal."""
-    mission = root.at(("mission",))
-    if mission is None or not isinstance(mission.value, dict):
-        return root
-    kept = {name: node for name, node in mission.value.items() if name != "course_deg"}
-    return replaced(root, ("mission",), Node(kept, mission.line))
-
-
 def flown_run(
     results: Path, run: int, overrides: Sequence[tuple[str, str]] = ()
 ) -> tuple[Scenario, str | None]:
@@ -373,24 +432,10 @@ def flown_run(
     runs = CampaignRuns(CampaignFile.from_plain(about, str(results)))
     if not 0 <= run < len(runs):
         raise InputError(f"{results}: has no run {run}; must be 0 to {len(runs) - 1}")
-    digests = dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True))
     asked = runs.scenario(run, overrides)
-    return asked, digests.get(run) if not overrides or _is_flown(runs, run, asked) else None
-
-
-def again_from(folder: Path, run: int) -> str:
-    """The command that flies a run again, from the folder of its campaign."""
-    results = folder / RESULTS
-    if results.is_file():
-        runs = CampaignRuns(CampaignFile.from_plain(read_table(results)[1], str(results)))
-        if run < len(runs):
-            return runs.again(run, folder)
-    return fly_again(results, run)
-
-
-def _is_flown(runs: CampaignRuns, run: int, asked: Scenario) -> bool:
-    """Whether a scenario is what the campaign flew in a run."""
-    try:
-        return packed(runs.scenario(run)) == packed(asked)
-    except InputError:  # its planner is not here; another one was given
-        return False
+    with suppress(InputError):  # a planner that is not here: another one was given
+        if not overrides or packed(runs.scenario(run)) == packed(asked):
+            return asked, dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True)).get(
+                run
+            )
+    return asked, None

@@ -5,15 +5,14 @@ Every value comes from a number in [0, 1) through the inverse of its distributio
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from functools import cache
+import math
 from statistics import NormalDist
 from typing import Annotated, Any, Final
 
 from pydantic import ConfigDict, Field, Strict, field_validator, model_validator
 
-from harness.files.strict_yaml import Loc
-from harness.scenario.scenario import scenario_schema
+from harness.files.strict_yaml import Loc, node_of
+from harness.scenario.scenario import Scenario
 from harness.scenario.sections import Section
 
 LEAST: Final = 1e-12
@@ -87,22 +86,28 @@ class Distribution(Section):
         low, high = self.normal.limits
         reached = min(max(low + (high - low) * share, LEAST), 1.0 - LEAST)
         drawn = NormalDist(self.normal.mean, self.normal.sigma).inv_cdf(reached)
-        least = drawn if self.normal.least is None else max(drawn, self.normal.least)
-        return least if self.normal.most is None else min(least, self.normal.most)
+        least, most = self.normal.least, self.normal.most
+        return min(max(drawn, drawn if least is None else least), drawn if most is None else most)
 
     def whole_number(self, share: float) -> int:
         """The same for a key that takes whole numbers alone."""
         if not self.uniform:
             return round(self.number(share))
-        low, high = map(int, self.uniform)
+        low, high = math.ceil(self.uniform[0]), math.floor(self.uniform[1])
         return low + min(int((high - low + 1) * share), high - low)
 
-    def ends(self) -> list[tuple[Loc, float]]:
-        """Where it begins and ends, as far as that is given, and where in it that is said."""
+    def ends(self) -> dict[Loc, float]:
+        """Where it begins and ends, as far as that is given, by the keys that say so."""
         if self.uniform:
-            return [(("uniform", index), end) for index, end in enumerate(self.uniform)]
+            return {("uniform", index): end for index, end in enumerate(self.uniform)}
         limits = {"least": self.normal.least, "most": self.normal.most} if self.normal else {}
-        return [(("normal", name), end) for name, end in limits.items() if end is not None]
+        return {("normal", name): end for name, end in limits.items() if end is not None}
+
+    def middle(self) -> float:
+        """A number that can be drawn: a whole one where there is one."""
+        whole = self.whole_number(0.5)
+        ends = [*self.ends().values()]
+        return whole if not ends or min(ends) <= whole <= max(ends) or len(ends) < 2 else self.number(0.5)
 
     def chosen(self, share: float) -> int:
         """Index of the choice that a number in [0, 1) stands for."""
@@ -110,35 +115,7 @@ class Distribution(Section):
         return min(int(share * len(self.choice)), len(self.choice) - 1)
 
 
-def takes_whole_numbers(loc: Loc) -> bool:
-    """Whether a key takes whole numbers and no others; of planners' own keys, of any planner's that has it."""
-    schema = _schema()
-    found = [schema]
-    for step in loc:
-        found = [inner for each in found for inner in _inside(each, step, schema["$defs"])]
-    return any(each.get("type") == "integer" for each in found)
-
-
-@cache
-def _schema() -> dict[str, Any]:
-    return scenario_schema()
-
-
-def _inside(schema: Mapping[str, Any], step: str | int, definitions: Mapping[str, Any]) -> Iterator[Any]:
-    """What stands at a step in any variant of a schema, variants of it one by one."""
-    for variant in _variants(schema, definitions):
-        inner = variant.get("properties", {}).get(step) if isinstance(step, str) else variant.get("items")
-        if isinstance(inner, Mapping):
-            yield from _variants(inner, definitions)
-
-
-def _variants(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """A schema, or those that it refers to or chooses from."""
-    if "$ref" in schema:
-        yield from _variants(definitions[schema["$ref"].rsplit("/", 1)[-1]], definitions)
-        return
-    chosen = [*schema.get("anyOf", ()), *schema.get("oneOf", ())]
-    for each in chosen:
-        yield from _variants(each, definitions)
-    if not chosen:
-        yield schema
+def takes_whole_numbers(scenario: Scenario, loc: Loc) -> bool:
+    """Whether a key of a scenario takes whole numbers alone; a whole one was given, which others keep with a point."""
+    node = node_of(scenario.model_dump(by_alias=True), 0).at(loc)
+    return node is not None and type(node.value) is int

@@ -3,36 +3,33 @@
 from __future__ import annotations
 
 import itertools
+import shlex
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from harness.analysis.causes import is_allowed_for
+from harness.analysis.metric import severity
 from harness.campaign.cell import CONFIDENCE, Cell, cell_of
 from harness.campaign.groups import Axis, grouped
 from harness.campaign.paired import RATIO, TESTED, Duel, duels
-from harness.campaign.table import (
-    Runs,
-    about,
-    are_crossed,
-    load_tables,
-    planned_runs,
-    varied_keys,
-)
-from harness.campaign.worst import Untracked, WorstRun, untracked_runs, worst_runs
+from harness.campaign.results import LAW, RESULTS, RUNS, fly_again
+from harness.campaign.table import NAMED, Runs
 from harness.files.strict_yaml import InputError
+from harness.run_files.run_folder import RECORDING
 
 BY_DEFAULT: Final = 3
 """Without a choice, tables are made of every two of the first this many varied keys."""
-
 WORST_OUTCOMES: Final = ("collision", "lost_control", "out_of_bounds")
 """Outcomes of which a campaign without any says how frequent they may still be."""
-
-CURVE_POINTS: Final = 201
-"""Points of a curve of lengths, evenly spaced shares of the goals reached."""
+WORST: Final = 10
+"""At most this many failures are listed."""
+CLOSEST: Final = 3
+"""Where none failed, this many runs that came closest to an obstacle are listed."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +48,52 @@ class Table:
 
 
 @dataclass(frozen=True)
+class WorstRun:
+    """A run to look at.
+
+    Attributes:
+        run: its number.
+        name: scenario or world, planner and aircraft.
+        seed: of the flight.
+        outcome: as in `results.parquet`.
+        reason: the same as a sentence.
+        min_clearance_m: least distance to an obstacle edge.
+        clearance_ratio: the same over the wanted one, where that is known.
+        varied: the varied keys with their values.
+        folder: its run folder relative to the campaign's, empty where none was kept.
+        view: the command that shows the recording, empty without one.
+        command: flies it again.
+    """
+
+    run: int
+    name: str
+    seed: int
+    outcome: str
+    reason: str
+    min_clearance_m: float | None
+    clearance_ratio: float | None
+    varied: Mapping[str, Any]
+    folder: str
+    view: str
+    command: str
+
+
+@dataclass(frozen=True)
+class Untracked:
+    """Runs that were not tracked for the same causes.
+
+    Attributes:
+        causes: of all their legs; empty where nothing was flown of a plan.
+        allowed_for: these are navigation errors alone, within what was planned for them.
+        count: how many runs.
+    """
+
+    causes: str
+    allowed_for: bool
+    count: int
+
+
+@dataclass(frozen=True)
 class Summary:
     """The answers.
 
@@ -60,8 +103,6 @@ class Summary:
         outcomes: number of runs by outcome, the most frequent first.
         total: all runs.
         tables: one for each choice of keys.
-        curves: one for each key that a table has, by planner.
-        lengths: of each planner, flown length over the optimum at evenly spaced shares of the goals reached.
         worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
         untracked: runs that were not tracked, by why, the most frequent first, but those `allowed_for` last.
         duels: planners on the same cases.
@@ -73,8 +114,6 @@ class Summary:
     outcomes: Mapping[str, int]
     total: Cell
     tables: tuple[Table, ...]
-    curves: tuple[Table, ...]
-    lengths: Mapping[str, tuple[float, ...]]
     worst: tuple[WorstRun, ...]
     untracked: tuple[Untracked, ...]
     duels: tuple[Duel, ...]
@@ -109,77 +148,99 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
     Raises:
         InputError: the folder holds no campaign, or a key is no column of it.
     """
-    results, timings = load_tables(folder)
-    keys, runs = varied_keys(results), Runs(results, timings)
+    runs = Runs.of(folder)
     for each in by or ():
         if len(each) not in (1, 2) or len(set(each)) < len(each):
             raise InputError(f"wayproof: --by {','.join(each)}: must be one key, or two different ones")
         runs.check_columns(each)
-    chosen = [list(each) for each in (by if by is not None else _default_choice(keys, runs))]
-    drawn = about(results)["campaign"].get("random", {})
-    planners = runs.texts("planner")
+    chosen = by if by is not None else _default_choice(runs)
     return Summary(
         name=folder.resolve().name,
-        varied=tuple(keys),
+        varied=tuple(runs.varied),
         outcomes=dict(Counter(runs.texts("outcome")).most_common()),
         total=cell_of(runs, np.ones(len(runs), dtype=bool)),
-        tables=tuple(table(runs, each, drawn) for each in chosen),
-        curves=tuple(
-            table(runs, [key, "planner"], drawn)
-            for key in dict.fromkeys(itertools.chain(*chosen))
-            if key != "planner"
-        ),
-        lengths=_lengths(runs, planners),
-        worst=worst_runs(runs, folder, keys),
-        untracked=untracked_runs(runs),
+        tables=tuple(_table(runs, *each) for each in chosen),
+        worst=_worst(runs, folder),
+        untracked=_untracked(runs),
         duels=duels(
-            planners,
+            runs.texts("planner"),
             list(zip(runs.values("case"), runs.texts("aircraft"), strict=True)),
             runs.reached.tolist(),
             {each.name: runs.numbers("length_ratio" if each.name == RATIO else each.path) for each in TESTED},
         ),
-        planned=planned_runs(results),
+        planned=runs.planned,
     )
 
 
-def _default_choice(keys: Sequence[str], runs: Runs) -> list[tuple[str, ...]]:
+def _default_choice(runs: Runs) -> Sequence[Sequence[str]]:
     """Every two of the first keys, but for one by which nearly every run would be a row of its own."""
-    crossed = are_crossed(runs.texts("world"), runs.texts("scenario"))
-    useful = [key for key in keys if key != "scenario" or crossed or "world" not in keys]
-    useful = [
-        key
-        for key in useful
-        if key not in ("world", "scenario") or 2 * len(set(runs.values(key))) <= len(runs)
-    ]
+    varied = runs.varied
+    useful = [key for key in varied if key != "scenario" or runs.are_crossed or "world" not in varied]
+    useful = [key for key in useful if key not in NAMED[2:] or 2 * len(set(runs.texts(key))) <= len(runs)]
     first = useful[:BY_DEFAULT]
-    return [tuple(first)] if len(first) == 1 else list(itertools.combinations(first, 2))
+    return [first] if len(first) == 1 else list(itertools.combinations(first, 2))
 
 
-def table(runs: Runs, keys: Sequence[str], drawn: Collection[str] = ()) -> Table:
-    """The runs by one key or two; of these `drawn` were drawn at random."""
-    rows, of_row = grouped(keys[0], runs.values(keys[0]), keys[0] in drawn)
-    columns, of_column = None, np.zeros(len(runs), dtype=np.int64)
-    if len(keys) == 2:
-        columns, of_column = grouped(keys[1], runs.values(keys[1]), keys[1] in drawn)
-    return Table(
-        rows,
-        columns,
-        tuple(
-            tuple(
-                cell_of(runs, (of_row == row) & (of_column == column))
-                for column in range(len(columns.labels) if columns else 1)
-            )
-            for row in range(len(rows.labels))
-        ),
+def _table(runs: Runs, *keys: str) -> Table:
+    """The runs by one key or two."""
+    drawn = runs.campaign.get("random", ())
+    (rows, row_of), *others = (grouped(key, runs.values(key), key in drawn) for key in keys)
+    columns, column_of = others[0] if others else (None, np.zeros(len(runs), dtype=np.int64))
+    places = range(len(columns.labels) if columns else 1)
+    cells = (
+        tuple(cell_of(runs, (row_of == row) & (column_of == column)) for column in places)
+        for row in range(len(rows.labels))
     )
+    return Table(rows, columns, tuple(cells))
 
 
-def _lengths(runs: Runs, planners: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    curves = {}
-    for planner in dict.fromkeys(planners):
-        own = np.array([name == planner for name in planners])
-        ratios = runs.numbers("length_ratio")[own & runs.reached]
-        ratios = ratios[np.isfinite(ratios)]
-        if len(ratios):
-            curves[planner] = tuple(np.quantile(ratios, np.linspace(0.0, 1.0, CURVE_POINTS)).tolist())
-    return curves
+def _worst(runs: Runs, folder: Path) -> tuple[WorstRun, ...]:
+    """Failures by severity, then by clearance over the wanted one, or by clearance where that is unknown.
+
+    Where nothing failed, the few that came closest.
+    """
+    ratio, clearance_m, outcomes = (
+        runs.clearance_ratio,
+        runs.numbers("min_clearance_m"),
+        runs.texts("outcome"),
+    )
+    near = np.nan_to_num(ratio if np.isfinite(ratio).any() else clearance_m, nan=np.inf)
+    numbers = runs.values("run")
+    order = sorted(range(len(runs)), key=lambda row: (-severity(outcomes[row]), near[row], numbers[row]))
+    failed = int((~runs.reached).sum())
+    varied = {key: runs.values(key) for key in runs.varied if key not in NAMED}
+    law = (runs.campaign.get("set") or {}).get(LAW, "")
+    found = []
+    for row in order[: min(failed, WORST) if failed else CLOSEST]:
+        number, inner = int(numbers[row]), Path(RUNS) / str(numbers[row])
+        kept = folder / inner
+        found.append(
+            WorstRun(
+                number,
+                runs.name(row),
+                int(runs.values("seed")[row]),
+                outcomes[row],
+                runs.texts("reason")[row],
+                float(clearance_m[row]) if np.isfinite(clearance_m[row]) else None,
+                float(ratio[row]) if np.isfinite(ratio[row]) else None,
+                {key: values[row] for key, values in varied.items()},
+                folder=str(inner) if kept.is_dir() else "",
+                view=shlex.join(["wayproof", "view", str(kept)]) if (kept / RECORDING).is_file() else "",
+                command=fly_again(
+                    folder / RESULTS, number, runs.texts("planner")[row].partition(", ")[0], law
+                ),
+            )
+        )
+    return tuple(found)
+
+
+def _untracked(runs: Runs) -> tuple[Untracked, ...]:
+    """Runs that were not tracked, by why."""
+    columns = ("trackable", "trackability.causes", "navigation_error_m.max", "navigation_margin_m")
+    alike = Counter(
+        (is_allowed_for((causes or "").split("; "), error_m, margin_m), causes or "")
+        for tracked, causes, error_m, margin_m in zip(*map(runs.values, columns), strict=True)
+        if tracked is False
+    )
+    order = sorted(alike.items(), key=lambda each: (each[0][0], -each[1]))
+    return tuple(Untracked(causes, allowed, count) for (allowed, causes), count in order)

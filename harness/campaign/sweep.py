@@ -5,24 +5,19 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from typing import Any, Final
+from typing import Final
 
-from harness.campaign.flight import Answer, Job, NoMemoryError
+from harness.campaign.flight import Answer, Job
 from harness.campaign.folder import CampaignFolder
 from harness.campaign.results import ERROR, RUNS
 from harness.campaign.runs import CampaignRuns
-from harness.campaign.workers import WorkerDiedError, Workers
-from harness.files.errors import RunFolderError
+from harness.campaign.workers import Workers
 from harness.files.wording import counted
 from harness.flight.signals import held_back
 
 TABLES_EVERY_S: Final = 30.0
 TABLES_SHARE: Final = 0.01
 """Tables are made anew at least this far apart, and so seldom that it takes at most this share of the time."""
-
-LOOK_S: Final = 2.0
-"""How often it is looked whether there are more workers, where there are none."""
 
 INTERRUPT_S: Final = 0.1
 """How often it is looked whether the process was asked to end, at the least."""
@@ -68,7 +63,7 @@ def fly_missing(
         if answer is None:
             left.append(run)
             return
-        folder.append(run, _row(runs, answer), answer.times, answer.held)
+        folder.append(run, {**runs.run(run).cells(), **answer.row}, answer.times, answer.held)
         if progress is not None:
             progress(answer)
 
@@ -81,7 +76,8 @@ def fly_missing(
             tables_due = time.monotonic() + max(TABLES_EVERY_S, took_s / TABLES_SHARE)
 
     try:
-        fly_jobs(_jobs(runs, folder), workers, over, write_at_times, enough)
+        missing = (runs.job(run, folder.path) for run in range(len(runs)) if run not in folder.done)
+        fly_jobs(missing, workers, over, write_at_times, enough)
     finally:
         folder.write_tables()
     return sorted(left)
@@ -106,46 +102,20 @@ def fly_jobs(
     Raises:
         OSError: a run folder cannot be written; or who flies has gone.
     """
-    ahead = next(jobs, None)
-    flying: dict[Future[Answer], int] = {}
+    ahead, flying = next(jobs, None), 0
     # An interrupt that is raised inside `concurrent.futures` leaves a future locked, and who ends the workers waits for
     # it without end.
     with held_back() as let_interrupt_through:
         while (ahead is not None or flying) and not enough():
             let_interrupt_through()
             while ahead is not None and workers.free() > 0:
-                flying[workers.start(ahead)] = ahead.run
+                workers.start(ahead)
+                flying += 1
                 ahead = next(jobs, None)
-            if not flying:
-                _sleep(LOOK_S, let_interrupt_through)
-            for future in wait(flying, timeout=INTERRUPT_S, return_when=FIRST_COMPLETED).done:
-                over(flying.pop(future), _answer(future))
+            for run, answer in workers.over(INTERRUPT_S):
+                flying -= 1
+                over(run, answer)
             between()
-
-
-def _sleep(seconds: float, let_interrupt_through: Callable[[], None]) -> None:
-    """Waits, and lets an interrupt through meanwhile."""
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
-        time.sleep(INTERRUPT_S)
-        let_interrupt_through()
-
-
-def _jobs(runs: CampaignRuns, folder: CampaignFolder) -> Iterator[Job]:
-    """What is missing, made when it is its turn."""
-    for number in range(len(runs)):
-        if number not in folder.done:
-            yield runs.job(number, folder.path)
-
-
-def _answer(future: Future[Answer]) -> Answer | None:
-    """What came of a run; None where the machine kept it from its end."""
-    try:
-        return future.result()
-    except (WorkerDiedError, NoMemoryError):
-        return None
-    except RunFolderError as error:
-        raise OSError(str(error)) from error
 
 
 def told_left(runs: Sequence[int]) -> str:
@@ -156,7 +126,3 @@ def told_left(runs: Sequence[int]) -> str:
         f"{counted(len(runs), 'run')} {were} not flown to the end ({first}): the process died, or had no memory, each "
         f"time that it was tried; --resume flies {them}"
     )
-
-
-def _row(runs: CampaignRuns, answer: Answer) -> dict[str, Any]:
-    return {**runs.run(answer.run).cells(), **answer.row}

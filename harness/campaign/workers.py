@@ -10,15 +10,17 @@ import re
 import signal
 import socket
 import threading
+import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, TypeAlias
 
-from harness.campaign.flight import Answer, Job, fly_job
+from harness.campaign.flight import Answer, Job, NoMemoryError, fly_job
+from harness.files.errors import RunFolderError
 from harness.files.spawning import open_standard_files, without_main
 from harness.files.strict_yaml import InputError
 from harness.files.versions import versions
@@ -35,8 +37,11 @@ JOBS_EACH: Final = 2
 """Jobs handed out for each that can be flown at a time: nobody waits for the next while an answer is written down."""
 
 
-class WorkerDiedError(Exception):
-    """The process that flew a run ended before the flight did, as often as it was tried."""
+TRIES: Final = 2
+"""A run whose process dies is tried this often."""
+
+Flown: TypeAlias = tuple[int, Answer | None]
+"""Number of a run that is over, and what came of it; None where the machine kept it from its end."""
 
 
 class SchedulerGoneError(OSError):
@@ -53,124 +58,106 @@ class Workers(Protocol):
         """How many jobs more may be handed out now; 0 or less for none."""
         ...
 
-    def start(self, job: Job) -> Future[Answer]:
-        """Hands out a job; its future may raise WorkerDiedError or SchedulerGoneError."""
+    def start(self, job: Job) -> None:
+        """Hands out a job."""
+        ...
+
+    def over(self, timeout_s: float) -> Sequence[Flown]:
+        """The jobs that have come to an end since, waited for at most so long.
+
+        Raises:
+            OSError: a run folder cannot be written, or who flies has gone.
+        """
         ...
 
 
-class _Line:
-    """Jobs that wait for a process, the first that came first."""
+def finished(futures: Collection[Future[Answer]], timeout_s: float) -> set[Future[Answer]]:
+    """Those that are done, waited for until the first is."""
+    if not futures:
+        time.sleep(timeout_s)
+    return wait(futures, timeout_s, FIRST_COMPLETED).done
+
+
+def _answer(future: Future[Answer]) -> Answer | None:
+    try:
+        return future.result()
+    except NoMemoryError:
+        return None
+    except RunFolderError as error:
+        raise OSError(str(error)) from error
+
+
+class _Process:
+    """One process and the jobs that it was handed, the first of which it flies: when it dies, it is known of what."""
 
     def __init__(self) -> None:
-        self.changing = threading.Lock()
-        self.waiting: deque[tuple[Job, Future[Answer]]] = deque()
-
-
-class _Lane:
-    """One process, one job at a time: when it dies, it is known of what."""
-
-    TRIES: Final = 2
-
-    def __init__(self, line: _Line) -> None:
-        self.busy = False
-        self._line = line
-        self._closed = False
+        self.jobs: deque[tuple[Job, Future[Answer]]] = deque()
         self._pool: ProcessPoolExecutor | None = None
-        self._broken: ProcessPoolExecutor | None = None
+        self._tries = TRIES
 
-    def go_on(self, *, over: bool = False) -> None:
-        """Takes the next job of the line, unless one is being flown that is not `over`."""
-        with self._line.changing:
-            if self.busy and not over:
-                return
-            self.busy = bool(self._line.waiting)
-            if not self.busy:
-                return
-            job, answer = self._line.waiting.popleft()
-        self._try(job, answer, self.TRIES)
-
-    def _try(self, job: Job, answer: Future[Answer], tries: int) -> None:
-        try:
-            flown = self._submitted(job)
-        except (OSError, RuntimeError) as error:
-            # No process can be begun.
-            answer.set_exception(error)
-            return
-        flown.add_done_callback(lambda flown: self._over(flown, job, answer, tries - 1))
-
-    def _submitted(self, job: Job) -> Future[Answer]:
+    def start(self, job: Job) -> None:
         with without_main():
             try:
-                return self._process().submit(fly_job, job)
-            except BrokenProcessPool:
-                # It died while it had nothing to do.
-                self._pool = None
-                return self._process().submit(fly_job, job)
+                flown = self._begun().submit(fly_job, job)
+            except BrokenProcessPool:  # it died while it had nothing to do
+                self.end()
+                flown = self._begun().submit(fly_job, job)
+        self.jobs.append((job, flown))
 
-    def _process(self) -> ProcessPoolExecutor:
-        if self._pool is None:
-            spawn = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin)
-        return self._pool
-
-    def _over(self, flown: Future[Answer], job: Job, answer: Future[Answer], tries: int) -> None:
-        if self._closed or flown.cancelled():
-            answer.cancel()
-            return
-        error = flown.exception()
-        if isinstance(error, BrokenProcessPool):
-            # It is this pool that calls, and Python 3.13 has locked it for that: nobody may let go of it now.
-            self._broken, self._pool = self._pool, None
-            if tries:
-                self._try(job, answer, tries)
-                return
-            error = WorkerDiedError()
-        self.go_on(over=True)
-        if error is None:
-            answer.set_result(flown.result())
+    def over(self) -> list[Flown]:
+        """What came of the first job, which is done; nothing where it is tried once more."""
+        job, flown = self.jobs[0]
+        try:
+            found = [(job.run, _answer(flown))]
+        except BrokenProcessPool:
+            self.end()
+            self._tries -= 1
+            found = [] if self._tries else [(job.run, None)]
+            again = [each for each, _ in self.jobs]
+            self.jobs.clear()
+            for each in again[len(found) :]:
+                self.start(each)
         else:
-            answer.set_exception(error)
-
-    def close(self) -> None:
-        self._closed = True
+            self.jobs.popleft()
+        if found:
+            self._tries = TRIES
+        return found
 
     def end(self) -> None:
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
             self._pool = None
 
+    def _begun(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            spawn = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin)
+        return self._pool
+
 
 class LocalWorkers:
     """Processes of this machine."""
 
     def __init__(self, number: int) -> None:
-        self._line = _Line()
-        self._lanes = [_Lane(self._line) for _ in range(number)]
+        self._processes = [_Process() for _ in range(number)]
 
     def free(self) -> int:
         """Room for a job that flies and one that waits for each process."""
-        with self._line.changing:
-            out = len(self._line.waiting) + sum(lane.busy for lane in self._lanes)
-        return JOBS_EACH * len(self._lanes) - out
+        return sum(JOBS_EACH - len(each.jobs) for each in self._processes)
 
-    def start(self, job: Job) -> Future[Answer]:
-        """Hands a job to an idle process, or to the first that will be."""
-        answer: Future[Answer] = Future()
-        self._line.waiting.append((job, answer))
-        for lane in self._lanes:
-            lane.go_on()
-        return answer
+    def start(self, job: Job) -> None:
+        """Hands a job to the process that has the fewest."""
+        min(self._processes, key=lambda each: len(each.jobs)).start(job)
 
-    def close(self) -> None:
-        """Takes no more jobs."""
-        self._line.waiting.clear()
-        for lane in self._lanes:
-            lane.close()
+    def over(self, timeout_s: float) -> list[Flown]:
+        """The jobs that have come to an end."""
+        flying = {each.jobs[0][1]: each for each in self._processes if each.jobs}
+        return [flown for future in finished(flying, timeout_s) for flown in flying[future].over()]
 
     def end(self) -> None:
         """Waits for what handed out jobs, once the processes have ended: at its end Python wakes it without a lock."""
-        for lane in self._lanes:
-            lane.end()
+        for each in self._processes:
+            each.end()
 
 
 @contextmanager
@@ -184,7 +171,6 @@ def local_workers(number: int) -> Iterator[Workers]:
     try:
         yield workers
     finally:
-        workers.close()
         for name, value in kept.items():
             os.environ.pop(name)
             if value is not None:
@@ -278,8 +264,7 @@ class DaskWorkers:
     def __init__(self, client: Any, tell: Callable[[str], None]) -> None:
         self._client, self._tell = client, tell
         self._executor = client.get_executor(pure=False)
-        self._flying = 0
-        self._counted = threading.Lock()
+        self._flying: dict[Future[Answer], int] = {}
         self._known = set(client.nthreads())
 
     def free(self) -> int:
@@ -292,30 +277,23 @@ class DaskWorkers:
             self._tell(f"the Dask worker {gone} has gone; others fly its runs again")
         self._known = set(threads_of)
         threads: int = sum(threads_of.values())
-        return JOBS_EACH * threads - self._flying
+        return JOBS_EACH * threads - len(self._flying)
 
-    def start(self, job: Job) -> Future[Answer]:
+    def start(self, job: Job) -> None:
         """Hands a job to the scheduler."""
+        self._flying[self._executor.submit(fly_job, job)] = job.run
+
+    def over(self, timeout_s: float) -> list[Flown]:
+        """The jobs that have come to an end."""
         from distributed import KilledWorker
 
-        answer: Future[Answer] = Future()
-        self._count(1)
-
-        def over(flown: Future[Answer]) -> None:
-            self._count(-1)
-            if flown.cancelled():
-                answer.set_exception(SchedulerGoneError())
-            elif error := flown.exception():
-                answer.set_exception(WorkerDiedError() if isinstance(error, KilledWorker) else error)
-            else:
-                answer.set_result(flown.result())
-
-        self._executor.submit(fly_job, job).add_done_callback(over)
-        return answer
-
-    def _count(self, more: int) -> None:
-        with self._counted:
-            self._flying += more
+        found: list[Flown] = []
+        for future in finished(self._flying, timeout_s):
+            run = self._flying.pop(future)
+            if future.cancelled():
+                raise SchedulerGoneError
+            found.append((run, None if isinstance(future.exception(), KilledWorker) else _answer(future)))
+        return found
 
 
 def _begin() -> None:

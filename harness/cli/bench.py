@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Final
 
@@ -15,7 +16,6 @@ from harness.cli.options import (
     law_kind,
     load,
     print_json,
-    straight_m,
 )
 
 
@@ -55,7 +55,7 @@ def bench(
     from harness.cli.terminal import print_table, progress_bar
 
     try:
-        with progress_bar(straight_m(loaded)) as report:
+        with progress_bar(math.dist(loaded.mission.start_m, loaded.mission.goal_m)) as report:
             result = measure(loaded, report)
     except AircraftError as error:
         raise bad_input(error) from error

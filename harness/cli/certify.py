@@ -13,23 +13,16 @@ import typer
 
 from harness.cli.options import (
     FAILED,
-    AircraftOption,
-    ConditionsOption,
-    GuidanceOption,
+    NOTHING,
+    Given,
     JsonOption,
     OutOption,
-    PlannerOption,
     QuietOption,
     ResumeOption,
-    SeedOption,
-    SettingsOption,
-    TurbulenceOption,
-    WindOption,
     WorkersOption,
-    overrides,
     print_json,
+    replacing,
     resumable,
-    sources,
     told_apart,
 )
 from harness.cli.standard_output import say
@@ -48,14 +41,13 @@ LEAST_SHARE: Final = 0.01
 STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
 
 
+@replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def certify(
     subject: Annotated[
         str,
         typer.Argument(metavar="SCENARIO|PATH", help="A scenario, or a path that `wayproof check` takes."),
     ],
-    planner: PlannerOption = None,
-    aircraft: AircraftOption = None,
-    guidance: GuidanceOption = None,
+    given: Given = NOTHING,
     claim: Annotated[
         str | None,
         typer.Option(
@@ -72,17 +64,12 @@ def certify(
     runs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Days to fly, at most. Default: 1000.")
     ] = None,
-    conditions: ConditionsOption = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
             metavar="KEY=DRAW", help="LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."
         ),
     ] = None,
-    wind: WindOption = None,
-    turbulence: TurbulenceOption = None,
-    seed: SeedOption = None,
-    settings: SettingsOption = None,
     world: Annotated[
         str | None, typer.Option("--scenario", metavar="WORLD", help="Of a path: obstacles, bounds, air.")
     ] = None,
@@ -114,21 +101,18 @@ def certify(
     from harness.scenario.shipped import scenario_path
 
     terms = Terms(probability, confidence)
-    replaced = overrides(
-        settings, planner, aircraft, guidance, wind, turbulence, seed=seed, conditions=conditions
-    )
     try:
         drawn = distributions(vary or ())
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--vary") from error
     if claim is not None and claim not in CLAIMS:
         raise typer.BadParameter(f"{claim[:60]!r} is not {', '.join(CLAIMS)}", param_hint="--claim")
-    if is_path(subject) and not any(key == "aircraft.model" for key, _ in replaced):
+    if is_path(subject) and not any(key == "aircraft.model" for key, _ in given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
-    asked = Asked(subject, replaced, drawn, claim, runs or MOST_RUNS, (sources(planner), sources(guidance)))
+    asked = Asked(subject, given.keys, drawn, claim, runs or MOST_RUNS, given.sources)
     days = days_of(asked, None if world is None else scenario_path(world))
     days.check()
-    apart = told_apart([*replaced, *((key, str(each)) for key, each in drawn.items())], named=())
+    apart = told_apart([*given.keys, *((key, str(each)) for key, each in drawn.items())], named=())
     folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{apart}"
     found = _fly(days, folder, workers, terms, resume=resume, silent=quiet)
     if as_json:

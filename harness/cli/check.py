@@ -13,21 +13,17 @@ import typer
 
 from harness.cli.options import (
     FAILED,
+    NOTHING,
     AircraftName,
-    ConditionsOption,
-    GuidanceOption,
+    Given,
     JsonOption,
     NoRecordingOption,
     OutOption,
     QuietOption,
-    SeedOption,
-    SettingsOption,
-    TurbulenceOption,
-    WindOption,
     faults_told,
     marked_incomplete,
-    overrides,
     print_json,
+    replacing,
     told_apart,
 )
 from harness.cli.standard_output import say
@@ -36,6 +32,7 @@ if TYPE_CHECKING:
     from harness.run.path_check import CheckedPath, PathCheck
 
 
+@replacing("guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def check(
     path: Annotated[
         Path,
@@ -45,8 +42,7 @@ def check(
         ),
     ],
     aircraft: AircraftName,
-    guidance: GuidanceOption = None,
-    conditions: ConditionsOption = None,
+    given: Given = NOTHING,
     airspeed_mps: Annotated[
         float | None, typer.Option(metavar="V", help="True airspeed. Default: the aircraft's cruise.")
     ] = None,
@@ -54,8 +50,6 @@ def check(
         float | None,
         typer.Option(metavar="H", help="Altitude above sea level. Default: the file's, else 300."),
     ] = None,
-    wind: WindOption = None,
-    turbulence: TurbulenceOption = None,
     scenario: Annotated[
         str | None,
         typer.Option(
@@ -83,8 +77,6 @@ def check(
             "file, else 90 m.",
         ),
     ] = None,
-    seed: SeedOption = None,
-    settings: SettingsOption = None,
     days: Annotated[
         int | None,
         typer.Option(
@@ -117,26 +109,19 @@ def check(
 
     if corner_m is not None and not 0.0 <= corner_m < math.inf:
         raise typer.BadParameter(f"is {corner_m:g}; must be at least 0, and finite", param_hint="--corner-m")
-    replaced = overrides(
-        settings,
-        None,
-        aircraft,
-        guidance,
-        wind,
-        turbulence,
-        seed=seed,
-        conditions=conditions,
+    replaced = given.plus(
+        aircraft__model=aircraft,
         aircraft__airspeed_mps=airspeed_mps,
         planner__clearance_m=clearance_m,
         trackability__cross_track_m=tolerance_m,
         trackability__altitude_m=altitude_tolerance_m,
-    )
+    ).keys
     world = None if scenario is None else scenario_path(scenario)
-    given = read_path(path, altitude_m is not None, origin_of(world))
+    points = read_path(path, altitude_m is not None, origin_of(world))
 
     def on_day(day: Sequence[tuple[str, str]]) -> PathCheck:
         return asked(
-            given,
+            points,
             {"aircraft": {"model": aircraft}},
             [*replaced, *day],
             world=world,

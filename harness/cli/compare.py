@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import shlex
 from collections.abc import Sequence
@@ -12,21 +13,18 @@ import typer
 
 from harness.cli.options import (
     FAILED,
-    AircraftOption,
-    ConditionsOption,
+    NOTHING,
+    Given,
     JsonOption,
     NoRecordingOption,
-    SeedOption,
-    SettingsOption,
-    TurbulenceOption,
-    WindOption,
+    OutOption,
     WorkersOption,
     faults_told,
-    flag,
+    given_by,
     load,
     marked_incomplete,
-    overrides,
     print_json,
+    replacing,
     sources,
 )
 from harness.cli.standard_output import say
@@ -34,8 +32,6 @@ from harness.cli.standard_output import say
 if TYPE_CHECKING:
     from harness.analysis.metric import Metric
     from harness.analysis.rows import Row
-    from harness.comparison.comparison import Comparison, Setup
-    from harness.scenario.scenario import Scenario
 
 LEGEND: Final = (
     "ratio: length over the optimum; clear: least clearance; κ·R: tightest planned turn, above 1 too tight; "
@@ -43,6 +39,7 @@ LEGEND: Final = (
 )
 
 
+@replacing("aircraft", "conditions", "wind", "turbulence", "seed", "settings")
 def compare(
     scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Files or shipped names.")],
     planners: Annotated[
@@ -51,18 +48,8 @@ def compare(
     guidance: Annotated[
         str | None, typer.Option(metavar="X,Y,...", help="Kinds of guidance laws. Default: the scenario's.")
     ] = None,
-    aircraft: AircraftOption = None,
-    conditions: ConditionsOption = None,
-    wind: WindOption = None,
-    turbulence: TurbulenceOption = None,
-    seed: SeedOption = None,
-    settings: SettingsOption = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="The comparison's folder.")] = Path(
-        "runs/comparison"
-    ),
-    kinematic: Annotated[
-        bool, flag("--kinematic", "Fly a point that follows every plan exactly, not the aircraft.")
-    ] = False,
+    given: Given = NOTHING,
+    out: OutOption = None,
     workers: WorkersOption = None,
     no_recording: NoRecordingOption = False,
     as_json: JsonOption = False,
@@ -79,60 +66,37 @@ def compare(
 
     2 bad input or usage, nothing flown
     """
-    from harness.comparison.comparison import Setup
-    from harness.scenario.sections import SHIELDED
+    from harness.cli.terminal import step_bar
+    from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
+    from harness.files.errors import WriteError
+    from harness.run_files.run_folder import OVERLAY
 
     kinds = [kind.strip() for kind in planners.split(",")]
     laws = [law.strip() for law in guidance.split(",")] if guidance is not None else [None]
-    fixed = overrides(
-        settings, aircraft=aircraft, wind=wind, turbulence=turbulence, seed=seed, conditions=conditions
-    )
-    variants = [[*overrides(planner=kind, guidance=law), *fixed] for kind in kinds for law in laws]
+    variants = [[*given_by(kind, law).keys, *given.keys] for kind in kinds for law in laws]
     loaded = [load(scenario, each) for scenario in scenarios for each in variants]
-    setup = Setup(
-        recording=not no_recording,
-        kinematic=kinematic,
-        workers=workers or os.cpu_count() or 1,
-        sources=sources(*kinds),
-        law_sources=sources(*laws),
-        shielded=tuple(kind.endswith(SHIELDED) for kind in kinds for _ in laws) * len(scenarios),
-    )
-    comparison = _fly(loaded, out, setup)
+    folder, over = out or Path("runs/comparison"), itertools.count(1)
+    try:
+        with faults_told(marked_incomplete("comparison", folder, INDEX, SCHEMA)), step_bar() as bar:
+            comparison = fly_and_compare(
+                loaded,
+                folder,
+                recording=not no_recording,
+                workers=workers or os.cpu_count() or 1,
+                sources=(sources(*kinds), sources(*laws)),
+                progress=lambda told: bar(next(over), len(loaded), told),
+            )
+    except OSError as error:
+        raise WriteError.of("the comparison", folder, error) from error
     if as_json:
         print_json(comparison.plain())
     else:
         print_comparison(comparison.rows)
-        say(f"report: {out / 'report.html'}")
-        _print_view([out / each.name for each in loaded])
+        say(f"report: {folder / 'report.html'}")
+        overlays = (folder / each.name / OVERLAY for each in loaded)
+        if overlay := next((each for each in overlays if each.is_file()), None):
+            say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
     return 0 if comparison.all_reached else FAILED
-
-
-def _print_view(folders: Sequence[Path]) -> None:
-    """How to see the first overlay, if there is one."""
-    from harness.run_files.run_folder import OVERLAY
-
-    for overlay in [each / OVERLAY for each in folders if (each / OVERLAY).is_file()][:1]:
-        say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
-
-
-def _fly(loaded: Sequence[Scenario], out: Path, setup: Setup) -> Comparison:
-    """Flies into a folder, with progress on standard error."""
-    from harness.cli.terminal import step_bar
-    from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
-    from harness.files.errors import WriteError
-
-    over = 0
-    try:
-        with faults_told(marked_incomplete("comparison", out, INDEX, SCHEMA)), step_bar() as bar:
-
-            def report(told: str) -> None:
-                nonlocal over
-                over += 1
-                bar(over, len(loaded), told)
-
-            return fly_and_compare(loaded, out, setup, report)
-    except OSError as error:
-        raise WriteError.of("the comparison", out, error) from error
 
 
 def _shown() -> list[Metric]:

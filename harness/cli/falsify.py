@@ -12,22 +12,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from harness.cli.options import (
-    AircraftOption,
-    ConditionsOption,
-    GuidanceOption,
+    NOTHING,
+    Given,
     JsonOption,
     OutOption,
-    PlannerOption,
     QuietOption,
     ScenarioArgument,
-    SeedOption,
-    SettingsOption,
-    TurbulenceOption,
-    WindOption,
     faults_told,
     load,
-    overrides,
     print_json,
+    replacing,
     told_apart,
 )
 from harness.cli.standard_output import say
@@ -40,33 +34,21 @@ if TYPE_CHECKING:
 RUNS_A_KEY: Final = 40
 
 
+@replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def falsify(
     scenario: ScenarioArgument,
     vary: Annotated[
         list[str],
         typer.Option(metavar="KEY.PATH=LO:HI", help="From the mild end LO to HI; can be repeated."),
     ],
-    planner: PlannerOption = None,
-    aircraft: AircraftOption = None,
-    guidance: GuidanceOption = None,
-    conditions: ConditionsOption = None,
-    wind: WindOption = None,
-    turbulence: TurbulenceOption = None,
-    seed: SeedOption = None,
-    settings: SettingsOption = None,
-    until: Annotated[
-        Literal["failed", "untrackable"],
-        typer.Option(
-            metavar="WHAT", help="failed: goal not reached; untrackable: that, or a leg not tracked."
-        ),
-    ] = "failed",
+    given: Given = NOTHING,
+    claim: Annotated[
+        Literal["reached", "no-contact", "trackable"],
+        typer.Option(metavar="CLAIM", help="What fails to hold: reached, no-contact or trackable."),
+    ] = "reached",
     runs: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=2, help=f"Number of conditions. Default: {RUNS_A_KEY} a key."),
+        int | None, typer.Option(metavar="N", min=2, help=f"Number of flights. Default: {RUNS_A_KEY} a key.")
     ] = None,
-    seeds: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Flights of a condition, which fails if one fails.")
-    ] = 1,
     tolerance: Annotated[
         float, typer.Option(metavar="SHARE", help="Precision, as a share of each range.")
     ] = 0.01,
@@ -92,25 +74,19 @@ def falsify(
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
     from harness.cli.terminal import print_table, step_bar
-    from harness.falsify.breaking_point import FALSIFIED, INDEX
+    from harness.falsify.breaking_point import FALSIFIED, INDEX, vary_of
     from harness.falsify.breaking_point import falsify as search
-    from harness.falsify.keys import vary_of
     from harness.scenario.given import own_words
 
     ranges = [range_of(text) for text in vary]
-    fixed = overrides(
-        settings, planner, aircraft, guidance, wind, turbulence, seed=seed, conditions=conditions
-    )
 
     def loaded(replaced: Any) -> Scenario:
-        return load(scenario, [*fixed, *replaced])
+        return load(scenario, [*given.keys, *replaced])
 
-    varied = vary_of(loaded, ranges, [name for name, _ in fixed], tolerance)
+    varied = vary_of(loaded, ranges, [name for name, _ in given.keys], tolerance)
     # Indices as `--set` takes them, which no shell takes for a pattern.
-    keys = [each.key.replace("[", ".").replace("]", "") for each in varied]
-    folder = (
-        out or Path("runs") / loaded(()).name / f"{'-'.join(['falsify', *keys])}{told_apart(fixed, named=())}"
-    )
+    keys = "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in varied)])
+    folder = out or Path("runs") / loaded(()).name / f"{keys}{told_apart(given.keys, named=())}"
     flights = 0
 
     def left() -> str:
@@ -118,20 +94,19 @@ def falsify(
 
     with faults_told(left), nullcontext() if quiet else step_bar() as bar:
 
-        def ended(*step: Any) -> None:
+        def ended(done: int, of: int, told: str) -> None:
             nonlocal flights
-            flights += 1
+            flights = done
             if bar is not None:
-                bar(*step)
+                bar(done, of, told)
 
         found = search(
             loaded,
             varied,
             folder,
             flown=_flown,
-            until=until,
+            claim=claim,
             conditions=runs or RUNS_A_KEY * len(ranges),
-            seeds=seeds,
             tolerance=tolerance,
             progress=ended,
         )
@@ -140,7 +115,7 @@ def falsify(
     elif not quiet:
         print_table(f"{found.scenario}: {found.planner}, {found.aircraft}", breaking_rows(found))
         if found.found is not None:
-            words = ["wayproof", "fly", str(folder / FALSIFIED), *own_words(planner, guidance)]
+            words = ["wayproof", "fly", str(folder / FALSIFIED), *own_words(given.planner, given.guidance)]
             say(f"again: {shlex.join(words)}")
         say(last_line(found))
     return 0
@@ -174,29 +149,29 @@ def range_of(text: str) -> tuple[str, float, float]:
 def breaking_rows(breaking: Breaking) -> dict[str, str]:
     """Name and value of each row. Values are printed as they were flown, never rounded."""
     from harness.cli.terminal import plain
-    from harness.falsify.keys import number_text
+    from harness.falsify.breaking_point import number_text
 
-    found, wanted = breaking.found, "trackable" if breaking.until == "untrackable" else "reached"
-    flights = len(breaking.trials)
-    told = f", {counted(flights, 'flight')}" if flights != breaking.conditions else ""
-    rows = {"tried": counted(breaking.conditions, "condition") + told}
+    def told(values: Sequence[float]) -> str:
+        if len(values) == 1:
+            return number_text(values[0])
+        pairs = zip(breaking.vary, values, strict=True)
+        return ", ".join(plain(f"{each.key} {number_text(value)}") for each, value in pairs)
+
+    found = breaking.found
+    rows = {"tried": counted(breaking.conditions, "condition")}
     for each in breaking.vary:
         rows[plain(each.key)] = f"{number_text(each.mild)} (mild) to {number_text(each.hard)} (hard)"
+    share = max(found.displacement) if found else 0.0
     if found is None:
-        rows["mildest found"] = f"none: every condition tried was {wanted}"
+        rows["mildest found"] = f"none: every condition tried was {breaking.claim}"
     else:
-        share = max(found.displacement)
-        rows["mildest found"] = (
-            f"[bold red]{_values(breaking, found.values)}[/], {share:.1%} of the way"
-            if share
-            else "[bold red]already at the mild end[/]"
-        )
-        rows["how it failed"] = plain(
-            f"{found.figures['outcome']}: {found.figures['reason']}, seed {found.seed}"
-        )
+        values = f"[bold red]{told(found.values)}[/], {share:.1%} of the way"
+        rows["mildest found"] = values if share else "[bold red]already at the mild end[/]"
+        how = f"{found.figures['outcome']}: {found.figures['reason']}, seed {breaking.seed}"
+        rows["how it failed"] = plain(how)
     if breaking.passes is not None:
-        rows["passes below"] = f"at {_values(breaking, breaking.passes)}"
-    if found is None or max(found.displacement):
+        rows["passes below"] = f"at {told(breaking.passes)}"
+    if found is None or share:
         rows["scan"] = (
             f"{counted(breaking.steps, 'equal step')} of {1.0 / breaking.steps:.2%}; a narrower failing range may have "
             "been missed, more --runs make the steps finer"
@@ -208,25 +183,12 @@ def breaking_rows(breaking: Breaking) -> dict[str, str]:
 
 def last_line(breaking: Breaking) -> str:
     """What came of it, in a sentence."""
-    from harness.falsify.keys import number_text
+    from harness.falsify.breaking_point import number_text
 
     if breaking.found is None:
-        return f"not falsified: nothing failed in {counted(len(breaking.trials), 'flight')}"
+        return f"not falsified: nothing failed in {counted(breaking.conditions, 'flight')}"
     if breaking.verdict == "fails_at_the_mild_end":
         return "falsified: it fails already at the mild end"
-    keys = ", ".join(
-        f"{each.key}={number_text(value)}"
-        for each, value in zip(breaking.vary, breaking.found.values, strict=True)
-    )
+    pairs = zip(breaking.vary, breaking.found.values, strict=True)
+    keys = ", ".join(f"{each.key}={number_text(value)}" for each, value in pairs)
     return f"falsified: {keys}, the mildest found in {counted(breaking.conditions, 'condition')}"
-
-
-def _values(breaking: Breaking, values: Sequence[float]) -> str:
-    """A condition; with several keys, each value with its key."""
-    from harness.cli.terminal import plain
-    from harness.falsify.keys import number_text
-
-    if len(values) == 1:
-        return number_text(values[0])
-    pairs = zip(breaking.vary, values, strict=True)
-    return ", ".join(plain(f"{each.key} {number_text(value)}") for each, value in pairs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -12,26 +13,19 @@ import typer
 
 from harness.cli.options import (
     FAILED,
-    AircraftOption,
-    ConditionsOption,
-    GuidanceOption,
+    NOTHING,
+    Given,
     JsonOption,
     NoRecordingOption,
     OptionalScenario,
     OutOption,
-    PlannerOption,
     QuietOption,
-    SeedOption,
-    SettingsOption,
-    TurbulenceOption,
-    WindOption,
     faults_told,
     flag,
     load,
     marked_incomplete,
-    overrides,
     print_json,
-    straight_m,
+    replacing,
     told_apart,
 )
 from harness.cli.review import open_viewer
@@ -45,16 +39,10 @@ FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
 """Exit status of `fly` by outcome; FAILED for the others."""
 
 
+@replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def fly(
     scenario: OptionalScenario = None,
-    planner: PlannerOption = None,
-    aircraft: AircraftOption = None,
-    guidance: GuidanceOption = None,
-    conditions: ConditionsOption = None,
-    wind: WindOption = None,
-    turbulence: TurbulenceOption = None,
-    seed: SeedOption = None,
-    settings: SettingsOption = None,
+    given: Given = NOTHING,
     results: Annotated[
         Path | None,
         typer.Option("--from", metavar="FILE", help="A campaign's results.parquet, instead of SCENARIO."),
@@ -89,12 +77,9 @@ def fly(
     3 the planner proved the goal unreachable and the aircraft is safe
     """
     _check_usage(view and no_recording, live, speed, web)
-    given = overrides(
-        settings, planner, aircraft, guidance, wind, turbulence, seed=seed, conditions=conditions
-    )
-    loaded, digest = _asked(scenario, results, run, given)
+    loaded, digest = _asked(scenario, results, run, given.keys)
     origin = [] if results is None else [("from", str(results.resolve())), ("run", str(run))]
-    folder = out or _default_folder(loaded, told_apart([*given, *origin]))
+    folder = out or _default_folder(loaded, told_apart([*given.keys, *origin]))
     with _viewer(web, speed) if live else nullcontext((None, lambda: None)) as (onlookers, wait):
         metrics = _fly(loaded, folder, onlookers, recording=not no_recording, silent=quiet)
         otherwise = bool(digest) and metrics["digest"] != digest
@@ -153,7 +138,8 @@ def _fly(
     from harness.run.scenario_flight import fly_to_folder
     from harness.run_files.run_folder import MANIFEST, SCHEMA
 
-    progress = nullcontext() if silent else progress_bar(straight_m(scenario))
+    straight_m = math.dist(scenario.mission.start_m, scenario.mission.goal_m)
+    progress = nullcontext() if silent else progress_bar(straight_m)
     with faults_told(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
         if onlookers is None:
             return fly_to_folder(scenario, folder, recording, report)

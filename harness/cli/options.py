@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import errno
+import inspect
 import json
 import os
 import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from inspect import cleandoc
+from dataclasses import dataclass, replace
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -28,13 +30,15 @@ BAD_INPUT: Final = 2
 IN_THE_NAME: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")
 """Keys that the default folder of a run is called after; of a model that is a folder, by the folder's last name."""
 
+Run = TypeVar("Run", bound=Callable[..., int])
+
 
 class Command(TyperCommand):
     """A command whose help shows no type for what takes no value, and paragraphs without the source's line breaks."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.help = re.sub(r"(?<!\n)\n(?!\n)", " ", cleandoc(self.help or ""))
+        self.help = re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.cleandoc(self.help or ""))
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Its parameters."""
@@ -105,33 +109,10 @@ _AIRCRAFT: Any = typer.Option(
     autocompletion=completing(_aircraft),
 )
 _KIND: Final = "or FILE.py:NAME, MODULE:NAME."
-_PLANNER: Any = typer.Option(
-    metavar="KIND", help=f"Replaces planner.kind; {_KIND}", autocompletion=completing(_planners)
-)
-_GUIDANCE: Any = typer.Option(
-    metavar="KIND", help=f"Replaces guidance.kind; {_KIND}", autocompletion=completing(_laws)
-)
-_CONDITIONS: Any = typer.Option(
-    metavar="DAY", help="Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."
-)
 ScenarioArgument = Annotated[str, _SCENARIO]
 OptionalScenario = Annotated[str | None, _SCENARIO]
 AircraftName = Annotated[str, _AIRCRAFT]
 AircraftOption = Annotated[str | None, _AIRCRAFT]
-PlannerOption = Annotated[str | None, _PLANNER]
-GuidanceOption = Annotated[str | None, _GUIDANCE]
-ConditionsOption = Annotated[str | None, _CONDITIONS]
-SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")]
-SettingsOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key of a scenario; can be repeated."),
-]
-WindOption = Annotated[
-    str | None, typer.Option(metavar="SPEED,FROM", help="Steady wind: m/s, degrees it blows from.")
-]
-TurbulenceOption = Annotated[
-    str | None, typer.Option(metavar="INTENSITY", help="light, moderate or severe; or milspec:light, ...")
-]
 WorkersOption = Annotated[
     int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
 ]
@@ -143,76 +124,162 @@ NoRecordingOption = Annotated[bool, flag("--no-recording", "Do not write flight.
 ResumeOption = Annotated[bool, flag("--resume", "Fly only what is missing in DIR.")]
 JsonOption = Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")]
 
+REPLACING: Final[dict[str, Any]] = {
+    "planner": Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND", help=f"Replaces planner.kind; {_KIND}", autocompletion=completing(_planners)
+        ),
+    ],
+    "aircraft": AircraftOption,
+    "guidance": Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND", help=f"Replaces guidance.kind; {_KIND}", autocompletion=completing(_laws)
+        ),
+    ],
+    "conditions": Annotated[
+        str | None,
+        typer.Option(
+            metavar="DAY",
+            help="Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly).",
+        ),
+    ],
+    "wind": Annotated[
+        str | None, typer.Option(metavar="SPEED,FROM", help="Steady wind: m/s, degrees it blows from.")
+    ],
+    "turbulence": Annotated[
+        str | None,
+        typer.Option(metavar="INTENSITY", help="light, moderate or severe; or milspec:light, ..."),
+    ],
+    "seed": Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")],
+    "settings": Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY.PATH=VALUE", help="Replaces any key of a scenario; can be repeated."
+        ),
+    ],
+}
+"""The options that replace keys of a scenario, by the name of the parameter."""
 
-def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-    """A scenario by file or shipped name, with keys replaced."""
-    from harness.files.strict_yaml import InputError
-    from harness.scenario.scenario import load_scenario
 
-    try:
-        return load_scenario(scenario, overrides)
-    except InputError as error:
-        if _is_campaign(scenario):
-            use = shlex.join(["wayproof", "sweep", scenario])
-            raise InputError(f"{scenario}: this is a campaign: use `{use}`") from error
-        raise
+@dataclass(frozen=True)
+class Given:
+    """What the options of `REPLACING` replace in a scenario.
+
+    Attributes:
+        options: key paths and values (YAML) of the options but --set.
+        settings: those of --set.
+        planner: as given; None where none was.
+        guidance: likewise.
+    """
+
+    options: tuple[tuple[str, str], ...] = ()
+    settings: tuple[tuple[str, str], ...] = ()
+    planner: str | None = None
+    guidance: str | None = None
+
+    @property
+    def keys(self) -> list[tuple[str, str]]:
+        """All of them, those of --set last."""
+        return [*self.options, *self.settings]
+
+    @property
+    def sources(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Planners and laws of one's own: a process that flies has to import them too."""
+        return sources(self.planner), sources(self.guidance)
+
+    def plus(self, **keys: Any) -> Given:
+        """With further values by key path, its points written as two underscores; None replaces nothing.
+
+        Raises:
+            typer.BadParameter: --set gives such a key another value.
+        """
+        named = {name.replace("__", "."): value for name, value in keys.items() if value is not None}
+        more = [(name, json.dumps(value)) for name, value in named.items()]
+        for name, value in self.settings:
+            for key, other in more:
+                if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
+                    raise typer.BadParameter(
+                        f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
+                        param_hint="--set",
+                    )
+        return replace(self, options=(*self.options, *more))
 
 
-def _is_campaign(text: str) -> bool:
-    """Whether what was given for a scenario is a campaign's file or name."""
-    from harness.campaign.campaign_file import is_campaign
-    from harness.files.strict_yaml import InputError
-    from harness.scenario.shipped import campaign_path
-
-    try:
-        return os.path.isfile(campaign_path(text)) and is_campaign(campaign_path(text))
-    except (InputError, OSError):
-        return False
+NOTHING: Final = Given()
 
 
-def overrides(
-    settings: Sequence[str] | None = None,
+def replacing(*names: str) -> Callable[[Run], Callable[..., int]]:
+    """Gives a command some options of `REPLACING`, which its parameter `given` has what they replace of."""
+
+    def made(command: Run) -> Callable[..., int]:
+        signature = inspect.signature(command, eval_str=True)
+        kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+        own = [inspect.Parameter(name, kind, default=None, annotation=REPLACING[name]) for name in names]
+        parameters = [
+            option
+            for each in signature.parameters.values()
+            for option in (own if each.name == "given" else [each])
+        ]
+
+        @wraps(command)
+        def run(**arguments: Any) -> int:
+            texts = {name: arguments.pop(name) for name in names}
+            return command(given=given_by(**texts), **arguments)
+
+        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        return run
+
+    return made
+
+
+def given_by(
     planner: str | None = None,
-    aircraft: str | None = None,
     guidance: str | None = None,
+    aircraft: str | None = None,
     wind: str | None = None,
     turbulence: str | None = None,
-    **keys: Any,
-) -> list[tuple[str, str]]:
-    """Key paths of a scenario and what options of these names replace them with, those of --set last; a name is text.
-
-    `keys` are further values by key path, its points written as two underscores.
+    settings: Sequence[str] | None = None,
+    seed: int | None = None,
+    conditions: str | None = None,
+) -> Given:
+    """What the texts of options replace.
 
     Raises:
         typer.BadParameter: one cannot be used, or --set gives a key that another option gives with another value.
     """
     from harness.scenario.sections import SHIELDED
 
-    shielded = planner is not None and planner.endswith(SHIELDED)
-    given = {
-        "planner.kind": planner and planner_kind(planner).removesuffix(SHIELDED),
-        "planner.shield": "loiter" if shielded else None,
-        "aircraft.model": aircraft,
-        "guidance.kind": guidance and law_kind(guidance),
-        "environment.wind": wind and _wind(wind),
-        "environment.turbulence": turbulence and _turbulence(turbulence),
-        **{name.replace("__", "."): value for name, value in keys.items()},
-    }
-    options = [(name, json.dumps(value)) for name, value in given.items() if value is not None]
-    found = [_setting(text) for text in settings or ()]
-    _check_alone(found, options)
-    return [*options, *found]
+    is_shielded = planner is not None and planner.endswith(SHIELDED)
+    begun = Given((), tuple(_setting(text) for text in settings or ()), planner, guidance)
+    return begun.plus(
+        planner__kind=planner and planner_kind(planner).removesuffix(SHIELDED),
+        planner__shield="loiter" if is_shielded else None,
+        aircraft__model=aircraft,
+        guidance__kind=guidance and law_kind(guidance),
+        environment__wind=wind and _wind(wind),
+        environment__turbulence=turbulence and _turbulence(turbulence),
+        seed=seed,
+        conditions=conditions,
+    )
 
 
-def _check_alone(settings: Sequence[tuple[str, str]], options: Sequence[tuple[str, str]]) -> None:
-    """Refuses a setting of a key that another option gives with another value."""
-    for name, value in settings:
-        for key, other in options:
-            if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
-                raise typer.BadParameter(
-                    f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
-                    param_hint="--set",
-                )
+def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+    """A scenario by file or shipped name, with keys replaced."""
+    from harness.campaign.campaign_file import is_campaign
+    from harness.files.strict_yaml import InputError
+    from harness.scenario.scenario import load_scenario
+    from harness.scenario.shipped import shipped_campaigns
+
+    try:
+        return load_scenario(scenario, overrides)
+    except InputError as error:
+        if scenario in shipped_campaigns() or (os.path.isfile(scenario) and is_campaign(Path(scenario))):
+            use = shlex.join(["wayproof", "sweep", scenario])
+            raise InputError(f"{scenario}: this is a campaign: use `{use}`") from error
+        raise
 
 
 def _wind(text: str) -> dict[str, float]:
@@ -272,13 +339,6 @@ def sources(*names: str | None) -> tuple[str, ...]:
     from harness.scenario.sections import SHIELDED
 
     return tuple(name.removesuffix(SHIELDED) for name in names if name is not None and is_source(name))
-
-
-def straight_m(scenario: Scenario) -> float:
-    """From start to goal, m: what a progress bar counts off."""
-    import math
-
-    return math.dist(scenario.mission.start_m, scenario.mission.goal_m)
 
 
 def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_THE_NAME) -> str:

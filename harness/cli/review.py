@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,23 +10,22 @@ import typer
 
 from harness.cli.options import (
     FAILED,
+    NOTHING,
     AircraftName,
-    GuidanceOption,
+    Given,
     JsonOption,
     NoRecordingOption,
     OutOption,
-    SettingsOption,
     bad_input,
     faults_told,
     flag,
-    overrides,
     print_json,
+    replacing,
 )
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
     from harness.analysis.paper_table import Format
-    from harness.campaign.summary import Summary
 
 
 def view(
@@ -43,7 +42,7 @@ def view(
 
     For example: wayproof view runs/paper_circles/rolling_window-aerosonde-1
     """
-    from harness.campaign.results import INDEX
+    from harness.campaign.results import INDEX, RESULTS, RUNS, fly_again
     from harness.files.input_file import InputError
 
     campaign = next((each for each in runs if (each / INDEX).is_file()), None)
@@ -54,24 +53,14 @@ def view(
     if campaign is not None:
         return 0 if open_campaign(campaign, web) else FAILED
     for each in runs:
-        _refuse_if_not_kept(each)
+        folder = each.resolve().parent.parent
+        is_run = each.resolve().parent.name == RUNS and each.name.isdecimal() and (folder / INDEX).is_file()
+        if is_run and not each.exists():
+            raise InputError(
+                f"{each}: no run folder was kept; `{fly_again(folder / RESULTS, int(each.name))}` flies the run again "
+                "with a recording, `recordings: thin` in the campaign's file keeps one of every run"
+            )
     return 0 if open_viewer(runs, web) else FAILED
-
-
-def _refuse_if_not_kept(run: Path) -> None:
-    """Raises InputError where a run of a campaign is meant of which no folder was kept."""
-    from harness.campaign.results import INDEX, RUNS
-    from harness.campaign.runs import again_from
-    from harness.files.input_file import InputError
-
-    folder = run.resolve().parent.parent
-    is_run = run.resolve().parent.name == RUNS and run.name.isdecimal() and (folder / INDEX).is_file()
-    if is_run and not run.exists():
-        again = again_from(folder, int(run.name))
-        raise InputError(
-            f"{run}: no run folder was kept; `{again}` flies the run again with a recording, `recordings: thin` in the "
-            "campaign's file keeps one of every run"
-        )
 
 
 def report(
@@ -82,13 +71,6 @@ def report(
         list[str] | None,
         typer.Option(metavar="KEY[,KEY]", help="Of a campaign: a table by these keys; can be repeated."),
     ] = None,
-    run_reports: Annotated[
-        bool,
-        flag(
-            "--run-reports",
-            "Of a campaign: also write the reports of the runs that its page describes (seconds each), and link them.",
-        ),
-    ] = False,
     table: Annotated[
         Literal["latex", "csv", "markdown"] | None,
         typer.Option(
@@ -119,13 +101,17 @@ def report(
 
     if out is not None and table is None:
         raise typer.BadParameter("goes with --format", param_hint="--out")
-    if table is not None and (run_reports or (by and not (run / RESULTS).is_file())):
-        raise typer.BadParameter("prints the table alone", param_hint="--format")
+    if by and not (run / RESULTS).is_file():
+        raise typer.BadParameter(
+            f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
+        )
+    keys = [[_column(key.strip()) for key in each.split(",")] for each in by] if by else None
     if table is not None:
-        _print_table(run, by, table, out)
+        _print_table(run, keys, table, out)
         return 0
     if (run / RESULTS).is_file():
-        return _summary(run, by, run_reports)
+        _summary(run, keys)
+        return 0
     if (run / INDEX).is_file() and is_held(run / LOCK):
         raise InputError(
             f"{run}: its campaign is being flown and has no tables yet; ask again in a minute, or when it has ended"
@@ -134,14 +120,6 @@ def report(
         raise InputError(
             f"{run}: its campaign was stopped before the tables were written; `wayproof sweep` with --resume makes them"
         )
-    if by:
-        raise typer.BadParameter(
-            f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
-        )
-    if run_reports:
-        raise typer.BadParameter(
-            f"{run} has no {RESULTS}; only a campaign has runs of its own", param_hint="--run-reports"
-        )
     try:
         say(f"report: {write_report(run)}")
     except RunFolderError as error:
@@ -149,34 +127,24 @@ def report(
     return 0
 
 
-def _summary(folder: Path, by: Sequence[str] | None, run_reports: bool) -> int:
-    """The answers of a campaign once more, by other keys or with the reports of its runs."""
+def _summary(folder: Path, keys: Sequence[Sequence[str]] | None) -> None:
+    """The answers of a campaign once more, by other keys perhaps."""
     from harness.campaign.report import write_summary
     from harness.campaign.summary import summarise
     from harness.cli.summary_table import print_summary
 
-    chosen = _keys(by)
-    summary = summarise(folder, by=chosen)
-    failed = False
-    if run_reports:
-        failed = not _run_reports(folder, summary)
-        summary = summarise(folder, by=chosen)
+    summary = summarise(folder, keys)
     page = write_summary(summary, folder)
-    print_summary(summary, all_tables=by is not None)
+    print_summary(summary, all_tables=keys is not None)
     say(f"summary: {page}")
-    return FAILED if failed else 0
 
 
-def _keys(by: Sequence[str] | None) -> list[list[str]] | None:
-    return [[_column(key.strip()) for key in each.split(",")] for each in by] if by else None
-
-
-def _print_table(folder: Path, by: Sequence[str] | None, table: Format, out: Path | None) -> None:
+def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: Format, out: Path | None) -> None:
     """The table of a campaign or a comparison for a paper."""
     from harness.analysis.paper_table import paper_table
     from harness.analysis.rows import legend as compared_legend
     from harness.analysis.rows import rows_for_paper as compared
-    from harness.campaign.questions import legend
+    from harness.campaign.cell import legend
     from harness.campaign.report import rows_for_paper
     from harness.campaign.results import RESULTS
     from harness.campaign.summary import summarise
@@ -185,7 +153,7 @@ def _print_table(folder: Path, by: Sequence[str] | None, table: Format, out: Pat
     from harness.files.whole_file import replace_text
 
     if (folder / RESULTS).is_file():
-        text = paper_table(*rows_for_paper(summarise(folder, by=_keys(by))), table, legend())
+        text = paper_table(*rows_for_paper(summarise(folder, keys)), table, legend())
     else:
         text = paper_table(*compared(read_rows(folder)), table, compared_legend())
     if out is None:
@@ -196,27 +164,6 @@ def _print_table(folder: Path, by: Sequence[str] | None, table: Format, out: Pat
     except OSError as error:
         raise WriteError(f"cannot write the table {out} ({error.strerror or error})") from error
     say(f"table: {out}")
-
-
-def _run_reports(folder: Path, summary: Summary) -> bool:
-    """Writes the reports of the runs that a campaign's page describes; says which it could not, and whether all."""
-    from harness.files.errors import RunFolderError
-    from harness.files.input_file import InputError
-    from harness.report.run_report import write_report
-
-    described = [each for each in summary.worst if each.folder]
-    if not described:
-        say(
-            "no run folder was kept of the runs on the page; `recordings: thin` in the campaign's file keeps all"
-        )
-    whole = True
-    for each in described:
-        try:
-            say(f"report: {write_report(folder / each.folder)}")
-        except (RunFolderError, InputError) as error:
-            whole = False
-            say(f"wayproof: no report of run {each.run}: {error}", err=True)
-    return whole
 
 
 def _column(key: str) -> str:
@@ -231,38 +178,31 @@ def _column(key: str) -> str:
 
 def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
     """Shows recordings until the viewer is closed; says on standard error why, if it cannot start."""
-    from harness.files.errors import RunFolderError
-    from harness.recording.viewer import ViewerError, open_viewer
+    from harness.recording.viewer import open_viewer
 
-    try:
-        open_viewer(runs, web, lambda told: say(told, err=True))
-    except RunFolderError as error:
-        raise bad_input(error) from error
-    except ViewerError as error:
-        say(f"wayproof: {error}", err=True)
-        return False
-    return True
+    return _opened(lambda tell: open_viewer(runs, web, tell))
 
 
 def open_campaign(folder: Path, web: bool = False) -> bool:
-    """Shows the recordings of a campaign as a table until the viewer is closed; says why, if it cannot start."""
+    """The same with the recordings of a campaign as a table."""
     from harness.campaign.table import recordings_of
     from harness.files.errors import RunFolderError
     from harness.recording.catalog import open_table
     from harness.recording.properties import NO_RECORDINGS
+
+    recordings = recordings_of(folder)
+    if not recordings:
+        raise bad_input(RunFolderError(NO_RECORDINGS.format(folder)))
+    say(f"{len(recordings)} recordings", err=True)
+    return _opened(lambda tell: open_table(folder.resolve().name, recordings, web, tell))
+
+
+def _opened(shown: Callable[[Callable[[str], None]], None]) -> bool:
+    from harness.files.errors import RunFolderError
     from harness.recording.viewer import ViewerError
 
     try:
-        recordings = recordings_of(folder)
-        if not recordings:
-            raise RunFolderError(NO_RECORDINGS.format(folder))
-        say(f"{len(recordings)} recordings", err=True)
-        open_table(
-            folder.resolve().name,
-            recordings,
-            web,
-            lambda address: say(address, err=True),
-        )
+        shown(lambda told: say(told, err=True))
     except RunFolderError as error:
         raise bad_input(error) from error
     except ViewerError as error:
@@ -271,6 +211,7 @@ def open_campaign(folder: Path, web: bool = False) -> bool:
     return True
 
 
+@replacing("guidance", "settings")
 def replay(
     log: Annotated[
         Path,
@@ -287,8 +228,7 @@ def replay(
             help="Its mission: a file of `check`, or a JSON with its corners. Default: that of the log.",
         ),
     ] = None,
-    guidance: GuidanceOption = None,
-    settings: SettingsOption = None,
+    given: Given = NOTHING,
     steady_wind: Annotated[
         bool, flag("--steady-wind", "Fly one wind, not the wind as it changed in the log.")
     ] = False,
@@ -305,12 +245,17 @@ def replay(
     from harness.replays.page import rows_of
     from harness.replays.replay import replay as flown_anew
 
-    replaced = overrides(settings, guidance=guidance)
     folder = out or Path("runs") / "replay" / log.stem
     try:
         with faults_told(lambda: f"what was written is in {folder}"):
             found = flown_anew(
-                log, aircraft, folder, mission, replaced, windows=not steady_wind, recording=not no_recording
+                log,
+                aircraft,
+                folder,
+                mission,
+                given.keys,
+                windows=not steady_wind,
+                recording=not no_recording,
             )
     except OSError as error:
         raise WriteError.of("the replay", folder, error) from error

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from harness.analysis.metric import number
-from harness.campaign.cell import Cell
-from harness.campaign.paired import Tested
-from harness.campaign.questions import QUESTIONS
+from harness.campaign.cell import QUESTIONS, Cell
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.summary import Summary, Table
 from harness.cli.standard_output import folded, say
@@ -18,10 +16,8 @@ from harness.files.wording import counted
 
 FIRST, LAST = 15, 5
 """Numbers of the first and last runs that are shown where there are more runs than both together."""
-
 CELL: Final = 28
 """A longer value is cut short."""
-
 SHOWN_WORST: Final = 5
 LEGEND: Final = (
     "reached, below the wanted clearance, tracks: 95 % interval; "
@@ -31,17 +27,15 @@ LEGEND: Final = (
 
 def print_runs(runs: CampaignRuns) -> None:
     """What would be flown, a line a run, those in the middle left out where there are many."""
-    campaign = runs.campaign
+    campaign, count = runs.campaign, len(runs)
     say(
-        f"{campaign.name}: {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}, root seed {campaign.seed}, "
+        f"{campaign.name}: {counted(count, 'run')} of {counted(runs.cases, 'case')}, root seed {campaign.seed}, "
         f"recordings: {campaign.recordings}"
     )
-    last = max(len(runs) - LAST, FIRST)
-    for index in range(len(runs)):
-        if FIRST <= index < last:
-            if index == FIRST:
-                say("...")
-            continue
+    last = max(count - LAST, FIRST)
+    for index in (*range(min(FIRST, count)), *range(last, count)):
+        if index == last > FIRST:
+            say("...")
         run = runs.run(index)
         varied = [f"{name}={_shown(value)}" for name, value in run.varied.items()]
         names = run.scenario, run.world, run.planner, run.aircraft, f"seed {run.seed}"
@@ -60,8 +54,16 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         summary: the answers.
         all_tables: every table, not the first alone.
     """
-    _print_counts(summary)
-    if not summary.total.runs:
+    total, missing = summary.total.runs, summary.missing
+    runs = f"{total} of {counted(summary.planned or 0, 'run')}" if missing else counted(total, "run")
+    ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
+    print_line(plain(f"{summary.name}: {runs}{ended and f': {ended}'}"))
+    if summary.never:
+        print_line(plain(summary.never))
+    if missing:
+        are, them = ("is missing", "it") if missing == 1 else ("are missing", "them")
+        print_line(f"[bold yellow]not complete[/]: {missing} {are}, --resume flies {them}")
+    if not total:
         return
     heads = ("", "runs", *(question.short for question in QUESTIONS))
     whole = ("all runs", *_cells(summary.total))
@@ -73,41 +75,21 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     print_line(LEGEND, style="dim")
     for duel in summary.duels:
         first, second = plain(duel.first), plain(duel.second)
-        figures = "; ".join(
-            f"{plain(each.figure)} {each.difference.text()}" for each in duel.figures if _differs(each)
-        )
-        told = f"figures that differ at 5 %: {figures}" if figures else "no figure differs at 5 %"
+        differ = [each for each in duel.figures if each.p is not None and each.p < 0.05]
+        figures = "; ".join(f"{plain(each.figure)} {each.difference.text()}" for each in differ)
         print_line(
             f"{first} against {second} in {counted(duel.pairs, 'pair')} of flights ({duel.only_first} reached by "
-            f"{first} alone, {duel.only_second} by {second} alone): {told}",
+            f"{first} alone, {duel.only_second} by {second} alone): "
+            + (f"figures that differ at 5 %: {figures}" if figures else "no figure differs at 5 %")
         )
-    _print_worst(summary)
-
-
-def _print_counts(summary: Summary) -> None:
-    """How many runs there are, how they ended, and what is missing."""
-    total = summary.total.runs
-    runs = f"{total} of {counted(summary.planned or 0, 'run')}" if summary.missing else counted(total, "run")
-    ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
-    print_line(plain(f"{summary.name}: {runs}" + (f": {ended}" if ended else "")))
-    if summary.never:
-        print_line(plain(summary.never))
-    if summary.missing:
-        are, them = ("is missing", "it") if summary.missing == 1 else ("are missing", "them")
-        print_line(f"[bold yellow]not complete[/]: {summary.missing} {are}, --resume flies {them}")
-
-
-def _print_worst(summary: Summary) -> None:
-    """The runs that failed, and how to fly and to see one again."""
     failed = [run for run in summary.worst if run.outcome != "reached"]
     for run in failed[:SHOWN_WORST]:
         near = "" if run.min_clearance_m is None else f", least clearance {number(run.min_clearance_m)} m"
         print_line(f"{coloured(run.outcome)} run {run.run} ({plain(run.name)}){near}")
     if failed:
         say(f"again: {failed[0].command}")
-    kept = next((run for run in summary.worst if run.view), None)
-    if kept is not None:
-        say(f"view: {kept.view}")
+    for view in [run.view for run in summary.worst if run.view][:1]:
+        say(f"view: {view}")
 
 
 def _cells(cell: Cell) -> list[str]:
@@ -122,11 +104,6 @@ def _lines(table: Table) -> list[Sequence[str]]:
             lines.append((plain(label), *_cells(cells[0])))
             continue
         lines.append((f"[bold]{plain(label)}[/]",))
-        for name, cell in zip(table.columns.labels, cells, strict=True):
-            lines.append((f" {plain(name)}", *_cells(cell)))
+        names = zip(table.columns.labels, cells, strict=True)
+        lines += [(f" {plain(name)}", *_cells(cell)) for name, cell in names]
     return lines
-
-
-def _differs(tested: Tested) -> bool:
-    """Whether two planners differ in a figure beyond chance, at 5 %."""
-    return tested.p is not None and tested.p < 0.05

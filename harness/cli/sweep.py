@@ -14,22 +14,18 @@ import typer
 
 from harness.cli.options import (
     FAILED,
-    ConditionsOption,
-    GuidanceOption,
+    NOTHING,
+    Given,
     JsonOption,
     OutOption,
     QuietOption,
     ResumeOption,
-    SeedOption,
-    SettingsOption,
-    TurbulenceOption,
-    WindOption,
     WorkersOption,
     completing,
     flag,
-    overrides,
     planner_kind,
     print_json,
+    replacing,
     resumable,
     sources,
 )
@@ -48,6 +44,7 @@ def _campaigns() -> Iterable[str]:
     return shipped_campaigns()
 
 
+@replacing("guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def sweep(
     campaign: Annotated[
         str,
@@ -66,12 +63,7 @@ def sweep(
             help="Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME.",
         ),
     ] = None,
-    guidance: GuidanceOption = None,
-    conditions: ConditionsOption = None,
-    wind: WindOption = None,
-    turbulence: TurbulenceOption = None,
-    seed: SeedOption = None,
-    settings: SettingsOption = None,
+    given: Given = NOTHING,
     workers: WorkersOption = None,
     scheduler: Annotated[
         str | None,
@@ -113,10 +105,7 @@ def sweep(
     from harness.scenario.shipped import campaign_path
 
     named = [each.strip() for each in planners.split(",")] if planners else []
-    replaced = overrides(
-        settings, guidance=guidance, wind=wind, turbulence=turbulence, seed=seed, conditions=conditions
-    )
-    runs = checked(campaign_path(campaign), named, replaced, sources(guidance))
+    runs = checked(campaign_path(campaign), named, given.keys, given.sources[1])
     if dry_run:
         _print_runs(runs, as_json)
         return 0

@@ -21,11 +21,11 @@ import numpy as np
 from harness.analysis.metric import ERROR
 from harness.analysis.rows import COMPARED, Row, to_csv
 from harness.campaign.flight import Answer, Job
+from harness.campaign.folder import claim_folder
 from harness.campaign.paired import TESTED, Duel, duels
 from harness.campaign.sweep import fly_jobs
 from harness.campaign.workers import local_workers
 from harness.files.errors import RunFolderError
-from harness.files.folder_lock import FolderLock
 from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
@@ -47,14 +47,12 @@ class Comparison:
         command: the command line.
         started_utc: date and time, ISO 8601.
         versions: what flew, by name; empty where nothing came to an end.
-        kinematic: a point flew instead of the aircraft.
         rows: scenario after scenario, planner after planner.
     """
 
     command: str
     started_utc: str
     versions: Mapping[str, str]
-    kinematic: bool
     rows: tuple[Row, ...]
 
     @property
@@ -64,46 +62,28 @@ class Comparison:
 
     def plain(self, complete: bool = True) -> dict[str, Any]:
         """The content of `comparison.json`."""
-        return {
-            "schema": SCHEMA,
-            "complete": complete,
-            **vars(self),
-            "rows": [row.plain() for row in self.rows],
-        }
+        rows = [row.plain() for row in self.rows]
+        return {"schema": SCHEMA, "complete": complete, **vars(self), "rows": rows}
 
 
 @dataclass(frozen=True)
-class Setup:
-    """How a comparison is flown.
+class _Flight:
+    """One planner, under one law, on one scenario; `law` is empty where all fly under the same one."""
 
-    Attributes:
-        recording: whether to write recordings and overlays.
-        kinematic: a point that follows the plans exactly flies in place of the aircraft.
-        workers: flights at the same time; they change nothing but the time it takes.
-        command: what the report says was called; default: the command line.
-        sources: planners among them that are given as FILE.py:NAME or MODULE:NAME.
-        law_sources: guidance laws among them that are given likewise.
-        shielded: of each flight, whether its planner was put under the shield and is called so; empty: of none.
-    """
-
-    recording: bool = True
-    kinematic: bool = False
-    workers: int = 1
-    command: str | None = None
-    sources: tuple[str, ...] = ()
-    law_sources: tuple[str, ...] = ()
-    shielded: tuple[bool, ...] = ()
-
-    def planner(self, number: int, scenario: Scenario) -> str:
-        """What the planner of a flight is called."""
-        shielded = bool(self.shielded) and self.shielded[number]
-        return f"{scenario.planner.kind}+shield" if shielded else scenario.planner.kind
+    scenario: Scenario
+    planner: str
+    law: str
+    job: Job
 
 
 def fly_and_compare(
     scenarios: Sequence[Scenario],
     out: Path,
-    setup: Setup,
+    *,
+    recording: bool = True,
+    workers: int = 1,
+    command: str | None = None,
+    sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
     progress: Callable[[str], None] | None = None,
 ) -> Comparison:
     """Flies scenarios that differ in name or planner and writes the folder of the comparison.
@@ -111,7 +91,10 @@ def fly_and_compare(
     Args:
         scenarios: one a flight, those of one name together; each names its planner.
         out: the folder.
-        setup: how they are flown.
+        recording: whether to write recordings and overlays.
+        workers: flights at the same time; they change nothing but the time it takes.
+        command: what the report says was called; default: the command line.
+        sources: planners, and guidance laws, that are given as FILE.py:NAME or MODULE:NAME.
         progress: told of every flight that is over how it ended.
 
     Raises:
@@ -119,106 +102,91 @@ def fly_and_compare(
             comparison is.
         RunFolderError: the folder holds something else or cannot be written.
     """
-    planners = [setup.planner(number, each) for number, each in enumerate(scenarios)]
-    laws = _laws(scenarios)
-    names = [f"{each}-{law}" if law else each for each, law in zip(planners, laws, strict=True)]
-    _check(scenarios, names)
-    jobs = [
-        Job(
-            number,
-            packed(each),
-            (out / each.name / names[number]).resolve(),
-            "all" if setup.recording else "folders",
-            optimum=False,
-            again=setup.command or "",
-            planners=setup.sources,
-            laws=setup.law_sources,
-            kinematic=setup.kinematic,
-        )
-        for number, each in enumerate(scenarios)
-    ]
-    command = setup.command or shlex.join(["wayproof", *sys.argv[1:]])
-    begun = Comparison(command, datetime.now(UTC).isoformat(timespec="seconds"), {}, setup.kinematic, ())
-    lock = _claim(out, begun)
+    how = Job(0, b"", out, "all" if recording else "folders", optimum=False, again=command or "")
+    flights = _flights(scenarios, replace(how, planners=sources[0], laws=sources[1]))
+    told = command or shlex.join(["wayproof", *sys.argv[1:]])
+    begun = Comparison(told, datetime.now(UTC).isoformat(timespec="seconds"), {}, ())
+    lock = claim_folder(out, "comparison", INDEX, SCHEMA)
     try:
-        return _compared(jobs, scenarios, planners, out, begun, setup.workers, progress)
+        try:
+            _write_index(out, begun, complete=False)
+            for name in (CSV, REPORT):
+                (out / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise RunFolderError(f"cannot write the comparison {out}: {error.strerror or error}") from error
+        crashes = _fly(flights, workers, progress)
+        return _written(flights, crashes, out, begun)
     finally:
         lock.release()
 
 
-def _compared(
-    jobs: Sequence[Job],
-    scenarios: Sequence[Scenario],
-    planners: Sequence[str],
-    out: Path,
-    begun: Comparison,
-    workers: int,
-    progress: Callable[[str], None] | None,
-) -> Comparison:
-    """Flies and writes everything, the folder being ours."""
-    reasons: dict[int, str] = {}
+def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
+    """The flights; an InputError where two have one name, or a scenario is called as a file of the comparison."""
+    by_law = len({each.guidance.kind for each in scenarios}) > 1
+    flights: list[_Flight] = []
+    taken: set[Path] = set()
+    for number, each in enumerate(scenarios):
+        planner = each.planner.label
+        law = each.guidance.kind if by_law else ""
+        folder = (how.folder / each.name / (f"{planner}-{law}" if law else planner)).resolve()
+        if folder in taken:
+            raise InputError(
+                f"wayproof: {planner} is to fly {each.name} twice{law and f' under {law}'}; leave one out or "
+                "rename the scenario"
+            )
+        if each.name in (INDEX, CSV, REPORT):
+            raise InputError(
+                f"wayproof: a scenario is called {each.name}, as a file of the comparison; rename it"
+            )
+        taken.add(folder)
+        job = replace(how, run=number, packed=packed(each), folder=folder)
+        flights.append(_Flight(each, planner, law, job))
+    return flights
+
+
+def _fly(flights: Sequence[_Flight], workers: int, progress: Callable[[str], None] | None) -> dict[int, str]:
+    """Flies all; returns why, by the number of the flight, where one did not come to an end."""
+    crashes: dict[int, str] = {}
 
     def over(number: int, answer: Answer | None) -> None:
         outcome = ERROR if answer is None else answer.row["outcome"]
         if answer is None:
-            reasons[number] = "the process that flew it died, or had no memory, each time that it was tried"
+            crashes[number] = "the process that flew it died, or had no memory, each time that it was tried"
         elif outcome == ERROR:
-            reasons[number] = answer.row["reason"]
+            crashes[number] = answer.row["reason"]
         if progress is not None:
-            progress(f"{scenarios[number].name}, {planners[number]}: {outcome}")
+            progress(f"{flights[number].scenario.name}, {flights[number].planner}: {outcome}")
 
-    with local_workers(min(workers, len(jobs))) as flyers:
-        fly_jobs(iter(jobs), flyers, over)
-    first = {each.name: each for each in reversed(scenarios)}
-    names = list(dict.fromkeys(each.name for each in scenarios))
+    with local_workers(min(workers, len(flights))) as flyers:
+        fly_jobs((each.job for each in flights), flyers, over)
+    return crashes
+
+
+def _written(
+    flights: Sequence[_Flight], crashes: Mapping[int, str], out: Path, begun: Comparison
+) -> Comparison:
+    """Writes everything that is made of the run folders."""
+    first = {each.scenario.name: each.scenario for each in reversed(flights)}
+    names = list(dict.fromkeys(each.scenario.name for each in flights))
     optima = {name: optimum_of(first[name]) for name in names}
-    laws = _laws(scenarios)
-    entries = [
-        _entry(each, jobs[number], planners[number], reasons.get(number), optima[each.name], laws[number])
-        for number, each in enumerate(scenarios)
-    ]
+    entries = [_entry(each, crashes.get(each.job.run), optima[each.scenario.name]) for each in flights]
     runs = [each.run for each in entries if each.run]
     named = runs[0].manifest["versions"] if runs else {}
     versions = {name: version for name, version in named.items() if version}
     done = replace(begun, versions=versions, rows=tuple(each.row for each in entries))
     chapters = []
     for name in names:
-        flights = [each for each in entries if each.row.scenario == name]
+        own = [each for each in entries if each.row.scenario == name]
         if (out / name).is_symlink():  # of a folder that somebody sent
             (out / name).unlink()
         (out / name).mkdir(exist_ok=True)
-        _overlay(out / name, flights)
-        chapters.append(chapter(out / name, first[name], flights, optima[name]))
+        _overlay(out / name, own)
+        chapters.append(chapter(out / name, first[name], own, optima[name]))
     replace_text(out / CSV, to_csv(done.rows))
-    page = report_html(
-        chapters, done.command, done.versions, done.started_utc, done.kinematic, _duels(done.rows)
-    )
+    page = report_html(chapters, done.command, done.versions, done.started_utc, _duels(done.rows))
     replace_text(out / REPORT, page)
     _write_index(out, done, complete=True)
     return done
-
-
-def _laws(scenarios: Sequence[Scenario]) -> list[str]:
-    """The guidance law of every flight; empty where all fly under the same one."""
-    kinds = [each.guidance.kind for each in scenarios]
-    return kinds if len(set(kinds)) > 1 else ["" for _ in kinds]
-
-
-def _check(scenarios: Sequence[Scenario], names: Sequence[str]) -> None:
-    """Refuses two flights of one name, and a scenario that is called as a file of the comparison is."""
-    seen = set()
-    for each, called in zip(scenarios, names, strict=True):
-        if (each.name, called) in seen:
-            under = f" under {each.guidance.kind}" if any(_laws(scenarios)) else ""
-            raise InputError(
-                f"wayproof: {each.planner.kind} is to fly {each.name} twice{under}; leave one out or rename the "
-                "scenario"
-            )
-        if each.name in (INDEX, CSV, REPORT):
-            raise InputError(
-                f"wayproof: a scenario is called {each.name}, as a file of the comparison; rename it"
-            )
-        seen.add((each.name, called))
 
 
 def read_rows(folder: Path) -> list[Row]:
@@ -235,53 +203,30 @@ def read_rows(folder: Path) -> list[Row]:
     return [Row(**row) for row in known]
 
 
-def _claim(out: Path, begun: Comparison) -> FolderLock:
-    """Makes `out` the folder of this comparison alone, or raises RunFolderError."""
-    if out.exists() and not out.is_dir():
-        raise RunFolderError(f"{out} is a file, not a folder for a comparison")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        lock = FolderLock(out)
-        if any(out.iterdir()) and read_index(out / INDEX, SCHEMA) is None:
-            lock.release()
-            raise RunFolderError(
-                f"{out} is not empty and not a comparison: choose another folder or empty it first"
-            )
-        _write_index(out, begun, complete=False)
-        for name in (CSV, REPORT):
-            (out / name).unlink(missing_ok=True)
-        return lock
-    except OSError as error:
-        raise RunFolderError(f"cannot write the comparison {out}: {error.strerror or error}") from error
-
-
 def _write_index(out: Path, comparison: Comparison, *, complete: bool) -> None:
     replace_text(out / INDEX, json.dumps(comparison.plain(complete), indent=2, allow_nan=False) + "\n")
 
 
-def _entry(
-    scenario: Scenario, job: Job, planner: str, crash: str | None, optimum: Optimum, law: str
-) -> ReportedFlight:
+def _entry(flight: _Flight, crash: str | None, optimum: Optimum) -> ReportedFlight:
+    scenario, planner, law = flight.scenario, flight.planner, flight.law
     if crash is not None:
-        return ReportedFlight(
-            Row(scenario.name, planner, ERROR, crash, optimum_m=optimum.length_m, guidance=law)
-        )
-    found = entry(scenario, load_run(job.folder), optimum, job.kinematic, law)
+        return ReportedFlight(Row(scenario.name, planner, ERROR, crash, law, optimum_m=optimum.length_m))
+    found = entry(scenario, load_run(flight.job.folder), optimum, law)
     row = found.row
     return replace(found, row=Row(row.scenario, planner, reason=row.reason, guidance=law, **row.figures))
 
 
 def _overlay(folder: Path, entries: Sequence[ReportedFlight]) -> None:
-    recorded = [each for each in entries if each.run and (each.run.folder / RECORDING).exists()]
+    recorded = {
+        each.row.label: each.run.folder / RECORDING
+        for each in entries
+        if each.run and (each.run.folder / RECORDING).exists()
+    }
     (folder / OVERLAY).unlink(missing_ok=True)
     if recorded:
         from harness.recording.overlay import write_overlay
 
-        write_overlay(
-            [each.run.folder / RECORDING for each in recorded if each.run],
-            [each.row.label for each in recorded],
-            folder / OVERLAY,
-        )
+        write_overlay([*recorded.values()], [*recorded], folder / OVERLAY)
 
 
 def _duels(rows: Sequence[Row]) -> tuple[Duel, ...]:

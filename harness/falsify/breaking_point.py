@@ -8,45 +8,71 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
-from harness.falsify.keys import Load, Vary, scenario_at
-from harness.falsify.search import Point, search
+from harness.analysis.claims import Claim, holds
+from harness.campaign.folder import claim_folder
+from harness.campaign.sampling import takes_whole_numbers
+from harness.falsify.search import Point, Search
 from harness.files.crash import sentence
-from harness.files.errors import RunFolderError
-from harness.files.folder_lock import FolderLock
-from harness.files.input_file import read_index
-from harness.files.strict_yaml import InputError
-from harness.files.whole_file import PARTIAL, replace_text
+from harness.files.errors import WriteError
+from harness.files.strict_yaml import InputError, as_spelt, loc_of
+from harness.files.whole_file import replace_text
 from harness.scenario.scenario import Scenario, dump_scenario
 
-SCHEMA: Final = "wayproof/falsify/2"
+SCHEMA: Final = "wayproof/falsify/3"
 INDEX: Final = "falsify.json"
 FALSIFIED: Final = "falsified.yaml"
+MAX_KEYS: Final = 6
+"""At most this many keys are varied at once: every combination of their ends is made before the search."""
+FIGURES: Final = (
+    *("outcome", "reason", "trackable", "min_clearance_m", "flown_length_m", "flight_time_s", "digest"),
+)
+"""Figures of `metrics.json` that are kept of every flight."""
 
-Until: TypeAlias = Literal["failed", "untrackable"]
-"""What is looked for: an outcome other than `reached`, or a leg that was not tracked (or such an outcome)."""
-
+Load: TypeAlias = Callable[[Sequence[tuple[str, str]]], Scenario]
+"""Makes the scenario with keys replaced, as `harness.scenario.scenario.load_scenario` takes them."""
 Flown: TypeAlias = Callable[[Scenario], Mapping[str, Any]]
 """Flies a scenario and gives the content of its `metrics.json`."""
 
 
-FIGURES: Final = (
-    "outcome",
-    "reason",
-    "trackable",
-    "min_clearance_m",
-    "flown_length_m",
-    "flight_time_s",
-    "digest",
-)
-"""Figures of `metrics.json` that are kept of every flight."""
+@dataclass(frozen=True)
+class Vary:
+    """A key to be varied.
+
+    Attributes:
+        key: its path.
+        mild: its mild end.
+        hard: its hard end; below `mild` where smaller is harder.
+        whole: whether it takes whole numbers alone.
+        decimals: places after the point to which a value between the ends is rounded before it is flown.
+    """
+
+    key: str
+    mild: float
+    hard: float
+    whole: bool = False
+    decimals: int = 15
+
+    def value(self, displacement: float) -> float:
+        """Its value at a displacement from 0 (mild) to 1 (hard)."""
+        if displacement in (0.0, 1.0):
+            return self.hard if displacement else self.mild
+        value = self.mild + displacement * (self.hard - self.mild)
+        return round(value) if self.whole else round(value, self.decimals)
+
+    def snapped(self, displacement: float) -> float:
+        """The displacement of the value that is flown."""
+        if displacement in (0.0, 1.0):
+            return displacement
+        return (self.value(displacement) - self.mild) / (self.hard - self.mild)
 
 
 @dataclass(frozen=True)
@@ -56,14 +82,12 @@ class Trial:
     Attributes:
         displacement: of each key, from 0 (mild) to 1 (hard).
         values: of each key.
-        seed: root seed of the flight; flights of one condition differ in it.
-        failed: whether it did what was looked for.
+        failed: whether the claim did not hold of it.
         figures: those of `FIGURES`; the outcome is `error` where the software failed.
     """
 
     displacement: Point
     values: tuple[float, ...]
-    seed: int
     failed: bool
     figures: Mapping[str, Any]
 
@@ -73,11 +97,10 @@ class Breaking:
     """What was found.
 
     Attributes:
-        until: what was looked for.
+        claim: a flight fails where this does not hold of it.
         tolerance: a displacement was narrowed down to this.
-        conditions: how many were tried.
         steps: number of equal steps of the scan; a failing range narrower than one may have been missed.
-        settled: whether the answer was narrowed down to the tolerance within the conditions that were allowed.
+        settled: whether the answer was narrowed down to the tolerance within the flights that were allowed.
         found: the flight that failed under the mildest condition of those tried.
         passes: values of the hardest condition that passed and is no harder in any key.
         trials: every flight, in order.
@@ -86,7 +109,8 @@ class Breaking:
     scenario: str
     planner: str
     aircraft: str
-    until: Until
+    seed: int
+    claim: Claim
     vary: tuple[Vary, ...]
     tolerance: float
     conditions: int
@@ -103,15 +127,81 @@ class Breaking:
         return {"schema": SCHEMA, "complete": True, "command": command, **asdict(self)}
 
 
+def vary_of(
+    load: Load, given: Sequence[tuple[str, float, float]], fixed: Sequence[str] = (), tolerance: float = 0.01
+) -> tuple[Vary, ...]:
+    """The keys to vary, once every combination of their ends has been found to be a scenario.
+
+    Args:
+        load: makes the scenario.
+        given: key path, mild end and hard end of each.
+        fixed: paths of keys that have been given a value.
+        tolerance: a displacement is narrowed down to this share of its range; values are flown rounded to a
+            hundredth of that, so that what is printed is what was flown.
+
+    Raises:
+        InputError: too many keys, one twice, with a value or without a range, or an end that makes no scenario.
+    """
+    if len(given) > MAX_KEYS:
+        raise InputError(
+            f"command line: --vary is given {len(given)} times; at most {MAX_KEYS} keys are varied"
+        )
+    given = [(_spelt("--vary", key), mild, hard) for key, mild, hard in given]
+    valued = {_spelt("--set", key) for key in fixed}
+    for number, (key, mild, hard) in enumerate(given):
+        if key == "seed":
+            raise InputError("command line: --vary seed: a seed is no condition; --seed gives another")
+        if key in [other for other, _, _ in given[:number]]:
+            raise InputError(f"command line: --vary {key}: is given twice; give one range")
+        if key in valued:
+            raise InputError(
+                f"command line: {key} is given a value, and a range with --vary; give one of them"
+            )
+        if mild == hard:
+            raise InputError(
+                f"command line: --vary {key}: both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}"
+            )
+    base = load([(key, number_text(mild)) for key, mild, _ in given])
+    vary = tuple(
+        Vary(key, mild, hard, takes_whole_numbers(base, loc_of(key)), _decimals(abs(hard - mild) * tolerance))
+        for key, mild, hard in given
+    )
+    diagonal = [(step / 8,) * len(vary) for step in range(9)]
+    for point in dict.fromkeys([*itertools.product((0.0, 1.0), repeat=len(vary)), *diagonal]):
+        scenario_at(load, vary, point)
+    return vary
+
+
+def scenario_at(load: Load, vary: Sequence[Vary], point: Point) -> Scenario:
+    """The scenario under a condition; an InputError where there is none."""
+    return load([(each.key, number_text(each.value(place))) for each, place in zip(vary, point, strict=True)])
+
+
+def _spelt(option: str, key: str) -> str:
+    try:
+        return as_spelt(key)
+    except ValueError as error:
+        raise InputError(f"command line: {option}: {error}") from error
+
+
+def number_text(value: float) -> str:
+    """A number as YAML, a whole one without a point; it reads back the same bit for bit."""
+    return str(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(value)
+
+
+def _decimals(resolution: float) -> int:
+    """Places after the point of the largest power of ten that is no larger than a hundredth of a resolution."""
+    return -math.floor(math.log10(max(resolution / 100.0, sys.float_info.min)))
+
+
 def falsify(
     load: Load,
     vary: Sequence[Vary],
     out: Path,
     *,
     flown: Flown,
-    until: Until = "failed",
+    claim: Claim = "reached",
     conditions: int = 40,
-    seeds: int = 1,
     tolerance: float = 0.01,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Breaking:
@@ -122,73 +212,67 @@ def falsify(
         vary: the keys, as `vary_of` gives them.
         out: the folder, made where missing.
         flown: flies a scenario.
-        until: what is looked for.
+        claim: a flight fails where this does not hold of it.
         conditions: at most so many are tried.
-        seeds: flights of a condition, from the scenario's seed on; it fails as soon as one does.
         tolerance: a displacement is narrowed down to this share of its range.
-        progress: told after each flight how many conditions have begun, of how many, and what became of it.
+        progress: told after each flight how many there were, of how many, and what became of it.
 
     Raises:
         InputError: a condition is no scenario, or cannot be flown; the folder is as it was.
-        RunFolderError: the folder holds something else, another process writes to it, or it cannot be written.
+        RunFolderError: the folder holds something else, or another process writes to it.
+        WriteError: it cannot be written.
     """
-    base = scenario_at(load, vary, (0.0,) * len(vary))
-    trials: list[Trial] = []
-    begun = itertools.count(1)
+    trials: dict[Point, Trial] = {}
 
     def values(point: Point) -> tuple[float, ...]:
         return tuple(each.value(place) for each, place in zip(vary, point, strict=True))
 
     def judge(point: Point) -> bool:
-        scenario = scenario_at(load, vary, point)
-        condition = next(begun)
-        for seed in range(base.seed, base.seed + seeds):
-            figures = _flown(flown, scenario.model_copy(update={"seed": seed}))
-            failed = figures["outcome"] != "reached" or (until == "untrackable" and not figures["trackable"])
-            kept = {name: figures.get(name) for name in FIGURES}
-            trials.append(Trial(point, values(point), seed, failed, kept))
-            if progress is not None:
-                told = ", ".join(f"{value:.4g}" for value in values(point))
-                progress(condition, conditions, f"{told}: {figures['outcome']}")
-            if failed:
-                return True
-        return False
+        figures = _flown(flown, scenario_at(load, vary, point))
+        failed = not holds(claim, figures)
+        kept = {name: figures.get(name) for name in FIGURES}
+        trials[point] = Trial(point, values(point), failed, kept)
+        if progress is not None:
+            told = ", ".join(f"{value:.4g}" for value in values(point))
+            progress(len(trials), conditions, f"{told}: {figures['outcome']}")
+        return failed
 
     def snap(point: Point) -> Point:
         return tuple(each.snapped(place) for each, place in zip(vary, point, strict=True))
 
-    with _claimed(out):
-        try:
-            searched = search(len(vary), judge, conditions, tolerance, snap)
-        except KeyboardInterrupt:
-            if trials:
-                told = {"schema": SCHEMA, "complete": False, "trials": [asdict(each) for each in trials]}
-                _write(out, told, None)
-            raise
-        mildest, passed = searched.mildest, searched.passed_below
-        verdict: Literal["found", "fails_at_the_mild_end"] = (
-            "found" if mildest and max(mildest) > 0.0 else "fails_at_the_mild_end"
-        )
-        found = next((each for each in trials if each.failed and each.displacement == mildest), None)
+    base = scenario_at(load, vary, (0.0,) * len(vary))
+    made = [each for each in (out, *out.parents) if not each.exists()]
+    lock = claim_folder(out, "search", INDEX, SCHEMA)
+    try:
+        search = Search(judge, conditions, tolerance, snap).run(len(vary))
+        mildest, passed = search.mildest, search.passed_below
         result = Breaking(
-            scenario=base.name,
-            planner=base.planner.label,
-            aircraft=Path(base.aircraft.model).name,
-            until=until,
-            vary=tuple(vary),
-            tolerance=tolerance,
-            conditions=len(searched.verdicts),
-            steps=searched.steps,
-            settled=searched.settled,
-            verdict="not_found" if found is None else verdict,
-            found=found,
-            passes=values(passed) if passed else None,
-            trials=tuple(trials),
+            base.name,
+            base.planner.label,
+            Path(base.aircraft.model).name,
+            base.seed,
+            claim,
+            tuple(vary),
+            tolerance,
+            len(trials),
+            search.steps,
+            search.settled,
+            "found" if mildest and max(mildest) else "not_found" if not mildest else "fails_at_the_mild_end",
+            trials[mildest] if mildest else None,
+            values(passed) if passed else None,
+            tuple(trials.values()),
         )
-        failing = None
-        if found is not None:
-            failing = scenario_at(load, vary, found.displacement).model_copy(update={"seed": found.seed})
-        _write(out, result.plain(), failing)
+        _write(out, result.plain(), scenario_at(load, vary, mildest) if mildest else None)
+    except KeyboardInterrupt:
+        if trials:
+            done = [asdict(each) for each in trials.values()]
+            _write(out, {"schema": SCHEMA, "complete": False, "trials": done}, None)
+        raise
+    finally:
+        lock.release()
+        with suppress(OSError):  # a folder that holds anything stays
+            for each in made:
+                each.rmdir()
     return result
 
 
@@ -204,35 +288,12 @@ def _flown(flown: Flown, scenario: Scenario) -> Mapping[str, Any]:
         return {"outcome": "error", "reason": sentence(error), "trackable": None}
 
 
-@contextmanager
-def _claimed(out: Path) -> Iterator[None]:
-    """Holds the folder of a search, made where missing; what was made goes again where nothing was written."""
-    if out.exists() and not out.is_dir():
-        raise RunFolderError(f"{out} is a file, not a folder for a search")
-    made = [each for each in (out, *out.parents) if not each.exists()]
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        lock = FolderLock(out)
-        try:
-            others = {each.name for each in out.iterdir() if not each.name.endswith(PARTIAL)}
-            if others and read_index(out / INDEX, SCHEMA) is None:
-                raise RunFolderError(
-                    f"{out} is not empty and not a search: choose another folder or empty it first"
-                )
-            yield
-        finally:
-            lock.release()
-    except OSError as error:
-        raise RunFolderError(f"cannot write the search in {out}: {error.strerror or error}") from error
-    finally:
-        with suppress(OSError):  # a folder that holds anything stays
-            for each in made:
-                each.rmdir()
-
-
 def _write(out: Path, result: Mapping[str, Any], failing: Scenario | None) -> None:
     """Replaces an earlier search, all of which goes; what fails comes before the index that names it."""
-    (out / FALSIFIED).unlink(missing_ok=True)
-    if failing is not None:
-        replace_text(out / FALSIFIED, dump_scenario(failing))
-    replace_text(out / INDEX, json.dumps(result, indent=2, allow_nan=False) + "\n")
+    try:
+        (out / FALSIFIED).unlink(missing_ok=True)
+        if failing is not None:
+            replace_text(out / FALSIFIED, dump_scenario(failing))
+        replace_text(out / INDEX, json.dumps(result, indent=2, allow_nan=False) + "\n")
+    except OSError as error:
+        raise WriteError(f"cannot write the search in {out}: {error.strerror or error}") from error

@@ -38,9 +38,7 @@ class ReportedFlight:
     run: Run | None = None
 
 
-def entry(
-    scenario: Scenario, run: Run, optimum: Optimum, kinematic: bool = False, guidance: str = ""
-) -> ReportedFlight:
+def entry(scenario: Scenario, run: Run, optimum: Optimum, guidance: str = "") -> ReportedFlight:
     """A flight that came to an end."""
     row = row_of(
         scenario.name,
@@ -48,7 +46,6 @@ def entry(
         run.metrics,
         optimum_m=optimum.length_m,
         turn_radius_m=_turn_radius_m(scenario, run),
-        kinematic=kinematic,
         guidance=guidance,
     )
     return ReportedFlight(row, run)

@@ -43,7 +43,6 @@ def report_html(
     command: str,
     versions: Mapping[str, str],
     written: str,
-    kinematic: bool,
     duels: Sequence[Any] = (),
 ) -> str:
     """The text of `report.html`; `duels` are planners in pairs, as `harness.campaign.paired` has them."""
@@ -55,7 +54,6 @@ def report_html(
         command=command,
         versions=versions,
         written=written,
-        kinematic=kinematic,
     )
 
 

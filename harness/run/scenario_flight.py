@@ -8,9 +8,8 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from aircraft.frames import LocalPlane
 from aircraft.guidance.altitude import LevelFlight
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import AircraftState, FlightModel
-from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, StartConditions
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
@@ -85,12 +83,6 @@ def make_loop(
         scan_rate_hz=scenario.sensor.rate_hz,
         navigator=Navigator(scenario.navigation, _stream(scenario.seed, NAVIGATION_STREAM)),
     )
-
-
-def kinematic_loop(scenario: Scenario) -> Loop:
-    """The same loop with a point that flies every path exactly in place of aircraft and guidance."""
-    loop = make_loop(scenario, partial(KinematicPoint, step_rate_hz=scenario.simulation.rate_hz))
-    return replace(loop, guidance=cast(GuidanceLaw, loop.model))
 
 
 def guidance_law(scenario: Scenario) -> GuidanceLaw:

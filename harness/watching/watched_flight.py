@@ -2,20 +2,48 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from aircraft.guidance.interface import GuidanceOutput
+from aircraft.interface import AircraftState
 from harness.flight.closed_loop import Loop
 from harness.flight.observer import Observer, Progress
 from harness.recording.properties import run_properties
 from harness.run.scenario_flight import fly_to_folder, make_loop, scene_of
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.watching.live import LiveLog
-from harness.watching.pace import Pace
 from harness.watching.relay import RelayProcess
+
+_CAUGHT_UP_S: Final = 1.0
+_NAP_S: Final = 0.05
+"""Waits are cut into pieces of this length, between which Python takes signals."""
+
+
+class Pace(Observer):
+    """Holds a flight back to a speed. One that has fallen behind catches up by a second, and is late for the rest.
+
+    Args:
+        speed: simulated seconds a second; 1 is real time.
+    """
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._due_s: float | None = None
+        self._flown_s = 0.0
+
+    def on_row(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
+        """Waits until it is time for a row of the track."""
+        now = time.monotonic()
+        if self._due_s is None:
+            self._due_s, self._flown_s = now, state.time_s
+        self._due_s = max(self._due_s + (state.time_s - self._flown_s) / self._speed, now - _CAUGHT_UP_S)
+        self._flown_s = state.time_s
+        while (left_s := self._due_s - time.monotonic()) > 0.0:
+            time.sleep(min(left_s, _NAP_S))
 
 
 @dataclass(frozen=True)
@@ -37,18 +65,19 @@ def fly_watched(
     scenario: Scenario, out: Path, recording: bool, progress: Progress | None, onlookers: Onlookers
 ) -> dict[str, Any]:
     """The same as `fly_to_folder`, and with the same result and errors, whoever looks on."""
-    observers: list[Observer] = [] if onlookers.speed is None else [Pace(onlookers.speed)]
-    with ExitStack() as stack:
-        relay = RelayProcess(onlookers.viewer_gone)
-        stack.callback(relay.end)
-        live = LiveLog(relay, onlookers.viewer)
+    relay = RelayProcess(onlookers.viewer_gone)
+    live = LiveLog(relay, onlookers.viewer)
 
-        def make(scenario: Scenario) -> Loop:
-            loop = make_loop(scenario)
-            scene = scene_of(scenario, loop, dump_scenario(scenario))
-            live.begin(loop, scene, f"{scene.name}, live")
-            return loop
+    def make(scenario: Scenario) -> Loop:
+        loop = make_loop(scenario)
+        scene = scene_of(scenario, loop, dump_scenario(scenario))
+        live.begin(loop, scene, f"{scene.name}, live")
+        return loop
 
-        figures = fly_to_folder(scenario, out, recording, progress, make=make, watching=[live, *observers])
+    paced = [] if onlookers.speed is None else [Pace(onlookers.speed)]
+    try:
+        figures = fly_to_folder(scenario, out, recording, progress, make=make, watching=[live, *paced])
         live.close(figures, run_properties(scenario, figures))
+    finally:
+        relay.end()
     return figures

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from harness.analysis.metrics import metrics
-from harness.falsify.breaking_point import Breaking, falsify
-from harness.falsify.keys import vary_of
+from harness.falsify.breaking_point import Breaking, falsify, vary_of
 from harness.flight.closed_loop import fly
-from harness.run.scenario_flight import flight_limits, kinematic_loop
+from harness.run.scenario_flight import flight_limits, make_loop
 from harness.scenario.scenario import Scenario, load_scenario
 
 SCENARIO = """
@@ -29,8 +28,8 @@ WAY_M = 1400.0
 
 
 def flown(scenario: Scenario) -> dict[str, Any]:
-    """A point flies: straight to the goal at the airspeed."""
-    return metrics(fly(kinematic_loop(scenario)), flight_limits(scenario))
+    """Flies straight to the goal at the airspeed."""
+    return metrics(fly(make_loop(scenario)), flight_limits(scenario))
 
 
 def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Breaking:

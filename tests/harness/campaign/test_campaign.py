@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from harness.campaign import runs as campaign_runs
 from harness.campaign.campaign_file import CampaignFile, campaign_schema, is_campaign, load_campaign
-from harness.campaign.cells import PlannedRun
-from harness.campaign.runs import CampaignRuns
+from harness.campaign.runs import CampaignRuns, PlannedRun
 from harness.cli.app import main
 from harness.files.strict_yaml import InputError, dump
 from harness.scenario.scenario import load_scenario

@@ -14,6 +14,7 @@ import pytest
 
 from harness.campaign.flight import Answer
 from harness.campaign.sweep import fly_missing
+from harness.campaign.workers import finished
 
 FLYING = 3000
 """So many futures that most of the time goes to locking and unlocking them."""
@@ -37,18 +38,23 @@ class Crowd:
 
     def __init__(self) -> None:
         self.given: list[Future[Answer]] = []
+        self._told = 0
         self._over = threading.Event()
         self._answering = threading.Thread(target=self._answer, daemon=True)
 
     def free(self) -> int:
         return FLYING - len(self.given)
 
-    def start(self, job: Any) -> Future[Answer]:
-        future: Future[Answer] = Future()
-        self.given.append(future)
+    def start(self, job: Any) -> None:
+        self.given.append(Future())
         if len(self.given) == FLYING:
             self._answering.start()
-        return future
+
+    def over(self, timeout_s: float) -> list[tuple[int, Answer | None]]:
+        left = self.given[self._told :]
+        done = [each.result() for each in left[: len(finished(left, timeout_s))]]
+        self._told += len(done)
+        return [(each.run, each) for each in done]
 
     def _answer(self) -> None:
         for number, future in enumerate(self.given):

@@ -186,7 +186,6 @@ def test_there_is_no_ratio_of_a_flight_that_did_not_arrive(flown: Path) -> None:
         {**said, "outcome": "timeout"},
         optimum_m=OPTIMUM_M,
         turn_radius_m=100.0,
-        kinematic=False,
     )
     assert row.ratio is None
     assert row.flown_length_m == said["flown_length_m"]
@@ -269,17 +268,14 @@ def test_the_report_says_how_to_repeat_it(
 
 
 @pytest.mark.flights
-def test_a_point_flies_every_plan_exactly_with_any_number_of_workers(
-    place: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_any_number_of_workers_gives_the_same_answer(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scenarios = [str(place / "ring.yaml"), str(place / "drift.yaml")]
     answers = []
     for workers in ("1", "2"):
         out = place / f"workers-{workers}"
         options = [
             "--planners",
-            "corner,bug2",
-            "--kinematic",
+            "rolling_window,bug2",
             "--no-recording",
             "--json",
             "--workers",
@@ -293,21 +289,18 @@ def test_a_point_flies_every_plan_exactly_with_any_number_of_workers(
     assert answers[0] == answers[1]
     ring, _, drift, _ = answers[0]
     assert (ring["scenario"], drift["scenario"]) == ("ring", "drift")
-    assert ring["total_system_error_max_m"] == 0.0
-    assert ring["trackable"] is None
-    # The flight ends at the edge of the goal circle, at the first look inside it.
-    assert ring["flown_length_m"] == pytest.approx(2400.0 + 2400.0 - 60.0, abs=3.0)
+    assert ring["ratio"] >= 0.98
     assert drift["ratio"] is None
     page = (place / "workers-1" / "report.html").read_text()
     assert "an obstacle moves" in page
-    assert "<h3>corner against bug2</h3>\n<p>2 pairs: both reached the goal in 2" in page
+    assert "<h3>rolling_window against bug2</h3>\n<p>2 pairs: both reached the goal in 2" in page
 
 
 @pytest.mark.flights
 def test_the_overlay_of_an_earlier_comparison_is_not_offered(
     place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = ["--planners", "corner", "--kinematic", "--out", str(tmp_path)]
+    options = ["--planners", "corner", "--out", str(tmp_path)]
     assert main(["compare", str(place / "ring.yaml"), *options]) == 0
     assert f"view: wayproof view {tmp_path}/ring/overlay.rrd" in capsys.readouterr().out.splitlines()
     assert main(["compare", str(place / "drift.yaml"), *options, "--no-recording"]) == 0
@@ -360,7 +353,7 @@ def test_a_planner_in_a_file_may_lie_in_another_folder(
     (tmp_path / "mine" / "own.py").write_text(own)
     monkeypatch.chdir(tmp_path)
     given = [str(place / "ring.yaml"), "--planners", "rolling_window,mine/own.py:Corner", "--no-recording"]
-    assert main(["compare", *given, "--kinematic", "--out", "out"]) == 0
+    assert main(["compare", *given, "--out", "out"]) == 0
     assert [row["planner"] for row in rows_of(tmp_path / "out")] == ["rolling_window", "own.py:Corner"]
 
 
@@ -559,9 +552,7 @@ def test_the_legend_explains_every_mark_that_is_there_and_no_other(
 def test_a_planner_that_came_too_near_is_marked_on_the_page() -> None:
     near = Row("s", "near", "reached", "there", min_clearance_m=1.1, clearance_violation_s=66.2)
     fair = Row("s", "fair", "reached", "there", min_clearance_m=102.2, clearance_violation_s=0.0)
-    html = report_html(
-        [Chapter("s", {}, [near, fair], [])], command="", versions={}, written="", kinematic=False
-    )
+    html = report_html([Chapter("s", {}, [near, fair], [])], command="", versions={}, written="")
     for text in ("1.1", "66.2"):
         assert f'<td data-planner="near" class="bad">{text}</td>' in html
     for text in ("102.2", "0"):

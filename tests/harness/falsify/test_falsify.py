@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from aircraft.airframes import AircraftError
 from harness.cli.app import main
 from harness.cli.falsify import breaking_rows, last_line
-from harness.falsify.breaking_point import FALSIFIED, INDEX
-from harness.falsify.keys import number_text, scenario_at, vary_of
+from harness.falsify.breaking_point import FALSIFIED, INDEX, number_text, scenario_at, vary_of
 from harness.files.errors import RunFolderError
 from harness.files.strict_yaml import InputError
 from harness.scenario.scenario import Scenario, load_scenario
@@ -84,25 +83,7 @@ def test_it_fails_already_at_the_mild_end(to_break: Path) -> None:
     assert breaking_rows(result)["tried"] == "1 condition"
 
 
-def test_a_condition_fails_when_one_of_its_seeds_does(to_break: Path) -> None:
-    def unlucky(scenario: Scenario) -> dict[str, Any]:
-        lost = scenario.seed == 6 and scenario.sensor.range_noise_m >= 4.0
-        return stand_in("collision" if lost else "reached", digest=f"{scenario.seed}")
-
-    result = broken(to_break, ("sensor.range_noise_m", 0.0, 8.0), flown=unlucky, seeds=4, tolerance=0.1)
-    assert result.found is not None
-    assert (result.found.values, result.found.seed) == ((4.0,), 6)
-    assert [trial.seed for trial in result.trials][:5] == [4, 5, 6, 7, 4], "in order, none left out"
-    assert [trial.seed for trial in result.trials if trial.failed] == [6] * sum(
-        t.failed for t in result.trials
-    )
-    assert breaking_rows(result)["tried"].startswith(
-        f"{result.conditions} conditions, {len(result.trials)} flights"
-    )
-    assert load_scenario(to_break.parent / "out" / FALSIFIED).seed == 6
-
-
-def test_untrackable_counts_where_it_is_asked_for(to_break: Path) -> None:
+def test_another_claim_is_broken_where_it_is_asked_for(to_break: Path) -> None:
     def shaky(scenario: Scenario) -> dict[str, Any]:
         noise = scenario.sensor.range_noise_m
         near: dict[str, Any] = {
@@ -114,7 +95,7 @@ def test_untrackable_counts_where_it_is_asked_for(to_break: Path) -> None:
 
     noise = ("sensor.range_noise_m", 0.0, 8.0)
     assert broken(to_break, noise, flown=shaky).verdict == "not_found"
-    result = broken(to_break, noise, flown=shaky, until="untrackable")
+    result = broken(to_break, noise, flown=shaky, claim="trackable")
     assert result.found is not None
     assert 3.0 <= result.found.values[0] <= 3.08
 
@@ -251,7 +232,7 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
             "--vary mission.goal_m[0]: is given twice",
         ),
         (["--vary", "sensor..rays=0:1"], "--vary: 'sensor..rays' is not a key path"),
-        (["--vary", "seed=1:5"], "a seed is no condition; --seeds flies several"),
+        (["--vary", "seed=1:5"], "a seed is no condition; --seed gives another"),
         (["--vary", "sensor.dropout=0:0"], "both ends are 0; give two, as sensor.dropout=0:1"),
         (["--vary", "sensor.dropout=0:1", "--vary", "sensor.dropout=0:1"], "is given twice"),
         (["--vary", "sensor.dropout=0:2"], "command line: sensor.dropout: is 2; must be at most 1"),
@@ -263,7 +244,7 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
         (["--vary", "planner.kind=0:1"], "planner.kind: is 0; must be text"),
         (["--vary", "sensor.dropout=0:1", "--tolerance", "0"], "is 0; must be between 0 and 1"),
         (["--vary", "sensor.dropout=0:1", "--runs", "1"], "--runs"),
-        (["--vary", "sensor.dropout=0:1", "--until", "later"], "--until"),
+        (["--vary", "sensor.dropout=0:1", "--claim", "later"], "--claim"),
         ([item for key in "abcdefg" for item in ("--vary", f"sensor.{key}=0:1")], "at most 6 keys"),
     ],
 )

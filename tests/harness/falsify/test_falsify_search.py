@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.falsify.search import Point, Searched, search
+from harness.falsify.search import Point, Search
 from harness.files.strict_yaml import InputError
 from tests.examples import examples
 
@@ -17,7 +17,7 @@ Fails = Callable[[Point], bool]
 
 def found(
     fails: Fails, keys: int = 1, conditions: int = 40, tolerance: float = 0.01
-) -> tuple[Searched, list[Point]]:
+) -> tuple[Search, list[Point]]:
     """A search, and the conditions that it asked for."""
     asked: list[Point] = []
 
@@ -25,7 +25,7 @@ def found(
         asked.append(point)
         return fails(point)
 
-    return search(keys, judge, conditions, tolerance), asked
+    return Search(judge, conditions, tolerance).run(keys), asked
 
 
 @given(st.floats(0.001, 1.0), st.sampled_from([0.1, 0.03, 0.004]))
@@ -112,10 +112,10 @@ def test_places_without_a_scenario_are_passed_over_away_from_the_diagonal() -> N
             raise InputError("the goal lies inside an obstacle")
         return point[1] >= 0.7
 
-    result = search(2, judge, 60, 0.01)
+    result = Search(judge, 60, 0.01).run(2)
     assert result.mildest == pytest.approx((0.4, 0.7), abs=0.02)
     with pytest.raises(InputError, match="inside an obstacle"):
-        search(2, lambda point: judge((0.1, point[1])), 60, 0.01)
+        Search(lambda point: judge((0.1, point[1])), 60, 0.01).run(2)
 
 
 def test_points_that_stand_for_the_same_value_are_tried_once() -> None:
@@ -125,6 +125,6 @@ def test_points_that_stand_for_the_same_value_are_tried_once() -> None:
         asked.append(point)
         return point[0] >= 0.5
 
-    result = search(1, judge, 40, 0.001, snap=lambda point: (round(point[0] * 4) / 4,))
+    result = Search(judge, 40, 0.001, snap=lambda point: (round(point[0] * 4) / 4,)).run(1)
     assert asked == [(0.0,), (0.25,), (0.5,)]
     assert (result.mildest, result.passed_below, result.settled) == ((0.5,), (0.25,), True)

@@ -6,7 +6,7 @@ import pytest
 
 from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
-from harness.run.scenario_flight import kinematic_loop, make_loop
+from harness.run.scenario_flight import make_loop
 from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario
 
 BARE = """\
@@ -65,5 +65,4 @@ def test_what_cannot_be_flown_is_refused(lines: list[str], said: str) -> None:
 def test_flights_take_so_many_steps() -> None:
     asked = scenario("sensor: {rate_hz: 5, range_m: 3000, rays: 90}", "simulation: {rate_hz: 90}")
     assert make_loop(asked).model.step_rate_hz == 90
-    assert kinematic_loop(asked).model.step_rate_hz == 90
-    assert fly(kinematic_loop(asked)).outcome.value == "reached"
+    assert fly(make_loop(asked)).outcome.value == "reached"

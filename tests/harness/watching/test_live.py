@@ -25,9 +25,8 @@ from harness.recording.viewer import free_port
 from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop, scene_of
 from harness.watching import live
 from harness.watching.live import LiveLog
-from harness.watching.pace import Pace
 from harness.watching.relay import Call, Opening, RelayProcess
-from harness.watching.watched_flight import Onlookers, fly_watched
+from harness.watching.watched_flight import Onlookers, Pace, fly_watched
 from tests.closed_loop.small import small_world as world
 from tests.point_mass import PointMass
 

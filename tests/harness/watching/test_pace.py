@@ -6,7 +6,7 @@ import pytest
 
 from aircraft.interface import AircraftState
 from harness.flight.closed_loop import NOT_STEERED
-from harness.watching import pace
+from harness.watching import watched_flight as pace
 
 
 class Clock:
