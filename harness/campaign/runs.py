@@ -7,11 +7,9 @@ planner and aircraft `r % pairs`. A case's streams are children of the campaign'
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -20,6 +18,7 @@ import numpy as np
 
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.flight import Job
+from harness.campaign.planned_run import PlannedRun, cell_of, kind_of
 from harness.campaign.results import LAW, RESULTS, RUNS, fly_again, read_table
 from harness.campaign.sampling import takes_whole_numbers
 from harness.files.strict_yaml import (
@@ -68,52 +67,6 @@ class _Place(NamedTuple):
     world: int
     grid: tuple[int, ...]
     entries: dict[str, int]
-
-
-@dataclass(frozen=True)
-class PlannedRun:
-    """One run of a campaign, before it is flown.
-
-    Attributes:
-        run: its number.
-        case: runs of one case fly the same world with the same seed and draws.
-        scenario: name of the scenario.
-        world: name of its file, or of the generator.
-        planner: kind.
-        aircraft: model.
-        seed: the scenario's.
-        varied: grid and drawn values, and those of its entries, by key path; lists and mappings as JSON text.
-    """
-
-    run: int
-    case: int
-    scenario: str
-    world: str
-    planner: str
-    aircraft: str
-    seed: int
-    varied: dict[str, Scalar]
-
-    def cells(self) -> dict[str, Scalar]:
-        """Its first columns in `results.parquet`."""
-        about = asdict(self)
-        return {**about, **about.pop("varied")}
-
-
-def kind_of(values: Sequence[Any]) -> str:
-    """What a column of these values holds, nulls aside."""
-    kinds = {type(value) for value in values if value is not None}
-    for name, of in (("bool", {bool}), ("int", {int}), ("number", {int, float}), ("text", {str})):
-        if kinds <= of:
-            return name
-    return "json"
-
-
-def _cell(value: Any, kind: str) -> Scalar:
-    """A value as its column has it."""
-    if kind == "json":
-        return json.dumps(value)
-    return float(value) if kind == "number" and value is not None else value
 
 
 class CampaignRuns:
@@ -194,7 +147,7 @@ class CampaignRuns:
                 columns[f"{section}.{name}"] = (
                     listed,
                     kind,
-                    [None if value is None else _cell(value, kind) for value in values],
+                    [None if value is None else cell_of(value, kind) for value in values],
                 )
         return columns
 
@@ -221,7 +174,7 @@ class CampaignRuns:
         base = self.file.bases[place.base]
         changes = [*self._grid(place), *self._drawn(place)]
         given = {key_path(each.loc): each.node.plain() for each in changes}
-        varied = {name: _cell(given[name], kind) for name, kind in self.varied.items() if name in given}
+        varied = {name: cell_of(given[name], kind) for name, kind in self.varied.items() if name in given}
         varied |= {
             name: cells[place.entries[listed]] for name, (listed, _, cells) in self._of_entries.items()
         }

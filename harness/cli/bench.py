@@ -12,26 +12,25 @@ from harness.cli.options import (
     FAILED,
     AircraftOption,
     JsonOption,
+    argument,
     bad_input,
-    law_kind,
     load,
+    option,
     print_json,
 )
+from harness.cli.replacing import law_kind
 
 
 def bench(
     scenario: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENARIO", help="A file or shipped name; or the word tracking.", show_default=True
-        ),
+        str, argument("SCENARIO", "A file or shipped name; or the word tracking.", show_default=True)
     ] = "paper_circles",
     aircraft: AircraftOption = None,
     seeds: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="With tracking: courses in each air. Default: 20.")
+        int | None, option("N", "With tracking: courses in each air. Default: 20.", min=1)
     ] = None,
     guidance: Annotated[
-        str | None, typer.Option(metavar="KIND", help="With tracking: the guidance law. Default: preview.")
+        str | None, option("KIND", "With tracking: the guidance law. Default: preview.")
     ] = None,
     as_json: JsonOption = False,
 ) -> int:
@@ -122,16 +121,13 @@ def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequen
 
 def envelope(
     aircraft: Annotated[
-        str,
-        typer.Argument(metavar="AIRCRAFT", help="A name that `wayproof list aircraft` prints, or a folder."),
+        str, argument("AIRCRAFT", "A name that `wayproof list aircraft` prints, or a folder.")
     ],
     airspeeds: Annotated[
-        list[float] | None,
-        typer.Option("--airspeed-mps", metavar="V", help="True airspeed; can be repeated. Default: cruise."),
+        list[float] | None, option("V", "True airspeed; can be repeated. Default: cruise.", "--airspeed-mps")
     ] = None,
     winds: Annotated[
-        list[float] | None,
-        typer.Option("--wind", metavar="M/S", help="Wind to track in; can be repeated. Default: 30 % of V."),
+        list[float] | None, option("M/S", "Wind to track in; can be repeated. Default: 30 % of V.", "--wind")
     ] = None,
     as_json: JsonOption = False,
 ) -> int:

@@ -13,18 +13,18 @@ import typer
 
 from harness.cli.options import (
     FAILED,
-    NOTHING,
-    Given,
     JsonOption,
     OutOption,
     QuietOption,
     ResumeOption,
     WorkersOption,
+    argument,
+    option,
     print_json,
-    replacing,
     resumable,
     told_apart,
 )
+from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -43,36 +43,22 @@ STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold
 
 @replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def certify(
-    subject: Annotated[
-        str,
-        typer.Argument(metavar="SCENARIO|PATH", help="A scenario, or a path that `wayproof check` takes."),
-    ],
+    subject: Annotated[str, argument("SCENARIO|PATH", "A scenario, or a path that `wayproof check` takes.")],
     given: Given = NOTHING,
     claim: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CLAIM", help="reached (default), no-contact, trackable; as-given (default of a path)."
-        ),
+        str | None, option("CLAIM", "reached (default), no-contact, trackable; as-given (default of a path).")
     ] = None,
     probability: Annotated[
         float | None,
-        typer.Option(
-            metavar="P", help="Claim that it holds on this share of the days; stops once that is decided."
-        ),
+        option("P", "Claim that it holds on this share of the days; stops once that is decided."),
     ] = None,
-    confidence: Annotated[float, typer.Option(metavar="C", help="Of each bound.")] = 0.95,
-    runs: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Days to fly, at most. Default: 1000.")
-    ] = None,
+    confidence: Annotated[float, option("C", "Of each bound.")] = 0.95,
+    runs: Annotated[int | None, option("N", "Days to fly, at most. Default: 1000.", min=1)] = None,
     vary: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="KEY=DRAW", help="LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."
-        ),
+        option("KEY=DRAW", "LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."),
     ] = None,
-    world: Annotated[
-        str | None, typer.Option("--scenario", metavar="WORLD", help="Of a path: obstacles, bounds, air.")
-    ] = None,
+    world: Annotated[str | None, option("WORLD", "Of a path: obstacles, bounds, air.", "--scenario")] = None,
     workers: WorkersOption = None,
     out: OutOption = None,
     resume: ResumeOption = False,

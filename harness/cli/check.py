@@ -13,19 +13,19 @@ import typer
 
 from harness.cli.options import (
     FAILED,
-    NOTHING,
     AircraftName,
-    Given,
     JsonOption,
     NoRecordingOption,
     OutOption,
     QuietOption,
+    argument,
     faults_told,
     marked_incomplete,
+    option,
     print_json,
-    replacing,
     told_apart,
 )
+from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -36,52 +36,41 @@ if TYPE_CHECKING:
 def check(
     path: Annotated[
         Path,
-        typer.Argument(
-            metavar="PATH",
-            help="A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints).",
+        argument(
+            "PATH",
+            "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints).",
         ),
     ],
     aircraft: AircraftName,
     given: Given = NOTHING,
     airspeed_mps: Annotated[
-        float | None, typer.Option(metavar="V", help="True airspeed. Default: the aircraft's cruise.")
+        float | None, option("V", "True airspeed. Default: the aircraft's cruise.")
     ] = None,
     altitude_m: Annotated[
-        float | None,
-        typer.Option(metavar="H", help="Altitude above sea level. Default: the file's, else 300."),
+        float | None, option("H", "Altitude above sea level. Default: the file's, else 300.")
     ] = None,
     scenario: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WORLD", help="A scenario that gives obstacles, bounds, environment, seed, altitude."
-        ),
+        str | None, option("WORLD", "A scenario that gives obstacles, bounds, environment, seed, altitude.")
     ] = None,
     clearance_m: Annotated[
-        float | None, typer.Option(metavar="C", help="Wanted clearance. Default: WORLD's, if written.")
+        float | None, option("C", "Wanted clearance. Default: WORLD's, if written.")
     ] = None,
     tolerance_m: Annotated[
-        float | None,
-        typer.Option(
-            metavar="T",
-            help="Largest distance from the path. Default: a tenth of C, or 10 m without C.",
-        ),
+        float | None, option("T", "Largest distance from the path. Default: a tenth of C, or 10 m without C.")
     ] = None,
     altitude_tolerance_m: Annotated[
-        float | None, typer.Option(metavar="A", help="Largest distance from the altitude. Default: 10 m.")
+        float | None, option("A", "Largest distance from the altitude. Default: 10 m.")
     ] = None,
     corner_m: Annotated[
         float | None,
-        typer.Option(
-            metavar="R",
-            help="Largest distance from corners. Default: T; at waypoints of a mission the acceptance radius in the "
+        option(
+            "R",
+            "Largest distance from corners. Default: T; at waypoints of a mission the acceptance radius in the "
             "file, else 90 m.",
         ),
     ] = None,
     days: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=1, help="Fly it on N days of its conditions too: DIR/days, as `certify` does."
-        ),
+        int | None, option("N", "Fly it on N days of its conditions too: DIR/days, as `certify` does.", min=1)
     ] = None,
     out: OutOption = None,
     no_recording: NoRecordingOption = False,

@@ -9,24 +9,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-import typer
-
 from harness.cli.options import (
     FAILED,
-    NOTHING,
-    Given,
     JsonOption,
     NoRecordingOption,
     OutOption,
     WorkersOption,
+    argument,
     faults_told,
-    given_by,
     load,
     marked_incomplete,
+    option,
     print_json,
-    replacing,
-    sources,
 )
+from harness.cli.replacing import NOTHING, Given, given_by, replacing, sources
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -41,12 +37,10 @@ LEGEND: Final = (
 
 @replacing("aircraft", "conditions", "wind", "turbulence", "seed", "settings")
 def compare(
-    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Files or shipped names.")],
-    planners: Annotated[
-        str, typer.Option(metavar="A,B,...", help="Kinds, in order; KIND+shield: under the shield.")
-    ],
+    scenarios: Annotated[list[str], argument("SCENARIO...", "Files or shipped names.")],
+    planners: Annotated[str, option("A,B,...", "Kinds, in order; KIND+shield: under the shield.")],
     guidance: Annotated[
-        str | None, typer.Option(metavar="X,Y,...", help="Kinds of guidance laws. Default: the scenario's.")
+        str | None, option("X,Y,...", "Kinds of guidance laws. Default: the scenario's.")
     ] = None,
     given: Given = NOTHING,
     out: OutOption = None,

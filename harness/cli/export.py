@@ -6,23 +6,20 @@ import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
-
-from harness.cli.options import bad_input
+from harness.cli.options import argument, bad_input, option
 from harness.cli.standard_output import say, to_nowhere
 
 
 def export(
-    run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A run folder.")],
+    run_dir: Annotated[Path, argument("RUN_DIR", "A run folder.")],
     form: Annotated[
         Literal["plan", "waypoints", "geojson", "kml"],
-        typer.Option("--format", metavar="FORMAT", help="plan, waypoints, geojson or kml."),
+        option("FORMAT", "plan, waypoints, geojson or kml.", "--format"),
     ],
     what: Annotated[
-        Literal["flown", "planned"],
-        typer.Option(metavar="WHAT", help="flown: the track; planned: the plans in effect."),
+        Literal["flown", "planned"], option("WHAT", "flown: the track; planned: the plans in effect.")
     ] = "flown",
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: standard output.")] = None,
+    out: Annotated[Path | None, option("FILE", "Default: standard output.")] = None,
 ) -> int:
     """Writes a run for QGroundControl (plan), MAVLink (waypoints) or maps (geojson, kml).
 

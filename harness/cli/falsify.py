@@ -12,18 +12,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from harness.cli.options import (
-    NOTHING,
-    Given,
     JsonOption,
     OutOption,
     QuietOption,
     ScenarioArgument,
     faults_told,
     load,
+    option,
     print_json,
-    replacing,
     told_apart,
 )
+from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
 from harness.files.wording import counted
 
@@ -37,21 +36,16 @@ RUNS_A_KEY: Final = 40
 @replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def falsify(
     scenario: ScenarioArgument,
-    vary: Annotated[
-        list[str],
-        typer.Option(metavar="KEY.PATH=LO:HI", help="From the mild end LO to HI; can be repeated."),
-    ],
+    vary: Annotated[list[str], option("KEY.PATH=LO:HI", "From the mild end LO to HI; can be repeated.")],
     given: Given = NOTHING,
     claim: Annotated[
         Literal["reached", "no-contact", "trackable"],
-        typer.Option(metavar="CLAIM", help="What fails to hold: reached, no-contact or trackable."),
+        option("CLAIM", "What fails to hold: reached, no-contact or trackable."),
     ] = "reached",
     runs: Annotated[
-        int | None, typer.Option(metavar="N", min=2, help=f"Number of flights. Default: {RUNS_A_KEY} a key.")
+        int | None, option("N", f"Number of flights. Default: {RUNS_A_KEY} a key.", min=2)
     ] = None,
-    tolerance: Annotated[
-        float, typer.Option(metavar="SHARE", help="Precision, as a share of each range.")
-    ] = 0.01,
+    tolerance: Annotated[float, option("SHARE", "Precision, as a share of each range.")] = 0.01,
     out: OutOption = None,
     quiet: QuietOption = False,
     as_json: JsonOption = False,

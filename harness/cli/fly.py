@@ -13,8 +13,6 @@ import typer
 
 from harness.cli.options import (
     FAILED,
-    NOTHING,
-    Given,
     JsonOption,
     NoRecordingOption,
     OptionalScenario,
@@ -24,10 +22,11 @@ from harness.cli.options import (
     flag,
     load,
     marked_incomplete,
+    option,
     print_json,
-    replacing,
     told_apart,
 )
+from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.review import open_viewer
 from harness.cli.standard_output import say
 
@@ -44,19 +43,15 @@ def fly(
     scenario: OptionalScenario = None,
     given: Given = NOTHING,
     results: Annotated[
-        Path | None,
-        typer.Option("--from", metavar="FILE", help="A campaign's results.parquet, instead of SCENARIO."),
+        Path | None, option("FILE", "A campaign's results.parquet, instead of SCENARIO.", "--from")
     ] = None,
-    run: Annotated[int | None, typer.Option(metavar="K", help="With --from: which run.")] = None,
+    run: Annotated[int | None, option("K", "With --from: which run.")] = None,
     out: OutOption = None,
     no_recording: NoRecordingOption = False,
     view: Annotated[bool, flag("--view", "Open the recording after the flight.")] = False,
     live: Annotated[bool, flag("--live", "Show the flight in the viewer while it is flown.")] = False,
     speed: Annotated[
-        float | None,
-        typer.Option(
-            metavar="X", help="With --live: simulated seconds a second. Default: as fast as it goes."
-        ),
+        float | None, option("X", "With --live: simulated seconds a second. Default: as fast as it goes.")
     ] = None,
     web: Annotated[bool, flag("--web", "With --live: show it in a browser, served on 127.0.0.1.")] = False,
     quiet: QuietOption = False,
@@ -105,9 +100,9 @@ def _check_usage(views_nothing: bool, live: bool, speed: float | None, web: bool
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
     if speed is not None and not 0.0 < speed <= 1e6:
         raise typer.BadParameter(f"--speed is {speed:g}; must be above 0 and at most 1e6")
-    for option, needs_live in (("--speed", speed is not None), ("--web", web)):
+    for name, needs_live in (("--speed", speed is not None), ("--web", web)):
         if needs_live and not live:
-            raise typer.BadParameter(f"{option} goes with --live")
+            raise typer.BadParameter(f"{name} goes with --live")
 
 
 def _asked(

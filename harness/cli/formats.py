@@ -6,16 +6,12 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
-
-from harness.cli.options import BAD_INPUT, load, print_json
+from harness.cli.options import BAD_INPUT, argument, load, print_json
 from harness.cli.standard_output import say
 
 
 def validate(
-    files: Annotated[
-        list[str], typer.Argument(metavar="FILE...", help="Scenario or campaign files, or shipped names.")
-    ],
+    files: Annotated[list[str], argument("FILE...", "Scenario or campaign files, or shipped names.")],
 ) -> int:
     """Checks scenario and campaign files without flying them; in a campaign, every run.
 
@@ -57,8 +53,7 @@ def _found(file: str) -> tuple[str, tuple[str, ...]]:
 
 def schema(
     kind: Annotated[
-        Literal["scenario", "campaign"],
-        typer.Argument(metavar="FORMAT", help="The file format.", show_default=True),
+        Literal["scenario", "campaign"], argument("FORMAT", "The file format.", show_default=True)
     ] = "scenario",
 ) -> int:
     """Prints the JSON Schema of a file format, for editors.

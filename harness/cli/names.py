@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from harness.cli.options import completing
+from harness.cli.options import argument
 from harness.cli.standard_output import folded, say
 
 LISTED: Final = ("planners", "aircraft", "guidance", "scenarios", "worlds", "campaigns", "metrics")
@@ -20,10 +20,10 @@ _WIDTH: Final = 80
 def list_names(
     what: Annotated[
         str,
-        typer.Argument(
-            metavar="WHAT",
-            help=f"{', '.join(LISTED[:-1])} or {LISTED[-1]}.",
-            autocompletion=completing(lambda: LISTED),
+        argument(
+            "WHAT",
+            f"{', '.join(LISTED[:-1])} or {LISTED[-1]}.",
+            autocompletion=lambda incomplete: [each for each in LISTED if each.startswith(incomplete)],
         ),
     ],
 ) -> int:

@@ -8,12 +8,11 @@ import json
 import os
 import re
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import wraps
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -22,15 +21,12 @@ from harness.cli.standard_output import say
 from harness.files.wording import printable
 
 if TYPE_CHECKING:
-    from harness.scenario.given import LoopPart
     from harness.scenario.scenario import Scenario
 
 FAILED: Final = 1
 BAD_INPUT: Final = 2
 IN_THE_NAME: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")
 """Keys that the default folder of a run is called after; of a model that is a folder, by the folder's last name."""
-
-Run = TypeVar("Run", bound=Callable[..., int])
 
 
 class Command(TyperCommand):
@@ -65,205 +61,47 @@ def flag(name: str, text: str) -> Any:
     return typer.Option(name, help=text)
 
 
-def completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
-    """What a shell completes an argument with; files it finds itself."""
+def option(metavar: str, text: str, *names: str, **other: Any) -> Any:
+    """An option with a value; its name is that of the parameter where none is given."""
+    return typer.Option(*names, metavar=metavar, help=text, **other)
+
+
+def argument(metavar: str, text: str, **other: Any) -> Any:
+    """What stands behind a command without a name."""
+    return typer.Argument(metavar=metavar, help=text, **other)
+
+
+def completing(source: str) -> Callable[[str], list[str]]:
+    """What a shell completes an argument with: the names that MODULE:FUNCTION gives; files it finds itself."""
 
     def begin_so(incomplete: str) -> list[str]:
-        return [name for name in names() if name.startswith(incomplete)]
+        module, _, function = source.partition(":")
+        names = getattr(import_module(module), function)()
+        return [name for name in names if name.startswith(incomplete)]
 
     return begin_so
-
-
-def _scenarios() -> Iterable[str]:
-    from harness.scenario.shipped import shipped_scenarios
-
-    return shipped_scenarios()
-
-
-def _planners() -> Iterable[str]:
-    from planner.registry import planner_kinds
-
-    return planner_kinds()
-
-
-def _laws() -> Iterable[str]:
-    from aircraft.guidance.registry import guidance_kinds
-
-    return guidance_kinds()
-
-
-def _aircraft() -> Iterable[str]:
-    from aircraft.airframes import aircraft_names
-
-    return aircraft_names()
 
 
 _SCENARIO: Any = typer.Argument(
     metavar="SCENARIO",
     help="A file, or a name that `wayproof list scenarios` prints.",
-    autocompletion=completing(_scenarios),
+    autocompletion=completing("harness.scenario.shipped:shipped_scenarios"),
 )
 _AIRCRAFT: Any = typer.Option(
     metavar="NAME",
     help="A name that `wayproof list aircraft` prints, or a folder.",
-    autocompletion=completing(_aircraft),
+    autocompletion=completing("aircraft.airframes:aircraft_names"),
 )
-_KIND: Final = "or FILE.py:NAME, MODULE:NAME."
 ScenarioArgument = Annotated[str, _SCENARIO]
 OptionalScenario = Annotated[str | None, _SCENARIO]
 AircraftName = Annotated[str, _AIRCRAFT]
 AircraftOption = Annotated[str | None, _AIRCRAFT]
-WorkersOption = Annotated[
-    int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
-]
-OutOption = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="The folder to write. Default: one of its own in runs.")
-]
+WorkersOption = Annotated[int | None, option("N", "Flights at a time. Default: one a processor.", min=1)]
+OutOption = Annotated[Path | None, option("DIR", "The folder to write. Default: one of its own in runs.")]
 QuietOption = Annotated[bool, flag("--quiet", "Print nothing but errors.")]
 NoRecordingOption = Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")]
 ResumeOption = Annotated[bool, flag("--resume", "Fly only what is missing in DIR.")]
 JsonOption = Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")]
-
-REPLACING: Final[dict[str, Any]] = {
-    "planner": Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND", help=f"Replaces planner.kind; {_KIND}", autocompletion=completing(_planners)
-        ),
-    ],
-    "aircraft": AircraftOption,
-    "guidance": Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND", help=f"Replaces guidance.kind; {_KIND}", autocompletion=completing(_laws)
-        ),
-    ],
-    "conditions": Annotated[
-        str | None,
-        typer.Option(
-            metavar="DAY",
-            help="Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly).",
-        ),
-    ],
-    "wind": Annotated[
-        str | None, typer.Option(metavar="SPEED,FROM", help="Steady wind: m/s, degrees it blows from.")
-    ],
-    "turbulence": Annotated[
-        str | None,
-        typer.Option(metavar="INTENSITY", help="light, moderate or severe; or milspec:light, ..."),
-    ],
-    "seed": Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")],
-    "settings": Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY.PATH=VALUE", help="Replaces any key of a scenario; can be repeated."
-        ),
-    ],
-}
-"""The options that replace keys of a scenario, by the name of the parameter."""
-
-
-@dataclass(frozen=True)
-class Given:
-    """What the options of `REPLACING` replace in a scenario.
-
-    Attributes:
-        options: key paths and values (YAML) of the options but --set.
-        settings: those of --set.
-        planner: as given; None where none was.
-        guidance: likewise.
-    """
-
-    options: tuple[tuple[str, str], ...] = ()
-    settings: tuple[tuple[str, str], ...] = ()
-    planner: str | None = None
-    guidance: str | None = None
-
-    @property
-    def keys(self) -> list[tuple[str, str]]:
-        """All of them, those of --set last."""
-        return [*self.options, *self.settings]
-
-    @property
-    def sources(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Planners and laws of one's own: a process that flies has to import them too."""
-        return sources(self.planner), sources(self.guidance)
-
-    def plus(self, **keys: Any) -> Given:
-        """With further values by key path, its points written as two underscores; None replaces nothing.
-
-        Raises:
-            typer.BadParameter: --set gives such a key another value.
-        """
-        named = {name.replace("__", "."): value for name, value in keys.items() if value is not None}
-        more = [(name, json.dumps(value)) for name, value in named.items()]
-        for name, value in self.settings:
-            for key, other in more:
-                if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
-                    raise typer.BadParameter(
-                        f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
-                        param_hint="--set",
-                    )
-        return replace(self, options=(*self.options, *more))
-
-
-NOTHING: Final = Given()
-
-
-def replacing(*names: str) -> Callable[[Run], Callable[..., int]]:
-    """Gives a command some options of `REPLACING`, which its parameter `given` has what they replace of."""
-
-    def made(command: Run) -> Callable[..., int]:
-        signature = inspect.signature(command, eval_str=True)
-        kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-        own = [inspect.Parameter(name, kind, default=None, annotation=REPLACING[name]) for name in names]
-        parameters = [
-            option
-            for each in signature.parameters.values()
-            for option in (own if each.name == "given" else [each])
-        ]
-
-        @wraps(command)
-        def run(**arguments: Any) -> int:
-            texts = {name: arguments.pop(name) for name in names}
-            return command(given=given_by(**texts), **arguments)
-
-        run.__annotations__ = {each.name: each.annotation for each in parameters}
-        run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-        return run
-
-    return made
-
-
-def given_by(
-    planner: str | None = None,
-    guidance: str | None = None,
-    aircraft: str | None = None,
-    wind: str | None = None,
-    turbulence: str | None = None,
-    settings: Sequence[str] | None = None,
-    seed: int | None = None,
-    conditions: str | None = None,
-) -> Given:
-    """What the texts of options replace.
-
-    Raises:
-        typer.BadParameter: one cannot be used, or --set gives a key that another option gives with another value.
-    """
-    from harness.scenario.sections import SHIELDED
-
-    is_shielded = planner is not None and planner.endswith(SHIELDED)
-    begun = Given((), tuple(_setting(text) for text in settings or ()), planner, guidance)
-    return begun.plus(
-        planner__kind=planner and planner_kind(planner).removesuffix(SHIELDED),
-        planner__shield="loiter" if is_shielded else None,
-        aircraft__model=aircraft,
-        guidance__kind=guidance and law_kind(guidance),
-        environment__wind=wind and _wind(wind),
-        environment__turbulence=turbulence and _turbulence(turbulence),
-        seed=seed,
-        conditions=conditions,
-    )
 
 
 def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
@@ -280,65 +118,6 @@ def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
             use = shlex.join(["wayproof", "sweep", scenario])
             raise InputError(f"{scenario}: this is a campaign: use `{use}`") from error
         raise
-
-
-def _wind(text: str) -> dict[str, float]:
-    """The key `environment.wind` that --wind SPEED,FROM means."""
-    try:
-        speed, direction = (float(part) for part in text.split(","))
-    except ValueError:
-        raise typer.BadParameter(f"{text!r} is not SPEED,FROM such as 8,270", param_hint="--wind") from None
-    return {"speed_mps": speed, "from_deg": direction}
-
-
-def _turbulence(text: str) -> dict[str, str]:
-    """The key `environment.turbulence` that --turbulence [MODEL:]INTENSITY means."""
-    model, colon, intensity = text.rpartition(":")
-    return {"model": model if colon else "tustin", "intensity": intensity}
-
-
-def _setting(text: str) -> tuple[str, str]:
-    """KEY.PATH=VALUE as its two parts."""
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
-    return name.strip(), value
-
-
-def planner_kind(text: str) -> str:
-    """The kind that --planner means: FILE.py:NAME and MODULE:NAME are imported, and known by their name then."""
-    from harness.scenario.given import PLANNER
-    from harness.scenario.sections import SHIELDED
-
-    shielded = SHIELDED if text.endswith(SHIELDED) else ""
-    return _kind(text.removesuffix(SHIELDED), PLANNER, "--planner") + shielded
-
-
-def law_kind(text: str) -> str:
-    """The kind that --guidance means, likewise."""
-    from harness.scenario.given import GUIDANCE
-
-    return _kind(text, GUIDANCE, "--guidance")
-
-
-def _kind(text: str, part: LoopPart, option: str) -> str:
-    from harness.scenario.given import registered
-
-    if text.endswith(".py") and text not in part.kinds():
-        told = f"is {text}; must be one of {', '.join(part.kinds())}, or FILE.py:NAME as {text}:NAME"
-        raise typer.BadParameter(told, param_hint=option)
-    try:
-        return registered(text, part)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint=option) from error
-
-
-def sources(*names: str | None) -> tuple[str, ...]:
-    """Those of some names that are FILE.py:NAME or MODULE:NAME: a process that flies has to import them too."""
-    from harness.scenario.given import is_source
-    from harness.scenario.sections import SHIELDED
-
-    return tuple(name.removesuffix(SHIELDED) for name in names if name is not None and is_source(name))
 
 
 def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_THE_NAME) -> str:

@@ -10,18 +10,18 @@ import typer
 
 from harness.cli.options import (
     FAILED,
-    NOTHING,
     AircraftName,
-    Given,
     JsonOption,
     NoRecordingOption,
     OutOption,
+    argument,
     bad_input,
     faults_told,
     flag,
+    option,
     print_json,
-    replacing,
 )
+from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -31,9 +31,8 @@ if TYPE_CHECKING:
 def view(
     runs: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="RUN_DIR...",
-            help="Run folders (several are overlaid), or a campaign's folder, as a table of runs.",
+        argument(
+            "RUN_DIR...", "Run folders (several are overlaid), or a campaign's folder, as a table of runs."
         ),
     ],
     web: Annotated[bool, flag("--web", "Show them in a browser, served on 127.0.0.1.")] = False,
@@ -64,24 +63,15 @@ def view(
 
 
 def report(
-    run: Annotated[
-        Path, typer.Argument(metavar="RUN_DIR", help="The folder of a complete run, or of a campaign.")
-    ],
+    run: Annotated[Path, argument("RUN_DIR", "The folder of a complete run, or of a campaign.")],
     by: Annotated[
-        list[str] | None,
-        typer.Option(metavar="KEY[,KEY]", help="Of a campaign: a table by these keys; can be repeated."),
+        list[str] | None, option("KEY[,KEY]", "Of a campaign: a table by these keys; can be repeated.")
     ] = None,
     table: Annotated[
         Literal["latex", "csv", "markdown"] | None,
-        typer.Option(
-            "--format",
-            metavar="FORMAT",
-            help="Of a campaign or comparison: only its table: latex, csv, markdown.",
-        ),
+        option("FORMAT", "Of a campaign or comparison: only its table: latex, csv, markdown.", "--format"),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Of --format: a file in place of standard output.")
-    ] = None,
+    out: Annotated[Path | None, option("FILE", "Of --format: a file in place of standard output.")] = None,
 ) -> int:
     """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
 
@@ -214,18 +204,13 @@ def _opened(shown: Callable[[Callable[[str], None]], None]) -> bool:
 @replacing("guidance", "settings")
 def replay(
     log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG",
-            help="A table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...).",
-        ),
+        Path, argument("LOG", "A table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...).")
     ],
     aircraft: AircraftName,
     mission: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Its mission: a file of `check`, or a JSON with its corners. Default: that of the log.",
+        option(
+            "FILE", "Its mission: a file of `check`, or a JSON with its corners. Default: that of the log."
         ),
     ] = None,
     given: Given = NOTHING,

@@ -14,62 +14,48 @@ import typer
 
 from harness.cli.options import (
     FAILED,
-    NOTHING,
-    Given,
     JsonOption,
     OutOption,
     QuietOption,
     ResumeOption,
     WorkersOption,
+    argument,
     completing,
     flag,
-    planner_kind,
+    option,
     print_json,
-    replacing,
     resumable,
-    sources,
 )
+from harness.cli.replacing import NOTHING, Given, planner_kind, replacing, sources
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from harness.campaign.runs import CampaignRuns
     from harness.campaign.workers import Workers
-
-
-def _campaigns() -> Iterable[str]:
-    from harness.scenario.shipped import shipped_campaigns
-
-    return shipped_campaigns()
 
 
 @replacing("guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def sweep(
     campaign: Annotated[
         str,
-        typer.Argument(
-            metavar="CAMPAIGN",
-            help="A campaign file, or a shipped one's name.",
-            autocompletion=completing(_campaigns),
+        argument(
+            "CAMPAIGN",
+            "A campaign file, or a shipped one's name.",
+            autocompletion=completing("harness.scenario.shipped:shipped_campaigns"),
         ),
     ],
     planners: Annotated[
         str | None,
-        typer.Option(
-            "--planners",
-            "--planner",
-            metavar="A,B,...",
-            help="Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME.",
+        option(
+            "A,B,...", "Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME.", "--planners", "--planner"
         ),
     ] = None,
     given: Given = NOTHING,
     workers: WorkersOption = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="A Dask cluster that flies instead: tls://HOST:8786. It can run code on this machine.",
+        option(
+            "ADDRESS", "A Dask cluster that flies instead: tls://HOST:8786. It can run code on this machine."
         ),
     ] = None,
     unencrypted: Annotated[

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from harness.cli.options import AircraftName
+from harness.cli.options import AircraftName, argument, option
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -22,46 +22,30 @@ Pair = tuple[float, float]
 
 def world(
     files: Annotated[
-        list[Path],
-        typer.Argument(metavar="FILE...", help="Terrain, buildings, airspace, fences or an occupancy map."),
+        list[Path], argument("FILE...", "Terrain, buildings, airspace, fences or an occupancy map.")
     ],
-    altitude_m: Annotated[
-        float, typer.Option("--altitude-m", metavar="H", help="Flight altitude above mean sea level.")
-    ],
-    out: Annotated[Path, typer.Option(metavar="SCENARIO.yaml", help="The scenario to write.")],
+    altitude_m: Annotated[float, option("H", "Flight altitude above mean sea level.", "--altitude-m")],
+    out: Annotated[Path, option("SCENARIO.yaml", "The scenario to write.")],
     aircraft: AircraftName = "aerosonde",
     start: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A,B", help="Latitude,longitude; or x,y in metres for a file without a place on earth."
-        ),
+        str | None, option("A,B", "Latitude,longitude; or x,y in metres for a file without a place on earth.")
     ] = None,
-    goal: Annotated[str | None, typer.Option(metavar="A,B", help="Likewise.")] = None,
+    goal: Annotated[str | None, option("A,B", "Likewise.")] = None,
     clearance_m: Annotated[
-        float | None,
-        typer.Option("--clearance-m", metavar="C", help="Wanted clearance: planner.clearance_m."),
+        float | None, option("C", "Wanted clearance: planner.clearance_m.", "--clearance-m")
     ] = None,
     vertical_clearance_m: Annotated[
         float,
-        typer.Option(
-            "--vertical-clearance-m",
-            metavar="V",
-            help="Whatever comes this near to the altitude is an obstacle.",
-        ),
+        option("V", "Whatever comes this near to the altitude is an obstacle.", "--vertical-clearance-m"),
     ] = 10.0,
     metres_per_cell: Annotated[
-        float | None,
-        typer.Option("--metres-per-cell", metavar="M", help="Side of a cell of an occupancy map."),
+        float | None, option("M", "Side of a cell of an occupancy map.", "--metres-per-cell")
     ] = None,
     ground_m: Annotated[
-        float | None,
-        typer.Option(
-            "--ground-m", metavar="G", help="Flat ground, for heights above ground without terrain."
-        ),
+        float | None, option("G", "Flat ground, for heights above ground without terrain.", "--ground-m")
     ] = None,
     crs: Annotated[
-        str | None,
-        typer.Option(metavar="EPSG:N", help="Coordinate system of files that name none, such as EPSG:28992."),
+        str | None, option("EPSG:N", "Coordinate system of files that name none, such as EPSG:28992.")
     ] = None,
 ) -> int:
     """Makes a scenario from files of terrain, buildings, airspace, fences or an occupancy map.

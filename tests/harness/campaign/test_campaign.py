@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from harness.campaign import runs as campaign_runs
 from harness.campaign.campaign_file import CampaignFile, campaign_schema, is_campaign, load_campaign
-from harness.campaign.runs import CampaignRuns, PlannedRun
+from harness.campaign.planned_run import PlannedRun
+from harness.campaign.runs import CampaignRuns
 from harness.cli.app import main
 from harness.files.strict_yaml import InputError, dump
 from harness.scenario.scenario import load_scenario

@@ -1,0 +1,217 @@
+"""The options of commands that replace keys of a scenario, and what they replace."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import wraps
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+
+import typer
+
+from harness.cli.options import AircraftOption, completing, option
+
+if TYPE_CHECKING:
+    from harness.scenario.given import LoopPart
+
+Run = TypeVar("Run", bound=Callable[..., int])
+
+_KIND: Final = "or FILE.py:NAME, MODULE:NAME."
+
+REPLACING: Final[dict[str, Any]] = {
+    "planner": Annotated[
+        str | None,
+        option(
+            "KIND",
+            f"Replaces planner.kind; {_KIND}",
+            autocompletion=completing("planner.registry:planner_kinds"),
+        ),
+    ],
+    "aircraft": AircraftOption,
+    "guidance": Annotated[
+        str | None,
+        option(
+            "KIND",
+            f"Replaces guidance.kind; {_KIND}",
+            autocompletion=completing("aircraft.guidance.registry:guidance_kinds"),
+        ),
+    ],
+    "conditions": Annotated[
+        str | None,
+        option("DAY", "Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."),
+    ],
+    "wind": Annotated[str | None, option("SPEED,FROM", "Steady wind: m/s, degrees it blows from.")],
+    "turbulence": Annotated[
+        str | None, option("INTENSITY", "light, moderate or severe; or milspec:light, ...")
+    ],
+    "seed": Annotated[int | None, option("N", "Replaces seed.")],
+    "settings": Annotated[
+        list[str] | None,
+        option("KEY.PATH=VALUE", "Replaces any key of a scenario; can be repeated.", "--set"),
+    ],
+}
+"""The options that replace keys of a scenario, by the name of the parameter."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the options of `REPLACING` replace in a scenario.
+
+    Attributes:
+        options: key paths and values (YAML) of the options but --set.
+        settings: those of --set.
+        planner: as given; None where none was.
+        guidance: likewise.
+    """
+
+    options: tuple[tuple[str, str], ...] = ()
+    settings: tuple[tuple[str, str], ...] = ()
+    planner: str | None = None
+    guidance: str | None = None
+
+    @property
+    def keys(self) -> list[tuple[str, str]]:
+        """All of them, those of --set last."""
+        return [*self.options, *self.settings]
+
+    @property
+    def sources(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Planners and laws of one's own: a process that flies has to import them too."""
+        return sources(self.planner), sources(self.guidance)
+
+    def plus(self, **keys: Any) -> Given:
+        """With further values by key path, its points written as two underscores; None replaces nothing.
+
+        Raises:
+            typer.BadParameter: --set gives such a key another value.
+        """
+        named = {name.replace("__", "."): value for name, value in keys.items() if value is not None}
+        more = [(name, json.dumps(value)) for name, value in named.items()]
+        for name, value in self.settings:
+            for key, other in more:
+                if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
+                    raise typer.BadParameter(
+                        f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
+                        param_hint="--set",
+                    )
+        return replace(self, options=(*self.options, *more))
+
+
+NOTHING: Final = Given()
+
+
+def replacing(*names: str) -> Callable[[Run], Callable[..., int]]:
+    """Gives a command some options of `REPLACING`, which its parameter `given` has what they replace of."""
+
+    def made(command: Run) -> Callable[..., int]:
+        signature = inspect.signature(command, eval_str=True)
+        kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+        own = [inspect.Parameter(name, kind, default=None, annotation=REPLACING[name]) for name in names]
+        parameters = [
+            option
+            for each in signature.parameters.values()
+            for option in (own if each.name == "given" else [each])
+        ]
+
+        @wraps(command)
+        def run(**arguments: Any) -> int:
+            texts = {name: arguments.pop(name) for name in names}
+            return command(given=given_by(**texts), **arguments)
+
+        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        return run
+
+    return made
+
+
+def given_by(
+    planner: str | None = None,
+    guidance: str | None = None,
+    aircraft: str | None = None,
+    wind: str | None = None,
+    turbulence: str | None = None,
+    settings: Sequence[str] | None = None,
+    seed: int | None = None,
+    conditions: str | None = None,
+) -> Given:
+    """What the texts of options replace.
+
+    Raises:
+        typer.BadParameter: one cannot be used, or --set gives a key that another option gives with another value.
+    """
+    from harness.scenario.sections import SHIELDED
+
+    is_shielded = planner is not None and planner.endswith(SHIELDED)
+    begun = Given((), tuple(_setting(text) for text in settings or ()), planner, guidance)
+    return begun.plus(
+        planner__kind=planner and planner_kind(planner).removesuffix(SHIELDED),
+        planner__shield="loiter" if is_shielded else None,
+        aircraft__model=aircraft,
+        guidance__kind=guidance and law_kind(guidance),
+        environment__wind=wind and _wind(wind),
+        environment__turbulence=turbulence and _turbulence(turbulence),
+        seed=seed,
+        conditions=conditions,
+    )
+
+
+def _wind(text: str) -> dict[str, float]:
+    """The key `environment.wind` that --wind SPEED,FROM means."""
+    try:
+        speed, direction = (float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is not SPEED,FROM such as 8,270", param_hint="--wind") from None
+    return {"speed_mps": speed, "from_deg": direction}
+
+
+def _turbulence(text: str) -> dict[str, str]:
+    """The key `environment.turbulence` that --turbulence [MODEL:]INTENSITY means."""
+    model, colon, intensity = text.rpartition(":")
+    return {"model": model if colon else "tustin", "intensity": intensity}
+
+
+def _setting(text: str) -> tuple[str, str]:
+    """KEY.PATH=VALUE as its two parts."""
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
+    return name.strip(), value
+
+
+def planner_kind(text: str) -> str:
+    """The kind that --planner means: FILE.py:NAME and MODULE:NAME are imported, and known by their name then."""
+    from harness.scenario.given import PLANNER
+    from harness.scenario.sections import SHIELDED
+
+    shielded = SHIELDED if text.endswith(SHIELDED) else ""
+    return _kind(text.removesuffix(SHIELDED), PLANNER, "--planner") + shielded
+
+
+def law_kind(text: str) -> str:
+    """The kind that --guidance means, likewise."""
+    from harness.scenario.given import GUIDANCE
+
+    return _kind(text, GUIDANCE, "--guidance")
+
+
+def _kind(text: str, part: LoopPart, option: str) -> str:
+    from harness.scenario.given import registered
+
+    if text.endswith(".py") and text not in part.kinds():
+        told = f"is {text}; must be one of {', '.join(part.kinds())}, or FILE.py:NAME as {text}:NAME"
+        raise typer.BadParameter(told, param_hint=option)
+    try:
+        return registered(text, part)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint=option) from error
+
+
+def sources(*names: str | None) -> tuple[str, ...]:
+    """Those of some names that are FILE.py:NAME or MODULE:NAME: a process that flies has to import them too."""
+    from harness.scenario.given import is_source
+    from harness.scenario.sections import SHIELDED
+
+    return tuple(name.removesuffix(SHIELDED) for name in names if name is not None and is_source(name))
