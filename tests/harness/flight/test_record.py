@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
 from harness.flight.record import COLUMNS, TRACK_FIELDS, FloatArray, Track, digest
 from harness.flight.track_log import TrackLog
+from tests.harness.conftest import track as make_track
 
 CONTRACT = (
     "time_s east_m north_m up_m course_deg heading_deg roll_deg pitch_deg airspeed_mps groundspeed_mps "
@@ -66,7 +66,7 @@ def test_a_state_that_is_not_finite_is_no_row_nor_a_block(rows: int) -> None:
     assert all(len(block) for block in blocks)
 
 
-def test_digest_is_the_hash_of_the_columns_in_order(make_track: Callable[..., Track]) -> None:
+def test_digest_is_the_hash_of_the_columns_in_order() -> None:
     track = make_track(5, cross_track_m=np.array([np.nan, 1, 2, 3, 4]))
     joined = b"".join(
         np.asarray(getattr(track, name), "<i8" if name == "plan_index" else "<f8").tobytes()

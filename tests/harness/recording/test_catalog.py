@@ -17,12 +17,14 @@ from rerun.experimental import ViewerClient
 from harness.analysis.metrics import metrics
 from harness.campaign.table import recordings_of
 from harness.cli.app import main
-from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
+from harness.flight.record import Flight, Outcome
 from harness.recording.catalog import catalog
 from harness.recording.log import RerunLog
 from harness.recording.properties import properties_of, run_properties
 from harness.recording.viewer import NO_DRIVER, ViewerError, free_port, viewer_process
 from harness.scenario.scenario import parse_scenario
+from tests.harness.conftest import plan as make_plan
+from tests.harness.conftest import track as make_track
 from tests.harness.recording.test_rerun_log import LIMITS, SCENE
 from tests.pictures import draw_settled
 
@@ -35,9 +37,6 @@ planner: {clearance_m: 100}
 environment: {wind: {speed_mps: 4, from_deg: 270}}
 """
 
-MakeTrack = Callable[..., Track]
-MakePlan = Callable[..., AcceptedPlan]
-
 
 @pytest.fixture(autouse=True)
 def strict(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -45,7 +44,7 @@ def strict(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rr.error_utils, "_strict_mode", True)
 
 
-def flight(make_track: MakeTrack, make_plan: MakePlan, outcome: Outcome, clearance_m: float) -> Flight:
+def flight(outcome: Outcome, clearance_m: float) -> Flight:
     """100 s north."""
     track = make_track(1001, clearance_m=np.linspace(500.0, clearance_m, 1001))
     plans = (make_plan([(0, 0, 0, 1, 0.0, 2500.0)]),)
@@ -68,19 +67,17 @@ def record(folder: Path, number: int, flown: Flight) -> dict[str, Any]:
 
 
 @pytest.fixture
-def campaign(tmp_path: Path, make_track: MakeTrack, make_plan: MakePlan) -> Path:
+def campaign(tmp_path: Path) -> Path:
     """Three runs; the second hit something, the third was close."""
     for number, (outcome, clearance_m) in enumerate(
         [(Outcome.REACHED, 250.0), (Outcome.COLLISION, -3.0), (Outcome.REACHED, 120.0)]
     ):
-        record(tmp_path, number, flight(make_track, make_plan, outcome, clearance_m))
+        record(tmp_path, number, flight(outcome, clearance_m))
     return tmp_path
 
 
-def test_a_thin_recording_is_small_and_has_typed_properties(
-    tmp_path: Path, make_track: MakeTrack, make_plan: MakePlan
-) -> None:
-    given = record(tmp_path, 7, flight(make_track, make_plan, Outcome.TIMEOUT, 90.0))
+def test_a_thin_recording_is_small_and_has_typed_properties(tmp_path: Path) -> None:
+    given = record(tmp_path, 7, flight(Outcome.TIMEOUT, 90.0))
     (path,) = recordings_of(tmp_path)
     assert path.stat().st_size < 300_000
     assert properties_of(path) == pytest.approx(given)
@@ -114,15 +111,13 @@ def test_a_thin_recording_shows_the_whole_track(campaign: Path) -> None:
     } <= rows.keys()
 
 
-def test_the_plots_of_a_thin_recording_have_the_peaks_that_its_figures_name(
-    tmp_path: Path, make_track: MakeTrack, make_plan: MakePlan
-) -> None:
+def test_the_plots_of_a_thin_recording_have_the_peaks_that_its_figures_name(tmp_path: Path) -> None:
     """Peaks of a tenth of a second, between the rows that are kept of the track."""
     cross_track_m, clearance_m, bank_deg = np.zeros(1001), np.full(1001, 250.0), np.zeros(1001)
     cross_track_m[[0, 1]] = np.nan
     cross_track_m[507], clearance_m[613], bank_deg[999] = -2.5, 37.5, -45.0
     track = make_track(1001, cross_track_m=cross_track_m, clearance_m=clearance_m, roll_deg=bank_deg)
-    record(tmp_path, 0, replace(flight(make_track, make_plan, Outcome.REACHED, 250.0), track=track))
+    record(tmp_path, 0, replace(flight(Outcome.REACHED, 250.0), track=track))
     assert curve(tmp_path, "cross_track/flown")[50.7] == -2.5
     assert curve(tmp_path, "clearance/flown")[61.3] == 37.5
     assert curve(tmp_path, "bank/flown")[99.9] == -45.0
@@ -153,13 +148,11 @@ def curve(campaign: Path, entity: str) -> dict[float, float]:
     return values
 
 
-def test_severity_orders_outcomes_then_clearance(make_track: MakeTrack, make_plan: MakePlan) -> None:
+def test_severity_orders_outcomes_then_clearance() -> None:
     scenario = parse_scenario(SCENARIO)
 
     def severity_of(outcome: Outcome, clearance_m: float) -> float:
-        value = run_properties(
-            scenario, metrics(flight(make_track, make_plan, outcome, clearance_m), LIMITS)
-        )["severity"]
+        value = run_properties(scenario, metrics(flight(outcome, clearance_m), LIMITS))["severity"]
         assert isinstance(value, float)
         return value
 

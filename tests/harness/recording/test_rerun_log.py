@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 import urllib.request
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -39,6 +39,8 @@ from harness.recording.viewer import NO_DRIVER, ViewerError, _executable, open_v
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from planner.interface import Mission, MovingEdges, Plan, PlanPicture, PlanStatus
 from planner.interface import Path as PlannedPath
+from tests.harness.conftest import plan as make_plan
+from tests.harness.conftest import track as make_track
 from tests.page import NoBrowserError, browser
 from tests.pictures import screenshot, served
 
@@ -85,13 +87,7 @@ def scan(time_s: float) -> RangeScan:
     return RangeScan(time_s, time_s, 5.0, 7.0, 0.0, math.pi / 2, math.pi / 2, fan, ranges, 800.0)
 
 
-def record(
-    path: Path,
-    make_track: Callable[..., Track],
-    make_plan: Callable[..., AcceptedPlan],
-    east_m: float = 0.0,
-    told: Sequence[str] = ("goal reached",),
-) -> Flight:
+def record(path: Path, east_m: float = 0.0, told: Sequence[str] = ("goal reached",)) -> Flight:
     """100 s north, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
     track = make_track(1001, east_m=east_m, clearance_m=np.where(np.arange(1001) < 200, np.inf, 150.0))
     first = replace(make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=lambda: PICTURE), scan_s=0.0)
@@ -112,12 +108,10 @@ def record(
 
 
 @pytest.fixture
-def recording(
-    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> tuple[Path, Flight]:
+def recording(tmp_path: Path) -> tuple[Path, Flight]:
     (tmp_path / "run").mkdir()
     path = tmp_path / "run" / "flight.rrd"
-    return path, record(path, make_track, make_plan)
+    return path, record(path)
 
 
 def read(path: Path) -> dict[str, Columns]:
@@ -182,9 +176,7 @@ def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
     assert seconds(entities, "/series/bank/flown")[-1] == 100.0
 
 
-def test_a_path_that_climbs_is_drawn_and_held_against_at_its_altitudes(
-    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> None:
+def test_a_path_that_climbs_is_drawn_and_held_against_at_its_altitudes(tmp_path: Path) -> None:
     scene = replace(SCENE, profile=lambda along: 300.0 + 0.1 * along)
     log = RerunLog(tmp_path / "flight.rrd", scene, recording_id="a")
     log.on_plan(make_plan([(0, 0, 0, 1, 0.0, 2500.0)]), STATE)
@@ -224,9 +216,7 @@ def test_scans_are_drawn_as_the_aircraft_goes_on(recording: tuple[Path, Flight])
     )
 
 
-def test_what_two_scans_in_a_row_have_shown_is_marked_once(
-    tmp_path: Path, make_track: Callable[..., Track]
-) -> None:
+def test_what_two_scans_in_a_row_have_shown_is_marked_once(tmp_path: Path) -> None:
     """The near edge of the circle from 5 s on, and at 5 s something that is not there."""
     near, false = (300.0, 1250.0), (-300.0, 0.0)
     log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
@@ -244,7 +234,7 @@ def test_what_two_scans_in_a_row_have_shown_is_marked_once(
     np.testing.assert_allclose(post, [(*near, 0.0), (*near, SCENE.obstacle_top_m)], rtol=1e-6)
 
 
-def test_what_should_not_happen_is_a_warning(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+def test_what_should_not_happen_is_a_warning(tmp_path: Path) -> None:
     """Nearer than the wanted 100 m from 5 to 15 s, over two blocks; 102 m at 10 s is not yet clear."""
     row = np.arange(201)
     clearance_m = np.where((row < 50) | (row > 150), 300.0, np.where(row == 100, 102.0, 80.0))
@@ -267,7 +257,7 @@ def test_what_should_not_happen_is_a_warning(tmp_path: Path, make_track: Callabl
     ]
 
 
-def test_the_trail_shows_the_error_by_its_colour(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+def test_the_trail_shows_the_error_by_its_colour(tmp_path: Path) -> None:
     row = np.arange(101)
     error = np.where((row < 50) & (row != 20), 0.0, -2.0 * LIMITS.cross_track_threshold_m)
     log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
@@ -280,7 +270,7 @@ def test_the_trail_shows_the_error_by_its_colour(tmp_path: Path, make_track: Cal
     assert set(colours[5:]) == {off}
 
 
-def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+def test_states_follow_plans_bank_and_verdicts(tmp_path: Path) -> None:
     """A plan to 5 s of flight, then its closing circle; at the bank limit from 8 s on."""
     circle = (0, 125.0, 0, 1, 0.01, 200 * math.pi)
     straight = (0, 0, 0, 1, 0.0, 125.0)
@@ -341,9 +331,7 @@ def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) ->
         assert column(entities, f"/plan/{entity}", part)[1] == [], "cleared where the planner shows nothing"
 
 
-def test_what_the_map_takes_to_move_is_shown_until_it_is_lost(
-    tmp_path: Path, make_track: Callable[..., Track]
-) -> None:
+def test_what_the_map_takes_to_move_is_shown_until_it_is_lost(tmp_path: Path) -> None:
     """Known from 5 to 20 s, at 2 Hz."""
     known: list[MovingEdges] = []
     log = RerunLog(tmp_path / "a.rrd", SCENE, "a", moving=lambda: known)
@@ -430,11 +418,9 @@ def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight
     assert (min(times), max(times)) == (0.0, 100.0)
 
 
-def test_overlay_keeps_every_track_and_one_world(
-    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> None:
+def test_overlay_keeps_every_track_and_one_world(tmp_path: Path) -> None:
     for name, east_m in (("a", 0.0), ("b", 40.0)):
-        record(tmp_path / f"{name}.rrd", make_track, make_plan, east_m)
+        record(tmp_path / f"{name}.rrd", east_m)
     write_overlay([tmp_path / "a.rrd", tmp_path / "b.rrd"], ["first", "second"], tmp_path / "c.rrd")
     entities = read(tmp_path / "c.rrd")
     for number, east_m in enumerate((0.0, 40.0)):
@@ -453,9 +439,7 @@ def test_overlay_keeps_every_track_and_one_world(
 
 
 @pytest.mark.flights
-def test_an_overlay_says_which_runs_are_of_other_worlds(
-    tmp_path: Path, make_track: Callable[..., Track]
-) -> None:
+def test_an_overlay_says_which_runs_are_of_other_worlds(tmp_path: Path) -> None:
     """Of a campaign that draws worlds two runs would be shown among the obstacles of one."""
     elsewhere = replace(SCENE, obstacles=(Obstacle(Circle((500.0, 1250.0), 300.0)),))
     for thin in (False, True):
