@@ -8,16 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.interface import GRAVITY_MPS2, FlightModel
+from aircraft.interface import GRAVITY_MPS2
 from aircraft.start import Atmosphere, StartConditions
 from tests.point_mass import PointMass
 
 START = StartConditions(1000.0, 2000.0, 300.0, 0.5, 25.0)
-
-
-def test_is_a_flight_model() -> None:
-    model: FlightModel = PointMass(START)
-    assert model.step_rate_hz == 120
 
 
 def test_straight_flight_makes_the_course_good_in_wind() -> None:
@@ -69,25 +64,6 @@ def test_big_strides_agree_with_single_steps(steps: int, roll: float) -> None:
     assert a.north_m == pytest.approx(b.north_m, abs=0.01)
     assert a.roll_rad == pytest.approx(b.roll_rad, abs=1e-9)
     assert (a.up_m, a.airspeed_mps) == (310.0, 27.0)
-
-
-def test_faults() -> None:
-    model = PointMass(START)
-    assert model.fault() is None
-    model.command(0.0, -1.0, 25.0)
-    assert model.fault() == "the aircraft is at the ground (-1.0 m above sea level)"
-    model.command(math.nan, 300.0, 25.0)
-    model.advance(1)
-    assert model.fault() == "the state is not finite"
-
-
-def test_what_it_cannot_do_is_refused() -> None:
-    with pytest.raises(ValueError, match="does not model turbulence"):
-        PointMass(START, Atmosphere(turbulence="tustin", intensity="light"))
-    with pytest.raises(ValueError, match="cannot be held at 25 m/s"):
-        PointMass(START, Atmosphere(wind_east_mps=40.0))
-    with pytest.raises(ValueError, match="roll_lag_s must be positive"):
-        PointMass(START, roll_lag_s=0.0)
 
 
 @pytest.mark.parametrize(
