@@ -244,6 +244,7 @@ class PlanRequest(NamedTuple):
         arc_length_m: distance of the aircraft along `flown.path`, from its start.
         scanned: a scan has come in since the last request.
         refused: why the shield refused the planner's last path; None without a shield, and while it is flown.
+        committed: what is left of the certified path that is flown under a shield, and the turn it ends in; else None.
     """
 
     time_s: float
@@ -254,6 +255,7 @@ class PlanRequest(NamedTuple):
     arc_length_m: float = 0.0
     scanned: bool = True
     refused: Refused | None = None
+    committed: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -157,6 +157,9 @@ class Shield:
             arc_length_m = _nearest_m(adopted.plan.path, request.position_m, adopted.certified_m)
         seen = self._places.on(request.seen)
         told = request._replace(seen=seen, flown=flown, arc_length_m=arc_length_m, refused=self._refused)
+        if effective is not None:
+            left = Path(effective.left(here_m).segments, effective.path.loiter)
+            told = told._replace(committed=left)
         try:
             self._own = self._inner.plan(told)
             return checked_plan(self._own, request.position_m, self._mission)
@@ -350,8 +353,8 @@ class Shield:
 def why_not(free_m: float, cut_m: float) -> str:
     """Why a path is refused that is free up to one arc length and cut at another."""
     if cut_m <= free_m:
-        return f"the path comes too near to something or leaves the area {free_m:.0f} m ahead"
-    return f"no turn off the path that gets on has been seen to be free within {free_m:.0f} m"
+        return "the path comes too near to something or leaves the area"
+    return "no turn off the path that gets on has been seen to be free"
 
 
 def first_exit_m(path: Path, bounds_m: tuple[float, float, float, float]) -> float:

@@ -104,3 +104,19 @@ def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
     assert told.status is PlanStatus.NO_PATH
     assert shield.report.refused_plans == refused
     assert ("holding" in told.reason) is (refused == 0)
+
+
+def test_a_planner_is_told_where_the_certified_plan_leads(known: Known) -> None:
+    inner = Once((0.0, 0.0), (3000.0, 0.0))
+    shield = Shield(inner, MISSION)
+    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), known(np.zeros((0, 2))))
+    flown = shield.plan(request)
+    assert flown.path is not None
+    shield.plan(request._replace(time_s=4.0, position_m=(100.0, 0.0), flown=flown, arc_length_m=100.0))
+    before, after = (each.committed for each in inner.told)
+    assert before is None
+    assert after is not None
+    assert after.loiter
+    np.testing.assert_allclose(after.segments[0, :4], (100.0, 0.0, 1.0, 0.0), atol=1e-6)
+    np.testing.assert_allclose(after.segments[-1], flown.path.segments[-1])
+    assert after.length_m == pytest.approx(flown.path.length_m - 100.0)
