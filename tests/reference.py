@@ -21,7 +21,7 @@ import wayproof
 MODULES = (
     "wayproof",
     *("planner.interface", "planner.registry", "planner.contract"),
-    *("aircraft.interface", "aircraft.guidance.interface", "aircraft.guidance.contract"),
+    *("aircraft.interface", "aircraft.guidance.interface"),
 )
 """The public face: the front door, and what planners, aircraft and guidance laws of others are built on."""
 FIRST_PAGE = '<!doctype html><meta http-equiv="refresh" content="0; url=wayproof.html">'

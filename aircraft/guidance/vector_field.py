@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLimits
 from aircraft.guidance.key import key
@@ -77,147 +76,29 @@ class VectorFieldConfig:
         return replace(self, path_gain_1pm=gain, course_bandwidth_radps=bandwidth)
 
 
-def parameters(config: VectorFieldConfig, limits: GuidanceLimits) -> VectorFieldParameters:
-    """What the law needs: the keys, resolved, and figures of the aircraft."""
-    assert config.path_gain_1pm is not None
-    assert config.course_bandwidth_radps is not None
-    return VectorFieldParameters(
-        math.radians(config.approach_angle_deg),
-        config.path_gain_1pm,
-        config.orbit_gain,
-        config.course_bandwidth_radps,
-        config.course_damping,
-        limits.bank_limit_rad,
-        1.0 / UPDATE_RATE_HZ,
-    )
-
-
-class VectorFieldParameters(NamedTuple):
-    """Constants of one flight."""
-
-    approach_angle_rad: float
-    path_gain_1pm: float
-    orbit_gain: float
-    """0: what approaches an orbit as soon as a line."""
-    course_bandwidth_radps: float
-    course_damping: float
-    roll_limit_rad: float
-    update_s: float
-    """Time between calls, which the integrator adds up."""
-
-
-class Motion(NamedTuple):
-    """How the aircraft moves."""
-
-    east_m: float
-    north_m: float
-    velocity_east_mps: float
-    velocity_north_mps: float
-    heading_rad: float
-
-
-class VectorFieldOutput(NamedTuple):
-    """The roll command, and what it comes from."""
-
-    roll_rad: float
-    course_rad: float
-    """Of the field."""
-    error_m: float
-    """From the path, positive to its right."""
-    feedforward_rad: float
-    integral_rad: float
-    """The integrator's part of the roll command, for the next call."""
-    saturated: bool
-    """The roll limit cut the command."""
-
-
 def line_course(
-    cross_track_m: float, tangent_east: float, tangent_north: float, has: VectorFieldParameters
+    cross_track_m: float, tangent_east: float, tangent_north: float, approach_rad: float, gain_1pm: float
 ) -> float:
     """Course of the field of a line (eq. 10.8), rad; the distance is positive to the line's right."""
-    away = 2.0 / math.pi * math.atan(has.path_gain_1pm * cross_track_m)
-    return math.atan2(tangent_east, tangent_north) - has.approach_angle_rad * away
+    away = 2.0 / math.pi * math.atan(gain_1pm * cross_track_m)
+    return math.atan2(tangent_east, tangent_north) - approach_rad * away
 
 
 def orbit_course(
-    out_east_m: float, out_north_m: float, radius_m: float, direction: float, has: VectorFieldParameters
+    out_east_m: float, out_north_m: float, radius_m: float, direction: float, gain: float
 ) -> float:
     """Course of the field of an orbit (eq. 10.13), rad, by the way out from its centre; direction +1 clockwise."""
-    gain = has.orbit_gain
-    if gain == 0.0:
-        # The slope, at the orbit, of the field of a line.
-        gain = 2.0 / math.pi * has.approach_angle_rad * has.path_gain_1pm * radius_m
-    distance = math.sqrt(out_east_m * out_east_m + out_north_m * out_north_m)
-    inwards = math.atan(gain * (distance - radius_m) / radius_m)
+    inwards = math.atan(gain * (math.hypot(out_east_m, out_north_m) - radius_m) / radius_m)
     return math.atan2(out_east_m, out_north_m) + direction * (0.5 * math.pi + inwards)
 
 
-def follow_line(
-    at: Motion,
-    point_east_m: float,
-    point_north_m: float,
-    tangent_east: float,
-    tangent_north: float,
-    integral_rad: float,
-    has: VectorFieldParameters,
-) -> VectorFieldOutput:
-    """The law on a line through a point; the integrator is as the last call left it, 0 at first."""
-    east, north = at.east_m - point_east_m, at.north_m - point_north_m
-    error = east * tangent_north - north * tangent_east
-    course = line_course(error, tangent_east, tangent_north, has)
-    return hold_course(at, course, error, 0.0, integral_rad, has)
-
-
-def follow_orbit(
-    at: Motion,
-    centre_east_m: float,
-    centre_north_m: float,
-    radius_m: float,
-    direction: float,
-    integral_rad: float,
-    has: VectorFieldParameters,
-) -> VectorFieldOutput:
-    """The law on an orbit, direction +1 clockwise; the integrator is as the last call left it, 0 at first."""
-    east, north = at.east_m - centre_east_m, at.north_m - centre_north_m
-    course = orbit_course(east, north, radius_m, direction, has)
-    # The bank that holds the orbit at this ground speed and crab angle (chapter 9).
-    speed_squared = at.velocity_east_mps**2 + at.velocity_north_mps**2
-    forward = direction * math.atan(speed_squared / (GRAVITY_MPS2 * radius_m * crab_cosine(at)))
-    error = direction * (radius_m - math.sqrt(east * east + north * north))
-    return hold_course(at, course, error, forward, integral_rad, has)
-
-
-def hold_course(
-    at: Motion,
-    course_rad: float,
-    error_m: float,
-    forward_rad: float,
-    integral_rad: float,
-    has: VectorFieldParameters,
-) -> VectorFieldOutput:
-    """Course hold (chapter 6): PI with the feedforward; the integrator stands still while the command is cut."""
-    east, north = at.velocity_east_mps, at.velocity_north_mps
-    to_east, to_north = math.sin(course_rad), math.cos(course_rad)
-    off = math.atan2(north * to_east - east * to_north, east * to_east + north * to_north)
-    speed = max(math.sqrt(east * east + north * north), SLOW_MPS)
-    scale = speed / (GRAVITY_MPS2 * crab_cosine(at))
-    omega = has.course_bandwidth_radps
-    grown = integral_rad + omega * omega * scale * off * has.update_s
-    wanted = forward_rad + 2.0 * has.course_damping * omega * scale * off + grown
-    roll = min(max(wanted, -has.roll_limit_rad), has.roll_limit_rad)
-    saturated = roll != wanted
-    return VectorFieldOutput(
-        roll, course_rad, error_m, forward_rad, integral_rad if saturated else grown, saturated
-    )
-
-
-def crab_cosine(at: Motion) -> float:
+def crab_cosine(state: AircraftState) -> float:
     """Cosine of the angle between course and heading, not below its least."""
-    east, north = at.velocity_east_mps, at.velocity_north_mps
-    speed = math.sqrt(east * east + north * north)
+    east, north = state.velocity_east_mps, state.velocity_north_mps
+    speed = math.hypot(east, north)
     if speed < SLOW_MPS:
         return 1.0
-    ahead = east * math.sin(at.heading_rad) + north * math.cos(at.heading_rad)
+    ahead = east * math.sin(state.heading_rad) + north * math.cos(state.heading_rad)
     return max(ahead / speed, LEAST_CRAB_COSINE)
 
 
@@ -226,17 +107,37 @@ class VectorFieldLaw(RouteLaw):
 
     def __init__(self, config: VectorFieldConfig, limits: GuidanceLimits) -> None:
         super().__init__(limits)
-        self._has, self._integral_rad = parameters(config, limits), 0.0
+        assert config.path_gain_1pm is not None
+        assert config.course_bandwidth_radps is not None
+        self._approach_rad, self._gain_1pm = math.radians(config.approach_angle_deg), config.path_gain_1pm
+        self._orbit_gain = config.orbit_gain
+        self._omega, self._damping = config.course_bandwidth_radps, config.course_damping
+        self._integral_rad = 0.0
 
     def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """What the law asks for."""
-        moves = state.east_m, state.north_m, state.velocity_east_mps, state.velocity_north_mps
-        at, bend = Motion(*moves, state.heading_rad), place.curvature_1pm
-        if bend == 0.0:
-            line = place.east_m, place.north_m, place.tangent_east, place.tangent_north
-            output = follow_line(at, *line, self._integral_rad, self._has)
-        else:
-            orbit = *centre_of(place), abs(1.0 / bend), -math.copysign(1.0, bend)
-            output = follow_orbit(at, *orbit, self._integral_rad, self._has)
-        self._integral_rad = output.integral_rad
-        return output.roll_rad, math.nan
+        if place.curvature_1pm == 0.0:
+            tangent = place.tangent_east, place.tangent_north
+            course_rad = line_course(place.cross_track_m, *tangent, self._approach_rad, self._gain_1pm)
+            return self._held(state, course_rad, 0.0), math.nan
+        radius, direction = abs(1.0 / place.curvature_1pm), -math.copysign(1.0, place.curvature_1pm)
+        # By default the slope, at the orbit, of the field of a line.
+        gain = self._orbit_gain or 2.0 / math.pi * self._approach_rad * self._gain_1pm * radius
+        centre_east, centre_north = centre_of(place)
+        out = state.east_m - centre_east, state.north_m - centre_north
+        # The bank that holds the orbit at this ground speed and crab angle (chapter 9).
+        speed2 = state.velocity_east_mps**2 + state.velocity_north_mps**2
+        forward = direction * math.atan(speed2 / (GRAVITY_MPS2 * radius * crab_cosine(state)))
+        return self._held(state, orbit_course(*out, radius, direction, gain), forward), math.nan
+
+    def _held(self, state: AircraftState, course_rad: float, forward_rad: float) -> float:
+        """Course hold (chapter 6): PI with the feedforward; the integrator stands still while the command is cut."""
+        east, north = state.velocity_east_mps, state.velocity_north_mps
+        to_east, to_north = math.sin(course_rad), math.cos(course_rad)
+        off = math.atan2(north * to_east - east * to_north, east * to_east + north * to_north)
+        scale = max(math.hypot(east, north), SLOW_MPS) / (GRAVITY_MPS2 * crab_cosine(state))
+        grown = self._integral_rad + self._omega * self._omega * scale * off / UPDATE_RATE_HZ
+        wanted = forward_rad + 2.0 * self._damping * self._omega * scale * off + grown
+        if abs(wanted) <= self._limit_rad:
+            self._integral_rad = grown
+        return wanted

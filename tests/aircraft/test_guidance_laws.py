@@ -12,48 +12,45 @@ from aircraft.guidance.pure_pursuit import (
     look_ahead_distance,
     pure_pursuit,
 )
-from aircraft.guidance.vector_field import (
-    Motion,
-    VectorFieldConfig,
-    follow_line,
-    follow_orbit,
-    line_course,
-    parameters,
-)
-from aircraft.interface import GRAVITY_MPS2
+from aircraft.guidance.vector_field import VectorFieldConfig, VectorFieldLaw, line_course, orbit_course
+from aircraft.interface import GRAVITY_MPS2, AircraftState
+from tests.contracts.test_guidance_contract import LINE, Point, route_of
 
 LIMITS = GuidanceLimits(25.0, 30.0, math.radians(45.0), 1.0, 0.25, 0.03, 1.44)
-FIELD = parameters(VectorFieldConfig().resolved(LIMITS), LIMITS)
+FIELD = VectorFieldConfig().resolved(LIMITS)
 
 
 def test_the_field_of_a_line_is_that_of_the_book() -> None:
     # chi = chi_q - chi_inf 2/pi atan(k_path e)
-    gain = FIELD.path_gain_1pm
+    gain, approach = FIELD.path_gain_1pm or 0.0, math.radians(FIELD.approach_angle_deg)
     assert gain == pytest.approx(0.01, rel=0.01)
-    assert line_course(1.0 / gain, 0.0, 1.0, FIELD) == pytest.approx(-math.radians(25.0))
-    assert line_course(1e9, 1.0, 0.0, FIELD) == pytest.approx(math.radians(40.0), abs=1e-6)
+    assert line_course(1.0 / gain, 0.0, 1.0, approach, gain) == pytest.approx(-math.radians(25.0))
+    assert line_course(1e9, 1.0, 0.0, approach, gain) == pytest.approx(math.radians(40.0), abs=1e-6)
+
+
+def wanted(law: VectorFieldLaw, at: AircraftState) -> float:
+    """Bank (rad), not limited, that the law asks for at a place on its route."""
+    return law.wanted(at, law.progress.nearest(at.east_m, at.north_m))[0]
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_on_an_orbit_the_bank_is_that_of_the_turn(direction: float) -> None:
-    at = Motion(0.0, 200.0, 25.0 * direction, 0.0, 0.5 * math.pi * direction)
-    output = follow_orbit(at, 0.0, 0.0, 200.0, direction, 0.0, FIELD)
-    assert output.error_m == 0.0
-    assert output.roll_rad == pytest.approx(direction * math.atan(625.0 / (GRAVITY_MPS2 * 200.0)))
+    law = VectorFieldLaw(FIELD, LIMITS)
+    law.follow(route_of((-direction / 200.0, 400.0 * math.pi), loiter=True))
+    assert wanted(law, Point().state()) == pytest.approx(
+        direction * math.atan(625.0 / (GRAVITY_MPS2 * 200.0))
+    )
 
 
 def test_far_from_an_orbit_the_field_leads_to_its_centre() -> None:
-    at = Motion(0.0, 1e7, 0.0, -25.0, math.pi)
-    output = follow_orbit(at, 0.0, 0.0, 200.0, 1.0, 0.0, FIELD)
-    assert math.cos(output.course_rad) == pytest.approx(-1.0, abs=1e-6)
+    assert math.cos(orbit_course(0.0, 1e7, 200.0, 1.0, 1.0)) == pytest.approx(-1.0, abs=1e-4)
 
 
 def test_the_integrator_waits_while_the_roll_is_cut() -> None:
-    at = Motion(5000.0, 0.0, 0.0, 25.0, 0.0)
-    output = follow_line(at, 0.0, 0.0, 0.0, 1.0, 0.01, FIELD)
-    assert output.saturated
-    assert output.integral_rad == 0.01
-    assert output.roll_rad == pytest.approx(-math.radians(45.0))
+    law = VectorFieldLaw(FIELD, LIMITS)
+    law.follow(LINE)
+    assert wanted(law, Point(5000.0, 10.0).state()) < -math.radians(45.0)
+    assert abs(wanted(law, Point(0.0, 20.0).state())) < 1e-9
 
 
 @pytest.mark.parametrize("speed_mps", [25.0, 0.05])
