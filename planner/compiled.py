@@ -1,8 +1,9 @@
 """Geometry compiled to machine code (numba): the loops over edge points that most of a planner's time goes to.
 
-All functions are compiled together, for the types of arguments that they name, by `compile_all` before a flight. What
-was compiled is kept on disk by file: a compiled function calls none of another file, and numbers that it takes from one
-never change. To import them takes no time. Fast mathematics is off: the same numbers give the same results.
+Functions that most flights call are compiled together, for the types of arguments that they name, by `compile_all`
+before a flight; those that are `rare`, when one is first called. What was compiled is kept on disk by file: a compiled
+function calls none of another file, and numbers that it takes from one never change. To import them takes no time. Fast
+mathematics is off: the same numbers give the same results.
 """
 
 from __future__ import annotations
@@ -46,10 +47,11 @@ class Compiled(Generic[P, R]):
     Args:
         function: the function.
         arguments: their types. Others are refused: nothing is ever compiled anew.
+        rare: few flights call it.
     """
 
-    def __init__(self, function: Callable[P, R], arguments: tuple[str, ...]) -> None:
-        self._function, self._arguments = function, arguments
+    def __init__(self, function: Callable[P, R], arguments: tuple[str, ...], rare: bool = False) -> None:
+        self._function, self._arguments, self.rare = function, arguments, rare
         self._code: Callable[..., R] = self._compile_first
         self.anew, self.kept = False, True
         """It was compiled by this process, not loaded; what was compiled is on disk."""
@@ -63,6 +65,9 @@ class Compiled(Generic[P, R]):
 
     def _compile_first(self, *args: Any) -> R:
         compile_all()
+        if self.rare:
+            with _compiling:
+                _compile(_functions(self.__module__))
         assert self._code != self._compile_first
         return self._code(*args)
 
@@ -90,35 +95,41 @@ _waiting: list[Compiled[..., Any]] = []
 _compiling = threading.RLock()
 
 
-def compiled(*arguments: str) -> Callable[[Callable[P, R]], Compiled[P, R]]:
+def compiled(*arguments: str, rare: bool = False) -> Callable[[Callable[P, R]], Compiled[P, R]]:
     """Has a function compiled for arguments of these types."""
 
     def compile_later(function: Callable[P, R]) -> Compiled[P, R]:
-        made = Compiled(function, arguments)
+        made = Compiled(function, arguments, rare)
         _waiting.append(made)
         return made
 
     return compile_later
 
 
-def compile_all() -> None:
-    """Compiles all functions imported so far that are not yet: some seconds the first time, then some tenths.
+def _functions(module: str = "") -> list[Compiled[..., Any]]:
+    """The functions imported so far that are not compiled yet: all of a module, or those that are not rare."""
+    return [each for each in _waiting if (each.__module__ == module if module else not each.rare)]
+
+
+def compile_all(rare: bool = False) -> None:
+    """Compiles all functions imported so far that are not yet nor are rare: some seconds the first time, then tenths.
 
     The first time is told by one line on standard error, where that is a terminal. Where there are two processors, a
-    second process compiles half of them meanwhile.
+    second process compiles half of them meanwhile. With `rare` those are compiled as well.
     """
     global _second
     with _compiling:
-        if not _waiting:
+        if not (_functions() or (rare and _waiting)):
             return
-        while _waiting:
+        while _functions():
             _start_second(0)
             elsewhere = _second.names if _second else frozenset()
-            _compile([each for each in _waiting if each.__module__ not in elsewhere])
+            _compile([each for each in _functions() if each.__module__ not in elsewhere])
             if _second:
                 _second.wait()
                 _second = None
-            _compile(list(_waiting))
+            _compile(_functions())
+        _compile(list(_waiting) if rare else ())
         # The compiler stays for good. Once it is counted among the old objects, garbage is looked for there only when
         # as many new ones have come as would be a quarter of it: that would hold a flight up for a tenth of a second.
         gc.collect()
@@ -139,9 +150,8 @@ def compile_modules(names: Sequence[str]) -> None:
     """Compiles the functions of some modules, so that they are on disk."""
     for name in names:
         importlib.import_module(name)
-    gc.disable()  # This process does nothing else.
     with _compiling:
-        _compile([each for each in _waiting if each.__module__ in names])
+        _compile([each for each in _functions() if each.__module__ in names])
 
 
 class _SecondProcess:
@@ -174,23 +184,31 @@ _second: _SecondProcess | None = None
 def _start_second(busy_bytes: int) -> None:
     """Compiles one function, and starts the second process where that was not on disk."""
     global _second
-    if _second or not _waiting:
+    if _second or not _functions():
         return
     # The first function of a module calls no other one. The shortest tells soonest whether they are on disk.
-    first = min({each.__module__: each for each in reversed(_waiting)}.values(), key=lambda each: each.size)
+    first = min(
+        {each.__module__: each for each in reversed(_functions())}.values(), key=lambda each: each.size
+    )
     _compile([first])
     if not first.anew:
         return
     _tell("wayproof: compiling for this machine, once; this takes some seconds")
-    names = _share(_waiting, busy_bytes) if first.kept and os.cpu_count() != 1 else frozenset()
+    names = _share(_functions(), busy_bytes) if first.kept and os.cpu_count() != 1 else frozenset()
     with suppress(OSError):  # All are then compiled here.
         _second = _SecondProcess(names) if names else None
 
 
 def _compile(functions: Sequence[Compiled[..., Any]]) -> None:
-    for each in functions:
-        each.compile()
-        _waiting.remove(each)
+    collects = gc.isenabled()
+    gc.disable()  # Else a fifth of the time is spent looking for garbage among what the compiler keeps.
+    try:
+        for each in functions:
+            each.compile()
+            _waiting.remove(each)
+    finally:
+        if collects:
+            gc.enable()
 
 
 def _share(functions: Sequence[Compiled[..., Any]], busy_bytes: int) -> frozenset[str]:

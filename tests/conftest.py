@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 from planner.compiled import compile_all
+from planner.kernel_cache import seal
 from tests.examples import ALL, TIMES
 
 SOME = 25
@@ -29,6 +30,7 @@ def pytest_configure(config: pytest.Config) -> None:
     for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, handler)
+    seal()  # Else the flight after the tests would take what they have compiled for damaged.
     if getattr(config.option, "numprocesses", None):
         _before_several_processes_test(config)
 
@@ -38,7 +40,7 @@ def _before_several_processes_test(config: pytest.Config) -> None:
     for path in (each for room in ROOMS for each in (ROOT / room).rglob("*.py")):
         if "\n@compiled(" in path.read_text(encoding="utf-8"):
             importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
-    compile_all()
+    compile_all(rare=True)
     # Each gets a half of the list, and who is done takes tests from the end of another's: neighbours, which share
     # flights, stay together, and nobody waits long for the other at the end.
     if config.option.dist == "load":

@@ -15,7 +15,7 @@ CELLS, CELLS_OUT = "Array(int32, 1, 'C', readonly=True)", "int32[::1]"
 COUNTED_OUT, FLAGS, FLAGS_OUT = "float32[:, ::1]", "Array(boolean, 1, 'C', readonly=True)", "boolean[::1]"
 
 
-@compiled(COUNTED_OUT, "int32", FLOAT, FLOAT, FLOAT)
+@compiled(COUNTED_OUT, "int32", FLOAT, FLOAT, FLOAT, rare=True)
 def _count(counts: NDArray[np.float32], slot: int, beyond: float, half: float, noise: float) -> None:
     """Counts a ray that went so much further than a cell: it was stopped, passed, or ended before it."""
     if abs(beyond) <= half:
@@ -26,9 +26,7 @@ def _count(counts: NDArray[np.float32], slot: int, beyond: float, half: float, n
         counts[slot, 2] += np.float32(1.0)
 
 
-@compiled(
-    CELLS_OUT, CELLS, FLOATS, FLOATS, FLOATS, FLAGS, COUNTED_OUT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, BOOL
-)
+@compiled(CELLS_OUT, CELLS, FLOATS, FLOATS, FLOATS, FLAGS, COUNTED_OUT, *[FLOAT] * 5, BOOL, rare=True)
 def count_rays(
     counted: NDArray[np.int32],
     slots: NDArray[np.int32],
@@ -79,7 +77,9 @@ def count_rays(
     return many
 
 
-@compiled(FLAGS_OUT, "Array(int64, 2, 'C', readonly=True)", CELLS, FLAGS, FLOATS, COUNT, COUNT, FLOAT)
+@compiled(
+    FLAGS_OUT, "Array(int64, 2, 'C', readonly=True)", CELLS, FLAGS, FLOATS, COUNT, COUNT, FLOAT, rare=True
+)
 def find_long(
     found: BoolArray,
     cells: NDArray[np.int64],

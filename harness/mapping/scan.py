@@ -168,7 +168,7 @@ def _side(ranges: FloatArray, ray: int, beam_rad: float, noise_m: float, closed:
     return 1.0 if from_right else -1.0
 
 
-@compiled(FLOATS_OUT, FLOATS, FLOAT, FLOAT, BOOL, BOOL)
+@compiled(FLOATS_OUT, FLOATS, FLOAT, FLOAT, BOOL, BOOL, rare=True)
 def _sides(
     sides: FloatArray, ranges: FloatArray, beam_rad: float, noise_m: float, closed: bool, lossy: bool
 ) -> None:

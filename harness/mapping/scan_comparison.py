@@ -154,7 +154,7 @@ def near_any(places: ComplexArray, others: ComplexArray, within_m: float) -> Boo
     return near_line(places, others, within_m, 0.0)
 
 
-@compiled(PLACES, PLACES, FLOAT, FLOAT)
+@compiled(PLACES, PLACES, FLOAT, FLOAT, rare=True)
 def near_line(places: ComplexArray, line: ComplexArray, within_m: float, apart_m: float) -> BoolArray:
     """(k,) which of (k,) places lie no further than that from a line through (m,) others, broken where it is apart."""
     near = np.zeros(len(places), dtype=np.bool_)

@@ -167,7 +167,7 @@ def register(
     return Registration(shift, np.asarray(members, dtype=np.intp))
 
 
-@compiled(PLACES, PLACES)
+@compiled(PLACES, PLACES, rare=True)
 def nearest(places: ComplexArray, points: ComplexArray) -> IntArray:
     """(k,) which of (m,) points each of (k,) places is nearest to; no table of all distances is laid."""
     which = np.zeros(len(places), dtype=np.intp)

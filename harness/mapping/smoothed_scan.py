@@ -51,7 +51,7 @@ def _medians(ring: FloatArray, rays: IntArray, half: int) -> FloatArray:
     return medians
 
 
-@compiled(FLOATS_OUT, FLOATS, COUNTS, COUNT, COUNT)
+@compiled(FLOATS_OUT, FLOATS, COUNTS, COUNT, COUNT, rare=True)
 def find_medians(medians: FloatArray, ring: FloatArray, rays: IntArray, offset: int, width: int) -> None:
     """Medians of stretches of a list of ranges; of an even number the lower of the two in the middle.
 

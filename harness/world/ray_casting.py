@@ -196,7 +196,7 @@ def _nearest_of(
     return right, ahead, math.hypot(right, ahead)
 
 
-@compiled(PLACE, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(PLACE, FLOAT, FLOAT, FLOAT, FLOAT, rare=True)
 def _along_to_edge(
     ray: complex, start_right: float, start_ahead: float, end_right: float, end_ahead: float
 ) -> float:
@@ -213,7 +213,7 @@ def _along_to_edge(
     return distance if distance >= 0.0 else math.inf
 
 
-@compiled(FLOATS_OUT, PLACES, PLACES, FACES, BOOL, *[FLOAT] * 8)
+@compiled(FLOATS_OUT, PLACES, PLACES, FACES, BOOL, *[FLOAT] * 8, rare=True)
 def _lower_to_edges(
     ranges: FloatArray,
     left: ComplexArray,

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from planner.compiled import BOOLS_OUT, COUNT, COUNTS, COUNTS_OUT, FLOAT, ROWS, compiled
+from planner.compiled import BOOLS_OUT, COUNT, COUNTS, COUNTS_OUT, FLOAT, FLOATS_OUT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
 EDGE_OFF_RAD = 1e-7
@@ -53,6 +53,20 @@ def first_met(
     return max(nearest, 0.0), met
 
 
+@compiled(FLOATS_OUT, FLOATS_OUT, COUNT, COUNT)
+def _sift_down(key: FloatArray, value: FloatArray, place: int, count: int) -> None:
+    """Restores a binary heap of so many pairs, the least key first, where one at a place may have too great a key."""
+    while 2 * place + 1 < count:
+        child = 2 * place + 1
+        if child + 1 < count and key[child + 1] < key[child]:
+            child += 1
+        if key[place] <= key[child]:
+            return
+        key[place], key[child] = key[child], key[place]
+        value[place], value[child] = value[child], value[place]
+        place = child
+
+
 @compiled(ROWS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
 def hugged(
     own: FloatArray,
@@ -83,12 +97,14 @@ def hugged(
                 count += 1
     if not count:
         return 0.0
-    # Stretches of the ray near to a point, from the first on: those that overlap are one.
+    # Stretches of the ray near to a point, from the first on, which a heap gives: those that overlap are one.
+    for k in range(count // 2 - 1, -1, -1):
+        _sift_down(begin, end, k, count)
     furthest = -math.inf
-    for k in np.argsort(begin[:count]):
-        if begin[k] > furthest > touch:
-            break
-        furthest = max(furthest, end[k])
+    while count and not begin[0] > furthest > touch:
+        furthest, count = max(furthest, end[0]), count - 1
+        begin[0], end[0] = begin[count], end[count]
+        _sift_down(begin, end, 0, count)
     return furthest
 
 

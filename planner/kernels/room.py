@@ -11,7 +11,7 @@ from planner.compiled import COUNTS, FLOAT, ROWS, compiled
 from planner.interface import FloatArray, IntArray
 
 
-@compiled(ROWS, ROWS, COUNTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, ROWS, COUNTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, rare=True)
 def room_along(
     places: FloatArray,
     still: FloatArray,

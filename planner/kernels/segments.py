@@ -108,7 +108,7 @@ def inside_bounds(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax:
     return True
 
 
-@compiled(ROWS, ROWS)
+@compiled(ROWS, ROWS, rare=True)
 def to_nearest(places: FloatArray, points: FloatArray) -> FloatArray:
     """(k,) distance of each of (k, 2) places to the nearest of (m, 2) points, m; infinite where there is none."""
     away = np.empty(len(places))
@@ -137,7 +137,7 @@ def pose(rows: FloatArray, arc_length: float) -> tuple[float, float, float, floa
     return east, north, cx * cos - cy * sin, cy * cos + cx * sin, rows[which, 4]
 
 
-@compiled(ROWS, FLOATS)
+@compiled(ROWS, FLOATS, rare=True)
 def poses_at(rows: FloatArray, arc_lengths: FloatArray) -> FloatArray:
     """(k, 4) places and tangents at (k,) arc lengths of a path, clamped to its ends."""
     poses = np.empty((len(arc_lengths), 4))
