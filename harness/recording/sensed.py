@@ -13,18 +13,19 @@ if TYPE_CHECKING:
 
 
 class Sensed:
-    """Gathers places that two scans in a row have shown, one a cell of a square grid: a false return is seen once."""
+    """Gathers places that two scans have shown, one a cell of a square grid: a false return is seen once."""
 
     def __init__(self, cell_m: float) -> None:
         self._cell_m = cell_m
-        self._known, self._before = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        self._once, self._known = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
 
     def new(self, points_m: FloatArray) -> FloatArray:
-        """(k, 2) those places of the next scan, of what it returned (n, 2), that none before had shown."""
+        """(k, 2) those places of the next scan, of what it returned (n, 2), that are shown for the second time."""
         cells = np.round(points_m / self._cell_m).astype(np.int64) @ (1 << 32, 1)
         cells, rows = np.unique(cells, return_index=True)
-        fresh = np.isin(cells, self._before) & ~np.isin(cells, self._known)
-        self._known, self._before = np.append(self._known, cells[fresh]), cells
+        again, known = np.isin(cells, self._once), np.isin(cells, self._known)
+        fresh = again & ~known
+        self._once, self._known = np.append(self._once, cells[~again]), np.append(self._known, cells[fresh])
         shown: FloatArray = points_m[rows[fresh]]
         return shown
 
