@@ -73,20 +73,17 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
         raise WrongAnswerError(f"the planner answered with {_type(answer)}; an answer must be a Plan")
     assert isinstance(answer, Plan)
     status, reason, wants_more_time = answer.status, answer.reason, answer.wants_more_time
-    if type(status) is not PlanStatus:
-        raise WrongAnswerError(
-            f"the planner's plan has {_type(status)} as its status; it must be a PlanStatus"
-        )
-    if not issubclass(type(reason), str):
-        raise WrongAnswerError(f"the planner's plan has {_type(reason)} as its reason; it must be a str")
+    for told, value, fits, must in (
+        ("its status", status, type(status) is PlanStatus, "a PlanStatus"),
+        ("its reason", reason, issubclass(type(reason), str), "a str"),
+        ("wants_more_time", wants_more_time, isinstance(wants_more_time, bool | np.bool_), "True or False"),
+    ):
+        if not fits:
+            raise WrongAnswerError(f"the planner's plan has {_type(value)} as {told}; it must be {must}")
     letters = str.__len__(reason)
     if letters > MOST_REASON_LETTERS:
         raise WrongAnswerError(
             f"the planner's plan has a reason of {letters:,} characters; it must have at most {MOST_REASON_LETTERS:,}"
-        )
-    if not isinstance(wants_more_time, bool | np.bool_):
-        raise WrongAnswerError(
-            f"the planner's plan has {_type(wants_more_time)} as wants_more_time; it must be True or False"
         )
     if status is not PlanStatus.FOUND:
         if type(answer) is Plan:
@@ -94,14 +91,8 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
         return Plan(status, str.__str__(reason), wants_more_time=bool(wants_more_time))
     waypoints_m = _waypoints(answer.waypoints_m)
     path = _path(answer.path, position_m, start_tolerance_m(mission))
-    return Plan(
-        status,
-        str.__str__(reason),
-        waypoints_m,
-        path,
-        _picture(answer.picture),
-        wants_more_time=bool(wants_more_time),
-    )
+    picture, more = _picture(answer.picture), bool(wants_more_time)
+    return Plan(status, str.__str__(reason), waypoints_m, path, picture, wants_more_time=more)
 
 
 def _type(value: object) -> str:
@@ -159,38 +150,36 @@ def _path(path: Any, position_m: tuple[float, float], start_m: float) -> Path:
 
 def _check_each(rows: FloatArray) -> None:
     """Every segment is finite, longer than zero, and begins with a unit tangent."""
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if len(bad):
-        raise _refused(
-            f"segment {bad[0]} is not finite: {', '.join(f'{x:g}' for x in rows[bad[0]].tolist())}"
-        )
-    bad = np.flatnonzero(rows[:, 5] <= 0.0)
-    if len(bad):
-        raise _refused(f"segment {bad[0]} is {rows[bad[0], 5]:g} m long; it must be longer than 0 m")
     tangent = np.hypot(rows[:, 2], rows[:, 3])
-    bad = np.flatnonzero(~(np.abs(tangent - 1.0) < NOT_UNIT))
-    if len(bad):
-        raise _refused(
-            f"segment {bad[0]} begins with a tangent of length {tangent[bad[0]]:.9g}; it must be a unit vector"
-        )
+    checks: tuple[tuple[Any, Callable[[int], str]], ...] = (
+        (
+            np.isfinite(rows).all(axis=1),
+            lambda i: "is not finite: " + ", ".join(f"{x:g}" for x in rows[i].tolist()),
+        ),
+        (rows[:, 5] > 0.0, lambda i: f"is {rows[i, 5]:g} m long; it must be longer than 0 m"),
+        (
+            np.abs(tangent - 1.0) < NOT_UNIT,
+            lambda i: f"begins with a tangent of length {tangent[i]:.9g}; it must be a unit vector",
+        ),
+    )
+    for fits, told in checks:
+        bad = np.flatnonzero(~fits)
+        if len(bad):
+            raise _refused(f"segment {bad[0]} {told(int(bad[0]))}")
 
 
 def _check_size(rows: FloatArray) -> None:
     """The path is no longer and turns no more than a path that is meant to be flown."""
     with np.errstate(over="ignore"):
         length, turning = np.cumsum(rows[:, 5]), np.cumsum(np.abs(rows[:, 4] * rows[:, 5]))
-    if not length[-1] <= LONGEST_M:
-        segment = int(np.argmax(~(length <= LONGEST_M)))
-        raise _refused(
-            f"it is {length[segment]:.6g} m long up to the end of segment {segment}; "
-            f"it must be at most {LONGEST_M:g} m long"
-        )
-    if not turning[-1] <= MOST_TURNING_RAD:
-        segment = int(np.argmax(~(turning <= MOST_TURNING_RAD)))
-        raise _refused(
-            f"it turns by {turning[segment]:.6g} rad up to the end of segment {segment}; "
-            f"it must turn by at most {MOST_TURNING_RAD:g} rad"
-        )
+    for sums, most, is_, must in (
+        (length, LONGEST_M, "is {:.6g} m long", "be at most {:g} m long"),
+        (turning, MOST_TURNING_RAD, "turns by {:.6g} rad", "turn by at most {:g} rad"),
+    ):
+        over = np.flatnonzero(~(sums <= most))
+        if len(over):
+            told = is_.format(sums[over[0]])
+            raise _refused(f"it {told} up to the end of segment {over[0]}; it must {must.format(most)}")
 
 
 def _check_joints(rows: FloatArray, position_m: tuple[float, float], start_m: float) -> None:
@@ -249,20 +238,23 @@ def _picture(make: Callable[[], PlanPicture] | None) -> Callable[[], PlanPicture
     candidates = tuple(made.candidates)
     fields |= {f"candidates[{number}]": (2, each) for number, each in enumerate(candidates)}
     for name, (width, points) in fields.items():
-        fits = issubclass(type(points), np.ndarray) and points.ndim == 2 and points.shape[1] == width
-        if not fits or (name == "guide_m" and len(points) != 2) or len(points) > MOST_PICTURE_POINTS:
-            shape = points.shape if isinstance(points, np.ndarray) else _type(points)
-            rows = "2" if name == "guide_m" else "n"
-            raise WrongAnswerError(
-                f"the planner's picture of its plan has {shape} as {name}; it must be an array of shape "
-                f"({rows}, {width}), n at most {MOST_PICTURE_POINTS:,}"
-            )
-        if not np.isfinite(points).all():
-            raise WrongAnswerError(
-                f"the planner's picture of its plan has a number in {name} that is not finite"
-            )
+        _check_drawn(name, width, points)
     window_m = float(made.window_m)
     if not 0.0 <= window_m <= FURTHEST_M:
         raise WrongAnswerError(f"the planner's picture of its plan has a window of {window_m:g} m")
     kept = PlanPicture(made.guide_m, window_m, made.sectors, candidates, made.met_m)
     return lambda: kept
+
+
+def _check_drawn(name: str, width: int, points: Any) -> None:
+    """What a picture draws has the shape that it must have, and is finite."""
+    fits = issubclass(type(points), np.ndarray) and points.ndim == 2 and points.shape[1] == width
+    if not fits or (name == "guide_m" and len(points) != 2) or len(points) > MOST_PICTURE_POINTS:
+        shape = points.shape if isinstance(points, np.ndarray) else _type(points)
+        rows = "2" if name == "guide_m" else "n"
+        raise WrongAnswerError(
+            f"the planner's picture of its plan has {shape} as {name}; it must be an array of shape "
+            f"({rows}, {width}), n at most {MOST_PICTURE_POINTS:,}"
+        )
+    if not np.isfinite(points).all():
+        raise WrongAnswerError(f"the planner's picture of its plan has a number in {name} that is not finite")

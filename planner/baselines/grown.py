@@ -91,22 +91,37 @@ class GrownObstacles:
         self._stale = False
         fresh, gone = self._changes()
         known = self._obstacles or [self._obstacle(self._frame() - self._hole())]
-        lost = [each for each in known if len(gone) and shapely.intersects_xy(each.discs, gone).any()]
-        for each in lost:
-            known.remove(each)
-            inside = shapely.intersects_xy(each.discs, self._points_m)
-            fresh = np.concatenate((fresh, self._points_m[inside]))
-            known += [self._obstacle(self._frame() - self._hole())] if each.border else []
+        if len(gone):
+            known, fresh = self._without(known, gone, fresh)
         added = self._discs(fresh)
         joined = [each for each in known if shapely.intersects(each.discs, added)]
         united = shapely.union_all([added, *(each.discs for each in joined)])
         self._obstacles = [each for each in known if each not in joined]
         self._obstacles += [self._obstacle(each) for each in shapely.get_parts(united)]
         self._united_m = self._points_m
+        self._number()
+
+    def _number(self) -> None:
+        """Numbers the obstacles, and their boundaries after them."""
         self._cores = np.array([each.core for each in self._obstacles], dtype=object)
-        self._rings = [ring for each in self._obstacles for ring in each.rings]
-        counts = [len(each.rings) for each in self._obstacles]
-        self._owners = np.repeat(np.arange(len(counts)), counts)
+        owned = [(i, ring) for i, each in enumerate(self._obstacles) for ring in each.rings]
+        self._rings = [ring for _, ring in owned]
+        self._owners = np.array([i for i, _ in owned], dtype=np.intp)
+
+    def _without(
+        self, known: list[Obstacle], gone: FloatArray, fresh: FloatArray
+    ) -> tuple[list[Obstacle], FloatArray]:
+        """The obstacles but those that lost a point, and (k, 2) the points to be grown: also what is left of these."""
+        import shapely
+
+        kept = []
+        for each in known:
+            if not shapely.intersects_xy(each.discs, gone).any():
+                kept.append(each)
+                continue
+            fresh = np.concatenate((fresh, self._points_m[shapely.intersects_xy(each.discs, self._points_m)]))
+            kept += [self._obstacle(self._frame() - self._hole())] if each.border else []
+        return kept, fresh
 
     def _changes(self) -> tuple[FloatArray, FloatArray]:
         """(k, 2) points that have come and (j, 2) that have gone since the obstacles were brought up to date."""

@@ -37,25 +37,30 @@ class ImprovedBug:
 
     def plan(self, request: PlanRequest) -> Plan:
         """Section 3.3: one step of the rolling window, where one is due."""
-        step_m = self._config.resolved_step_m
-        window = self.planning_window(request)
-        path = request.flown.path if request.flown else None
-        flying = path is not None and not path.loiter
+        window, path = self.planning_window(request), request.flown.path if request.flown else None
         cut = path is not None and math.isfinite(
             first_breach(path, window.points_m, self._mission.clearance_m, request.arc_length_m)
         )
-        if path is not None and not request.scanned:
-            return Plan(PlanStatus.KEPT, "nothing new is sensed")
-        if flying and not cut and request.arc_length_m < step_m:
-            return Plan(PlanStatus.KEPT, "the first step of the plan is being flown")
+        why = self._serves(request, path, cut)
+        if why:
+            return Plan(PlanStatus.KEPT, why)
         start, before = self._start(request, cut)
-        left_m = path.length_m - request.arc_length_m if path is not None else 0.0
         routes = self.local_planning(window, start)
         if routes:
             return self._found(request, window, routes, before)
-        if flying and not cut and left_m > step_m:
+        left_m = 0.0 if path is None or path.loiter or cut else path.length_m - request.arc_length_m
+        if left_m > self._config.resolved_step_m:
             return Plan(PlanStatus.NO_PATH, "no candidate in the window; the plan in effect is flown on")
         return stuck("no candidate in the window", request, self._mission, window.points_m)
+
+    def _serves(self, request: PlanRequest, path: Path | None, cut: bool) -> str:
+        """Section 3.3: why the window does not roll yet; empty where it does."""
+        if path is None:
+            return ""
+        if not request.scanned:
+            return "nothing new is sensed"
+        first = not path.loiter and not cut and request.arc_length_m < self._config.resolved_step_m
+        return "the first step of the plan is being flown" if first else ""
 
     def planning_window(self, request: PlanRequest) -> Window:
         """Section 3.3: U_1 about the aircraft, with the sensed edge points that are not too far to matter in it."""
