@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 
 from planner.geometry.course import Course
-from planner.geometry.curves import Pose, Segment, along, on_loiter, place_on
+from planner.geometry.curves import along, on_loiter, place_on
 from planner.interface import FloatArray, MapView, Mission, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.plan_checks import start_tolerance_m
@@ -42,9 +42,9 @@ from planner.rolling_window.rolling_search import (
     Work,
 )
 from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
-from planner.shield.committed_plan import CommittedPlan, MonitorLimits, PlanMonitor
+from planner.shield.committed_plan import CommittedPlan, PlanMonitor, flown_next
 from planner.shield.encounters import encounters
-from planner.shield.escape import BROKEN_SHARE, Escapes, left_of, room_m
+from planner.shield.escape import Escapes, meets, room_m
 from planner.shield.evasion import Threats
 from planner.shield.intervention_log import InterventionLog, ShieldReport
 
@@ -81,14 +81,11 @@ class RollingWindow:
         self._giving_up = GivingUp(mission, memory)
         self._escapes = Escapes(mission, memory, self._local.room)
         self._monitor = PlanMonitor(
-            MonitorLimits.of(
-                mission,
-                keep_m=0.5 * (mission.clearance_m + self._local.room.path_keeps_m),
-                turn_keeps_m=BROKEN_SHARE * mission.clearance_m,
-                urgent_m=least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps,
-                lead_m=self._lead_m,
-                step_m=config.rolling_step_m,
-            )
+            mission,
+            keep_m=0.5 * (mission.clearance_m + self._local.room.path_keeps_m),
+            urgent_m=least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps,
+            lead_m=self._lead_m,
+            step_m=config.rolling_step_m,
         )
         self._search = RollingSearch(
             mission,
@@ -182,14 +179,14 @@ class RollingWindow:
 
     def _due(self, request: PlanRequest, plan: CommittedPlan, here_m: float, newly_cut: bool) -> bool:
         """Whether the window is to roll on now."""
-        meets = self._threats is not None and self._meets_something(plan, here_m)
-        self._monitor.broken |= meets
+        met = meets(plan, here_m, self._mission, self._threats)
+        self._monitor.broken |= met
         if self._left_behind(request, plan, here_m):
             return True
         since_m = request.arc_length_m - self._monitor.searched_at_m
         if self._giving_up.out_of_effort and self._search.up_to_date:
             return self._giving_up.whole_turn(since_m)
-        return self._monitor.due(plan, here_m, since_m, newly_cut) or meets or self._search.anew
+        return self._monitor.due(plan, here_m, since_m, newly_cut) or met or self._search.anew
 
     def _free_again(self, now: Situation) -> bool:
         """Whether edge points have gone, and a rolling step has been flown, since the last search."""
@@ -201,11 +198,6 @@ class RollingWindow:
         if plan is None:
             return False
         return math.dist(place_on(plan.path, here_m)[0][:2], request.position_m) > self._start_tolerance_m
-
-    def _meets_something(self, plan: CommittedPlan, here_m: float) -> bool:
-        """Whether the plan in effect would come too near to what moves or has just appeared."""
-        least_m = BROKEN_SHARE * self._mission.clearance_m
-        return room_m(left_of(plan, here_m, self._mission), self._threats, least_m) < least_m
 
     def _roll(self, now: Situation) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
@@ -238,15 +230,10 @@ class RollingWindow:
 
     def _start(self, now: Situation) -> Start:
         """Where a new plan begins: a little ahead, on the one in effect or straight on from the aircraft."""
-        request, plan = now.request, now.plan
-        prefix: list[Segment] = [(*request.position_m, *request.direction, 0.0, self._lead_m)]
-        if plan is not None:
-            uncut_m = math.inf if plan.holds(now.here_m) else max(0.0, self._monitor.cut_m - now.here_m)
-            pose = Pose(*request.position_m, *request.direction)
-            lead_m, near_m = min(self._lead_m, uncut_m), self._mission.off_path_m
-            prefix = plan.onward_from(pose, now.here_m, lead_m, near_m) or prefix
+        to_m, lead_m = self._monitor.cut_m, self._lead_m
+        prefix = flown_next(now.plan, now.request, now.here_m, lead_m, self._mission, to_m)
         last = prefix[-1]
-        return Start(request.position_m, along(last, last[5]), last[4], prefix)
+        return Start(now.request.position_m, along(last, last[5]), last[4], prefix)
 
     def _follow(self, found: CommittedPlan) -> Plan:
         """Any state -> FOLLOWING: a new plan is committed to."""

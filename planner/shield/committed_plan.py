@@ -11,10 +11,13 @@ import numpy as np
 from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, Segment, between, moved, onward, place_on
-from planner.interface import FloatArray, Mission, Path, Plan
+from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest
 
 COMPARED_TOGETHER = 16
 """Edge points that are not near the aircraft are compared with the course once in so many requests."""
+
+BROKEN_SHARE = 0.99
+"""Share of the clearance: an edge point seen nearer than that to a certified turn breaks the certificate."""
 
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
@@ -54,54 +57,30 @@ class CommittedPlan:
         """Whether an aircraft there has nothing left to fly: it missed the goal."""
         return not (self.path.loiter or between(self.path, arc_length_m, self.path.length_m))
 
-    def onward_from(self, pose: Pose, arc_length_m: float, length_m: float, near_m: float) -> list[Segment]:
-        """What of it is flown next. An aircraft that is not near it bends as that does until it is told otherwise."""
-        flown = onward(self.path, arc_length_m, length_m)
-        off_m = math.dist(place_on(self.path, arc_length_m)[0][:2], pose[:2])
-        return flown if off_m <= near_m or not flown else moved(flown, pose)
-
     def left(self, arc_length_m: float) -> Path:
         """What is left of it: the way to its turn, with the straight to roll on before that, and the turn."""
         turn_at_m = self.path.length_m - self.turn.length_m
         return Path(np.array([*between(self.path, arc_length_m, turn_at_m), *self.turn.segments.tolist()]))
 
 
-@dataclass(frozen=True)
-class MonitorLimits:
-    """Distances that a plan monitor goes by.
-
-    Attributes:
-        keep_m: a course that comes nearer to an edge point is cut there.
-        turn_keeps_m: a certified turn that an edge point comes nearer to is broken.
-        urgent_m: edge points nearer to the aircraft are compared at once; what is wrong nearer to it is urgent.
-        lead_m: least distance flown between two searches.
-        step_m: the rolling step: distance flown between two searches where nothing is urgent.
-        prolong_m: a plan whose certified part ends nearer than this is prolonged.
-        goal_radius_m: a plan that ends so near to the goal leads to it.
-    """
-
-    keep_m: float
-    turn_keeps_m: float
-    urgent_m: float
-    lead_m: float
-    step_m: float
-    prolong_m: float
-    goal_radius_m: float
-
-    @classmethod
-    def of(
-        cls,
-        mission: Mission,
-        *,
-        keep_m: float,
-        turn_keeps_m: float,
-        urgent_m: float,
-        lead_m: float,
-        step_m: float,
-    ) -> MonitorLimits:
-        """Those of a mission: a plan is prolonged at a share of its sensing range."""
-        prolong_m = PROLONG * mission.sensor_range_m
-        return cls(keep_m, turn_keeps_m, urgent_m, lead_m, step_m, prolong_m, mission.goal_radius_m)
+def flown_next(
+    plan: CommittedPlan | None,
+    request: PlanRequest,
+    here_m: float,
+    lead_m: float,
+    mission: Mission,
+    to_m: float = math.inf,
+) -> list[Segment]:
+    """What is flown in any case: the plan in effect for `lead_m`, not beyond `to_m`; without one, straight on."""
+    straight: list[Segment] = [(*request.position_m, *request.direction, 0.0, lead_m)]
+    if plan is None:
+        return straight
+    uncut_m = math.inf if plan.holds(here_m) else max(0.0, to_m - here_m)
+    flown = onward(plan.path, here_m, min(lead_m, uncut_m))
+    off_m = math.dist(place_on(plan.path, here_m)[0][:2], request.position_m)
+    if off_m > mission.off_path_m and flown:  # it bends as the plan does until it is told otherwise
+        return moved(flown, Pose(*request.position_m, *request.direction))
+    return flown or straight
 
 
 class PlanMonitor:
@@ -116,8 +95,21 @@ class PlanMonitor:
         searched_at_m: arc length at which the last search was made.
     """
 
-    def __init__(self, limits: MonitorLimits) -> None:
-        self._limits = limits
+    def __init__(
+        self, mission: Mission, *, keep_m: float, urgent_m: float, lead_m: float, step_m: float
+    ) -> None:
+        """Distances to go by.
+
+        Args:
+            mission: tells the clearance, the sensing range and the goal circle.
+            keep_m: a course that comes nearer to an edge point is cut there.
+            urgent_m: edge points nearer to the aircraft are compared at once; what is wrong nearer to it is urgent.
+            lead_m: least distance flown between two searches.
+            step_m: the rolling step: distance flown between two searches where nothing is urgent.
+        """
+        self._mission, self._keep_m, self._urgent_m = mission, keep_m, urgent_m
+        self._lead_m, self._step_m = lead_m, step_m
+        self._turn_keeps_m = BROKEN_SHARE * mission.clearance_m
         self._waiting: list[FloatArray] = []
         self._nearest_m = math.inf
         self._since = COMPARED_TOGETHER  # requests since edge points were compared
@@ -143,7 +135,7 @@ class PlanMonitor:
 
         `points_m`, (m, 2), are all still ones in the order in which they came in; at most `gone` have been let go of.
         """
-        return first_breach(course.path, points_m[max(course.known - gone, 0) :], self._limits.keep_m)
+        return first_breach(course.path, points_m[max(course.known - gone, 0) :], self._keep_m)
 
     def look(self, plan: CommittedPlan, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
         """Takes in (k, 2) new edges: compares them at once where one is near, else those of a few requests together.
@@ -157,17 +149,16 @@ class PlanMonitor:
             self._nearest_m = min(self._nearest_m, away_m)
         elif not self._waiting:
             return False
-        if self._since < COMPARED_TOGETHER and self._nearest_m > self._limits.urgent_m:
+        if self._since < COMPARED_TOGETHER and self._nearest_m > self._urgent_m:
             return False
         self._since = 0
         edges = np.concatenate(self._waiting)
         self._waiting, self._nearest_m = [], math.inf
         before = self.cut_m
         if not plan.holds(here_m):
-            self.cut_m = min(before, first_breach(plan.course.path, edges, self._limits.keep_m, here_m))
+            self.cut_m = min(before, first_breach(plan.course.path, edges, self._keep_m, here_m))
         self.broken |= (
-            self.cut_m < plan.loiter_entry_m
-            or first_breach(plan.turn, edges, self._limits.turn_keeps_m) < math.inf
+            self.cut_m < plan.loiter_entry_m or first_breach(plan.turn, edges, self._turn_keeps_m) < math.inf
         )
         return self.cut_m < before
 
@@ -182,23 +173,22 @@ class PlanMonitor:
 
     def urgent(self, plan: CommittedPlan, here_m: float) -> bool:
         """Whether the plan in effect is broken, and what is wrong with it is near."""
-        return self.broken and min(self.cut_m, plan.loiter_entry_m) - here_m < self._limits.urgent_m
+        return self.broken and min(self.cut_m, plan.loiter_entry_m) - here_m < self._urgent_m
 
     def due(self, plan: CommittedPlan, here_m: float, since_m: float, newly_cut: bool) -> bool:
         """Whether to roll the window: the nearer ahead something is wrong with the plan in effect, the sooner.
 
         `since_m` were flown since the last search; `newly_cut` is what `look` returned.
         """
-        limits = self._limits
         wrong = min(self.cut_m, plan.loiter_entry_m) - here_m
-        near = wrong < limits.urgent_m
+        near = wrong < self._urgent_m
         if near and (self.broken or newly_cut):
             return True
         serves = plan.course.shortest and self.cut_m == math.inf and not self.broken
-        whole = plan.loiter_entry_m >= plan.course.path.length_m - limits.goal_radius_m
-        if serves and (whole or plan.loiter_entry_m - here_m > limits.prolong_m):
+        whole = plan.loiter_entry_m >= plan.course.path.length_m - self._mission.goal_radius_m
+        if serves and (whole or plan.loiter_entry_m - here_m > PROLONG * self._mission.sensor_range_m):
             return False
         if self.cut_m < math.inf:
             grazed = self.lengthened_m < GRAZED * wrong
-            return since_m >= max(limits.lead_m, (REPLAN_SHARE if grazed else CUT) * wrong)
-        return since_m >= max(limits.lead_m if near else limits.step_m, REPLAN_SHARE * wrong)
+            return since_m >= max(self._lead_m, (REPLAN_SHARE if grazed else CUT) * wrong)
+        return since_m >= max(self._lead_m if near else self._step_m, REPLAN_SHARE * wrong)

@@ -22,12 +22,9 @@ from planner.interface import MapView, Mission, NoWayToBegin, Path, Plan, PlanRe
 from planner.memory import ObstacleMemory
 from planner.plan_checks import start_tolerance_m
 from planner.shield.certificate import CertificateBroken, Certifier
-from planner.shield.committed_plan import CommittedPlan
+from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan
 from planner.shield.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out, step_along_m
 from planner.shield.room import Room
-
-BROKEN_SHARE = 0.99
-"""Share of the clearance: an edge point seen nearer than that to a certified turn breaks the certificate."""
 
 LOITER_SHARES = (1.0, 0.5, 0.25)
 """Shares of the distance that paths keep from edge points. A turn is looked for with one share after the other."""
@@ -265,6 +262,12 @@ class Escapes:
 def room_m(path: Path, threats: Threats | None, least_m: float = -math.inf, later: float = LATER) -> float:
     """How far a path keeps from what is near; infinite where nothing is to be feared. See `Threats.room_m`."""
     return math.inf if threats is None else threats.room_m(path, least_m, later)
+
+
+def meets(plan: CommittedPlan, here_m: float, mission: Mission, threats: Threats | None) -> bool:
+    """Whether the plan in effect would come too near to what moves or has just appeared."""
+    least_m = BROKEN_SHARE * mission.clearance_m
+    return threats is not None and room_m(left_of(plan, here_m, mission), threats, least_m) < least_m
 
 
 def left_of(committed: CommittedPlan, here: float, mission: Mission) -> Path:

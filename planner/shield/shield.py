@@ -25,6 +25,7 @@ import numpy as np
 from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, Segment, along, between, on_loiter, place_on
+from planner.geometry.joining import LEAD_S
 from planner.geometry.path_samples import poses_at
 from planner.geometry.terrain import WorkCount
 from planner.interface import (
@@ -41,17 +42,14 @@ from planner.interface import (
 from planner.memory import ObstacleMemory
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.certificate import Certified, Certifier, hold_centre
-from planner.shield.committed_plan import CommittedPlan, MonitorLimits, PlanMonitor
+from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, flown_next
 from planner.shield.encounters import encounters
-from planner.shield.escape import BROKEN_SHARE, Escapes, left_of, room_m
+from planner.shield.escape import Escapes, meets, room_m
 from planner.shield.evasion import Threats
 from planner.shield.intervention_log import InterventionLog, ShieldReport
 from planner.shield.refused_places import RefusedPlaces
 from planner.shield.room import Room
 from planner.shield.tracking import MOST_RADII, Tracked, can_be_flown, tracked
-
-LEAD_S = 1.0
-"""A new plan leaves the one in effect this much flying time ahead, so that guidance has seen the joint coming."""
 
 PROGRESS = 0.25
 """A part of a path gets on if it gains at least this share of the hold radius along the planner's path."""
@@ -87,14 +85,11 @@ class Shield:
         self._escapes = Escapes(mission, memory, self._room)
         self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
         self._monitor = PlanMonitor(
-            MonitorLimits.of(
-                mission,
-                keep_m=BROKEN_SHARE * mission.clearance_m,
-                turn_keeps_m=BROKEN_SHARE * mission.clearance_m,
-                urgent_m=math.inf,
-                lead_m=self._lead_m,
-                step_m=mission.sensor_range_m,
-            )
+            mission,
+            keep_m=BROKEN_SHARE * mission.clearance_m,
+            urgent_m=math.inf,
+            lead_m=self._lead_m,
+            step_m=mission.sensor_range_m,
         )
         self._adopted: Adopted | None = None  # what the plan in effect comes from
         self._proposed: Adopted | None = None
@@ -122,10 +117,7 @@ class Shield:
         if effective is not None:
             here_m = on_loiter(effective.path, here_m)
             self._monitor.look(effective, here_m, request.position_m, fresh_m)
-            if self._threats is not None:
-                least_m = BROKEN_SHARE * self._mission.clearance_m
-                left = left_of(effective, here_m, self._mission)
-                self._monitor.broken |= room_m(left, self._threats, least_m) < least_m
+            self._monitor.broken |= meets(effective, here_m, self._mission, self._threats)
         answer = self._asked(request, here_m)
         found = self._certified(request, here_m, answer)
         if found is not None:
@@ -248,11 +240,7 @@ class Shield:
 
     def _start(self, request: PlanRequest, here_m: float) -> tuple[list[Segment], Pose, float]:
         """What of the plan in effect is flown in any case, and the pose and curvature where a new one leaves it."""
-        prefix: list[Segment] = [(*request.position_m, *request.direction, 0.0, self._lead_m)]
-        effective = self._monitor.plan
-        if effective is not None:
-            pose = Pose(*request.position_m, *request.direction)
-            prefix = effective.onward_from(pose, here_m, self._lead_m, self._mission.off_path_m) or prefix
+        prefix = flown_next(self._monitor.plan, request, here_m, self._lead_m, self._mission)
         last = prefix[-1]
         return prefix, along(last, last[5]), last[4]
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from planner.geometry.course import Course
-from planner.geometry.curves import Pose, pose_at
-from planner.interface import FloatArray, Mission, Path, Plan, PlanStatus
-from planner.shield.committed_plan import CUT, CommittedPlan, MonitorLimits, PlanMonitor
+from planner.geometry.curves import pose_at
+from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.shield.committed_plan import CUT, CommittedPlan, PlanMonitor, flown_next
+from tests.planner.rolling_window.test_rolling_window import Seen
 
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
 TURN = (2000.0, 0.0, 1.0, 0.0, 0.01, 2.0 * math.pi * 100.0)
@@ -33,11 +34,7 @@ MISSION = Mission(
 
 
 def monitoring() -> PlanMonitor:
-    return PlanMonitor(
-        MonitorLimits.of(
-            MISSION, keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0, lead_m=50.0, step_m=500.0
-        )
-    )
+    return PlanMonitor(MISSION, keep_m=300.0, urgent_m=1000.0, lead_m=50.0, step_m=500.0)
 
 
 def in_effect(monitor: PlanMonitor, plan: CommittedPlan, points: FloatArray, gone: int = 0) -> None:
@@ -81,10 +78,11 @@ def test_what_is_left_has_the_straight_on_which_it_rolls() -> None:
 
 
 def test_a_new_plan_begins_on_the_one_in_effect_or_at_an_aircraft_that_is_not_near_it() -> None:
-    flown, aircraft = committed(3), Pose(400.0, 4.0, 1.0, 0.0)
-    for near_m, north in ((4.5, 0.0), (3.5, 4.0)):
-        onward = flown.onward_from(aircraft, 400.0, 300.0, near_m)
+    for off_m, north in ((11.9, 0.0), (12.1, 12.1)):  # four tracking errors
+        request = PlanRequest(0.0, (400.0, off_m), (1.0, 0.0), Seen(EDGES))
+        onward = flown_next(committed(3), request, 400.0, 300.0, MISSION)
         assert onward == [pytest.approx((400.0, north, 1.0, 0.0, 0.0, 300.0))]
+    assert flown_next(None, request, 0.0, 300.0, MISSION) == [(400.0, 12.1, 1.0, 0.0, 0.0, 300.0)]
 
 
 def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside_its_course() -> None:
@@ -94,7 +92,7 @@ def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside
     assert monitor.cut_m == math.inf
     assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 401.0)]))
     assert not monitor.broken
-    assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 399.0)]))
+    assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 397.0)]))
     assert monitor.broken
 
 
