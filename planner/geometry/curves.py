@@ -197,32 +197,26 @@ def fillet(
     )
     if segments is None:
         return None
-    corner = along(segments[-1], segments[-1][5]) if segments else start
-    last_turn = segments[-1][4] if segments else start_curvature
+    corner, last_turn = start, start_curvature
+    if segments:
+        corner, last_turn = along(segments[-1], segments[-1][5]), segments[-1][4]
     used = 0.0  # how much of the present leg the corner before it has taken
     for i, node in enumerate(nodes):
         leg = math.dist(corner[:2], node)
-        if leg <= SHORTEST_M:
+        out = math.dist(node, nodes[i + 1]) if i + 1 < len(nodes) else math.inf
+        if min(leg, out) <= SHORTEST_M:
             return None
         ux, uy = (node[0] - corner[0]) / leg, (node[1] - corner[1]) / leg
         trim, turn, radius = 0.0, 0.0, math.inf
         if i + 1 < len(nodes):
-            out = math.dist(node, nodes[i + 1])
-            if out <= SHORTEST_M:
-                return None
             vx, vy = (nodes[i + 1][0] - node[0]) / out, (nodes[i + 1][1] - node[1]) / out
             turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
-            tangent = math.tan(0.5 * abs(turn))
-            if tangent > 1e-9:
-                free = leg - used - (limits.roll_m if turn * last_turn < 0.0 else 0.0)
-                need = limits.radius_m * tangent
-                if need > min(free, out):
-                    return None
-                # An arc of radius r passes the corner at r (1 / cos(turn / 2) - 1).
-                widest = cut_m * tangent / max(1.0 / math.cos(0.5 * turn) - 1.0, 1e-12)
-                wanted = min(widest, 0.5 * leg, out if i + 2 == len(nodes) else 0.5 * out)
-                trim = min(max(need, wanted), free)
-                radius = trim / tangent
+            free = leg - used - (limits.roll_m if turn * last_turn < 0.0 else 0.0)
+            most = min(0.5 * leg, out if i + 2 == len(nodes) else 0.5 * out)
+            rounded = _rounded(turn, limits.radius_m, min(free, out), free, most, cut_m)
+            if rounded is None:
+                return None
+            trim, radius = rounded
         straight = leg - used - trim
         if straight > SHORTEST_M:
             segments.append((corner[0] + ux * used, corner[1] + uy * used, ux, uy, 0.0, straight))
@@ -233,6 +227,22 @@ def fillet(
         corner = Pose(node[0], node[1], ux, uy)
         used = trim
     return Path(np.array(segments)) if segments else None
+
+
+def _rounded(
+    turn: float, least_radius_m: float, room_m: float, free_m: float, most_m: float, cut_m: float
+) -> tuple[float, float] | None:
+    """How much of its legs the arc of a corner takes, and its radius; None where the least radius has no room."""
+    tangent = math.tan(0.5 * abs(turn))
+    if tangent <= 1e-9:
+        return 0.0, math.inf
+    need = least_radius_m * tangent
+    if need > room_m:
+        return None
+    # An arc of radius r passes the corner at r (1 / cos(turn / 2) - 1).
+    widest = cut_m * tangent / max(1.0 / math.cos(0.5 * turn) - 1.0, 1e-12)
+    trim = min(max(need, min(widest, most_m)), free_m)
+    return trim, trim / tangent
 
 
 def _first_turn(

@@ -48,6 +48,11 @@ class Candidate:
         """C: the length of the whole candidate if nothing more is met."""
         return self.flown_m + self.left_m
 
+    @property
+    def hugged(self) -> list[int]:
+        """The obstacle that the last step hugged, if it did."""
+        return [] if self.last is None else [self.last.obstacle]
+
 
 def search_candidates(
     window: Window,
@@ -105,16 +110,10 @@ def search_candidates(
         if depth == steps:
             continue
         beside = [int(labels[entry_m.argmin()]), *(around if not depth else ())]
-        if wide:
-            # Whatever lies towards the goal, not only what comes first; and on round what it hugs.
-            beside += np.unique(labels).tolist()
-            beside += [] if candidate.last is None else [candidate.last.obstacle]
-        edges = (
-            edge
-            for edge in window.sector_edges(here, beside, outer_m)
-            if wide or not _leads_away(candidate, edge)
-        )
-        for child in _steps(candidate, edges, goal, bounds_m, outer_m):
+        if wide:  # whatever lies towards the goal, not only what comes first; and on round what it hugs
+            beside += np.unique(labels).tolist() + candidate.hugged
+        edges = window.sector_edges(here, beside, outer_m)
+        for child in _steps(candidate, edges, goal, bounds_m, outer_m, wide):
             count += 1
             cost = child.cost_m if to_go is None else child.flown_m + to_go(child.nodes[-1])
             heapq.heappush(queue, (cost, count, depth + 1, child))
@@ -126,10 +125,13 @@ def _steps(
     goal: Point,
     bounds_m: tuple[float, float, float, float],
     outer_m: float,
+    back_too: bool,
 ) -> Iterator[Candidate]:
-    """The steps along some edges that lead anywhere in the area."""
+    """The steps along some edges that lead anywhere in the area; those that lead away or back only if wanted."""
     for edge in edges:
-        child = _step(candidate, edge, goal, outer_m)
+        child = (
+            _step(candidate, edge, goal, outer_m) if back_too or not _leads_away(candidate, edge) else None
+        )
         if child is not None and _inside(child.nodes[-1], bounds_m):
             yield child
 

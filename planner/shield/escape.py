@@ -194,12 +194,15 @@ class Escapes:
             if best is not None:
                 break
         best = best or unseen
-        if best is not None and best.path is left:
-            return Escape(Plan(PlanStatus.NO_PATH, best.reason), broken=False)
-        if best is not None and best.committed is not None:
-            return Escape(best.committed.plan, best.committed)
         if best is not None:
-            return self._away(request, best.path, best.reason)
+            if best.path is left:
+                return Escape(Plan(PlanStatus.NO_PATH, best.reason), broken=False)
+            committed_to = best.committed
+            return (
+                Escape(committed_to.plan, committed_to)
+                if committed_to
+                else self._away(request, best.path, best.reason)
+            )
         if certain and not self._began_hidden:
             raise CertificateBroken(request.time_s)
         ways = ways or list(rolled_out(prefix, self._room.limits))
