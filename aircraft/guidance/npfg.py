@@ -84,20 +84,18 @@ class NpfgConfig:
 
 
 class NpfgInput(NamedTuple):
-    """Where the aircraft is, how it moves over the ground, the wind, and the nearest point of the path."""
+    """Where the aircraft is, how it moves over the ground, the wind, and the nearest point of the path.
 
-    east_m: float
-    north_m: float
-    velocity_east_mps: float
-    velocity_north_mps: float
-    wind_east_mps: float
+    Vectors are complex: east + i north, in m and m/s.
+    """
+
+    place: complex
+    velocity: complex
+    wind: complex
     """The direction the wind blows towards."""
-    wind_north_mps: float
-    path_east_m: float
-    path_north_m: float
-    tangent_east: float
+    path: complex
+    tangent: complex
     """The path's unit tangent at that point."""
-    tangent_north: float
     right_curvature_1pm: float
     """The path's curvature there, positive for a right turn."""
 
@@ -121,59 +119,44 @@ class NpfgOutput(NamedTuple):
     """The period within its bounds."""
 
 
+def dot(a: complex, b: complex) -> float:
+    """Scalar product of two vectors."""
+    return a.real * b.real + a.imag * b.imag
+
+
+def cross(a: complex, b: complex) -> float:
+    """How far b leads to the left of a, times the length of a."""
+    return a.real * b.imag - a.imag * b.real
+
+
 def npfg(at: NpfgInput, has: NpfgConfig, nominal_mps: float, largest_mps: float) -> NpfgOutput:
     """The law, with the nominal and the largest true airspeed; it has no memory."""
-    wind_east, wind_north = at.wind_east_mps, at.wind_north_mps
-    tangent_east, tangent_north = at.tangent_east, at.tangent_north
-    air_east, air_north = at.velocity_east_mps - wind_east, at.velocity_north_mps - wind_north
-    airspeed = math.sqrt(air_east * air_east + air_north * air_north)
-    wind = math.sqrt(wind_east * wind_east + wind_north * wind_north)
-    ground_speed = math.sqrt(at.velocity_east_mps**2 + at.velocity_north_mps**2)
-    error = tangent_north * (at.east_m - at.path_east_m) - tangent_east * (at.north_m - at.path_north_m)
-    on_track = feasibility(airspeed, wind, wind_east, wind_north, tangent_east, tangent_north)
-
-    period = adapted_period(has, abs(error), ground_speed, airspeed, wind, at.right_curvature_1pm, on_track)
+    air = at.velocity - at.wind
+    error = cross(at.place - at.path, at.tangent)
+    on_track = feasibility(abs(air), at.wind, at.tangent)
+    period = adapted_period(at, has, abs(error), abs(air), on_track)
     time_constant = period * has.damping
-    gain = 4.0 * math.pi * has.damping / period
-    bound = track_error_bound(ground_speed, time_constant)
-    share = min(abs(error) / bound, 1.0)
+    share = min(abs(error) / track_error_bound(abs(at.velocity), time_constant), 1.0)
     look_ahead = look_ahead_angle(share)
     proximity = math.sin(look_ahead) ** 2
 
-    # The bearing: along the path, less the part that leads back to it.
-    along = math.sin(look_ahead)
-    back = math.cos(look_ahead) if error < 0.0 else -math.cos(look_ahead)
-    bearing_east = along * tangent_east + back * tangent_north
-    bearing_north = along * tangent_north - back * tangent_east
-    bearing = feasibility(airspeed, wind, wind_east, wind_north, bearing_east, bearing_north)
-    combined = bearing * on_track
-    least = min_ground_speed(has, share, combined)
-    wanted_east, wanted_north = air_velocity(
-        has, nominal_mps, largest_mps, least, wind_east, wind_north, bearing_east, bearing_north
-    )
+    # The bearing: along the path, and back to it.
+    side = 1.0 if error < 0.0 else -1.0
+    bearing = at.tangent * complex(math.sin(look_ahead), -side * math.cos(look_ahead))
+    feasible = feasibility(abs(air), at.wind, bearing)
+    combined = feasible * on_track
+    least_mps = min_ground_speed(has, share, combined)
+    wanted = air_velocity(has, nominal_mps, largest_mps, least_mps, at.wind, bearing)
 
-    forward = curvature_feedforward(at, airspeed, error)
-    acceleration = turning(gain, airspeed, air_east, air_north, wanted_east, wanted_north)
-    acceleration += combined * proximity * forward
-    return NpfgOutput(
-        acceleration,
-        math.hypot(wanted_east, wanted_north),
-        math.atan2(wanted_east, wanted_north),
-        math.atan2(bearing_east, bearing_north),
-        error,
-        proximity,
-        bearing,
-        period,
-    )
+    acceleration = turning(4.0 * math.pi * has.damping / period, air, wanted)
+    acceleration += combined * proximity * curvature_feedforward(at, abs(air), error)
+    heading, course = (math.atan2(each.real, each.imag) for each in (wanted, bearing))
+    return NpfgOutput(acceleration, abs(wanted), heading, course, error, proximity, feasible, period)
 
 
-def feasibility(
-    airspeed_mps: float, wind_mps: float, wind_east: float, wind_north: float, east: float, north: float
-) -> float:
+def feasibility(airspeed_mps: float, wind: complex, direction: complex) -> float:
     """How well a direction over the ground can be made good: 1 in light wind, 0 where the wind is too strong."""
-    against = wind_mps
-    if wind_east * east + wind_north * north >= 0.0:
-        against = abs(wind_north * east - wind_east * north)
+    against = abs(wind) if dot(wind, direction) < 0.0 else abs(cross(direction, wind))
     share = min(max((airspeed_mps - against) / FEASIBILITY_BUFFER_MPS, 0.0), 1.0)
     return math.sin(0.5 * math.pi * share) ** 2
 
@@ -191,30 +174,21 @@ def look_ahead_angle(share: float) -> float:
 
 
 def adapted_period(
-    has: NpfgConfig,
-    distance_m: float,
-    ground_speed_mps: float,
-    airspeed_mps: float,
-    wind_mps: float,
-    curvature_1pm: float,
-    on_track: float,
+    at: NpfgInput, has: NpfgConfig, distance_m: float, airspeed_mps: float, on_track: float
 ) -> float:
     """The period between what roll can follow and what a curved path in wind needs, s."""
-    roll_s = has.roll_time_constant_s or 0.0
+    roll_s, wind_mps = has.roll_time_constant_s or 0.0, abs(at.wind)
     if not has.lower_period_bound or roll_s <= SMALL:
         return has.period_s
-    rate = abs(curvature_1pm) * airspeed_mps
-    if wind_mps > airspeed_mps or airspeed_mps < SMALL:
-        rate *= 2.0
-    else:
-        rate *= 2.0 * (1.0 - math.sqrt(1.0 - wind_mps / airspeed_mps))
+    beaten = wind_mps > airspeed_mps or airspeed_mps < SMALL
+    rate = 2.0 * abs(at.right_curvature_1pm) * airspeed_mps
+    rate *= 1.0 if beaten else 1.0 - math.sqrt(1.0 - wind_mps / airspeed_mps)
     straight = math.pi * roll_s / has.damping
     curved = straight
     if rate >= SMALL and has.damping >= LEAST_DAMPING:
-        curved = on_track * 4.0 * math.pi * roll_s * has.damping
-        curved += (1.0 - on_track) * straight
+        curved = on_track * 4.0 * math.pi * roll_s * has.damping + (1.0 - on_track) * straight
     safety = has.period_safety_factor
-    bound = track_error_bound(ground_speed_mps, safety * straight * has.damping)
+    bound = track_error_bound(abs(at.velocity), safety * straight * has.damping)
     near = math.sin(look_ahead_angle(min(distance_m / bound, 1.0))) ** 2
     lower = near * safety * curved + (1.0 - near) * safety * straight
     period = max(has.period_s, lower)
@@ -237,85 +211,57 @@ def min_ground_speed(has: NpfgConfig, share: float, feasible: float) -> float:
 
 
 def air_velocity(
-    has: NpfgConfig,
-    nominal: float,
-    largest: float,
-    least_mps: float,
-    wind_east: float,
-    wind_north: float,
-    east: float,
-    north: float,
-) -> tuple[float, float]:
-    """East and north of the air velocity that makes a bearing good, or comes nearest to it, m/s."""
-    along = wind_east * east + wind_north * north
-    across = wind_north * east - wind_east * north
-    wind_mps = math.hypot(wind_east, wind_north)
+    has: NpfgConfig, nominal: float, largest: float, least_mps: float, wind: complex, bearing: complex
+) -> complex:
+    """The air velocity that makes a bearing good, or comes nearest to it, m/s."""
+    along, across = dot(wind, bearing), cross(bearing, wind)
+
+    def solvable(airspeed: float) -> bool:
+        """Whether the wind triangle has a solution that moves along the bearing."""
+        return abs(across) < airspeed and (along > 0.0 or abs(wind) < airspeed)
+
     asks = has.wind_regulation and (has.min_ground_speed_on or has.track_keeping)
     speed = 0.0  # of the wind triangle; 0: none
     if asks and least_mps > along:
-        speed = math.sqrt((least_mps - along) ** 2 + across * across)
+        speed = max(math.hypot(least_mps - along, across), nominal)
         if speed > largest:
-            if not solvable(largest, wind_mps, along, across):
-                return against_wind(largest, wind_mps, wind_east, wind_north, east, north)
+            if not solvable(largest):
+                return against_wind(largest, wind, bearing)
             speed = largest
-        elif speed <= nominal:
-            speed = nominal
-    elif solvable(nominal, wind_mps, along, across):
+    elif solvable(nominal):
         speed = nominal
     elif not has.wind_regulation:
-        return against_wind(nominal, wind_mps, wind_east, wind_north, east, north)
-    elif not solvable(largest, wind_mps, along, across):
-        return against_wind(largest, wind_mps, wind_east, wind_north, east, north)
+        return against_wind(nominal, wind, bearing)
+    elif not solvable(largest):
+        return against_wind(largest, wind, bearing)
     elif along <= 0.0:
-        return wind_east, wind_north  # as flown: to face the wind it would be the other way round
-    ahead = math.sqrt(max(speed * speed - across * across, 0.0))
-    return ahead * east + across * north, ahead * north - across * east
+        return wind  # as flown: to face the wind it would be the other way round
+    return bearing * complex(math.sqrt(max(speed * speed - across * across, 0.0)), -across)
 
 
-def solvable(airspeed_mps: float, wind_mps: float, along_mps: float, across_mps: float) -> bool:
-    """Whether the wind triangle has a solution that moves along the bearing."""
-    return abs(across_mps) < airspeed_mps and (along_mps > 0.0 or wind_mps < airspeed_mps)
-
-
-def against_wind(
-    airspeed_mps: float, wind_mps: float, wind_east: float, wind_north: float, east: float, north: float
-) -> tuple[float, float]:
+def against_wind(airspeed_mps: float, wind: complex, bearing: complex) -> complex:
     """The air velocity where a bearing cannot be made good: it drifts least, and fades to the wind triangle, m/s."""
-    reach = math.sqrt(max(wind_mps * wind_mps - airspeed_mps * airspeed_mps, 0.0))
-    to_east, to_north = reach * east - wind_east, reach * north - wind_north
-    length = math.sqrt(to_east * to_east + to_north * to_north)
-    scale = airspeed_mps / length if length > 0.0 else 0.0
-    return scale * to_east, scale * to_north
+    to = math.sqrt(max(abs(wind) ** 2 - airspeed_mps * airspeed_mps, 0.0)) * bearing - wind
+    return to * (airspeed_mps / abs(to)) if to else 0j
 
 
 def curvature_feedforward(at: NpfgInput, airspeed_mps: float, error_m: float) -> float:
     """Lateral acceleration that holds the path's curvature in the wind, m/s^2."""
     curvature = at.right_curvature_1pm
-    if curvature == 0.0:
-        return 0.0
     # On the circle through the aircraft, which has no less than half of the path's radius.
     curvature /= max(1.0 - curvature * error_m, 0.5 * abs(curvature))
-    along = at.wind_east_mps * at.tangent_east + at.wind_north_mps * at.tangent_north
-    across = at.wind_north_mps * at.tangent_east - at.wind_east_mps * at.tangent_north
+    along, across = dot(at.wind, at.tangent), cross(at.tangent, at.wind)
     ahead = math.sqrt(max(airspeed_mps * airspeed_mps - across * across, 0.0))
-    speed = at.velocity_east_mps * at.tangent_east + at.velocity_north_mps * at.tangent_north
-    return airspeed_mps * (1.0 + along / max(ahead, SMALL)) * curvature * max(speed, 0.0)
+    speed = max(dot(at.velocity, at.tangent), 0.0)
+    return airspeed_mps * (1.0 + along / max(ahead, SMALL)) * curvature * speed
 
 
-def turning(
-    gain_1ps: float,
-    airspeed_mps: float,
-    air_east: float,
-    air_north: float,
-    wanted_east: float,
-    wanted_north: float,
-) -> float:
+def turning(gain_1ps: float, air: complex, wanted: complex) -> float:
     """Lateral acceleration that turns the air velocity to the wanted one, m/s^2."""
-    across = air_north * wanted_east - air_east * wanted_north
-    if air_east * wanted_east + air_north * wanted_north < 0.0:
-        return gain_1ps * airspeed_mps * (-1.0 if across < 0.0 else 1.0)
-    length = math.sqrt(wanted_east * wanted_east + wanted_north * wanted_north)
-    return gain_1ps * across / length if length > 0.0 else 0.0
+    across = cross(wanted, air)
+    if dot(air, wanted) < 0.0:
+        return gain_1ps * abs(air) * (-1.0 if across < 0.0 else 1.0)
+    return gain_1ps * across / abs(wanted) if wanted else 0.0
 
 
 class NpfgLaw(RouteLaw):
@@ -327,18 +273,14 @@ class NpfgLaw(RouteLaw):
 
     def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """What the law asks for."""
-        east_mps, north_mps = state.velocity_east_mps, state.velocity_north_mps
+        velocity = complex(state.velocity_east_mps, state.velocity_north_mps)
+        nose = complex(math.sin(state.heading_rad), math.cos(state.heading_rad))
         at = NpfgInput(
-            state.east_m,
-            state.north_m,
-            east_mps,
-            north_mps,
-            east_mps - state.airspeed_mps * math.sin(state.heading_rad),
-            north_mps - state.airspeed_mps * math.cos(state.heading_rad),
-            place.east_m,
-            place.north_m,
-            place.tangent_east,
-            place.tangent_north,
+            complex(state.east_m, state.north_m),
+            velocity,
+            velocity - state.airspeed_mps * nose,
+            complex(place.east_m, place.north_m),
+            complex(place.tangent_east, place.tangent_north),
             -place.curvature_1pm,
         )
         output = npfg(at, self._has, *self._speeds_mps)

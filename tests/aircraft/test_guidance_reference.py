@@ -92,12 +92,18 @@ class Npfg:
         run = self.run
         path = around(run, at) if at.segment == 1 else beside(run, at)
         output = npfg(
-            NpfgInput(*at[:2], *at[3:5], run["w_e"], run["w_n"], *path),
+            npfg_input(*at[:2], *at[3:5], run["w_e"], run["w_n"], *path),
             NpfgConfig(roll_time_constant_s=0.5),
             run["va_nom"],
             run["va_max"],
         )
         return output.lateral_acceleration_mps2, output.track_error_m, output.airspeed_mps
+
+
+def npfg_input(*values: float) -> NpfgInput:
+    """From east and north of five vectors, and the curvature."""
+    vectors: list[Any] = [*map(complex, values[:10:2], values[1:10:2])]
+    return NpfgInput(*vectors, values[10])
 
 
 def around(run: Row, at: Place) -> tuple[float, ...]:
@@ -165,7 +171,7 @@ def npfg_columns(row: Row) -> Row:
         "p_gsp_max_tk p_roll_tc p_sw_mult p_period_sf"
     )
     has = NpfgConfig(*(bool(row[key]) if "_en_" in key else row[key] for key in keys.split()))
-    output = npfg(NpfgInput(*(row[name] for name in at.split())), has, row["p_va_nom"], row["p_va_max"])
+    output = npfg(npfg_input(*(row[name] for name in at.split())), has, row["p_va_nom"], row["p_va_max"])
     names = "lat_acc airspeed_ref heading_ref course_sp track_err track_prox feas adapted_period"
     return dict(zip(names.split(), output, strict=True))
 
