@@ -78,12 +78,10 @@ class L1Config:
 
 
 class L1Motion(NamedTuple):
-    """How the aircraft moves."""
+    """How the aircraft moves. Vectors are complex: east + i north, in m and m/s."""
 
-    east_m: float
-    north_m: float
-    velocity_east_mps: float
-    velocity_north_mps: float
+    place: complex
+    velocity: complex
     yaw_rad: float
     yaw_cd: int
     """The same in hundredths of a degree, as the autopilot keeps it."""
@@ -101,19 +99,16 @@ class L1Memory(NamedTuple):
 class L1Leg(NamedTuple):
     """A leg, from A to B."""
 
-    from_east_m: float
-    from_north_m: float
-    to_east_m: float
-    to_north_m: float
-    min_distance_m: float
+    begin: complex
+    end: complex
+    min_distance_m: float = 0.0
     """Least L1 distance; 0 from the autopilot's plain missions."""
 
 
 class L1Circle(NamedTuple):
     """A circle to loiter on."""
 
-    centre_east_m: float
-    centre_north_m: float
+    centre: complex
     radius_m: float
     direction: float
     """+1 clockwise (right turns), -1 counter-clockwise."""
@@ -129,25 +124,32 @@ class L1Output(NamedTuple):
     """The circle is held; before, it is approached."""
 
 
+def dot(a: complex, b: complex) -> float:
+    """Scalar product of two vectors."""
+    return a.real * b.real + a.imag * b.imag
+
+
+def right_of(a: complex, b: complex) -> float:
+    """How far b leads to the right of a, times the length of a."""
+    return a.imag * b.real - a.real * b.imag
+
+
 def follow_leg(
     at: L1Motion, leg: L1Leg, since_s: float, memory: L1Memory, has: L1Config
 ) -> tuple[L1Output, L1Memory]:
     """The law on a leg, so long since the last call on one, and the memory for the next call."""
     fresh, since = since_s > STALE_S, min(since_s, MAX_UPDATE_S)
-    east, north, speed = leg_velocity(at)
+    velocity, speed = leg_velocity(at)
     distance = max(ONE_OVER_PI * has.damping * has.period_s * speed, leg.min_distance_m)
-    leg_east, leg_north, length = leg_direction(at, leg)
-    from_east, from_north = at.east_m - leg.from_east_m, at.north_m - leg.from_north_m
-    left = from_north * leg_east - from_east * leg_north
-    along = from_east * leg_east + from_north * leg_north
-    away = math.sqrt(from_east * from_east + from_north * from_north)
-    to_east, to_north = leg.to_east_m - at.east_m, leg.to_north_m - at.north_m
+    ahead, length = leg_direction(at, leg), abs(leg.end - leg.begin)
+    gone, to = at.place - leg.begin, leg.end - at.place
+    left, along = -right_of(ahead, gone), dot(ahead, gone)
 
     integrator, gain = 0.0 if fresh else memory.integrator_rad, memory.last_gain
-    if away > distance and along / max(away, 1.0) < -HALF_RIGHT_SINE:
-        nu = aim_at(-from_east, -from_north, east, north)
+    if abs(gone) > distance and along / max(abs(gone), 1.0) < -HALF_RIGHT_SINE:
+        nu = aim_at(-gone, velocity)
     elif along > length + PAST_LEG_S * speed:
-        nu = aim_at(to_east, to_north, east, north)
+        nu = aim_at(to, velocity)
     else:
         sine = left / max(distance, 0.1)
         intercept = math.asin(min(max(sine, -HALF_RIGHT_SINE), HALF_RIGHT_SINE))
@@ -156,11 +158,8 @@ def follow_leg(
         elif abs(intercept) < INTEGRATOR_RANGE_RAD:
             integrator += intercept * has.integrator_gain * since
             integrator = min(max(integrator, -INTEGRATOR_LIMIT_RAD), INTEGRATOR_LIMIT_RAD)
-        intercept += integrator
-        across, ahead = north * leg_east - east * leg_north, east * leg_east + north * leg_north
-        nu = intercept + math.atan2(across, ahead)
-    target_cd = bearing_cd(to_east, to_north)
-    nu = decided(nu, memory.last_nu_rad, target_cd, at.yaw_cd)
+        nu = intercept + integrator + aim_at(ahead, velocity)
+    nu = decided(nu, memory.last_nu_rad, bearing_cd(to), at.yaw_cd)
     used = min(max(nu, -QUARTER_TURN), QUARTER_TURN)
     acceleration = 4.0 * has.damping * has.damping * speed * speed / distance * math.sin(used)
     return L1Output(acceleration, left, False), L1Memory(nu, integrator, gain)
@@ -171,22 +170,20 @@ def follow_circle(
 ) -> tuple[L1Output, L1Memory]:
     """The law on a circle, and the memory for the next call."""
     radius, omega = circle.radius_m, TWO_PI / has.period_s
-    east, north = at.velocity_east_mps, at.velocity_north_mps
-    over_ground = math.sqrt(east * east + north * north)
-    speed = max(over_ground, MIN_CIRCLE_SPEED_MPS)
+    speed = max(abs(at.velocity), MIN_CIRCLE_SPEED_MPS)
     distance = ONE_OVER_PI * has.damping * has.period_s * speed
-    out_east, out_north = at.east_m - circle.centre_east_m, at.north_m - circle.centre_north_m
-    away = math.sqrt(out_east * out_east + out_north * out_north)
-    target_cd = bearing_cd(circle.centre_east_m - at.east_m, circle.centre_north_m - at.north_m)
+    out = at.place - circle.centre
+    away = abs(out)
     if away > NEAR_CENTRE_M:
-        out_east, out_north = out_east / away, out_north / away
-    elif over_ground < SLOW_MPS:
-        out_east, out_north = math.sin(at.yaw_rad), math.cos(at.yaw_rad)
+        out /= away
+    elif abs(at.velocity) < SLOW_MPS:
+        out = nose(at)
     else:
-        out_east, out_north = east / over_ground, north / over_ground
-    across = out_north * east - out_east * north
-    inwards = -(out_east * east + out_north * north)
-    nu = decided(math.atan2(across, inwards), memory.last_nu_rad, target_cd, at.yaw_cd)
+        out = at.velocity / abs(at.velocity)
+    across, inwards = right_of(out, at.velocity), -dot(out, at.velocity)
+    nu = decided(
+        math.atan2(across, inwards), memory.last_nu_rad, bearing_cd(circle.centre - at.place), at.yaw_cd
+    )
     used = min(max(nu, -0.5 * math.pi), 0.5 * math.pi)
     capture = 4.0 * has.damping * has.damping * speed * speed / distance * math.sin(used)
 
@@ -206,31 +203,30 @@ def follow_circle(
     return L1Output(acceleration, error, circling), L1Memory(nu, memory.integrator_rad, memory.last_gain)
 
 
-def leg_velocity(at: L1Motion) -> tuple[float, float, float]:
-    """East and north of the ground velocity that a leg is flown with, and its speed, m/s."""
-    east, north = at.velocity_east_mps, at.velocity_north_mps
-    speed = math.sqrt(east * east + north * north)
-    if speed < SLOW_MPS or abs(wrapped(math.atan2(east, north) - at.yaw_rad)) >= 0.5 * math.pi:
-        return SLOW_MPS * math.sin(at.yaw_rad), SLOW_MPS * math.cos(at.yaw_rad), SLOW_MPS
-    return east, north, speed
+def nose(at: L1Motion) -> complex:
+    """Unit vector along the nose."""
+    return complex(math.sin(at.yaw_rad), math.cos(at.yaw_rad))
 
 
-def leg_direction(at: L1Motion, leg: L1Leg) -> tuple[float, float, float]:
-    """East and north of a leg's unit direction, and its length, m."""
-    east, north = leg.to_east_m - leg.from_east_m, leg.to_north_m - leg.from_north_m
-    length = math.sqrt(east * east + north * north)
-    if length >= SHORT_LEG_M:
-        return east / length, north / length, length
-    east, north = leg.to_east_m - at.east_m, leg.to_north_m - at.north_m
-    away = math.sqrt(east * east + north * north)
-    if away >= SHORT_LEG_M:
-        return east / away, north / away, length
-    return math.sin(at.yaw_rad), math.cos(at.yaw_rad), length
+def leg_velocity(at: L1Motion) -> tuple[complex, float]:
+    """The ground velocity that a leg is flown with, and its speed, m/s."""
+    speed = abs(at.velocity)
+    if speed < SLOW_MPS or dot(at.velocity, nose(at)) <= 0.0:
+        return SLOW_MPS * nose(at), SLOW_MPS
+    return at.velocity, speed
 
 
-def aim_at(to_east: float, to_north: float, east_mps: float, north_mps: float) -> float:
-    """Nu towards a point, rad."""
-    return math.atan2(north_mps * to_east - east_mps * to_north, east_mps * to_east + north_mps * to_north)
+def leg_direction(at: L1Motion, leg: L1Leg) -> complex:
+    """A leg's unit direction."""
+    for way in (leg.end - leg.begin, leg.end - at.place):
+        if abs(way) >= SHORT_LEG_M:
+            return way / abs(way)
+    return nose(at)
+
+
+def aim_at(to: complex, velocity: complex) -> float:
+    """Nu towards a direction, rad."""
+    return math.atan2(right_of(velocity, to), dot(velocity, to))
 
 
 def decided(nu_rad: float, last_nu_rad: float, target_cd: int, yaw_cd: int) -> float:
@@ -242,23 +238,11 @@ def decided(nu_rad: float, last_nu_rad: float, target_cd: int, yaw_cd: int) -> f
     return last_nu_rad if behind and abs(off) > INDECISION_CD and nu_rad * last_nu_rad < 0.0 else nu_rad
 
 
-def bearing_cd(to_east: float, to_north: float) -> int:
+def bearing_cd(to: complex) -> int:
     """Direction to a point in whole hundredths of a degree, in (-18000, 18000]."""
-    angle = 0.5 * math.pi + math.atan2(-to_north, to_east)
-    if angle < 0.0:
-        angle += 2.0 * math.pi
-    whole = int(angle * 18000.0 / math.pi + 0.5) % 36000
+    angle = 0.5 * math.pi + math.atan2(-to.imag, to.real)
+    whole = int(angle % math.tau * 18000.0 / math.pi + 0.5) % 36000
     return whole - 36000 if whole > 18000 else whole
-
-
-def wrapped(angle_rad: float) -> float:
-    """The same direction within half a turn of 0, rad."""
-    inside = angle_rad - 2.0 * math.pi * int(angle_rad / (2.0 * math.pi))
-    if inside > math.pi:
-        return inside - 2.0 * math.pi
-    if inside < -math.pi:
-        return inside + 2.0 * math.pi
-    return inside
 
 
 class L1Law(RouteLaw):
@@ -271,16 +255,19 @@ class L1Law(RouteLaw):
     def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
         """What the law asks for."""
         yaw = (state.heading_rad + math.pi) % math.tau - math.pi
-        moves = state.east_m, state.north_m, state.velocity_east_mps, state.velocity_north_mps
-        at = L1Motion(*moves, yaw, int(100.0 * math.degrees(yaw)) % 36000)
+        velocity = complex(state.velocity_east_mps, state.velocity_north_mps)
+        at = L1Motion(
+            complex(state.east_m, state.north_m), velocity, yaw, int(100.0 * math.degrees(yaw)) % 36000
+        )
         if place.curvature_1pm == 0.0:
             east, north, ahead_east, ahead_north, _, length, start, *_ = self.progress.segment
             length = min(length, place.arc_length_m - start + FAR_M)
-            leg = L1Leg(east, north, east + length * ahead_east, north + length * ahead_north, 0.0)
+            begin = complex(east, north)
+            leg = L1Leg(begin, begin + length * complex(ahead_east, ahead_north))
             since_s, self._leg_time_s = state.time_s - self._leg_time_s, state.time_s
             output, self._memory = follow_leg(at, leg, since_s, self._memory, self._has)
         else:
             bend = place.curvature_1pm
-            circle = L1Circle(*centre_of(place), abs(1.0 / bend), -math.copysign(1.0, bend))
+            circle = L1Circle(complex(*centre_of(place)), abs(1.0 / bend), -math.copysign(1.0, bend))
             output, self._memory = follow_circle(at, circle, self._memory, self._has)
         return math.atan(output.lateral_acceleration_mps2 / GRAVITY_MPS2), math.nan

@@ -56,11 +56,11 @@ def test_the_integrator_waits_while_the_roll_is_cut() -> None:
 @pytest.mark.parametrize("speed_mps", [25.0, 0.05])
 def test_l1_flies_straight_on_at_the_centre_of_a_circle_without_a_radius(speed_mps: float) -> None:
     has = L1Config()
-    at = L1Motion(7.0, -3.0, speed_mps, 0.0, 0.0, 0)
-    output, memory = follow_circle(at, L1Circle(7.0, -3.0, 0.0, 1.0), L1Memory(), has)
+    at = L1Motion(7 - 3j, complex(speed_mps), 0.0, 0)
+    output, memory = follow_circle(at, L1Circle(7 - 3j, 0.0, 1.0), L1Memory(), has)
     assert all(map(math.isfinite, (*output, *memory)))
     assert output.crosstrack_m == 0.0
-    beside, _ = follow_circle(at._replace(east_m=8.0), L1Circle(7.0, -3.0, 0.0, 1.0), L1Memory(), has)
+    beside, _ = follow_circle(at._replace(place=8 - 3j), L1Circle(7 - 3j, 0.0, 1.0), L1Memory(), has)
     assert beside.crosstrack_m == 1.0
     assert math.isfinite(beside.lateral_acceleration_mps2)
 

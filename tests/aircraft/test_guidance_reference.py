@@ -102,8 +102,8 @@ class Npfg:
 
 def npfg_input(*values: float) -> NpfgInput:
     """From east and north of five vectors, and the curvature."""
-    vectors: list[Any] = [*map(complex, values[:10:2], values[1:10:2])]
-    return NpfgInput(*vectors, values[10])
+    every: Any = (*map(complex, values[:10:2], values[1:10:2]), values[10])
+    return NpfgInput(*every)
 
 
 def around(run: Row, at: Place) -> tuple[float, ...]:
@@ -137,9 +137,10 @@ class L1:
         """Lateral acceleration, cross-track error, and no airspeed reference."""
         run = self.run
         yaw_cd = int(100.0 * math.degrees(at.yaw_rad))
-        motion = L1Motion(*at[:2], *at[3:5], at.yaw_rad, yaw_cd + 36000 if yaw_cd < 0 else yaw_cd)
+        place, velocity = complex(*at[:2]), complex(*at[3:5])
+        motion = L1Motion(place, velocity, at.yaw_rad, yaw_cd + 36000 if yaw_cd < 0 else yaw_cd)
         if at.segment == 1:
-            circle = L1Circle(run["c_e"], run["c_n"], run["radius"], run["dir"])
+            circle = L1Circle(complex(run["c_e"], run["c_n"]), run["radius"], run["dir"])
             output, self.memory = follow_circle(motion, circle, self.memory, self.has)
         else:
             now_s = FIRST_CALL_S + tick * STEP_S
@@ -152,11 +153,10 @@ class L1:
     def leg(self, segment: int) -> L1Leg:
         run = self.run
         point, course = ("p2", "course2") if segment == 2 else ("a", "course")
-        east, north = run[f"{point}_e"], run[f"{point}_n"]
+        begin = complex(run[f"{point}_e"], run[f"{point}_n"])
         if run["kind"] == "lal" and segment == 0:
-            return L1Leg(east, north, run["p1_e"], run["p1_n"], 0.0)
-        to_east = east + LONG_LEG_M * math.sin(run[course])
-        return L1Leg(east, north, to_east, north + LONG_LEG_M * math.cos(run[course]), 0.0)
+            return L1Leg(begin, complex(run["p1_e"], run["p1_n"]))
+        return L1Leg(begin, begin + LONG_LEG_M * complex(math.sin(run[course]), math.cos(run[course])))
 
 
 def wrapped(angle_rad: float) -> float:
@@ -177,13 +177,14 @@ def npfg_columns(row: Row) -> Row:
 
 
 def motion_of(row: Row) -> L1Motion:
-    place = row["pos_e"], row["pos_n"], row["vg_e"], row["vg_n"]
-    return L1Motion(*place, row["yaw"], int(row["yaw_cd"]))
+    place, velocity = complex(row["pos_e"], row["pos_n"]), complex(row["vg_e"], row["vg_n"])
+    return L1Motion(place, velocity, row["yaw"], int(row["yaw_cd"]))
 
 
 def leg_columns(row: Row) -> Row:
     """What the law gives for a row of `l1_waypoint_states`."""
-    leg = L1Leg(*(row[name] for name in ["prev_e", "prev_n", "next_e", "next_n", "dist_min"]))
+    begin, end = (complex(row[f"{name}_e"], row[f"{name}_n"]) for name in ("prev", "next"))
+    leg = L1Leg(begin, end, row["dist_min"])
     before = L1Memory(*(row[name] for name in ["last_nu_in", "xtrack_i_in", "gain_prev_in"]))
     has = L1Config(row["p_period"], row["p_damping"], row["p_xtrack_i"])
     output, memory = follow_leg(motion_of(row), leg, row["dt_us"] * 1e-6, before, has)
@@ -193,7 +194,7 @@ def leg_columns(row: Row) -> Row:
 
 def circle_columns(row: Row) -> Row:
     """What the law gives for a row of `l1_loiter_states`, on a circle as large as that was flown."""
-    circle = L1Circle(row["centre_e"], row["centre_n"], row["scaled_radius"], row["direction"])
+    circle = L1Circle(complex(row["centre_e"], row["centre_n"]), row["scaled_radius"], row["direction"])
     has = L1Config(row["p_period"], row["p_damping"], 0.0)
     output, memory = follow_circle(motion_of(row), circle, L1Memory(row["last_nu_in"]), has)
     told = {"lat_acc": output.lateral_acceleration_mps2, "crosstrack": output.crosstrack_m}
