@@ -65,15 +65,9 @@ class GroundSpec(Section):
         lowest_m = float(np.floor(np.nanmin(field.heights_m)))
         step_m = max(STEP_M, float(np.nanmax(field.heights_m) - lowest_m) / 60_000)
         rows, columns = field.heights_m.shape
-        return cls.model_construct(
-            corner_m=field.corner_m,
-            spacing_m=field.spacing_m,
-            rows=rows,
-            columns=columns,
-            lowest_m=lowest_m,
-            step_m=step_m,
-            heights=packed(field.heights_m, lowest_m, step_m),
-        )
+        nodes = {"corner_m": field.corner_m, "spacing_m": field.spacing_m, "rows": rows, "columns": columns}
+        heights = packed(field.heights_m, lowest_m, step_m)
+        return cls.model_construct(**nodes, lowest_m=lowest_m, step_m=step_m, heights=heights)
 
 
 class SourceSpec(Section):

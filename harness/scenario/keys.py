@@ -124,14 +124,10 @@ class ScenarioKeys(Section):
 
 
 def step_rate_hz(given_hz: int | None, sensor: Sensor) -> int:
-    """The step rate of a flight.
-
-    Args:
-        given_hz: what the scenario says; None: nothing.
-        sensor: whose rate must divide it.
+    """The step rate of a flight, where the scenario gives it or not.
 
     Raises:
-        KeyFault: it does not.
+        KeyFault: the sensor's rate does not divide it.
     """
     rates = RATES_HZ if given_hz is None else (given_hz,)
     for rate_hz in rates:

@@ -48,9 +48,10 @@ def resolve(
     simulation = keys.simulation.filled(rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
     mission = _ends_in_plane(keys.mission, keys.area)
     aircraft = keys.aircraft.model_copy(update={"model": model_or_folder(keys.aircraft.model, folder)})
-    nominal = _nominal_airframe(aircraft)
+    card = aircraft.model_copy(update={"actuators": None, "autopilot": None})
+    nominal = _airframe(card, "model")
     keys = with_servos(keys.updated(simulation=simulation, mission=mission, aircraft=aircraft), nominal)
-    aircraft = keys.aircraft.filled(airspeed_mps=_cruise_mps(keys.aircraft))
+    aircraft = keys.aircraft.filled(airspeed_mps=_airframe(keys.aircraft, "actuators").cruise_mps)
     keys = with_day(keys.updated(aircraft=aircraft), nominal)
     aircraft = _with_latency(keys.aircraft, keys.navigation.latency_s)
     keys = keys.updated(aircraft=aircraft)
@@ -135,23 +136,14 @@ def model_or_folder(model: str, folder: Path | None) -> str:
     return model
 
 
-def _nominal_airframe(spec: AircraftSpec) -> Airframe:
-    """The airframe as its card has it, without servos of the scenario's."""
+def _airframe(spec: AircraftSpec, key: str) -> Airframe:
+    """The airframe of a scenario; where there is none, that is the fault of a key."""
     from aircraft.airframes import AircraftError
 
     try:
-        return airframe_of(spec.model_copy(update={"actuators": None, "autopilot": None}))
+        return airframe_of(spec)
     except AircraftError as error:
-        raise KeyFault(("aircraft", "model"), str(error)) from error
-
-
-def _cruise_mps(spec: AircraftSpec) -> float:
-    from aircraft.airframes import AircraftError
-
-    try:
-        return airframe_of(spec).cruise_mps
-    except AircraftError as error:
-        raise KeyFault(("aircraft", "actuators"), str(error)) from error
+        raise KeyFault(("aircraft", key), str(error)) from error
 
 
 def _limit_load_factor(spec: AircraftSpec) -> float:

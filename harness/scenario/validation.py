@@ -19,42 +19,33 @@ MAX_FAULTS: Final = 2
 MOST_WHOLE: Final = 2**53
 """Beyond this a number is not read as a whole one."""
 
-_WANTED: Final = {
-    "int_type": "a whole number",
-    "float_type": "a number",
-    "string_type": "text; put it in quotes",
-    "bool_type": "true or false",
-    "tuple_type": "a list",
-    "list_type": "a list",
-    "model_type": "a mapping `key: value`",
-    "dict_type": "a mapping `key: value`",
-    "model_attributes_type": "a mapping `key: value`",
-}
 NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"
 """Pattern of a name that a folder may be called after."""
 
 _PATTERNS: Final = {NAME_PATTERN: "have only a-z, 0-9, '.', '_' and '-', and not only dots"}
+_MAPPING: Final = "is {shown}; must be a mapping `key: value`"
 _SENTENCES: Final = {
     "missing": "is missing; it is required",
     "literal_error": "is {shown}; must be {expected}",
     "too_long": "has {actual_length} items; must have {max_length}",
     "too_short": "has {actual_length} items; must have at least {min_length}",
     "string_too_short": "is empty text; must be a name",
+    "int_type": "is {shown}; must be a whole number",
+    "float_type": "is {shown}; must be a number",
+    "string_type": "is {shown}; must be text; put it in quotes",
+    "bool_type": "is {shown}; must be true or false",
+    **dict.fromkeys(("tuple_type", "list_type"), "is {shown}; must be a list"),
+    **dict.fromkeys(("model_type", "dict_type", "model_attributes_type"), _MAPPING),
+    "greater_than": "is {shown}; must be greater than {gt:.12g}",
+    "greater_than_equal": "is {shown}; must be at least {ge:.12g}",
+    "less_than": "is {shown}; must be less than {lt:.12g}",
+    "less_than_equal": "is {shown}; must be at most {le:.12g}",
 }
-_BOUNDS: Final = {
-    "greater_than": ("greater than", "gt"),
-    "greater_than_equal": ("at least", "ge"),
-    "less_than": ("less than", "lt"),
-    "less_than_equal": ("at most", "le"),
-}
+"""What is wrong, and what would be right, by the type of pydantic's error and with what it tells of it."""
 
 
 class KeyFault(ValueError):
-    """A key that contradicts others.
-
-    Attributes:
-        loc: the key.
-    """
+    """The key at `loc` contradicts others."""
 
     def __init__(self, loc: Loc, sentence: str) -> None:
         super().__init__(sentence)
@@ -62,11 +53,7 @@ class KeyFault(ValueError):
 
 
 class KeyFaults(ValueError):
-    """What is wrong with the keys of a file.
-
-    Attributes:
-        every: key and sentence of each fault.
-    """
+    """What is wrong with the keys of a file: key and sentence of `every` fault."""
 
     def __init__(self, every: Sequence[tuple[Loc, str]]) -> None:
         super().__init__("; ".join(sentence for _, sentence in every))
@@ -156,11 +143,6 @@ def sentence(details: ErrorDetails, known: tuple[str, ...] = ()) -> str:
     if kind == "int_type" and isinstance(value, float):
         wanted = "without a point" if abs(value) < MOST_WHOLE else f"of at most {MOST_WHOLE}"
         return f"is {value!r}; must be a whole number {wanted}"
-    if kind in _WANTED:
-        return f"is {shown(value)}; must be {_WANTED[kind]}"
-    if kind in _BOUNDS:
-        words, name = _BOUNDS[kind]
-        return f"is {shown(value)}; must be {words} {context[name]:.12g}"
     if kind == "string_pattern_mismatch":
         return f"is {shown(value)}; must {_PATTERNS.get(context['pattern'], 'match ' + context['pattern'])}"
     if kind in _SENTENCES:
