@@ -12,7 +12,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from harness.analysis.causes import is_allowed_for
 from harness.analysis.metric import severity
 from harness.campaign.cell import CONFIDENCE, Cell, cell_of
 from harness.campaign.groups import Axis, grouped
@@ -79,21 +78,6 @@ class WorstRun:
 
 
 @dataclass(frozen=True)
-class Untracked:
-    """Runs that were not tracked for the same causes.
-
-    Attributes:
-        causes: of all their legs; empty where nothing was flown of a plan.
-        allowed_for: these are navigation errors alone, within what was planned for them.
-        count: how many runs.
-    """
-
-    causes: str
-    allowed_for: bool
-    count: int
-
-
-@dataclass(frozen=True)
 class Summary:
     """The answers.
 
@@ -104,7 +88,7 @@ class Summary:
         total: all runs.
         tables: one for each choice of keys.
         worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
-        untracked: runs that were not tracked, by why, the most frequent first, but those `allowed_for` last.
+        untracked: number of runs that were not tracked, by the causes of all their legs, the most frequent first.
         duels: planners on the same cases.
         planned: how many runs the campaign has, flown or not; None where the results do not say so.
     """
@@ -115,7 +99,7 @@ class Summary:
     total: Cell
     tables: tuple[Table, ...]
     worst: tuple[WorstRun, ...]
-    untracked: tuple[Untracked, ...]
+    untracked: Mapping[str, int]
     duels: tuple[Duel, ...]
     planned: int | None = None
 
@@ -161,7 +145,15 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
         total=cell_of(runs, np.ones(len(runs), dtype=bool)),
         tables=tuple(_table(runs, *each) for each in chosen),
         worst=_worst(runs, folder),
-        untracked=_untracked(runs),
+        untracked=dict(
+            Counter(
+                causes or "no plan"
+                for causes, tracked in zip(
+                    runs.texts("trackability.causes"), runs.values("trackable"), strict=True
+                )
+                if tracked is False
+            ).most_common()
+        ),
         duels=duels(
             runs.texts("planner"),
             list(zip(runs.values("case"), runs.texts("aircraft"), strict=True)),
@@ -232,15 +224,3 @@ def _worst(runs: Runs, folder: Path) -> tuple[WorstRun, ...]:
             )
         )
     return tuple(found)
-
-
-def _untracked(runs: Runs) -> tuple[Untracked, ...]:
-    """Runs that were not tracked, by why."""
-    columns = ("trackable", "trackability.causes", "navigation_error_m.max", "navigation_margin_m")
-    alike = Counter(
-        (is_allowed_for((causes or "").split("; "), error_m, margin_m), causes or "")
-        for tracked, causes, error_m, margin_m in zip(*map(runs.values, columns), strict=True)
-        if tracked is False
-    )
-    order = sorted(alike.items(), key=lambda each: (each[0][0], -each[1]))
-    return tuple(Untracked(causes, allowed, count) for (allowed, causes), count in order)

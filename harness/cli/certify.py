@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import shlex
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -133,12 +132,11 @@ def _fly(
     with (
         resumable(folder, INDEX),
         local_workers(workers or os.cpu_count() or 1) as flyers,
-        nullcontext() if silent else step_bar() as bar,
+        step_bar(silent) as bar,
     ):
 
         def report(tally: Tally) -> None:
-            if bar is not None:
-                bar(tally.runs, len(days), f"held on {tally.held} of {tally.runs} days")
+            bar(tally.runs, len(days), f"held on {tally.held} of {tally.runs} days")
 
         return fly_days(days, folder, flyers, terms, resume=resume, progress=report)
 

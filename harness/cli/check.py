@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -164,7 +163,7 @@ def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> Ch
     from harness.run_files.run_folder import MANIFEST, SCHEMA
 
     length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
-    progress = nullcontext() if silent else progress_bar(length_m)
+    progress = progress_bar(length_m, silent)
     with faults_told(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
         return fly_check(check, folder, recording, report)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -86,13 +85,12 @@ def falsify(
     def left() -> str:
         return f"the flights so far are in {folder / INDEX}" if flights else "no flight had ended yet"
 
-    with faults_told(left), nullcontext() if quiet else step_bar() as bar:
+    with faults_told(left), step_bar(quiet) as bar:
 
         def ended(done: int, of: int, told: str) -> None:
             nonlocal flights
             flights = done
-            if bar is not None:
-                bar(done, of, told)
+            bar(done, of, told)
 
         found = search(
             loaded,

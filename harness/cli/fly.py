@@ -134,7 +134,7 @@ def _fly(
     from harness.run_files.run_folder import MANIFEST, SCHEMA
 
     straight_m = math.dist(scenario.mission.start_m, scenario.mission.goal_m)
-    progress = nullcontext() if silent else progress_bar(straight_m)
+    progress = progress_bar(straight_m, silent)
     with faults_told(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
         if onlookers is None:
             return fly_to_folder(scenario, folder, recording, report)

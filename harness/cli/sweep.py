@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -178,7 +178,7 @@ def _fly(
         resumable(path, INDEX),
         workers as flyers,
         CampaignFolder(path, runs, resume=resume) as folder,
-        nullcontext() if silent else step_bar() as bar,
+        step_bar(silent) as bar,
     ):
         over, not_reached = len(folder.done), 0
 
@@ -186,8 +186,7 @@ def _fly(
             nonlocal over, not_reached
             over += 1
             not_reached += answer.row["outcome"] != "reached"
-            if bar is not None:
-                bar(over, len(runs), f"flights, {not_reached} not at the goal" if not_reached else "flights")
+            bar(over, len(runs), f"flights, {not_reached} not at the goal" if not_reached else "flights")
 
         broken_off = fly_missing(runs, folder, flyers, report)
         if broken_off:

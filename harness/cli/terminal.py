@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import operator
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 from rich import box
 from rich.console import Console, JustifyMethod
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -37,30 +39,30 @@ OUTCOME_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
 
 
 @contextmanager
-def progress_bar(straight_m: float) -> Iterator[FlightReport]:
+def progress_bar(straight_m: float, silent: bool = False) -> Iterator[FlightReport]:
     """A progress bar of one flight on standard error; a line every ten seconds where that is not a terminal.
 
     Args:
         straight_m: distance from start to goal.
+        silent: nothing is shown.
     """
-    columns = (
-        TextColumn("{task.fields[time_s]:7.0f} s  {task.fields[speed_up]:5.0f} x real time"),
-        TextColumn("{task.fields[to_go_m]:8.0f} m to go  {task.description}"),
-    )
-    with _bar(*columns, time_s=0.0, speed_up=0.0, to_go_m=straight_m) as show:
+    with _bar(silent) as show:
+        begun_s = time.monotonic()
 
         def report(time_s: float, to_go_m: float, state: str) -> None:
             left_m, told = max(0.0, to_go_m), plain(state)
+            speed = time_s / max(time.monotonic() - begun_s, 1e-3)
+            bar = f"{time_s:7.0f} s  {speed:5.0f} x real time {left_m:8.0f} m to go  {told}"
             line = f"{time_s:.0f} s flown, {left_m:.0f} m to go, {told}"
-            show(max(0.0, straight_m - to_go_m), straight_m, told, line, time_s=time_s, to_go_m=left_m)
+            show(max(0.0, straight_m - to_go_m), straight_m, bar, line)
 
         yield report
 
 
 @contextmanager
-def step_bar() -> Iterator[StepReport]:
+def step_bar(silent: bool = False) -> Iterator[StepReport]:
     """A bar of steps done, with the time left, on standard error; without a terminal, lines likewise."""
-    with _bar(TextColumn("{task.description}"), TimeRemainingColumn()) as show:
+    with _bar(silent, TimeRemainingColumn()) as show:
 
         def report(done: int, of: int, what: str) -> None:
             told = f"{done} of {of}: {plain(what)}" if what else f"{done} of {of}"
@@ -70,49 +72,30 @@ def step_bar() -> Iterator[StepReport]:
 
 
 @contextmanager
-def _bar(*columns: TextColumn | TimeRemainingColumn, **fields: Any) -> Iterator[Callable[..., None]]:
-    """What shows progress: it takes what is done, the whole, a description, a line for a log, and fields."""
+def _bar(silent: bool, *columns: ProgressColumn) -> Iterator[Callable[[float, float, str, str], None]]:
+    """What shows progress: it takes what is done, the whole, a text beside the bar, and a line for a log."""
     console = Console(stderr=True)
-    if not console.is_terminal:
-        state = ["starting up"]
+    if silent:
+        yield lambda *_: None
+    elif console.is_terminal:
+        shown = (BarColumn(bar_width=20), TextColumn("{task.description}"), *columns)
+        with Progress(*shown, console=console, transient=True, speed_estimate_period=120.0) as bar:
+            task = bar.add_task("starting up", total=None)
+            yield lambda done, whole, told, _: bar.update(task, completed=done, total=whole, description=told)
+    else:
+        lines, over = ["starting up"], threading.Event()
 
-        def note(_done: float, _whole: float, _told: str, line: str, **_fields: float) -> None:
-            state[0] = line
+        def tell() -> None:
+            while not over.wait(LINE_EVERY_S):
+                say(f"wayproof: {lines[-1]}", err=True)
 
-        with _progress_lines(lambda: state[0]):
-            yield note
-        return
-    bar = Progress(
-        BarColumn(bar_width=20), *columns, console=console, transient=True, speed_estimate_period=120.0
-    )
-    with bar:
-        task = bar.add_task("starting up", total=None, **fields)
-
-        def show(done: float, whole: float, told: str, _line: str, **values: Any) -> None:
-            if "time_s" in values:
-                elapsed_s = bar.tasks[0].elapsed or 0.0
-                values["speed_up"] = values["time_s"] / elapsed_s if elapsed_s > 0 else 0.0
-            bar.update(task, completed=done, total=whole, description=told, **values)
-
-        yield show
-
-
-@contextmanager
-def _progress_lines(state: Callable[[], str]) -> Iterator[None]:
-    """Prints a line on standard error every ten seconds, for those who read a log."""
-    over = threading.Event()
-
-    def tell() -> None:
-        while not over.wait(LINE_EVERY_S):
-            say(f"wayproof: {state()}", err=True)
-
-    thread = threading.Thread(target=tell, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
+        thread = threading.Thread(target=tell, daemon=True)
+        thread.start()
+        try:
+            yield lambda _done, _whole, _told, line: operator.setitem(lines, 0, line)
+        finally:
+            over.set()
+            thread.join()
 
 
 def print_table(

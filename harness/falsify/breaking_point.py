@@ -20,7 +20,7 @@ from typing import Any, Final, Literal, TypeAlias
 from harness.analysis.claims import Claim, holds
 from harness.campaign.folder import claim_folder
 from harness.campaign.sampling import takes_whole_numbers
-from harness.falsify.search import Point, Search
+from harness.falsify.search import Search, Values, Vary
 from harness.files.crash import sentence
 from harness.files.errors import WriteError
 from harness.files.strict_yaml import InputError, as_spelt, loc_of
@@ -44,38 +44,6 @@ Flown: TypeAlias = Callable[[Scenario], Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
-class Vary:
-    """A key to be varied.
-
-    Attributes:
-        key: its path.
-        mild: its mild end.
-        hard: its hard end; below `mild` where smaller is harder.
-        whole: whether it takes whole numbers alone.
-        decimals: places after the point to which a value between the ends is rounded before it is flown.
-    """
-
-    key: str
-    mild: float
-    hard: float
-    whole: bool = False
-    decimals: int = 15
-
-    def value(self, displacement: float) -> float:
-        """Its value at a displacement from 0 (mild) to 1 (hard)."""
-        if displacement in (0.0, 1.0):
-            return self.hard if displacement else self.mild
-        value = self.mild + displacement * (self.hard - self.mild)
-        return round(value) if self.whole else round(value, self.decimals)
-
-    def snapped(self, displacement: float) -> float:
-        """The displacement of the value that is flown."""
-        if displacement in (0.0, 1.0):
-            return displacement
-        return (self.value(displacement) - self.mild) / (self.hard - self.mild)
-
-
-@dataclass(frozen=True)
 class Trial:
     """One flight.
 
@@ -86,8 +54,8 @@ class Trial:
         figures: those of `FIGURES`; the outcome is `error` where the software failed.
     """
 
-    displacement: Point
-    values: tuple[float, ...]
+    displacement: tuple[float, ...]
+    values: Values
     failed: bool
     figures: Mapping[str, Any]
 
@@ -118,7 +86,7 @@ class Breaking:
     settled: bool
     verdict: Literal["found", "not_found", "fails_at_the_mild_end"]
     found: Trial | None
-    passes: tuple[float, ...] | None
+    passes: Values | None
     trials: tuple[Trial, ...]
 
     def plain(self) -> dict[str, Any]:
@@ -166,15 +134,16 @@ def vary_of(
         Vary(key, mild, hard, takes_whole_numbers(base, loc_of(key)), _decimals(abs(hard - mild) * tolerance))
         for key, mild, hard in given
     )
-    diagonal = [(step / 8,) * len(vary) for step in range(9)]
-    for point in dict.fromkeys([*itertools.product((0.0, 1.0), repeat=len(vary)), *diagonal]):
-        scenario_at(load, vary, point)
+    ends = itertools.product(*((each.mild, each.hard) for each in vary))
+    diagonal = (tuple(each.value(step / 8) for each in vary) for step in range(9))
+    for values in dict.fromkeys([*ends, *diagonal]):
+        scenario_at(load, vary, values)
     return vary
 
 
-def scenario_at(load: Load, vary: Sequence[Vary], point: Point) -> Scenario:
+def scenario_at(load: Load, vary: Sequence[Vary], values: Values) -> Scenario:
     """The scenario under a condition; an InputError where there is none."""
-    return load([(each.key, number_text(each.value(place))) for each, place in zip(vary, point, strict=True)])
+    return load([(each.key, number_text(value)) for each, value in zip(vary, values, strict=True)])
 
 
 def _spelt(option: str, key: str) -> str:
@@ -222,30 +191,26 @@ def falsify(
         RunFolderError: the folder holds something else, or another process writes to it.
         WriteError: it cannot be written.
     """
-    trials: dict[Point, Trial] = {}
+    trials: dict[Values, Trial] = {}
 
-    def values(point: Point) -> tuple[float, ...]:
-        return tuple(each.value(place) for each, place in zip(vary, point, strict=True))
-
-    def judge(point: Point) -> bool:
-        figures = _flown(flown, scenario_at(load, vary, point))
+    def judge(values: Values) -> bool:
+        figures = _flown(flown, scenario_at(load, vary, values))
         failed = not holds(claim, figures)
         kept = {name: figures.get(name) for name in FIGURES}
-        trials[point] = Trial(point, values(point), failed, kept)
+        trials[values] = Trial(search.hardness(values), values, failed, kept)
         if progress is not None:
-            told = ", ".join(f"{value:.4g}" for value in values(point))
+            told = ", ".join(f"{value:.4g}" for value in values)
             progress(len(trials), conditions, f"{told}: {figures['outcome']}")
         return failed
 
-    def snap(point: Point) -> Point:
-        return tuple(each.snapped(place) for each, place in zip(vary, point, strict=True))
-
-    base = scenario_at(load, vary, (0.0,) * len(vary))
+    search = Search(vary, judge, conditions, tolerance)
+    base = scenario_at(load, vary, search.at(0.0))
     made = [each for each in (out, *out.parents) if not each.exists()]
     lock = claim_folder(out, "search", INDEX, SCHEMA)
     try:
-        search = Search(judge, conditions, tolerance, snap).run(len(vary))
-        mildest, passed = search.mildest, search.passed_below
+        mildest = search.run().mildest
+        found = trials[mildest] if mildest else None
+        hard = found is not None and max(found.displacement) > 0.0
         result = Breaking(
             base.name,
             base.planner.label,
@@ -257,9 +222,9 @@ def falsify(
             len(trials),
             search.steps,
             search.settled,
-            "found" if mildest and max(mildest) else "not_found" if not mildest else "fails_at_the_mild_end",
-            trials[mildest] if mildest else None,
-            values(passed) if passed else None,
+            "found" if hard else "not_found" if found is None else "fails_at_the_mild_end",
+            found,
+            search.passed_below,
             tuple(trials.values()),
         )
         _write(out, result.plain(), scenario_at(load, vary, mildest) if mildest else None)

@@ -170,7 +170,7 @@ def test_a_key_inside_a_list_can_be_varied(to_break: Path) -> None:
     vary = vary_of(load, [("obstacles.0.circle.radius_m", 100.0, 500.0)])
     assert vary[0].key == "obstacles[0].circle.radius_m"
     assert not vary[0].whole
-    circle = scenario_at(load, vary, (0.5,)).obstacles[0].circle
+    circle = scenario_at(load, vary, (vary[0].value(0.5),)).obstacles[0].circle
     assert circle is not None
     assert circle.radius_m == 300.0
 

@@ -8,24 +8,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.falsify.search import Point, Search
+from harness.falsify.search import Search, Values, Vary
 from harness.files.strict_yaml import InputError
 from tests.examples import examples
 
-Fails = Callable[[Point], bool]
+Fails = Callable[[Values], bool]
+EVENLY = Vary("key", 0.0, 1.0, decimals=17)
 
 
 def found(
     fails: Fails, keys: int = 1, conditions: int = 40, tolerance: float = 0.01
-) -> tuple[Search, list[Point]]:
+) -> tuple[Search, list[Values]]:
     """A search, and the conditions that it asked for."""
-    asked: list[Point] = []
+    asked: list[Values] = []
 
-    def judge(point: Point) -> bool:
+    def judge(point: Values) -> bool:
         asked.append(point)
         return fails(point)
 
-    return Search(judge, conditions, tolerance).run(keys), asked
+    return Search([EVENLY] * keys, judge, conditions, tolerance).run(), asked
 
 
 @given(st.floats(0.001, 1.0), st.sampled_from([0.1, 0.03, 0.004]))
@@ -48,7 +49,7 @@ Islands = st.lists(st.tuples(st.floats(0.01, 0.95), st.floats(0.005, 0.2)), min_
 def test_no_failing_range_as_wide_as_a_step_lies_below_the_answer(
     islands: list[tuple[float, float]], conditions: int, tolerance: float
 ) -> None:
-    def fails(point: Point) -> bool:
+    def fails(point: Values) -> bool:
         return any(start <= point[0] <= start + width for start, width in islands)
 
     result, asked = found(fails, conditions=conditions, tolerance=tolerance)
@@ -107,24 +108,24 @@ def test_a_key_that_does_nothing_goes_back_to_its_mild_end() -> None:
 
 
 def test_places_without_a_scenario_are_passed_over_away_from_the_diagonal() -> None:
-    def judge(point: Point) -> bool:
+    def judge(point: Values) -> bool:
         if point[0] < point[1] - 0.3:
             raise InputError("the goal lies inside an obstacle")
         return point[1] >= 0.7
 
-    result = Search(judge, 60, 0.01).run(2)
+    result = Search([EVENLY] * 2, judge, 60, 0.01).run()
     assert result.mildest == pytest.approx((0.4, 0.7), abs=0.02)
     with pytest.raises(InputError, match="inside an obstacle"):
-        Search(lambda point: judge((0.1, point[1])), 60, 0.01).run(2)
+        Search([EVENLY] * 2, lambda point: judge((0.1, point[1])), 60, 0.01).run()
 
 
 def test_points_that_stand_for_the_same_value_are_tried_once() -> None:
-    asked: list[Point] = []
+    asked: list[Values] = []
 
-    def judge(point: Point) -> bool:
+    def judge(point: Values) -> bool:
         asked.append(point)
-        return point[0] >= 0.5
+        return point[0] >= 2
 
-    result = Search(judge, 40, 0.001, snap=lambda point: (round(point[0] * 4) / 4,)).run(1)
-    assert asked == [(0.0,), (0.25,), (0.5,)]
-    assert (result.mildest, result.passed_below, result.settled) == ((0.5,), (0.25,), True)
+    result = Search([Vary("quarters", 0.0, 4.0, whole=True)], judge, 40, 0.001).run()
+    assert asked == [(0,), (1,), (2,)]
+    assert (result.mildest, result.passed_below, result.settled) == ((2,), (1,), True)
