@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import sys
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ FRAME = b"\x80\x05\x95"
 @functools.cache
 def seal() -> None:
     """Has numba write a SHA-256 behind what it keeps, and compile anew where that is another."""
+    _put_off_linear_algebra()
     from numba.core.caching import IndexDataCacheFile as File
 
     kept: Any = File
@@ -37,6 +39,18 @@ def seal() -> None:
         return load_data(self, name)
 
     kept._dump, kept._load_index, kept._load_data = sealed_dump, checked_index, checked_data
+
+
+def _put_off_linear_algebra() -> None:
+    """Has numba import `scipy.linalg`, a seventh of a second, when code asks for it, not to see whether it is there."""
+    linalg: Any = import_module("numba.np.linalg")
+    ensure = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None  # which `arraymath` calls once, when it is imported
+    try:
+        arraymath: Any = import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = ensure
+    arraymath.ensure_blas = ensure
 
 
 def _is_whole(path: Path, is_index: bool = False) -> bool:

@@ -46,6 +46,37 @@ def test_a_damaged_kernel_is_compiled_anew(ending: str, place: float, tmp_path: 
     assert called(tmp_path) == ("42.0 1", [])
 
 
+ALGEBRA = """
+import sys
+from planner.kernel_cache import seal
+seal()
+import numpy as np
+import plain
+assert plain.twice(2.0) == 4.0
+assert "scipy.linalg" not in sys.modules
+import kernel
+a = np.array([[2.0, 1.0], [1.0, 3.0]])
+print(*kernel.algebra(a).ravel(), sum(kernel.algebra.stats.cache_hits.values()))
+"""
+
+
+def test_linear_algebra_of_a_users_kernel_is_there_when_it_is_asked_for(tmp_path: Path) -> None:
+    """Compiled, and loaded: A x A^-1 + cov(A), by hand, of A = [[2, 1], [1, 3]]; other kernels import none of it."""
+    body = "    return np.dot(x, np.linalg.inv(x)) + np.cov(x)\n"
+    head = "import numba\nimport numpy as np\n@numba.njit('float64[:, ::1](float64[:, ::1])', cache=True)\n"
+    (tmp_path / "kernel.py").write_text(f"{head}def algebra(x):\n{body}")
+    (tmp_path / "plain.py").write_text(KERNEL)
+    path = f"{ROOT}{os.pathsep}{tmp_path}"
+    keys = {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    for hits in ("0", "1"):
+        done = subprocess.run(
+            [sys.executable, "-c", ALGEBRA], env=keys, capture_output=True, text=True, check=True
+        )
+        *numbers, loaded = done.stdout.split()
+        assert [float(each) for each in numbers] == pytest.approx([1.5, -1.0, -1.0, 3.0])
+        assert loaded == hits
+
+
 LIST = """
 from aircraft import airframes
 airframes.aircraft_names = lambda: ("aerosonde",)
