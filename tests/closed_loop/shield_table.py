@@ -3,13 +3,15 @@
 Flight number n takes planner n modulo their count, and one world of 2.0 x 1.4 km for all planners of a round. Each row
 goes into the CSV as it is flown; a second call goes on after the last. Contact and departure are judged by shapely from
 the track and the true obstacles. Those that people use are flown bare in the same world too. Prints the table.
-`ROWS.csv FLIGHTS 0 2` flies the first of two parts, for two processors; `ROWS0.csv ROWS1.csv` prints the table of both.
+`ROWS.csv FLIGHTS 0 2` flies the first of two parts, for two processors; `ROWS0.csv ROWS1.csv` prints the table of both,
+and `ROWS0.csv ROWS1.csv planner/MEASURED.md` puts it there.
 """
 
 from __future__ import annotations
 
 import csv
 import math
+import re
 import sys
 import time
 from pathlib import Path
@@ -29,6 +31,16 @@ from tests.closed_loop.hostile import HOSTILE
 KINDS: Final = ("improved_bug", "tangent_bug", "bug2", "bug1", "vfh_plus", "bendy_ruler", "mppi")
 OWN: Final = "rolling_window"
 """It has the shield built in."""
+TOLD: Final = {
+    "Straight": "straight at the goal",
+    "Anywhere": "corners at random",
+    "Outwards": "out of the area",
+    "Raising": "raises after 20 s",
+    "NotANumber": "NaN after 20 s",
+    "Kinked": "zigzag of right angles",
+    "Teleporting": "begins 3 km away",
+}
+"""What the hostile planners do."""
 PLANNERS: Final = (OWN, *KINDS, *(each.__name__ for each in HOSTILE))
 PAIRED: Final = (*KINDS, "Straight", "Anywhere")
 AREA: Final = (0.0, 0.0, 2000.0, 1400.0)
@@ -167,7 +179,7 @@ def table(rows: pd.DataFrame) -> str:
         open_ = mine[mine.world % 3 != 0]
         own = f"{mine.own_p50_ms.median():.1f}, {mine.own_p99_ms.median():.1f}" if mine.calls.sum() else "-"
         told.append(
-            f"| `{name}` | {len(mine)} | {(mine.outcome == 'reached').sum()} | "
+            f"| {TOLD.get(name, f'`{name}`')} | {len(mine)} | {(mine.outcome == 'reached').sum()} | "
             f"{(open_.outcome == 'reached').sum()} of {len(open_)} | {mine.contact.sum()}, {mine.departed.sum()} | "
             f"{bare_hits} | {ratio} | {refused} | {mine.backup_s.mean():.1f} | {own} |"
         )
@@ -177,6 +189,17 @@ def table(rows: pd.DataFrame) -> str:
         bound = f"below {100 * upper(hits, flights):.2f} % at 95 %"
         told += [f"{what}: {hits} of {flights}, {bound}; bare {bare[what].sum()} of {len(bare)}"]
     return "\n".join(told)
+
+
+def put(table: str, file: Path) -> None:
+    """Puts the tables of a text into a Markdown file, in place of those that have the same heads."""
+    old = file.read_text()
+    for new in re.findall(r"(?m)(?:^\|.*\n?)+", table):
+        head, rows = new.split("\n", 1)
+        begin = old.index(head)
+        end = old.find("\n\n", begin)
+        old = f"{old[:begin]}{head}\n{rows.rstrip()}{old[end:]}"
+    file.write_text(old)
 
 
 def main(file: Path, flights: int, part: int = 0, parts: int = 1) -> None:
@@ -197,7 +220,10 @@ def main(file: Path, flights: int, part: int = 0, parts: int = 1) -> None:
 
 if __name__ == "__main__":
     given = sys.argv[1:]
-    if all(each.endswith(".csv") for each in given):
-        print(table(pd.concat([pd.read_csv(each) for each in given])))
+    if given[-1].endswith((".csv", ".md")):
+        text = table(pd.concat([pd.read_csv(each) for each in given if each.endswith(".csv")]))
+        print(text)
+        if given[-1].endswith(".md"):
+            put(text, Path(given[-1]))
     else:
         main(Path(given[0]), *map(int, given[1:]))

@@ -1,6 +1,7 @@
 """The standing table of `planner/MEASURED.md` from a campaign: `python -m tests.closed_loop.standing_table FOLDER`.
 
 A row each planner and wind, in Markdown; then every planner in pairs with `rolling_window` in the same world and wind.
+With `planner/MEASURED.md` behind it, the tables are put there.
 The campaign's page has the rest; `wayproof report FOLDER --format latex` and `csv` have its own table.
 """
 
@@ -16,7 +17,7 @@ from scipy import stats
 
 from harness.campaign.cell import wilson
 from harness.campaign.paired import mean_estimate
-from tests.closed_loop.shield_table import upper
+from tests.closed_loop.shield_table import put, upper
 
 WIND: Final = "environment.wind.speed_mps"
 YARDSTICK: Final = "rolling_window"
@@ -91,16 +92,22 @@ def pairs(rows: pd.DataFrame) -> list[str]:
     return told
 
 
-def main(folder: Path) -> None:
-    """Prints the tables."""
+def tables(folder: Path) -> str:
+    """Both tables."""
     rows = load(folder)
-    print(f"| {' | '.join(HEAD)} |\n|{' --- |' * len(HEAD)}")
+    told = [f"| {' | '.join(HEAD)} |", f"|{' --- |' * len(HEAD)}"]
     for name in rows.planner.unique():
-        for wind, of in rows[rows.planner == name].groupby(WIND):
-            print(row(name, wind, of))
-    print(f"\n| planner | pairs | length over `{YARDSTICK}`, mean [95 %] | p |\n| --- | --- | --- | --- |")
-    print("\n".join(pairs(rows)))
+        told += [row(name, wind, of) for wind, of in rows[rows.planner == name].groupby(WIND)]
+    told += [
+        "",
+        f"| planner | pairs | length over `{YARDSTICK}`, mean [95 %] | p |",
+        "| --- | --- | --- | --- |",
+    ]
+    return "\n".join((*told, *pairs(rows)))
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    text = tables(Path(sys.argv[1]))
+    print(text)
+    if len(sys.argv) > 2:
+        put(text, Path(sys.argv[2]))
