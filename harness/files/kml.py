@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 
 from harness.files.input_file import InputError
 from harness.files.values import finite, shown
-from harness.files.wording import counted
 from harness.files.zip_archive import unpacked
 
 LINES: Final = ("LineString", "Track")
@@ -54,53 +53,53 @@ class Shape(NamedTuple):
 
 
 class Kml(NamedTuple):
-    """What a KML file has: lines, polygons, how many of what else, and notes on further files of its archive."""
+    """What a KML file has: lines, polygons, and how many of what else; its name for faults."""
 
     source: str
     lines: tuple[Shape, ...]
     polygons: tuple[Shape, ...]
     others: Counter[str]
-    notes: tuple[str, ...]
 
 
 def read_kml(data: bytes, source: str, most: int) -> Kml:
-    """Reads a KML file.
-
-    Args:
-        data: its bytes.
-        source: begins a fault: the file, or nothing.
-        most: bytes that an archive may unpack to.
+    """Reads the bytes of a KML file, or of an archive with one that unpacks to at most `most` bytes.
 
     Raises:
-        InputError: it is none, cannot be unpacked, has a coordinate that is no number, or what is refused by name.
+        InputError: it is none, cannot be unpacked, has a coordinate that is no number, or what is refused by name. The
+            text begins with `source`, the file or nothing.
     """
-    notes: tuple[str, ...] = ()
     if data.startswith(b"PK"):
         try:
-            name, data, further = unpacked(data, ".kml", most, "doc.kml")
+            name, data = unpacked(data, ".kml", most)
         except InputError as error:
             raise InputError(f"{source}: {error}" if source else str(error)) from error
         source = f"{source} ({name})" if source else ""
-        notes = (f"{counted(further, 'further KML file')} in the archive passed over",) if further else ()
     root = parsed_xml(data, source, "kml")
     lines: list[Shape] = []
     polygons: list[Shape] = []
     for number, each in enumerate(named(root, "Placemark"), start=1):
         name, kept = shown(text_of(each, "name") or f"Placemark {number}"), dict(_data(each))
         where = f"{source}: {name}" if source else name
-        for kind in LINES:
-            for line in named(each, kind):
-                points = _points(line, where, "point")
-                lines.append(Shape(name, text_of(line, "altitudeMode"), (points,), kept))
-        for area in named(each, "Polygon"):
-            inner = [ring for boundary in BOUNDARIES for ring in named(area, boundary)]
-            if not inner:
-                raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
-            rings = tuple(_points(ring, where, "corner") for ring in inner)
-            polygons.append(Shape(name, text_of(area, "altitudeMode"), rings, kept))
+        lines += [
+            Shape(name, text_of(line, "altitudeMode"), (_points(line, where, "point"),), kept)
+            for kind in LINES
+            for line in named(each, kind)
+        ]
+        polygons += [
+            Shape(name, text_of(area, "altitudeMode"), _rings(area, where), kept)
+            for area in named(each, "Polygon")
+        ]
     others = Counter(kind for each in root.iter() if (kind := name_of(each)) in OTHERS)
     others["LinearRing"] -= sum(len(each.rings) for each in polygons)
-    return Kml(source, tuple(lines), tuple(polygons), others, notes)
+    return Kml(source, tuple(lines), tuple(polygons), others)
+
+
+def _rings(area: Element, where: str) -> tuple[tuple[Point, ...], ...]:
+    """The boundaries of a polygon, the outer one first."""
+    rings = [ring for boundary in BOUNDARIES for ring in named(area, boundary)]
+    if not rings:
+        raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
+    return tuple(_points(ring, where, "corner") for ring in rings)
 
 
 def parsed_xml(data: bytes, source: str, root: str) -> Element:

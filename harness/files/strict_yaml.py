@@ -34,8 +34,11 @@ Scalar: TypeAlias = str | int | float | bool | None
 Loc: TypeAlias = tuple[str | int, ...]
 
 _LOADER: Final = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
-_NULL: Final = frozenset(("", "~", "null", "Null", "NULL"))
-_BOOL: Final = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+_CONSTANTS: Final[dict[str, bool | None]] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
 _INT: Final = re.compile(r"[-+]?[0-9]{1,18}")
 _BASED: Final = re.compile(r"0o[0-7]{1,18}|0x[0-9a-fA-F]{1,15}")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
@@ -46,12 +49,7 @@ _UNPRINTABLE: Final = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A value and where it was written.
-
-    Attributes:
-        value: a scalar, a dict of nodes by key, or a tuple of nodes.
-        line: line of its key, or of the value itself in a list; from 1, or COMMAND_LINE, or IN_PYTHON.
-    """
+    """A scalar, a dict of nodes by key, or a tuple of nodes; and the line of its key, or in a list its own."""
 
     value: Scalar | dict[str, Node] | tuple[Node, ...]
     line: int
@@ -66,11 +64,7 @@ class Node:
 
     def moved(self, line: int) -> Node:
         """The same value, every part of it from `line`."""
-        if isinstance(self.value, dict):
-            return Node({key: node.moved(line) for key, node in self.value.items()}, line)
-        if isinstance(self.value, tuple):
-            return Node(tuple(node.moved(line) for node in self.value), line)
-        return Node(self.value, line)
+        return node_of(self.plain(), line)
 
     def at(self, loc: Loc) -> Node | None:
         """The value at `loc`; None where there is none."""
@@ -125,11 +119,7 @@ def loc_of(path: str) -> Loc:
 
 
 def as_spelt(path: str) -> str:
-    """A key path as messages and tables spell it, however it was given: `obstacles.2.circle` as `obstacles[2].circle`.
-
-    Raises:
-        ValueError: as `loc_of`.
-    """
+    """A key path as messages and tables spell it: `obstacles.2.circle` as `obstacles[2].circle`."""
     return key_path(loc_of(path))
 
 
@@ -140,24 +130,12 @@ def fault_line(source: str, line: int, loc: Loc, sentence: str) -> str:
 
 
 def read(path: Path) -> Node:
-    """Reads one YAML file.
-
-    Raises:
-        InputError: the file cannot be opened, is too large, is not UTF-8 text or is not strict YAML.
-    """
+    """Reads one YAML file; an InputError says why it cannot be opened, is too large, no UTF-8 or not strict YAML."""
     return parse(read_text(path, MAX_BYTES, "a scenario, in YAML"), str(path))
 
 
 def parse(text: str, source: str) -> Node:
-    """Parses one YAML document.
-
-    Args:
-        text: the document.
-        source: what its faults name it, usually the path.
-
-    Raises:
-        InputError: it is not strict YAML.
-    """
+    """Parses one YAML document; faults, InputErrors, name it by `source`, usually the path."""
     if match := _UNPRINTABLE.search(text):
         line = text.count("\n", 0, match.start()) + 1
         raise InputError(
@@ -168,19 +146,15 @@ def parse(text: str, source: str) -> Node:
 
 def value_of(text: str) -> Scalar:
     """What a plain (unquoted) scalar stands for."""
-    if text in _NULL:
-        return None
-    if text in _BOOL:
-        return _BOOL[text]
+    if text in _CONSTANTS:
+        return _CONSTANTS[text]
     if _INT.fullmatch(text):
         return int(text)
     if _BASED.fullmatch(text):
         return int(text, 0)
     if _FLOAT.fullmatch(text):
         return float(text)
-    if _NOT_FINITE.fullmatch(text):
-        return float(text.replace(".", ""))
-    return text
+    return float(text.replace(".", "")) if _NOT_FINITE.fullmatch(text) else text
 
 
 class _Composer:
@@ -238,8 +212,7 @@ class _Composer:
             return Node(self.sequence(loc), line)
         if not isinstance(event, yaml.ScalarEvent):
             raise self.fault(_line(event), loc, "is not a value; must be a scalar, a list or a mapping")
-        plain_style = event.implicit[0]
-        return Node(value_of(event.value) if plain_style else event.value, line)
+        return Node(value_of(event.value) if event.implicit[0] else event.value, line)
 
     def check_bare(self, event: yaml.Event, loc: Loc) -> None:
         """Refuses anchors and tags."""
@@ -287,30 +260,25 @@ def is_key(text: str) -> bool:
 KEY_RULE: Final = f"a key must be printable and at most {MAX_KEY_LENGTH} characters long"
 
 
-def replaced(node: Node, loc: Loc, new: Node) -> Node:
-    """A copy of `node` with `new` at `loc`; mappings on the way are made where they are missing.
+def replaced(node: Node, loc: Loc, new: Node, depth: int = 0) -> Node:
+    """A copy of `node` with `new` at `loc` behind `depth` steps; mappings on the way are made where they are missing.
 
     Raises:
         InputError: a step of `loc` leads into a scalar or past the end of a list.
     """
-    return _replaced(node, loc, 0, new)
-
-
-def _replaced(node: Node, loc: Loc, depth: int, new: Node) -> Node:
     if depth == len(loc):
         return new
-    step, value = loc[depth], node.value
+    step, value, where = loc[depth], node.value, min(new.line, COMMAND_LINE)
     if isinstance(value, tuple) and isinstance(step, int):
         if step >= len(value):
             sentence = f"does not exist; there are {len(value)}, counted from 0"
-            raise InputError(fault_line("", min(new.line, COMMAND_LINE), loc[: depth + 1], sentence))
-        inner = _replaced(value[step], loc, depth + 1, new)
+            raise InputError(fault_line("", where, loc[: depth + 1], sentence))
+        inner = replaced(value[step], loc, new, depth + 1)
         return Node((*value[:step], inner, *value[step + 1 :]), node.line)
     if (value is None or isinstance(value, dict)) and isinstance(step, str):
         entries = value or {}
-        inner = _replaced(entries.get(step, Node({}, min(new.line, COMMAND_LINE))), loc, depth + 1, new)
+        inner = replaced(entries.get(step, Node({}, where)), loc, new, depth + 1)
         return Node({**entries, step: inner}, node.line)
-    where = min(new.line, COMMAND_LINE)
     raise InputError(fault_line("", where, loc[: depth + 1], "no such key; see `wayproof schema`"))
 
 

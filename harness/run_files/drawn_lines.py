@@ -90,27 +90,12 @@ def read_csv(text: str, source: str) -> PathAsRead:
     Raises:
         InputError: it is none.
     """
-    lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
-    rows = csv.reader(lines)
-    try:
-        filled = [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise InputError(f"{source}: is not CSV ({error})") from error
-    line, header = filled[0] if filled else (1, [])
+    (line, header), *filled = _filled(text, source) or [(1, [])]
     header = [name.strip().lower() for name in header]
-    names = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
-    if names is None:
-        raise InputError(
-            f"{source}:{line}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
-            "latitude_deg,longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas"
-        )
-    heights = [name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]
+    names, heights = _columns(header, f"{source}:{line}")
     wanted = (*names, *heights)
-    for name in wanted:
-        if header.count(name) > 1:
-            raise InputError(f"{source}:{line}: {name}: stands {header.count(name)} times; must stand once")
     found = []
-    for number, row in filled[1:]:
+    for number, row in filled:
         if len(row) != len(header):
             raise InputError(f"{source}:{number}: has {len(row)} cells, the header {len(header)}")
         cells = dict(zip(header, row, strict=True))
@@ -124,6 +109,30 @@ def read_csv(text: str, source: str) -> PathAsRead:
         above_ground=heights == [ABOVE_GROUND],
         notes=(f"columns passed over: {', '.join(others[:MOST_NAMED])}{more}",) if others else (),
     )
+
+
+def _filled(text: str, source: str) -> list[tuple[int, list[str]]]:
+    """The rows that are neither blank nor a comment, with their lines."""
+    rows = csv.reader(["" if line.lstrip().startswith("#") else line for line in text.splitlines()])
+    try:
+        return [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise InputError(f"{source}: is not CSV ({error})") from error
+
+
+def _columns(header: list[str], where: str) -> tuple[tuple[str, str], list[str]]:
+    """The columns of the place, and that of the altitude where there is one."""
+    names = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
+    if names is None:
+        raise InputError(
+            f"{where}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
+            "latitude_deg,longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas"
+        )
+    heights = [name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]
+    for name in (*names, *heights):
+        if header.count(name) > 1:
+            raise InputError(f"{where}: {name}: stands {header.count(name)} times; must stand once")
+    return names, heights
 
 
 class _Shape(NamedTuple):
@@ -222,7 +231,6 @@ def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
         Fence(each.name, False, tuple(tuple(point[:2] for point in ring) for ring in each.rings))
         for each in found.polygons
     ]
-    notes += found.notes
     return _of_points(points, f"{source}: {line.name}", fences, notes, line.mode == RELATIVE)
 
 

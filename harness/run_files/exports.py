@@ -42,15 +42,9 @@ PX4, FIXED_WING = 12, 1
 
 @dataclass(frozen=True, eq=False)
 class ExportedPath:
-    """A path on the WGS84 ellipsoid. All arrays are equally long.
+    """A path on the WGS84 ellipsoid, "flown" or "planned": (n, 2) geodetic latitude and longitude, rounded for a file.
 
-    Attributes:
-        what: "flown" or "planned".
-        scenario: of the run.
-        degrees: (n, 2) geodetic latitude and longitude, rounded for a file.
-        altitude_m: (n,) above mean sea level.
-        time_s: (n,) simulated time at which the aircraft was there, or followed the plan there.
-        started: date and time of `time_s` 0.
+    Altitudes (n,) are above mean sea level; times (n,) are simulated, since the date at which the run was started.
     """
 
     what: str
@@ -70,12 +64,7 @@ class Exported:
 
 
 def exported(run: Run, form: str, what: str) -> Exported:
-    """A run as a file of another tool.
-
-    Args:
-        run: the run.
-        form: one of `FORMATS`.
-        what: "flown": the track; "planned": of every plan the part that was in effect.
+    """A run as a file of another tool, in one of `FORMATS`: what was flown, or of every plan what was in effect.
 
     Raises:
         RunFolderError: the run has no such path.
@@ -115,11 +104,7 @@ def _path_of(run: Run, what: str) -> ExportedPath:
 
 
 def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
-    """The plan in effect, row by row of the track.
-
-    Returns:
-        (n, 2) east and north, and the (n,) rows of the track that they go with; both empty where nothing was planned.
-    """
+    """(n, 2) places of the plan in effect, row by row of the track, and the (n,) rows that they go with."""
     track = run.track
     points = np.full((len(track), 2), np.nan)
     for plan in run.plans:

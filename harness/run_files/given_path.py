@@ -45,10 +45,8 @@ WIND_SAMPLES: Final = 9
 class Tightest:
     """How tightly corners are rounded at the most, one value each or (m,) point by point.
 
-    Attributes:
-        radius_m: least radius of the aircraft in calm air.
-        limit_m: how far off a corner may be passed.
-        wind: over the airspeed, east + i north where it blows to.
+    By the least radius of the aircraft in calm air, how far off a corner may be passed, and the wind over the airspeed,
+    east + i north where it blows to.
     """
 
     radius_m: float | FloatArray
@@ -62,12 +60,10 @@ class Tightest:
 
 @dataclass(frozen=True)
 class CutCorner:
-    """A corner that the turn radius does not let an aircraft fly through.
+    """A corner that the turn radius does not let an aircraft fly through, and where it is.
 
     Attributes:
         waypoint: its number in the path as given, the first being 0.
-        east_m: where it is.
-        north_m: where it is.
         turn_deg: the turn asked for, positive to the left.
         radius_m: of the arc that is flown instead; 0 where a loiter's circle is joined without one.
         cut_m: how far from the corner that arc passes.
@@ -120,21 +116,15 @@ def fly_by(
     tightest: Tightest | None = None,
     every: bool = False,
 ) -> FlyBy:
-    """Rounds the corners of a polyline.
+    """Rounds the corners of a polyline of (m, 2) points, not all in one place.
 
     The arc at a corner of angle `a` that touches the legs `t` before and after it has the radius
     `t / tan(a / 2)` and passes the corner at `radius (1 / cos(a / 2) - 1)`. It is as wide as it can be without
-    passing further off than `free_cut_m`, but not tighter than `radius_m` where there is room for that.
-    Neighbouring corners share the leg between them in proportion to what they need. Corners sharper than `PAST_RAD` are
-    flown past the next leg and back onto it, the turn beginning one radius before the corner.
-
-    Args:
-        points_m: (m, 2) points, not all in one place.
-        radius_m: smallest radius that the aircraft should fly, > 0; (m,) if it differs from point to point.
-        free_cut_m: a corner may be passed at this distance wherever that makes its arc wider, > 0; likewise.
-        tightest: corners that would be cut by more than `LIMIT_SHARE` of what they may be passed at are flown more
-            tightly, down to this; None: they are not.
-        every: every corner is among the corners, however little it is cut.
+    passing further off than `free_cut_m`, but not tighter than `radius_m` where there is room for that; both are > 0,
+    (m,) if they differ from point to point. Corners that would be cut by more than `LIMIT_SHARE` of what they may be
+    passed at are flown more tightly, down to `tightest`. Neighbouring corners share the leg between them in proportion
+    to what they need. Corners sharper than `PAST_RAD` are flown past the next leg and back onto it, the turn beginning
+    one radius before the corner. With `every`, corners are told however little they are cut.
     """
     kept = _needed(points_m)
     least, free = (np.broadcast_to(each, len(points_m))[kept][1:-1] for each in (radius_m, free_cut_m))

@@ -26,12 +26,9 @@ Fix = dict[str, Any]
 
 
 def read_igc(text: str, source: str) -> PathAsRead:
-    """The fixes of a flight, from the takeoff to the landing, at their GNSS altitude.
+    """The fixes of a flight, from the takeoff to the landing, at their GNSS altitude; InputError without a flight.
 
     Where the logger has no GNSS altitude (0 or no 3-D fix), all of it is at the pressure altitude.
-
-    Raises:
-        InputError: it is no IGC file, has no flight in it, or aerofiles is not installed.
     """
     fixes, broken = igc_fixes(text, source)
     placed = [fix for fix in fixes if abs(fix["lat"]) > 1e-9 or abs(fix["lon"]) > 1e-9]

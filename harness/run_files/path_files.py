@@ -52,7 +52,7 @@ PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"|"groundStation"\s*:\s*"Missio
 
 @dataclass(frozen=True, eq=False)
 class PathAsGiven:
-    """A path as it was given.
+    """A path as it was given, with areas that come with it and notes on what does not change the path.
 
     Attributes:
         source: the file, for faults.
@@ -61,8 +61,6 @@ class PathAsGiven:
         altitudes_m: (n,) above mean sea level; (0,) where the file does not say, and for a mission.
         above_ground: the altitudes are above the ground instead.
         mission: what is flown, in the plane, where it is a mission; None for a line that is wanted as drawn.
-        fences: areas that come with it.
-        notes: what else is in the file and does not change the path, a line each.
     """
 
     source: str
@@ -84,7 +82,7 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
     """Reads a path; the name's ending says how it is written.
 
     Args:
-        path: .csv, .geojson or .json, .kml or .kmz, .gpx, .igc; or a mission: .plan, .waypoints or .txt, .mission.
+        path: the file.
         any_altitude: the altitudes of a drawn line are left out, for a flight whose altitude is given otherwise.
         origin_deg: latitude and longitude of east = north = 0; None: those of the first point of a path in degrees.
 
@@ -144,10 +142,7 @@ def _of_mission(found: MissionAsRead, origin_deg: Place | None) -> PathAsGiven:
 
 
 def given_points(points: Any) -> PathAsGiven:
-    """A drawn path from points in the local plane.
-
-    Args:
-        points: (n, 2) east, north in metres; (n, 3) with the altitude above mean sea level, linear along legs.
+    """A drawn path from points in the local plane, (n, 2) or with altitudes above the sea (n, 3), in metres.
 
     Raises:
         InputError: they are no such array, not finite, too far, or all in one place.

@@ -64,16 +64,7 @@ WHOLE = "plan_index"
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A complete run, read back.
-
-    Attributes:
-        folder: where it lies.
-        scenario_yaml: the scenario as flown, YAML text.
-        manifest: versions, platform, command, start time.
-        track: the flown track.
-        plans: the accepted plans, in order.
-        metrics: the content of `metrics.json`.
-    """
+    """A complete run, read back; `scenario_yaml` is the scenario as flown, the plans are in order."""
 
     folder: Path
     scenario_yaml: str
@@ -105,12 +96,8 @@ class RunFolder:
     ) -> RunFolder:
         """Makes the folder, marked incomplete, with scenario and manifest; removes a former run's files.
 
-        Args:
-            path: the folder; made with its parents where missing.
-            scenario_yaml: the scenario as flown, all defaults filled in.
-            command: command line, for the manifest.
-            sources: path and SHA-256 of each file that obstacles were made of, for the manifest.
-            turn_radius_m: smallest radius that a plan may ask for, for the manifest.
+        The scenario is that as flown, all defaults filled in. The manifest has the command line, path and SHA-256 of
+        each file that obstacles were made of, and the smallest radius that a plan may ask for.
 
         Raises:
             RunFolderError: the path is a file, a folder with other things in it or that another process is
@@ -152,9 +139,7 @@ class RunFolder:
         return self.path / RECORDING
 
     def finish(self, track: Track, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
-        """Writes track, plans and metrics, then marks the run complete.
-
-        Call it last: after the recording is closed.
+        """Writes track, plans and metrics, then marks the run complete: last, after the recording is closed.
 
         Raises:
             RunFolderError: the track has no rows.
@@ -171,11 +156,8 @@ class RunFolder:
     def log_events(self, events: Sequence[tuple[float, str, str]]) -> None:
         """Writes the log of events as text: a row each of simulated time (s), level and sentence."""
         text = io.StringIO()
-        rows = (
-            ("time_s", "level", "text"),
-            *((f"{at:g}", level, printable(said)) for at, level, said in events),
-        )
-        csv.writer(text, lineterminator="\n").writerows(rows)
+        rows = ((f"{at:g}", level, printable(said)) for at, level, said in events)
+        csv.writer(text, lineterminator="\n").writerows((("time_s", "level", "text"), *rows))
         replace_text(self.path / EVENTS, text.getvalue())
 
     def leave(self, track: Track, plans: Sequence[AcceptedPlan]) -> None:
@@ -212,8 +194,7 @@ def load_run(path: Path) -> Run:
     """Reads a complete run back.
 
     Raises:
-        RunFolderError: `path` is not a run folder, its run is incomplete, or a file of it is missing or
-            damaged.
+        RunFolderError: it is no run folder, its run is incomplete, or a file of it is missing or damaged.
     """
     manifest = read_index(path / MANIFEST, SCHEMA)
     if manifest is None:
@@ -245,13 +226,8 @@ def load_run(path: Path) -> Run:
 
 
 WRONG_CONTENT: Final = (
-    RecursionError,
-    AttributeError,
-    LookupError,
-    TypeError,
-    ValueError,
-    ArithmeticError,
-    MemoryError,
+    *(RecursionError, AttributeError, LookupError, TypeError),
+    *(ValueError, ArithmeticError, MemoryError),
 )
 """What reading values raises that are not what they should be."""
 

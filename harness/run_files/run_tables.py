@@ -30,19 +30,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PlanRow:
-    """One row of `plans.parquet`.
+    """One row of `plans.parquet`: a plan, in effect from a simulated time on.
 
     Attributes:
-        plan_index: 0 for the first plan.
-        time_s: in effect from this simulated time on.
         status: how the planner's call ended, a value of `planner.interface.PlanStatus`.
         compute_ms: processor time of the call that found it.
         waypoints_m: (k, 2) east, north.
         path_m: (m, 2) dense polyline, east, north.
         segments: (n, 6) the same path exactly, as in `planner.interface.Path`.
         loiter: whether its last segment is a full circle, flown for ever.
-        length_m: length of the path.
-        max_curvature_1pm: its largest absolute curvature.
         reason: the planner's sentence on it; empty in folders of older versions.
     """
 

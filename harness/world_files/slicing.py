@@ -115,16 +115,13 @@ def _solid(part: Part, shape: Any, band: HeightBand, ground: KnownGround) -> lis
     heights, corner = _ground_below(part, shape, ground) if on_ground else (np.zeros((1, 1)), (0.0, 0.0))
     if not heights.size or not np.isfinite(heights).all():
         return None
-    lows, tops = (
-        limit.height_m + (heights if limit.datum is Datum.GROUND else 0.0 * heights)
-        for limit in (part.bottom, part.top)
-    )
+    lows, tops = (each.height_m + heights * (each.datum is Datum.GROUND) for each in (part.bottom, part.top))
     solid = Solid(shape, float(lows.min()), float(tops.max()))
     mask = (lows <= band.high_m) & (tops >= band.low_m)
     if part.rigid:  # it stands level, as low and as high as its limits are anywhere
-        mask = np.array([[solid.low_m <= band.high_m and solid.high_m >= band.low_m]])
+        mask = np.array([[solid.low_m <= band.high_m]]) & (solid.high_m >= band.low_m)
     if mask.all() or not mask.any() or ground.field is None:
-        return [solid] if mask.all() else []
+        return [solid] * bool(mask.all())
     spacing = ground.field.spacing_m
     placed = shapely.transform(outlines(mask)[0], lambda p: p * spacing + corner)
     return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]

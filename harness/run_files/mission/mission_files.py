@@ -93,11 +93,11 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
         raise InputError(f"{source}: has no items; the first is home, the others are the path")
     notes: list[str] = []
     items = _numbered(items, notes)
-    home: tuple[float | None, ...] = (None, None, None)
-    first, above = items[0], FRAMES.get(items[0].frame, SEA)
-    if first.command == commands.WAYPOINT and (first.number == 0 or above == SEA):
-        home, items = (*(first.position or (None, None)), first.params[6]), items[1:]
-        if above != SEA and home[2]:
+    home: Sequence[float | None] = (None, None, None)
+    if _is_home(items[0]):
+        first, *items = items
+        home = (*(first.position or (None, None)), first.params[6])
+        if FRAMES.get(first.frame, SEA) != SEA and home[2]:
             told = f"its altitude, {home[2]:g} m, is taken as above the sea"
             notes.append(
                 f"its first item is home, as autopilots have it, though of frame {first.frame}: {told}"
@@ -111,8 +111,13 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
         )
         told = "`wayproof world` takes fences, and `check` takes them beside a mission"
         raise InputError(f"{source}: has no items to fly to, but {' and '.join(held)}; {told}")
-    fences = Fences(item_fences(items, first.position if home[0] is not None else None), inside_all=True)
-    return _mission(source, flown, home, fences, rally, notes)
+    place = None if home[0] is None or home[1] is None else (home[0], home[1])
+    return _mission(source, flown, home, Fences(item_fences(items, place), inside_all=True), rally, notes)
+
+
+def _is_home(first: Item) -> bool:
+    """Whether the first item of a file is home."""
+    return first.command == commands.WAYPOINT and (first.number == 0 or FRAMES.get(first.frame, SEA) == SEA)
 
 
 def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
@@ -149,8 +154,8 @@ def read_plan(text: str, source: str) -> MissionAsRead:
     """
     plan = parsed_json(text, source)
     mission = plan.get("mission") if isinstance(plan, dict) else None
-    kind = plan.get("fileType") if isinstance(plan, dict) else ""
-    if kind != "Plan" and not (kind is None and isinstance(mission, dict)):  # Mission Planner leaves it open
+    kinds = ("Plan", None) if isinstance(mission, dict) else ("Plan",)  # Mission Planner leaves it open
+    if not isinstance(plan, dict) or plan.get("fileType") not in kinds:
         raise InputError(f'{source}: is not a plan of QGroundControl; must have "fileType": "Plan"')
     if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
         raise InputError(f"{source}: mission.items: is missing; it is required")
@@ -164,7 +169,7 @@ def read_plan(text: str, source: str) -> MissionAsRead:
         notes.append("a doJumpId is there twice: items are counted from 1 instead")
     geofence, rally = plan.get("geoFence"), plan.get("rallyPoints")
     fences = Fences(plan_fences(geofence, f"{source}: "), commands.inside_all(mission.get("firmwareType")))
-    if isinstance(geofence, dict) and geofence.get("breachReturn") is not None:
+    if (geofence or {}).get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
     points = rally.get("points") if isinstance(rally, dict) else None
     return _mission(source, items, home, fences, len(points) if isinstance(points, list) else 0, notes)

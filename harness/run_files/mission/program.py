@@ -33,14 +33,7 @@ AIRSPEED, GROUND_SPEED = 0, 1
 
 @dataclass(frozen=True)
 class Loiter:
-    """Circles to be flown.
-
-    Attributes:
-        radius_m: of the circle; 0: the autopilot's own.
-        clockwise: which way round.
-        turns: how many times round; or
-        time_s: how long; or neither: until the altitude is reached.
-    """
+    """A circle, flown for some turns or a time, or until the altitude is reached; radius 0: the autopilot's own."""
 
     radius_m: float
     clockwise: bool

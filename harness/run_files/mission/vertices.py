@@ -60,17 +60,14 @@ class Flying:
 
 
 class Vertex(NamedTuple):
-    """A place that is flown to.
+    """A place that is flown to, east + i north, at an altitude above mean sea level.
 
     Attributes:
-        place: east + i north.
-        altitude_m: above mean sea level.
         item: number of its item; None where it has none, as where a circle is joined.
         acceptance_m: how far off it may be passed; 0 where its item does not say.
         agl_m: height above ground that is held on the way to it; None: the altitude is linear.
         centre: of the circle that it lies on, for which the aircraft heads.
-        asked_mps: airspeed that the mission asks for on the way to it.
-        airspeed_mps: that is flown.
+        asked_mps: airspeed that the mission asks for on the way to it, not always that which is flown.
     """
 
     place: complex

@@ -48,38 +48,31 @@ def read(path: Path, reading: Reading) -> Contents:
         vertices = _vertices(content, contents[0].get("transform"))
         vertices[:, 2] *= unit_m
         for name, thing in content["CityObjects"].items():
-            parts += _object(name, thing, vertices, reading, doubts, passed)
+            part = _object(name, thing, vertices, reading, doubts, passed)
+            parts += [] if part is None else [part]
     if not parts:
         raise WorldFileError("has no building with a shape; must have some")
-    notes += [*doubts.notes(reading), *_passed_over(passed)]
+    notes += doubts.notes(reading)
+    if told := [f"{number} {kind}" for kind, number in passed.most_common() if number]:
+        notes.append(f"passed over: {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}")
     if crs is None:
         notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
     return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
 
 
-def _passed_over(passed: Counter[str]) -> list[str]:
-    told = [f"{number} {kind}" for kind, number in passed.most_common() if number]
-    return [f"passed over: {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}"] if told else []
-
-
 def _object(
-    name: str,
-    thing: Any,
-    vertices: FloatArray,
-    reading: Reading,
-    doubts: limits.Doubts,
-    passed: Counter[str],
-) -> list[Part]:
+    name: str, thing: Any, vertices: FloatArray, reading: Reading, doubts: limits.Doubts, passed: Counter[str]
+) -> Part | None:
     """The part that an object is, if it is one; what of it is passed over is counted."""
     kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
     if not kind.startswith(SOLID):
         passed[kind] += 1
-        return []
+        return None
     instances = sum(each["type"] == INSTANCE for each in _geometries(thing))
     passed[INSTANCE] += instances
     part = _part(name, thing, vertices, reading, doubts)
     passed["building without a shape"] += part is None and not (thing.get("children") or instances)
-    return [] if part is None else [part]
+    return part
 
 
 def _height_unit_m(crs: str, notes: list[str]) -> float:

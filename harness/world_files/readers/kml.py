@@ -34,7 +34,7 @@ def read(path: Path, reading: Reading) -> Contents:
     ExtendedData go before altitudes.
     """
     found = read_kml(read_bytes(path, MAX_TREE_BYTES), "", MAX_TREE_BYTES)
-    notes = list(found.notes)
+    notes: list[str] = []
     parts = tuple(_part(each, notes) for each in found.polygons if each.rings)
     flat = sum((part.bottom, part.top) == (NO_BOTTOM, NO_TOP) for part in parts)
     if flat:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -34,10 +34,14 @@ _DATUMS: Final = {**dict.fromkeys(_ON_GROUND, Datum.GROUND), **dict.fromkeys(_AT
 _WORDS: Final = sorted((*_UNITS, *_DATUMS, "ABOVE"), key=len, reverse=True)
 _TOKEN: Final = re.compile(rf"-?\s*(?:\d+(?:\.\d*)?|\.\d+)|{'|'.join(_WORDS)}|[^\s()'./+\N{{DEGREE SIGN}}]")
 """A number, or a word that a limit may consist of. Nothing is guessed of a limit with others, as `ASK 123.5`."""
-_SURFACE: Final = re.compile(r"SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?")
-_NO_END: Final = re.compile(r"(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b")
-_NOT_KNOWN: Final = -9000.0
-"""A limit as low as this stands for one that is not known, as -9998 in files of the FAA."""
+_PLAIN: Final = (
+    (re.compile(r"SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?"), NO_BOTTOM),
+    (re.compile(r"(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b.*"), NO_TOP),
+    (re.compile("MSL|AMSL|SEA LEVEL"), Limit(0.0)),
+)
+"""Limits without a number."""
+_NOT_KNOWN_M: Final = -2700.0
+"""A limit as low as this stands for one that is not known, as -9998 (ft) in files of the FAA."""
 _SIDES: Final = {"lower": ("lower|floor|bottom", "min"), "upper": ("upper|ceiling|top", "max")}
 """Beginnings of the names of attributes with a limit; the last belong to altitudes only."""
 _NAMES: Final = {
@@ -71,70 +75,56 @@ _HEIGHT: Final = (
 _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")
 
 
-def limit_of(text: str, unit_m: float | None = FOOT_M, datum: Datum | None = Datum.SEA) -> Limit | None:
-    """A height as airspace files write it, `2500 ft AMSL`, `FL 65`, `100m GND`.
+def _told(words: Iterable[str]) -> tuple[str | None, Datum | None]:
+    """Unit and datum that some words name; the ground goes before the sea, a flight level before other units."""
+    units = [each for each in words if each in _UNITS]
+    datums = {_DATUMS[each] for each in words if each in _DATUMS}
+    datum = Datum.GROUND if Datum.GROUND in datums else Datum.SEA if datums else None
+    return ("FL", Datum.SEA) if "FL" in units else (next(iter(units), None), datum)
 
-    Args:
-        text: the height.
-        unit_m: of a number without a unit.
-        datum: likewise; that of a flight level is the sea.
 
-    Returns:
-        The limit; NO_BOTTOM for the surface; None where it cannot be told.
+def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | None:
+    """A height as airspace files write it, `2500 ft AMSL`, `FL 65`, `100m GND`; NO_BOTTOM for the surface.
+
+    A number without a unit or a datum has those that are given. None where it cannot be told.
     """
     word = " ".join(text.upper().split())
-    if _SURFACE.fullmatch(word):
-        return NO_BOTTOM
-    if _NO_END.match(word):
-        return NO_TOP
-    if word in ("MSL", "AMSL", "SEA LEVEL"):
-        return Limit(0.0)
+    plain = next((limit for pattern, limit in _PLAIN if pattern.fullmatch(word)), None)
+    if plain is not None:
+        return plain
     tokens = _TOKEN.findall(word)
     numbers = [each for each in tokens if each[-1] in "0123456789."]
     words = [each for each in tokens if each not in numbers]
     if len(numbers) != 1 or not set(words) <= set(_WORDS):
         return None
-    value = float(numbers[0].replace(" ", ""))
-    own = [_DATUMS[each] for each in words if each in _DATUMS]
-    datum = Datum.GROUND if Datum.GROUND in own else Datum.SEA if own else datum
-    if value <= _NOT_KNOWN or (datum is Datum.GROUND and value < 0.0):
+    own_unit, own_datum = _told(words)
+    limit = Limit(float(numbers[0].replace(" ", "")) * _UNITS[own_unit or unit], own_datum or datum)
+    if limit.height_m <= _NOT_KNOWN_M or (limit.datum is Datum.GROUND and limit.height_m < 0.0):
         return None  # as in SFC-2500, which says where a zone begins as well
-    if "FL" in words:
-        return Limit(value * _UNITS["FL"])
-    factor = next((_UNITS[each] for each in words if each in _UNITS), unit_m)
-    return Limit(value * (factor or 1.0), datum or Datum.SEA)
+    return limit
 
 
 def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | None:
     """A limit whose unit and reference may stand apart; what is missing is metres above mean sea level, and noted.
 
-    Args:
-        value: a number or a text.
-        said: the unit and the reference, where the value has none, as `FT AGL`, `m AMSL`, `FL`.
-        notes: are added to.
-        name: of the part.
+    The value is a number or a text; where it has none, `said` has its unit and reference, as `FT AGL`, `m AMSL`, `FL`.
     """
-    if isinstance(value, bool | Mapping | list) or value is None:
-        return None
-    text, said = str(value), said.upper()
-    apart = re.findall(r"[A-Z]+", said)
-    unit_m = next((_UNITS[each] for each in apart if each in _UNITS), None)
-    datum = next((_DATUMS[each] for each in apart if each in _DATUMS), None)
-    own = set(_TOKEN.findall(text.upper()))
-    is_level = "FL" in own or (unit_m == _UNITS["FL"] and not own & set(_UNITS))
-    limit = limit_of(text, unit_m, Datum.SEA if is_level else datum)
+    text, said = "" if isinstance(value, bool | Mapping | list | None) else str(value), said.upper()
+    own_unit, own_datum = _told(_TOKEN.findall(text.upper()))
+    unit, datum = _told(re.findall(r"[A-Z]+", said))
+    if own_unit and unit == "FL":
+        datum = None
+    limit = limit_of(text, unit or "M", datum or Datum.SEA)
     if limit is None or not re.search(r"[1-9]", text):  # the surface, or nothing that is known
         return limit
-    told = []
-    if unit_m is None and not own & set(_UNITS):
-        told.append("its limits name no unit; taken as metres")
-    if not is_level and datum is None and not own & set(_DATUMS):
-        if re.search("WGS|W84|HAE|ELLIPS", said):
-            told.append("its limits are above the ellipsoid; taken as above mean sea level")
-        else:
-            told.append("its limits name no reference; taken as above mean sea level")
+    told = [] if unit or own_unit else ["its limits name no unit; taken as metres"]
+    told += [] if datum or own_datum else [f"its limits {_undated(said)}; taken as above mean sea level"]
     notes += [new for each in told if (new := f"{name or 'a part'}: {each}") not in notes[-4:]]
     return limit
+
+
+def _undated(said: str) -> str:
+    return "are above the ellipsoid" if re.search("WGS|W84|HAE|ELLIPS", said) else "name no reference"
 
 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:

@@ -16,6 +16,7 @@ from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import Place, arc, circle, corridor, on_earth, polar
 
 MILE_M: Final = 1852.0
+COMMANDS: Final = ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")
 _ANGLE: Final = r"([\d.:\s°'\",]+)"
 _SIDES: Final = (rf"{_ANGLE}([NS]){_ANGLE}([EW])", rf"([NS]){_ANGLE}([EW]){_ANGLE}")
 """A place with its sides behind the numbers, or before them."""
@@ -36,23 +37,28 @@ class _Airspace:
     line: list[Place] = field(default_factory=list)
     shapes: list[Any] = field(default_factory=list)
 
+    @property
+    def is_drawn(self) -> bool:
+        """Whether something of a shape was read."""
+        return bool(self.ring or self.line or self.shapes)
+
     def take(self, command: str, rest: str) -> None:
         """One command of it."""
-        name, _, value = (part.strip() for part in rest.partition("="))
+        name, _, value = (part.strip() for part in rest.upper().partition("="))
         if command == "AN":
             self.name = rest[:40]
         elif command in ("AL", "AH"):
             (self.lower if command == "AL" else self.upper).append(limits.limit_of(rest))
         elif command != "V":
-            self._draw(command, rest)
-        elif name.upper() == "X":
+            self.draw(command, rest)
+        elif name == "X":
             self.center = _places(value, 1)[0]
-        elif name.upper() == "D":
+        elif name == "D":
             self.clockwise = not value.startswith("-")
-        elif name.upper() == "W":
+        elif name == "W":
             self.width_m = _numbers(value, 1)[0] * MILE_M
 
-    def _draw(self, command: str, rest: str) -> None:
+    def draw(self, command: str, rest: str) -> None:
         """A corner, a circle or an arc."""
         if command in ("DP", "DY"):
             (self.ring if command == "DP" else self.line).append(_places(rest, 1)[0])
@@ -93,7 +99,7 @@ class _Airspace:
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads every airspace, whatever its class."""
+    """Reads every airspace, whatever its class; a fault of a coordinate or a radius names its line."""
     spaces: list[_Airspace] = []
     ignored = Counter[str]()
     for number, line in enumerate(text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines(), 1):
@@ -108,9 +114,8 @@ def read(path: Path, reading: Reading) -> Contents:
     if not any(parts):
         raise WorldFileError("has no airspace with an area; must be OpenAir with some")
     classes = Counter(each.kind or "none" for each in spaces).most_common()
-    told = ", ".join(f"{count} {kind[:12]}" for kind, count in classes[:6]) + ", and others" * (
-        len(classes) > 6
-    )
+    told = ", ".join(f"{count} {kind[:12]}" for kind, count in classes[:6])
+    told += ", and others" if len(classes) > 6 else ""
     notes.append(f"airspaces of every class are solid ({told}): take out what may be flown in")
     notes += _passed_over(ignored, sum(not each for each in parts))
     return Contents("openair", WGS84, tuple(part for each in parts for part in each), notes=tuple(notes))
@@ -131,14 +136,13 @@ def _take(spaces: list[_Airspace], command: str, rest: str, ignored: Counter[str
     """One line of a file; an airspace begins with its class, or without one with its name."""
     # Before the first it is as behind one that is whole.
     last = spaces[-1] if spaces else _Airspace("none", shapes=[None])
-    is_drawn = bool(last.ring or last.line or last.shapes)
-    if command == "AC" and not last.kind and not is_drawn:
+    if command == "AC" and not last.kind and not last.is_drawn:
         last.kind = rest  # its name stood before its class
     elif command == "AC":
         spaces.append(_Airspace(rest))
-    elif command == "AN" and is_drawn:
+    elif command == "AN" and last.is_drawn:
         spaces.append(_Airspace("", rest[:40]))
-    elif spaces and command in ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V"):
+    elif spaces and command in COMMANDS:
         last.take(command, rest)
     else:
         ignored[command] += 1
@@ -173,8 +177,8 @@ def _degrees(text: str, digits: int) -> float:
     if len(numbers) == 1 and len(whole) in (digits + 2, digits + 4):
         numbers = [whole[:digits], *(whole[k : k + 2] for k in range(digits, len(whole), 2))]
         numbers[-1] += f".{part or 0}"
+    # Where numbers are rounded, 60 seconds are written.
     if not 1 <= len(numbers) <= 3 or any(float(each) > 60.0 for each in numbers[1:]):
-        # Where numbers are rounded, 60 seconds are written.
         raise WorldFileError(
             f"has the angle {text.strip()!r}; must be degrees, and minutes and seconds of at most 60"
         )

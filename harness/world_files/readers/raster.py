@@ -96,7 +96,7 @@ def _inside(path: Path) -> tuple[Path | str, str]:
     if begin in (b"II", b"MM"):
         return path, "GTiff"
     if begin == b"PK":
-        return member_path(path, (".hgt",), MAX_TILE_BYTES), "SRTMHGT"
+        return member_path(path, ".hgt", MAX_TILE_BYTES), "SRTMHGT"
     if begin == b"\x1f\x8b":
         return f"/vsigzip/{path.absolute()}", "SRTMHGT"
     if path.suffix.lower() != ".hgt":

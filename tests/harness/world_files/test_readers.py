@@ -297,7 +297,7 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
     path.with_name("b.kml").write_text(lifted)
     with pytest.raises(WorldFileError, match="has gx:altitudeOffset, which is not read"):
         read_any(path.with_name("b.kml"))
-    packed = zipped(tmp_path / "a.kmz", a__kml=b"<kml/>", doc__kml=path.read_bytes())
+    packed = zipped(tmp_path / "a.kmz", doc__kml=path.read_bytes())
     assert [part.top for part in read_any(packed).parts] == [part.top for part in found.parts]
 
 
