@@ -1,8 +1,9 @@
-"""The table of public worlds in planner/MEASURED.md: `python -m tests.closed_loop.worlds_table [MOST]`.
+"""The table of public worlds in planner/MEASURED.md: `python -m tests.closed_loop.worlds_table [MOST [WIND]]`.
 
-Each world with a way to the goal, and each without one, is flown in calm air by the Aerosonde and judged by the
-independent referee, which knows the true obstacles. Prints a row for each family, then what the referee or the verdict
-found wrong, and exits with 1 where that is anything. MOST is how many worlds of a family are flown.
+Each world with a way to the goal, and each without one, is flown by the Aerosonde, in calm air if nothing else is
+said, and judged by the independent referee, which knows the true obstacles. Prints a row for each family, then what
+the referee or the verdict found wrong, and exits with 1 where that is anything. MOST is how many worlds of a family
+are flown, WIND the speed of a wind from 300 degrees, m/s.
 """
 
 from __future__ import annotations
@@ -43,11 +44,12 @@ FAMILIES: Final[dict[str, tuple[str, ...]]] = {
 ENDS: Final = {"reach": "reached", "unreachable": "unreachable"}
 
 
-def judged(world: Path, folder: Path) -> dict[str, Any]:
+def judged(world: Path, folder: Path, wind: str) -> dict[str, Any]:
     """A world flown: how it ended, the faults that the referee and the verdict show, and what the row needs."""
     facts = json.loads(world.read_text())
     scenario, run = folder / f"{world.stem}.yaml", folder / world.stem
     convert = [sys.executable, str(SHARED / "tools" / "world_to_scenario.py"), str(world)]
+    convert += ["--wind", wind, "300"] if wind else []
     scenario.write_text(subprocess.run(convert, capture_output=True, text=True, check=True).stdout)
     metrics = fly_to_folder(load_scenario(scenario), run, recording=False)
     faults = referee_faults(run)
@@ -89,14 +91,14 @@ def row(name: str, flown: list[dict[str, Any]]) -> str:
     return f"| {name} | {len(flown)} | {length} | {half:.1f} | {tail:.0f} | ({ends})"
 
 
-def main(most: int) -> int:
+def main(most: int, wind: str = "") -> int:
     wrong: list[str] = []
     print(
         "| worlds | number | length over the optimum: median | p95 | planner p50: median, ms | p99: largest, ms |"
     )
     with tempfile.TemporaryDirectory() as folder:
         for name, folders in FAMILIES.items():
-            flown = [judged(world, Path(folder)) for world in worlds(folders, most)]
+            flown = [judged(world, Path(folder), wind) for world in worlds(folders, most)]
             print(row(name, flown), flush=True)
             wrong += [fault for world in flown for fault in world["faults"]]
     print("\n".join(wrong) or "no fault")
@@ -104,4 +106,4 @@ def main(most: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000))
+    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000, *sys.argv[2:]))
