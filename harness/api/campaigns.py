@@ -50,15 +50,10 @@ def compare(
     kinds = _named(planners, PLANNER, "planners")
     laws = None if guidance is None else _named(guidance, GUIDANCE, "guidance")
     of_laws = "" if laws is None else f", guidance={laws}"
-    chosen = [
-        {"planner.kind": kind} | ({"guidance.kind": law} if law else {})
-        for kind in kinds
-        for law in laws or ("",)
-    ]
     sources, law_sources = (tuple(filter(is_source, names)) for names in (planners, guidance or ()))
     with as_input_errors():
         compared = fly_and_compare(
-            [each.with_(keys) for each in loaded for keys in chosen],
+            [each.with_(keys) for each in loaded for keys in _combinations(kinds, laws)],
             Path(out),
             recording=recording,
             workers=workers or os.cpu_count() or 1,
@@ -66,6 +61,12 @@ def compare(
             sources=(sources, law_sources),
         )
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
+
+
+def _combinations(kinds: Sequence[str], laws: Sequence[str] | None) -> list[dict[str, Any]]:
+    """Keys of every planner, under every law where there are laws."""
+    planners = [{"planner.kind": kind} for kind in kinds]
+    return planners if laws is None else [each | {"guidance.kind": law} for each in planners for law in laws]
 
 
 def _named(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:

@@ -12,6 +12,7 @@ from harness.flight.record import AcceptedPlan, FloatArray
 from harness.recording import blueprint as look
 from harness.recording.scene import fan
 from harness.recording.solids import circle, strips_2d, strips_3d
+from planner.interface import PlanPicture
 
 
 def send_plans(
@@ -21,53 +22,52 @@ def send_plans(
     chord_error_m: float,
     thin: bool = False,
 ) -> None:
-    """Draws plans, each from the time on at which it takes effect."""
+    """Draws plans, each from the time on at which it takes effect; of a thin recording path and waypoints alone."""
     if not plans:
         return
     times = [look.time_column(np.array([each.time_s for each in plans]))]
     paths = polylines([each.segments for each in plans], chord_error_m)
-    waypoints = [each.plan.waypoints_m for each in plans]
-    rec.send_columns(
-        f"{look.PLAN}/waypoints",
-        times,
-        rr.Points2D.columns(positions=np.concatenate(waypoints)).partition([len(each) for each in waypoints]),
-    )
+    _send_points(rec, "waypoints", times, [each.plan.waypoints_m for each in plans])
     rec.send_columns(f"{look.PLAN}/chosen", times, rr.LineStrips2D.columns(strips=strips_2d(paths)))
     if thin:
         return
-    pictures = [each.plan.picture() if each.plan.picture else None for each in plans]
-    guides = np.array([p.guide_m for p in pictures if p]).reshape(-1, 2, 2)
-    strips: dict[str, list[list[FloatArray]]] = {
-        "window": [[circle(p.guide_m[0], p.window_m)] if p and p.window_m else [] for p in pictures],
-        "sectors": [
-            [fan(p.guide_m[0], edges, p.window_m) for edges in p.sectors] if p else [] for p in pictures
-        ],
-        "candidates": [list(p.candidates[1:]) if p else [] for p in pictures],
-    }
-    for entity, rows in strips.items():
-        flat = [strip for row in rows for strip in row]
-        columns = rr.LineStrips2D.columns(strips=strips_2d(flat)).partition([len(row) for row in rows])
-        rec.send_columns(f"{look.PLAN}/{entity}", times, columns)
-    rec.send_columns(
-        f"{look.PLAN}/guide",
-        times,
-        rr.Arrows2D.columns(origins=guides[:, 0], vectors=guides[:, 1] - guides[:, 0]).partition(
-            [1 if p else 0 for p in pictures]
-        ),
-    )
-    met = [p.met_m if p else np.zeros((0, 2)) for p in pictures]
-    rec.send_columns(
-        f"{look.PLAN}/{look.MET}",
-        times,
-        rr.Points2D.columns(positions=np.concatenate(met)).partition([len(each) for each in met]),
-    )
     steep = [np.column_stack((path, held_m(_along(path)))) for path in paths]
     rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(steep)))
+    _send_pictures(rec, times, [each.plan.picture() if each.plan.picture else None for each in plans])
     for entity, values in (
         (look.SEARCH, [each.compute_ms for each in plans]),
         (look.DELAYS, [each.delay_s for each in plans]),
     ):
         rec.send_columns(f"{look.SERIES}/{entity}", times, rr.Scalars.columns(scalars=np.array(values)))
+
+
+def _send_pictures(
+    rec: rr.RecordingStream, times: list[rr.TimeColumn], pictures: Sequence[PlanPicture | None]
+) -> None:
+    """Draws how plans came about, nothing where a planner does not show it."""
+    strips = [_strips(picture) if picture else ([], [], []) for picture in pictures]
+    for entity, rows in zip(("window", "sectors", "candidates"), zip(*strips, strict=True), strict=True):
+        flat = strips_2d([strip for row in rows for strip in row])
+        columns = rr.LineStrips2D.columns(strips=flat).partition([len(row) for row in rows])
+        rec.send_columns(f"{look.PLAN}/{entity}", times, columns)
+    guides = np.array([picture.guide_m for picture in pictures if picture]).reshape(-1, 2, 2)
+    arrows = rr.Arrows2D.columns(origins=guides[:, 0], vectors=guides[:, 1] - guides[:, 0])
+    rec.send_columns(f"{look.PLAN}/guide", times, arrows.partition([int(bool(each)) for each in pictures]))
+    _send_points(rec, look.MET, times, [each.met_m if each else np.zeros((0, 2)) for each in pictures])
+
+
+def _strips(picture: PlanPicture) -> tuple[list[FloatArray], ...]:
+    """Window, free sectors, and the candidates that were not chosen."""
+    here, window_m = picture.guide_m[0], picture.window_m
+    window = [circle(here, window_m)] if window_m else []
+    return window, [fan(here, edges, window_m) for edges in picture.sectors], list(picture.candidates[1:])
+
+
+def _send_points(
+    rec: rr.RecordingStream, entity: str, times: list[rr.TimeColumn], points: Sequence[FloatArray]
+) -> None:
+    columns = rr.Points2D.columns(positions=np.concatenate(points))
+    rec.send_columns(f"{look.PLAN}/{entity}", times, columns.partition([len(each) for each in points]))
 
 
 def _along(path: FloatArray) -> FloatArray:
