@@ -127,7 +127,6 @@ class Base:
     Attributes:
         file: name of its file; of the campaign itself, if that names no scenarios.
         source: what its faults name it.
-        root: its keys.
     """
 
     file: str
@@ -150,7 +149,6 @@ class CampaignFile:
     """A campaign file as it was read.
 
     Attributes:
-        campaign: its content.
         source: what its faults name it.
         root: its keys, with their lines.
         bases: the scenarios that it names, in order; at least one.
@@ -191,10 +189,8 @@ def load_campaign(
 ) -> CampaignFile:
     """Reads a campaign file and the scenario files that it names; the scenarios themselves are not checked.
 
-    Args:
-        path: the file.
-        planners: kinds that fly in place of those that the file names.
-        settings: keys that are added to `set`, and their values as YAML; `seed` replaces that of the campaign.
+    `planners`: kinds that fly in place of those that the file names.
+    `settings`: keys that are added to `set`, and their values as YAML; `seed` replaces that of the campaign.
 
     Raises:
         InputError: a file cannot be read or is not a campaign; a line of its text names file, line and key.
@@ -292,12 +288,7 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
 
 
 def absolute_paths(root: Node, folder: Path) -> Node:
-    """A scenario's keys with what lies beside its file given from the root of the file system on.
-
-    Args:
-        root: the keys.
-        folder: of the file.
-    """
+    """A scenario's keys with what lies beside its file given from the root of the file system on."""
     return _with_folder(_with_world_files(root, folder), ("aircraft", "model"), folder)
 
 

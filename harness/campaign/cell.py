@@ -42,16 +42,11 @@ class Cell:
     """The figures of a group of runs. One that no run has is None.
 
     Attributes:
-        runs: how many.
-        reached: how many of them reached their goal.
         success: their share. A goal proved unreachable, and a run whose software failed, did not reach it.
         length_median: flown length over the clairvoyant optimum where the goal was reached, median.
-        length_p95: the same, 95th percentile.
-        least_clearance_m: least distance to an obstacle edge in any run.
         below_wanted: share of the runs flown that were below the wanted clearance at any time.
         trackable: share of the runs flown in which every leg was tracked.
         planner_p99_ms: largest 99th percentile of a run; of all searches together it is no larger.
-        planner_max_ms: longest search.
     """
 
     runs: int
@@ -107,13 +102,8 @@ class Question:
     """A figure, or two, of a cell.
 
     Attributes:
-        title: of its heat map.
-        note: what it is.
         short: heading of its column on a terminal, and in a table for a paper.
-        first: the figure.
         bad: how bad it is, from 0 to 1.
-        form: the figure as a text.
-        second: another figure that stands behind the first.
     """
 
     title: str

@@ -32,10 +32,6 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
 
     Runs that did not reach the goal are crosses. A figure's axis ends at its 1st and 99th percentile where others lie
     far beyond them; those are triangles at its edge.
-
-    Args:
-        runs: of the campaign.
-        keys: that were varied.
     """
     varied = [key for key in keys if are_numbers(runs.values(key)) and len({*runs.values(key)} - {None}) > 1]
     varied = varied[:MAX_KEYS]

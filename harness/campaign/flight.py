@@ -29,12 +29,8 @@ class Job:
     """One run to be flown.
 
     Attributes:
-        run: its number.
         packed: the scenario to fly (`harness.scenario.scenario.packed`).
-        folder: the run folder, if it is kept.
         recordings: when it is kept; `folders`: always, without recordings.
-        optimum: whether to compute the shortest path of the world.
-        again: the command line that flies it again.
         varied: the keys that the campaign varies and their values in this run, for the recording's properties.
         claim: a run is a failure where this does not hold of it.
         path: a check, if a given path is flown in place of what a planner finds; `packed` is empty then.
@@ -62,10 +58,7 @@ class Answer:
     """What came of a job.
 
     Attributes:
-        run: its number.
         row: cells of `results.parquet`, by column; those of the job itself are left out.
-        times: cells of `timings.parquet`.
-        held: whether the job's claim holds of it.
     """
 
     run: int

@@ -39,13 +39,9 @@ def claim_folder(
 ) -> FolderLock:
     """Holds the folder that a command writes, made where missing.
 
-    Args:
-        path: the folder.
-        what: is written there, a noun.
-        index: its file that says so.
-        schema: of that file.
-        lock: name of a file to lock in place of the folder.
-        most_bytes: the largest index that is read.
+    `what`: the noun for what is written there.
+    `lock`: name of a file to lock in place of the folder.
+    `most_bytes`: the largest index that is read.
 
     Raises:
         RunFolderError: it is a file, holds something else, another process writes to it, or it cannot be made.
@@ -68,17 +64,13 @@ class CampaignFolder:
     """The folder of a campaign that is being flown. Use as a context manager; the lock ends with it.
 
     Attributes:
-        path: where it lies.
         done: numbers of the runs that are over.
     """
 
     def __init__(self, path: Path, runs: CampaignRuns, *, resume: bool) -> None:
         """Claims the folder: makes it, or goes on with it.
 
-        Args:
-            path: the folder; made with its parents where missing.
-            runs: the campaign.
-            resume: whether what the folder has of this campaign is kept and gone on with.
+        `resume`: whether what the folder has of this campaign is kept and gone on with.
 
         Raises:
             RunFolderError: the folder holds something else, results without `resume` or those of another

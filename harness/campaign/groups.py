@@ -32,8 +32,6 @@ class Axis:
     """The values of a key, in groups.
 
     Attributes:
-        key: its path.
-        labels: of the groups, in order.
         edges: where the groups are quantiles, their limits from the least value to the largest; the limit
             between two belongs to the upper one. Else empty.
     """
@@ -61,10 +59,7 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
 
     Numbers stand in rising order, names as they first appear; values that are missing come last.
 
-    Args:
-        key: its path.
-        values: one a run; None where there is none.
-        drawn: they were drawn at random: numbers are grouped where there are more than `BINS`.
+    `drawn`: they were drawn at random: numbers are grouped where there are more than `BINS`.
     """
     if are_numbers(values):
         different = sorted({value for value in values if value is not None})

@@ -25,8 +25,6 @@ class Over:
     """A run that is over.
 
     Attributes:
-        row: its cells in `results.parquet`.
-        times: those in `timings.parquet`.
         held: whether the claim of the campaign holds of it.
     """
 
@@ -40,7 +38,6 @@ class Journal:
     """What a journal holds.
 
     Attributes:
-        path: where it lies; it need not exist.
         runs: those that are over, by number, in the order in which they ended.
         end: the byte at which the last whole line ends.
     """

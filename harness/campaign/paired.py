@@ -55,10 +55,8 @@ class Tested:
     """One figure of two planners on the cases of which both have it.
 
     Attributes:
-        figure: its label, with the unit.
         pairs: cases of which both have it.
         first: mean of the first planner, in the unit of the label.
-        second: mean of the second.
         difference: mean of the first less the second, with its bootstrap interval over the cases.
         p: of Wilcoxon's signed-rank test over the cases (two-sided), corrected by Holm's method for all figures of the
             two planners; None where all pairs agree or there are fewer than `MIN_CASES`.
@@ -79,8 +77,6 @@ class Duel:
     Attributes:
         pairs: cases, times aircraft, that both flew.
         only_first: of them, those where only the first reached its goal.
-        only_second: those where only the second did.
-        both_reached: pairs where both did.
         figures: the share of goals reached, in percent, then each figure of `TESTED` that both have.
     """
 
@@ -98,11 +94,8 @@ def duels(
 ) -> tuple[Duel, ...]:
     """Every planner against every other, in the order in which they first appear.
 
-    Args:
-        planners: of each flight.
-        cases: of each flight, what a pair has in common: the case first, then what else there is, its aircraft perhaps.
-        reached: of each flight, whether it reached its goal.
-        figures: by name of `TESTED`, one a flight; NaN where there is none.
+    `cases`: of each flight, what a pair has in common: the case first, then what else there is, its aircraft perhaps.
+    `figures`: by name of `TESTED`, one a flight; NaN where there is none.
     """
     flown: dict[str, dict[Any, int]] = {}
     for row, (planner, case) in enumerate(zip(planners, cases, strict=True)):
@@ -156,9 +149,7 @@ def mean_estimate(differences: FloatArray, cases: IntArray) -> Estimate:
     All pairs of a case, one an aircraft, are drawn together: they share its world, weather and seed. Efron and
     Tibshirani, An Introduction to the Bootstrap (1993), chapters 8 and 13.
 
-    Args:
-        differences: (n,) one a pair, all finite.
-        cases: (n,) case of each.
+    `differences`: (n,) one a pair, all finite.
     """
     mean = float(differences.mean())
     different, index = np.unique(cases, return_inverse=True)

@@ -15,13 +15,8 @@ class PlannedRun:
     """One run of a campaign, before it is flown.
 
     Attributes:
-        run: its number.
         case: runs of one case fly the same world with the same seed and draws.
-        scenario: name of the scenario.
         world: name of its file, or of the generator.
-        planner: kind.
-        aircraft: model.
-        seed: the scenario's.
         varied: grid and drawn values, and those of its entries, by key path; lists and mappings as JSON text.
     """
 

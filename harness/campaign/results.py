@@ -67,10 +67,8 @@ def metric_cells(
 ) -> dict[str, Any]:
     """The content of `metrics.json` as cells of a row, by column.
 
-    Args:
-        metrics: the content.
-        wanted_clearance_m: distance from obstacles that the planner was to keep.
-        optimum_m: length of the shortest path; None where there is none or it is not wanted.
+    `wanted_clearance_m`: distance from obstacles that the planner was to keep.
+    `optimum_m`: length of the shortest path; None where there is none or it is not wanted.
     """
     reached = metrics["outcome"] == "reached"
     return {

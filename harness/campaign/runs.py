@@ -73,7 +73,6 @@ class CampaignRuns:
     """All runs of a campaign.
 
     Args:
-        file: the campaign.
         planners: planners that who flies has to import, as FILE.py:NAME or MODULE:NAME.
         laws: guidance laws, likewise.
     """
@@ -196,9 +195,7 @@ class CampaignRuns:
     def scenario(self, number: int, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
         """What run `number` flies, complete.
 
-        Args:
-            number: from 0.
-            overrides: keys to replace besides, as `load_scenario` takes them.
+        `overrides`: keys to replace besides, as `load_scenario` takes them.
 
         Raises:
             InputError: it is not a scenario; the faults name what in the campaign makes it so.
@@ -259,9 +256,6 @@ class CampaignRuns:
 
     def check(self, progress: Callable[[int], None] | None = None) -> None:
         """Makes every scenario of the campaign once; the first ones are kept for when they are flown.
-
-        Args:
-            progress: told how many have been made.
 
         Raises:
             InputError: one is not a scenario.

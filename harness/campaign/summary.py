@@ -36,7 +36,6 @@ class Table:
     """The runs by two keys.
 
     Attributes:
-        rows: the first key.
         columns: the second key; None for all runs in one column.
         cells: one a row and column; empty groups have no runs.
     """
@@ -51,17 +50,10 @@ class WorstRun:
     """A run to look at.
 
     Attributes:
-        run: its number.
         name: scenario or world, planner and aircraft.
-        seed: of the flight.
-        outcome: as in `results.parquet`.
-        reason: the same as a sentence.
-        min_clearance_m: least distance to an obstacle edge.
         clearance_ratio: the same over the wanted one, where that is known.
-        varied: the varied keys with their values.
         folder: its run folder relative to the campaign's, empty where none was kept.
         view: the command that shows the recording, empty without one.
-        command: flies it again.
     """
 
     run: int
@@ -82,14 +74,9 @@ class Summary:
     """The answers.
 
     Attributes:
-        name: the folder's.
-        varied: keys that were varied.
         outcomes: number of runs by outcome, the most frequent first.
-        total: all runs.
-        tables: one for each choice of keys.
         worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
         untracked: number of runs that were not tracked, by the causes of all their legs, the most frequent first.
-        duels: planners on the same cases.
         planned: how many runs the campaign has, flown or not; None where the results do not say so.
     """
 
@@ -125,9 +112,7 @@ class Summary:
 def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summary:
     """The answers of the campaign in a folder.
 
-    Args:
-        folder: with `results.parquet` and `timings.parquet`.
-        by: one or two keys for each table; default: every two of the first varied keys.
+    `by`: one or two keys for each table; default: every two of the first varied keys.
 
     Raises:
         InputError: the folder holds no campaign, or a key is no column of it.

@@ -40,12 +40,7 @@ def fly_missing(
     A run that the machine kept from its end, since its process was killed or there was no memory, is no result: it is
     left out, and flown when the campaign is gone on with.
 
-    Args:
-        runs: the campaign.
-        folder: its folder, claimed.
-        workers: who flies.
-        progress: told of every run that is over.
-        enough: asked before every look whether what is over answers the question; what still flies is given up then.
+    `enough`: asked before every look whether what is over answers the question; what still flies is given up then.
 
     Returns:
         Numbers of the runs that the machine kept from their ends.
@@ -92,12 +87,8 @@ def fly_jobs(
 ) -> None:
     """Hands out jobs until none is left.
 
-    Args:
-        jobs: made when it is their turn.
-        workers: who flies.
-        over: told of every job that is over, by its number; None where the machine kept it from its end.
-        between: called after every look.
-        enough: asked before every look; what still flies is given up then.
+    `over`: told of every job that is over, by its number; None where the machine kept it from its end.
+    `enough`: asked before every look; what still flies is given up then.
 
     Raises:
         OSError: a run folder cannot be written; or who flies has gone.

@@ -190,11 +190,9 @@ def dask_workers(
     A job whose worker dies is flown again by another one; after the scheduler's `allowed-failures` it is given
     up. Scheduler and workers are trusted: Dask sends pickles, which run code, in both directions.
 
-    Args:
-        address: of the scheduler, as tcp://127.0.0.1:8786 or tls://host:8786.
-        unencrypted: whether an address beyond this machine may lead there without TLS, where whoever can change
-            what is sent can run code on both ends.
-        tell: told when a worker has gone.
+    `address`: of the scheduler, as tcp://127.0.0.1:8786 or tls://host:8786.
+    `unencrypted`: whether an address beyond this machine may lead there without TLS, where whoever can change
+    what is sent can run code on both ends.
 
     Raises:
         InputError: the address leads beyond this machine without TLS and may not, Dask is not installed, no

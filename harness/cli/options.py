@@ -121,15 +121,7 @@ def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
 
 
 def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_THE_NAME) -> str:
-    """What a default folder's name has at its end, so that runs which differ in settings do not replace one another.
-
-    Args:
-        settings: keys and values as given.
-        named: keys that the folder is called after anyway.
-
-    Returns:
-        Eight digits after a dash, the same for the same settings; nothing without any.
-    """
+    """What a default folder's name has at its end, so that runs which differ in settings do not replace one another."""
     from hashlib import sha256
 
     from harness.files.strict_yaml import as_spelt
@@ -159,11 +151,7 @@ def with_remedy(error: OSError) -> str:
 
 @contextmanager
 def faults_told(left: Callable[[], str]) -> Iterator[None]:
-    """Ends with BAD_INPUT for a folder or an aircraft that cannot be used, and says after Ctrl-C what is left.
-
-    Args:
-        left: what became of what was begun, for the line after an interrupt.
-    """
+    """Ends with BAD_INPUT for a folder or an aircraft that cannot be used, and says after Ctrl-C what is left."""
     from aircraft.airframes import AircraftError
     from harness.files.errors import RunFolderError
 
@@ -177,14 +165,7 @@ def faults_told(left: Callable[[], str]) -> Iterator[None]:
 
 
 def marked_incomplete(what: str, folder: Path, index: str, schema: str) -> Callable[[], str]:
-    """What became of a folder that was being written, for `faults_told`.
-
-    Args:
-        what: that was to be written: "run".
-        folder: where.
-        index: file of the folder that says whether it is complete.
-        schema: of that file.
-    """
+    """What became of a folder that was being written, for `faults_told`."""
 
     def left() -> str:
         from harness.files.input_file import read_index
@@ -199,12 +180,7 @@ def marked_incomplete(what: str, folder: Path, index: str, schema: str) -> Calla
 
 @contextmanager
 def resumable(folder: Path, index: str) -> Iterator[None]:
-    """The same for many flights, which --resume goes on with; a full disk or a cluster that is gone ends with FAILED.
-
-    Args:
-        folder: where they are kept.
-        index: file of the folder that is there once something was begun.
-    """
+    """The same for many flights, which --resume goes on with; a full disk or a cluster that is gone ends with FAILED."""
     done = f"what is done is in {folder}, --resume goes on"
     try:
         with faults_told(lambda: done if (folder / index).exists() else "nothing was written"):

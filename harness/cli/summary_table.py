@@ -48,12 +48,7 @@ def _shown(value: Scalar) -> str:
 
 
 def print_summary(summary: Summary, all_tables: bool = False) -> None:
-    """Prints the answers on standard output.
-
-    Args:
-        summary: the answers.
-        all_tables: every table, not the first alone.
-    """
+    """Prints the answers on standard output, with `all_tables` every table, not the first alone."""
     total, missing = summary.total.runs, summary.missing
     runs = f"{total} of {counted(summary.planned or 0, 'run')}" if missing else counted(total, "run")
     ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())

@@ -138,14 +138,7 @@ def checked(
     settings: Sequence[tuple[str, str]] = (),
     laws: tuple[str, ...] = (),
 ) -> CampaignRuns:
-    """The runs of a campaign file, every scenario of them made once.
-
-    Args:
-        path: and the others: as `load_campaign` takes them.
-        planners: likewise; FILE.py:NAME and MODULE:NAME too.
-        settings: likewise.
-        laws: guidance laws that who flies has to import.
-    """
+    """The runs of a campaign file, every scenario of them made once."""
     from harness.campaign.campaign_file import is_scenario, load_campaign
     from harness.campaign.runs import CampaignRuns
     from harness.cli.terminal import step_bar

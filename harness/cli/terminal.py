@@ -40,12 +40,7 @@ OUTCOME_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
 
 @contextmanager
 def progress_bar(straight_m: float, silent: bool = False) -> Iterator[FlightReport]:
-    """A progress bar of one flight on standard error; a line every ten seconds where that is not a terminal.
-
-    Args:
-        straight_m: distance from start to goal.
-        silent: nothing is shown.
-    """
+    """A progress bar of one flight on standard error; a line every ten seconds where that is not a terminal."""
     with _bar(silent) as show:
         begun_s = time.monotonic()
 

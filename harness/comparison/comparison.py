@@ -44,10 +44,8 @@ class Comparison:
     """What was compared.
 
     Attributes:
-        command: the command line.
         started_utc: date and time, ISO 8601.
         versions: what flew, by name; empty where nothing came to an end.
-        rows: scenario after scenario, planner after planner.
     """
 
     command: str
@@ -88,14 +86,10 @@ def fly_and_compare(
 ) -> Comparison:
     """Flies scenarios that differ in name or planner and writes the folder of the comparison.
 
-    Args:
-        scenarios: one a flight, those of one name together; each names its planner.
-        out: the folder.
-        recording: whether to write recordings and overlays.
-        workers: flights at the same time; they change nothing but the time it takes.
-        command: what the report says was called; default: the command line.
-        sources: planners, and guidance laws, that are given as FILE.py:NAME or MODULE:NAME.
-        progress: told of every flight that is over how it ended.
+    `scenarios`: one a flight, those of one name together; each names its planner.
+    `workers`: flights at the same time; they change nothing but the time it takes.
+    `command`: what the report says was called; default: the command line.
+    `sources`: planners, and guidance laws, that are given as FILE.py:NAME or MODULE:NAME.
 
     Raises:
         InputError: a scenario is there twice with the same planner and guidance, or is called as a file of the

@@ -49,8 +49,6 @@ class Trial:
 
     Attributes:
         displacement: of each key, from 0 (mild) to 1 (hard).
-        values: of each key.
-        failed: whether the claim did not hold of it.
         figures: those of `FIGURES`; the outcome is `error` where the software failed.
     """
 
@@ -66,12 +64,9 @@ class Breaking:
 
     Attributes:
         claim: a flight fails where this does not hold of it.
-        tolerance: a displacement was narrowed down to this.
         steps: number of equal steps of the scan; a failing range narrower than one may have been missed.
         settled: whether the answer was narrowed down to the tolerance within the flights that were allowed.
-        found: the flight that failed under the mildest condition of those tried.
         passes: values of the hardest condition that passed and is no harder in any key.
-        trials: every flight, in order.
     """
 
     scenario: str
@@ -100,12 +95,9 @@ def vary_of(
 ) -> tuple[Vary, ...]:
     """The keys to vary, once every combination of their ends has been found to be a scenario.
 
-    Args:
-        load: makes the scenario.
-        given: key path, mild end and hard end of each.
-        fixed: paths of keys that have been given a value.
-        tolerance: a displacement is narrowed down to this share of its range; values are flown rounded to a
-            hundredth of that, so that what is printed is what was flown.
+    `given`: key path, mild end and hard end of each.
+    `tolerance`: a displacement is narrowed down to this share of its range; values are flown rounded to a
+    hundredth of that, so that what is printed is what was flown.
 
     Raises:
         InputError: too many keys, one twice, with a value or without a range, or an end that makes no scenario.
@@ -176,15 +168,9 @@ def falsify(
 ) -> Breaking:
     """Searches, and writes the folder.
 
-    Args:
-        load: makes the scenario.
-        vary: the keys, as `vary_of` gives them.
-        out: the folder, made where missing.
-        flown: flies a scenario.
-        claim: a flight fails where this does not hold of it.
-        conditions: at most so many are tried.
-        tolerance: a displacement is narrowed down to this share of its range.
-        progress: told after each flight how many there were, of how many, and what became of it.
+    `claim`: a flight fails where this does not hold of it.
+    `tolerance`: a displacement is narrowed down to this share of its range.
+    `progress`: told after each flight how many there were, of how many, and what became of it.
 
     Raises:
         InputError: a condition is no scenario, or cannot be flown; the folder is as it was.

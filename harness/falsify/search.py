@@ -26,10 +26,7 @@ class Vary:
     """A key to be varied.
 
     Attributes:
-        key: its path.
-        mild: its mild end.
         hard: its hard end; below `mild` where smaller is harder.
-        whole: whether it takes whole numbers alone.
         decimals: places after the point to which a value between the ends is rounded before it is flown.
     """
 
@@ -56,12 +53,10 @@ class Search:
     """Conditions tried, each once.
 
     Attributes:
-        vary: the keys.
         judge: whether a condition fails. It raises InputError where there is none: such a condition passes while a key
             is taken back.
         left: how many more may be tried, at least `LEAST` at the beginning.
         tolerance: a displacement is narrowed down to this.
-        steps: number of equal steps of the scan.
         settled: whether the answer was narrowed down to the tolerance within the conditions that were allowed.
         verdicts: whether each condition tried failed, in order.
     """
