@@ -180,7 +180,7 @@ def marked_incomplete(what: str, folder: Path, index: str, schema: str) -> Calla
 
 @contextmanager
 def resumable(folder: Path, index: str) -> Iterator[None]:
-    """The same for many flights, which --resume goes on with; a full disk or a cluster that is gone ends with FAILED."""
+    """The same for many flights, which --resume goes on with; a full disk, or a cluster gone, ends with FAILED."""
     done = f"what is done is in {folder}, --resume goes on"
     try:
         with faults_told(lambda: done if (folder / index).exists() else "nothing was written"):

@@ -26,7 +26,6 @@ from harness.campaign.results import METRICS, RUN, TIMES, metric_cells, read_tab
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import ONE_THREAD, local_workers
 from harness.cli.app import main
-from harness.files.errors import RunFolderError
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import load_scenario
 from tests.longer import longer
@@ -251,17 +250,6 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
 
 
 @pytest.mark.flights
-@pytest.mark.parametrize("of", ["[]", "{}", '{"schema": "wayproof/results/0"}', "no JSON"])
-def test_a_table_of_something_else_is_no_campaigns(
-    of: str, place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    rows = pq.read_table(unbroken / "results.parquet")
-    pq.write_table(rows.replace_schema_metadata({"wayproof": of}), place / "r.parquet")
-    assert main(["fly", "--from", str(place / "r.parquet"), "--run", "1"]) == 2
-    assert "is not the results.parquet of a campaign" in capsys.readouterr().err
-
-
-@pytest.mark.flights
 def test_a_row_that_was_flown_otherwise_is_told(
     place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -409,39 +397,6 @@ def test_resume_refuses_a_changed_campaign_and_says_what_changed(
         assert folder.done == set(range(8))
 
 
-def cut_short(place: Path, unbroken: Path) -> None:
-    """The campaign's folder after two of its runs."""
-    (place / "out").mkdir()
-    (place / "out" / "campaign.json").write_bytes((unbroken / "campaign.json").read_bytes())
-    lines = (unbroken / "journal.jsonl").read_bytes().splitlines(keepends=True)
-    (place / "out" / "journal.jsonl").write_bytes(b"".join(lines[:2]))
-
-
-@pytest.mark.flights
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        (
-            "  environment.wind.speed_mps: [0, 5]\n",
-            "  environment.wind.speed_mps: [0, 5]\n  sensor.rays: [360, 720]\n",
-            "campaign.grid.sensor.rays was not there, is [360, 720]",
-        ),
-        (
-            "seed: 5\n",
-            "seed: 5\nset: {environment.vertical_gusts: null}\n",
-            "campaign.set.environment.vertical_gusts was not there, is null",
-        ),
-    ],
-)
-def test_resume_refuses_what_was_added(
-    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
-) -> None:
-    cut_short(place, unbroken)
-    (place / "campaign.yaml").write_text(CAMPAIGN.replace(old, new))
-    assert sweep(place, "--resume") == 2
-    assert said in capsys.readouterr().err
-
-
 def test_resume_refuses_an_added_null_and_another_order_of_keys(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -532,17 +487,6 @@ def test_a_folder_that_holds_other_things_is_refused(place: Path, capsys: pytest
     (place / "out").write_text("a file")
     assert sweep(place) == 2
     assert "is a file" in capsys.readouterr().err
-
-
-def test_two_sweeps_into_one_folder_are_one_too_many(place: Path) -> None:
-    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
-    with (
-        CampaignFolder(place / "out", runs, resume=False),
-        pytest.raises(RunFolderError, match="another wayproof is writing to"),
-    ):
-        CampaignFolder(place / "out", runs, resume=True)
-    with CampaignFolder(place / "out", runs, resume=True) as folder:
-        assert folder.done == set(), "the lock ends with its holder"
 
 
 @pytest.fixture
@@ -648,27 +592,6 @@ def test_the_optimum_can_be_left_out(place: Path) -> None:
     (place / "campaign.yaml").write_text(text)
     assert sweep(place, "--workers", "1") == 0
     assert {(row["optimum_m"], row["length_ratio"]) for row in rows_of(place / "out")} == {(None, None)}
-
-
-@pytest.mark.flights
-def test_a_full_disk_is_told_and_what_is_done_stays(
-    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    append, left = CampaignFolder.append, [3]
-
-    def full(self: CampaignFolder, *given: Any) -> None:
-        left[0] -= 1
-        if left[0] < 0:
-            raise OSError(28, "No space left on device")
-        append(self, *given)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(CampaignFolder, "append", full)
-        assert sweep(place, "--workers", "1") == 1
-    assert "No space left on device; what is done is in" in capsys.readouterr().err
-    assert [row["run"] for row in rows_of(place / "out")] == [0, 1, 2]
-    assert sweep(place, "--resume", "--workers", "1") == 0
-    assert len(rows_of(place / "out")) == 8
 
 
 FLIGHTS_IN_ONE_PROCESS = """
