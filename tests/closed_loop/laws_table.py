@@ -1,9 +1,9 @@
-"""The table of guidance laws in wind in aircraft/MEASURED.md: `python -m tests.closed_loop.laws_table [MOST] [LOG]`.
+"""The table of guidance laws in wind in aircraft/MEASURED.md: `python -m tests.closed_loop.laws_table [MOST]`.
 
 Each law flies the Aerosonde through public worlds in wind of 30 % of the airspeed: the plan itself, and for npfg and L1
 the plan as a mission of waypoints too. Prints a row for each, with the collisions and the least clearance of each
 family, then every flight that did not reach the goal, and exits with 1 where one collided. MOST is how many worlds of a
-family are flown. LOG is a file that gets a line of JSON for each flight; what it has already is not flown again.
+family are flown.
 """
 
 from __future__ import annotations
@@ -64,34 +64,17 @@ def cell(flights: list[Flown]) -> str:
     return f"{reached}/{len(ends)}, {hit}, {least:.2f}"
 
 
-def kept(log: Path | None) -> dict[tuple[str, str, str, str], Flown]:
-    """The flights of a log, by family, world, law and what it followed."""
-    lines = log.read_text().splitlines() if log and log.exists() else []
-    return {(each := Flown(**json.loads(line)))[:4]: each for line in lines}
-
-
-def main(most: int, log: Path | None = None) -> int:
+def main(most: int) -> int:
     if not WORLDS.is_dir():
         print(f"{WORLDS}: the shared worlds are not beside this checkout", file=sys.stderr)
         return 2
-    known = kept(log)
-
-    def once(path: Path, law: str, follow: str) -> Flown:
-        key = (path.parent.name, path.stem, law, follow)
-        if key not in known:
-            known[key] = flown(path, law, follow)
-            if log:
-                with log.open("a") as file:
-                    file.write(json.dumps(known[key]._asdict()) + "\n")
-        return known[key]
-
     collisions = 0
     print(f"| law | {' | '.join(f'`{family}`' for family in FAMILIES)} |", flush=True)
     for law, follow in FLOWN:
-        flights = {family: [once(path, law, follow) for path in worlds(family, most)] for family in FAMILIES}
+        flights = [[flown(path, law, follow) for path in worlds(family, most)] for family in FAMILIES]
         name = f"`{law}`" if follow == "path" else f"`{law}`, {follow}"
-        print(f"| {name} | {' | '.join(cell(some) for some in flights.values())} |", flush=True)
-        for each in (flight for some in flights.values() for flight in some):
+        print(f"| {name} | {' | '.join(map(cell, flights))} |", flush=True)
+        for each in (flight for some in flights for flight in some):
             if each.outcome != Outcome.REACHED.value:
                 collisions += each.outcome == Outcome.COLLISION.value
                 print(f"  {each.family}/{each.world}, {name}: {each.outcome}: {each.reason}", flush=True)
@@ -99,5 +82,4 @@ def main(most: int, log: Path | None = None) -> int:
 
 
 if __name__ == "__main__":
-    given = sys.argv[1:]
-    sys.exit(main(int(given[0]) if given else 10_000, Path(given[1]) if given[1:] else None))
+    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000))

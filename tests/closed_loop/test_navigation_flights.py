@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,6 @@ from harness.flight.record import BELIEVED_FIELDS, TRACK_FIELDS, Flight, Outcome
 from harness.flight.state_estimator import PerfectEstimator
 from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run, tables
-from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, parse_scenario
 from planner.interface import Plan, PlanRequest
 from tests.closed_loop.small import small_world
@@ -97,21 +95,6 @@ def test_metrics_have_the_error_and_its_cause(scenario: Scenario, flight: Flight
     both = replace(flight.track, believed_cross_track_m=flight.track.cross_track_m)
     told = [leg["cause"] for leg in metrics(replace(flight, track=both), tight)["trackability"]]
     assert "navigation error" not in told  # guidance was off as well
-
-
-def test_the_plan_keeps_the_margin_beyond_the_clearance(scenario: Scenario) -> None:
-    wanted, margin = scenario.planner.clearance_m, scenario.navigation.margin_m
-    radius_m = mission_of(scenario).turn_radius_m
-    turned_rad = 3.0 * math.radians(1.0)
-    assert margin == pytest.approx(
-        3.0 * 4.7
-        + 0.03 * min(25.0 * 60.0, math.pi * radius_m)
-        + turned_rad * max(wanted, 4.0 * radius_m * turned_rad)
-    )
-    assert mission_of(scenario).clearance_m == pytest.approx(wanted + margin)
-    assert flight_limits(scenario).clearance_m == wanted
-    given = scenario.with_({"navigation.margin_m": 3.0})
-    assert mission_of(given).clearance_m == pytest.approx(wanted + 3.0)
 
 
 class Jumping:

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from harness.run.scenario_flight import fly_to_folder
@@ -129,16 +128,6 @@ def test_real_terrain_is_never_touched(flown: Flown) -> None:
     assert run.metrics["min_altitude_above_ground_m"] > 10.0
     (source,) = run.manifest["sources"]
     assert source["path"].endswith("jacksboro_fault_dem.npz")
-
-
-@pytest.mark.flights
-def test_another_aircraft_flies_the_papers_world(flown: Flown) -> None:
-    run = flown("paper_circles", ("aircraft.model", "c172p"), ("aircraft.airspeed_mps", "50"))
-    assert run.metrics["outcome"] == "reached"
-    assert run.metrics["clearance_violation_s"] == 0.0
-    assert run.metrics["cross_track_m"]["p95"] <= 0.3
-    assert run.metrics["cross_track_m"]["max"] <= 1.5
-    assert np.percentile(np.abs(run.track.airspeed_mps - 50.0), 95) <= 0.5
 
 
 @pytest.mark.parametrize("side_m", [100_000, 200_000])

@@ -91,35 +91,6 @@ def plan(*items: dict[str, Any], **more: Any) -> dict[str, Any]:
 
 
 PLAN = plan(*(item(16, north, 0, 0, 0, None) for north in (0.0, 0.01, 0.02)))
-MISSION = plan(
-    item(22, 0.0, 15, 0, 0, None),
-    item(16, 0.01, 0, 30, 0, None),
-    item(18, 0.02, 2, 0, 150, None),
-    item(178, 0.0, 0, 22, 0, 0),
-    item(31, 0.03, 1, -150, 0, 1),
-    item(19, 0.04, 30, 0, 0, 0),
-    item(177, 0.0, 2, 1, 0, 0),
-    item(30, 0.0, 0, 0, 0, 0),
-    {
-        "type": "ComplexItem",
-        "complexItemType": "survey",
-        "TransectStyleComplexItem": {"Items": [item(16, 0.05, 0, 0, 0, None)]},
-    },
-    {
-        "type": "ComplexItem",
-        "complexItemType": "fwLandingPattern",
-        "altitudesAreRelative": True,
-        "landCoordinate": [47.0, 8.0, 0],
-        "landingApproachCoordinate": [47.02, 8.0, 60],
-        "loiterRadius": 120,
-        "loiterClockwise": False,
-    },
-    geoFence={
-        "polygons": [{"inclusion": True, "polygon": [[46.9, 7.9], [46.9, 8.2], [47.2, 8.0]]}],
-        "circles": [{"inclusion": False, "circle": {"center": [47.1, 8.1], "radius": 100}}],
-    },
-    rallyPoints={"points": [[47.0, 8.0, 50]]},
-)
 CSV = [["x_m", "y_m"], ["0", "0"], ["500", "0"], ["900", "700"]]
 WAYPOINTS = [
     ["QGC WPL 110"],
@@ -194,7 +165,6 @@ READERS = {
     "short campaign": Reader("c.yaml", read_campaign, SHORT_CAMPAIGN, as_yaml, CAMPAIGN_SNIPPETS),
     "geojson": Reader("p.geojson", read_given_path, GEOJSON, as_json, JSON_SNIPPETS),
     "plan": Reader("p.plan", read_given_path, PLAN, as_json, JSON_SNIPPETS),
-    "mission": Reader("p.plan", read_given_path, MISSION, as_json, JSON_SNIPPETS),
     "csv": Reader("p.csv", read_given_path, CSV, rows(","), CELLS),
     "waypoints": Reader("p.waypoints", read_given_path, WAYPOINTS, rows("\t"), CELLS),
 }

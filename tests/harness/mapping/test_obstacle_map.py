@@ -172,19 +172,6 @@ def test_an_obstacle_that_has_gone_is_forgotten(doubtful: bool) -> None:
     assert seen.last_removal_revision > 0
 
 
-@pytest.mark.parametrize("doubtful", [True, False])
-def test_an_obstacle_that_moves_leaves_no_trail(doubtful: bool) -> None:
-    world = World([Obstacle(Circle((3500.0, 6500.0), 400.0), velocity_mps=(10.0, 0.0))], BOUNDS)
-    taken = scans(sensor(world), on_circle(80) * 8)
-    seen = fed(taken, doubtful=doubtful)
-    time = taken[-1].time_s
-    points = edges(seen)
-    off = np.abs(world.clearance(points, np.full(len(points), time)))
-    assert len(points) > 5
-    # Evidence against an edge that was certain takes six scans a point, six points: 18 s and 180 m.
-    assert off.max() < 3.0 * 180.0
-
-
 def test_edges_since_tells_each_edge_once_in_order() -> None:
     world = world_of(WALL, Circle((7000.0, 5000.0), 500.0))
     seen, known, revisions = empty_map(), np.zeros((0, 2)), [seen_revision := 0]

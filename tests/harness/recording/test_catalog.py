@@ -148,27 +148,6 @@ def curve(campaign: Path, entity: str) -> dict[float, float]:
     return values
 
 
-def test_severity_orders_outcomes_then_clearance() -> None:
-    scenario = parse_scenario(SCENARIO)
-
-    def severity_of(outcome: Outcome, clearance_m: float) -> float:
-        value = run_properties(scenario, metrics(flight(outcome, clearance_m), LIMITS))["severity"]
-        assert isinstance(value, float)
-        return value
-
-    worst_first = [
-        (Outcome.COLLISION, -5.0),
-        (Outcome.COLLISION, -1.0),
-        (Outcome.TIMEOUT, 30.0),
-        (Outcome.TIMEOUT, 300.0),
-        (Outcome.REACHED, 90.0),
-        (Outcome.REACHED, 300.0),
-    ]
-    figures = [severity_of(*each) for each in worst_first]
-    assert figures == sorted(figures, reverse=True)
-    assert len(set(figures)) == len(figures)
-
-
 def test_a_campaign_without_recordings_says_how_to_get_some(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -148,18 +148,6 @@ def test_flying_anew_removes_the_report_of_the_run_before(run: Path, tmp_path: P
     assert not {path.name for path in copy.iterdir()} & set(REPORT_FILES)
 
 
-@pytest.mark.parametrize("command", [[None], [7], [], None, "", ["'"]])
-def test_a_manifest_with_another_command_is_damaged(
-    command: Any, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    copy = tmp_path / "run"
-    shutil.copytree(run, copy)
-    manifest = json.loads((copy / "manifest.json").read_text())
-    (copy / "manifest.json").write_text(json.dumps(manifest | {"command": command}))
-    assert main(["report", str(copy)]) == 2
-    assert "damaged" in capsys.readouterr().err
-
-
 @pytest.mark.flights
 def test_a_browser_shows_the_report_on_phone_and_screen(run: Path, chromium: Any) -> None:
     for width_px in (390, 1280):
