@@ -32,6 +32,7 @@ class AsGiven:
         climb_mps: (n,) climb that it asks for there, negative for a descent.
         fastest_mps: (n, 2) fastest climb and descent of the aircraft at its airspeed there.
         airspeed_mps: (n,) true airspeed that was commanded there.
+        unheld_mps: (n,) by how much that is beyond the airspeeds that the aircraft holds.
         believed_off_m: (n,) distance of the believed position from the path; None where navigation is perfect.
     """
 
@@ -42,4 +43,5 @@ class AsGiven:
     climb_mps: FloatArray
     fastest_mps: FloatArray
     airspeed_mps: FloatArray
+    unheld_mps: FloatArray | float = 0.0
     believed_off_m: FloatArray | None = None

@@ -88,6 +88,11 @@ class _Flown:
             return self.limits.altitude_m, self.limits.airspeed_mps
         return self.given.altitude_m[rows], self.given.airspeed_mps[rows]
 
+    def unheld_mps(self, first: int, rows: int) -> float:
+        """Mean over some rows of how far the airspeed asked for is beyond those that the aircraft holds."""
+        beyond = np.broadcast_to(self.given.unheld_mps if self.given else 0.0, len(self.track))
+        return float(beyond[first : first + rows].mean())
+
 
 def legs(
     track: Track,
@@ -166,7 +171,10 @@ def _judge(flown: _Flown, first: int, last: int) -> Leg:
         cause = _steep(flown, first + int(loads.argmax()), len(leg) - len(loads) + 1) or "load factor"
     elif slow.max() > limits.max_airspeed_error_mps:
         begins, rows = int(slow.argmax()), len(leg) - len(slow) + 1
-        cause = _steep(flown, first + begins, rows) or speed_cause(leg.part(begins, begins + rows), limits)
+        cause = _steep(flown, first + begins, rows)
+        if cause is None and flown.unheld_mps(first + begins, rows) > limits.max_airspeed_error_mps:
+            cause = "speed or throttle saturation"
+        cause = cause or speed_cause(leg.part(begins, begins + rows), limits)
     elif high.max() > limits.max_altitude_error_m:
         cause = _altitude_cause(flown, leg, wanted_m, first, int(high.argmax()))
     return Leg(

@@ -259,6 +259,7 @@ def _as_given(
         climb_mps=profile.slopes(along) * track.groundspeed_mps,
         fastest_mps=fastest,
         airspeed_mps=speeds,
+        unheld_mps=np.abs(plan.asked_mps - profile.airspeed_mps)[np.maximum(asked, 0)],
     )
 
 
