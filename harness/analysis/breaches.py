@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -28,17 +28,10 @@ CONTACTS: Final = (CONTACT, TERRAIN)
 
 @dataclass(frozen=True)
 class Breach:
-    """One stretch of flight where the aircraft was where it must not be.
+    """One stretch of flight where the aircraft was where it must not be, and the time and place where it was deepest.
 
-    Attributes:
-        kind: `obstacle`, `terrain`, `exclusion`, `inclusion` or `area`.
-        name: of what it touched or crossed.
-        start_s: when it began.
-        end_s: when it was over, or the flight was.
-        time_s: when it was deepest.
-        east_m: where it was deepest.
-        north_m: where it was deepest.
-        depth_m: how far inside, or outside of what it had to stay in, it was there.
+    `kind` is `obstacle`, `terrain`, `exclusion`, `inclusion` or `area`; `depth_m` is how far inside it was there, or
+    outside of what it had to stay in.
     """
 
     kind: str
@@ -50,26 +43,17 @@ class Breach:
     north_m: float
     depth_m: float
 
-    def plain(self) -> dict[str, Any]:
-        """Its content for `metrics.json`."""
-        return dict(vars(self))
-
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """What a track kept from obstacles and fences.
-
-    Attributes:
-        breaches: in order of time.
-        margin_m: least distance from every edge of obstacles and fences, negative where one was crossed; +inf without
-            any.
-        height_m: `min`, `mean` and where the least was: `time_s`, `east_m`, `north_m`; None where the ground is not
-            known anywhere.
-    """
+    """What a track kept from obstacles and fences."""
 
     breaches: tuple[Breach, ...]
+    """In order of time."""
     margin_m: float
+    """Least distance from every edge of obstacles and fences, negative where one was crossed; +inf without any."""
     height_m: dict[str, float] | None = None
+    """Above ground: `min`, `mean` and where the least was; None where the ground is not known anywhere."""
 
     @property
     def contacts(self) -> tuple[Breach, ...]:
@@ -93,7 +77,6 @@ def kept(
     import shapely
 
     heights = track.altitude_above_ground_m
-
     found = _contacts(track, world)
     found += others[0]
     margins = [float(np.min(track.clearance_m, initial=np.inf)), others[1]]

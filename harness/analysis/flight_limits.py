@@ -17,22 +17,13 @@ class FlightLimits:
     """What a flight is measured against.
 
     Attributes:
-        altitude_m: altitude to be held, above mean sea level.
+        altitude_m: to be held, above mean sea level.
         clearance_m: wanted distance from every obstacle edge.
-        bank_limit_rad: largest roll command of the guidance.
         turn_radius_m: smallest radius a plan may have, in the flight's wind and turbulence.
         airspeed_mps: true airspeed to be held; NaN where it is not judged.
-        roll_rate_radps: fastest change of the roll command.
-        stall_angle_deg: angle of attack beyond which the wing is stalled.
-        sensor_range_m: how far obstacles are seen.
-        horizon_m: how far they have to be seen, so that a turn along a wall straight ahead keeps the clearance.
+        horizon_m: how far obstacles have to be seen, so that a turn along a wall straight ahead keeps the clearance.
         no_wind: the air has no mean wind and no gust; then what the track seems to show of one is turbulence.
-        scan_period_s: time from one scan to the next.
         compute_latency_s: a plan takes effect this much later than the scan that it was made from.
-        max_cross_track_m: largest cross-track error, before the navigation margin.
-        max_altitude_error_m: largest altitude error.
-        max_airspeed_error_mps: largest error of the airspeed averaged over `SPEED_S`.
-        max_load_factor: largest load factor averaged over `LOAD_S`.
         navigation_margin_m: what the planner keeps from obstacles beyond the clearance, for the navigation error; the
             cross-track error may be larger by so much.
     """

@@ -39,23 +39,11 @@ SHORTEST_LEG_S = 5.0
 class Leg:
     """A stretch of flight under one plan, and the verdict on it.
 
-    Attributes:
-        start_s: simulated time of its first row.
-        end_s: simulated time of its last row.
-        max_cross_track_m: largest absolute cross-track error.
-        threshold_m: what it may be.
-        max_altitude_error_m: largest absolute altitude error.
-        max_airspeed_error_mps: largest absolute error of the airspeed, averaged over `SPEED_S`; None where the
-            airspeed is not judged.
-        max_load_factor: largest load factor, averaged over `LOAD_S`.
-        waypoint: the number of the point of a given path that it leads to; None where it leads to none.
-        corner_cut_m: how far from the corner at its end the plan passes; 0 without one.
-        max_deviation_m: largest distance from the path as given; None where a planner made the path.
-        trackable: whether all of them stayed within what they may be.
-        cause: why not, as `harness.analysis.causes.FINDINGS` tells; None where trackable. Of several limits that were
-            exceeded the first counts: control lost, cross-track error or distance from the path as given, load factor,
-            airspeed, altitude. It is a navigation error where, at the largest true error, the believed one was within
-            the limit.
+    Errors are absolute; airspeed is averaged over `SPEED_S` (None where it is not judged), load factor over `LOAD_S`.
+    `threshold_m` is what the cross-track error may be. `waypoint` is the number of the point of a given path that the
+    leg leads to, `corner_cut_m` how far from the corner there the plan passes, `max_deviation_m` the largest distance
+    from the path as given. Of several limits that were exceeded the first is the cause: control lost, cross-track error
+    or distance from the path as given, load factor, airspeed, altitude.
     """
 
     start_s: float

@@ -55,20 +55,14 @@ KEYS_OF_THE_WORLD: Final = (
 
 @dataclass(frozen=True, eq=False)
 class _Keys:
-    """What the scenario of a path is made of, beside the path.
-
-    Attributes:
-        name: of the scenario.
-        sections: `aircraft`, `environment`, ... as in a file; what is left out has its default.
-        overrides: keys to replace.
-        world: a scenario file with the obstacles, the area, the air, the altitude, the clearance and the seed. None:
-            nothing is there, and the area reaches beyond the path.
-    """
+    """What the scenario of a path is made of, beside the path."""
 
     name: str
     sections: Mapping[str, Mapping[str, Any]]
+    """`aircraft`, `environment`, ... as in a file; what is left out has its default."""
     overrides: Sequence[tuple[str, str]]
     world: FilePath | None
+    """A scenario file with obstacles, area, air, altitude, clearance and seed; None: nothing is there."""
 
     @property
     def folder(self) -> FilePath | None:
@@ -86,13 +80,9 @@ class _Keys:
     ) -> Scenario:
         """The mission of a path (n, 2) as a scenario: from its start to its end, or to where it is furthest from there.
 
-        Start and goal may lie anywhere, in an obstacle too: that is then what the flight finds.
-
-        Args:
-            points_m: the path.
-            files: files among the obstacles are obstacles where they are solid at the altitude of the start; else they
-                are left out, for a path that is not flown at one altitude.
-            ground: in place of what these files say of it.
+        Start and goal may lie anywhere, in an obstacle too: that is then what the flight finds. Without `files` those
+        among the obstacles are left out, for a path that is not flown at one altitude, and `ground` stands in place of
+        what they say of it.
 
         Raises:
             InputError: the keys contradict each other; the fault names the key.
@@ -159,30 +149,24 @@ def _obstacles(root: Node) -> tuple[Node, ...]:
 
 @dataclass(frozen=True, eq=False)
 class PathCheck:
-    """A path, and what it is to be flown and judged with.
-
-    Attributes:
-        given: the path, with its fences.
-        scenario: aircraft, air, obstacles, altitude and thresholds.
-        plan: what is flown.
-        bounded: the bounds of the area were named, and must not be crossed.
-        corner_m: how far off a corner may be passed; None: what `allowed_cut_m` says.
-        files: among the obstacles, for a path that is not flown at one altitude.
-    """
+    """A path, and what it is to be flown and judged with."""
 
     given: PathAsGiven
     scenario: Scenario
     plan: PathPlan
     bounded: bool = False
+    """The bounds of the area were named, and must not be crossed."""
     corner_m: float | None = None
+    """How far off a corner may be passed; None: what `allowed_cut_m` says."""
     files: tuple[FileSpec, ...] = ()
+    """Files among the obstacles, for a path that is not flown at one altitude."""
 
     @cached_property
     def _accepted_m(self) -> dict[int, float]:
         """How far from it an item lets the aircraft pass."""
-        if self.given.mission is None:
-            return {}
-        return {step.item: step.acceptance_m for step in self.given.mission.steps}
+        return (
+            {step.item: step.acceptance_m for step in self.given.mission.steps} if self.given.mission else {}
+        )
 
     def allowed_cut_m(self, waypoint: int) -> float:
         """How far off a corner may be passed; nothing of the aircraft or its guidance enters.
@@ -199,13 +183,7 @@ class PathCheck:
 
 @dataclass(frozen=True, eq=False)
 class CheckedPath:
-    """A path that was flown.
-
-    Attributes:
-        check: what was asked.
-        metrics: what came of it, as in `metrics.json`; `check.ok` and `check.verdict` in there are the answer.
-        folder: the run folder; None where none was written.
-    """
+    """A path that was flown, its metrics as in `metrics.json`, and the run folder, where one was written."""
 
     check: PathCheck
     metrics: dict[str, Any]

@@ -51,32 +51,21 @@ FREE_SHARE = 0.25
 
 @dataclass(frozen=True, eq=False)
 class PathPlan:
-    """A path as it is flown.
-
-    Attributes:
-        way: lines and arcs.
-        profile: altitude and airspeed along them, what the aircraft is commanded.
-        asked_mps: airspeeds that the path asks for, as those of the profile; the aircraft may not hold them.
-        frame: the aircraft.
-        marks: number and arc length of every item of a mission; none for a drawn line.
-        bends: number and arc length of the points of a drawn line at which its slope changes.
-        notes: what was assumed, a line each.
-        legs: the path leg by leg, for a law that flies to its waypoints.
-    """
+    """A path as it is flown: lines and arcs, with the altitude and airspeed that are commanded along them."""
 
     way: FlyBy
     profile: VerticalProfile
     asked_mps: FloatArray
+    """Airspeeds that the path asks for, as those of the profile; the aircraft may not hold them."""
     frame: Airframe
     marks: tuple[tuple[int, float], ...] = ()
+    """Number and arc length of every item of a mission; none for a drawn line."""
     bends: tuple[tuple[int, float], ...] = ()
+    """Number and arc length of the points of a drawn line at which its slope changes."""
     notes: tuple[str, ...] = ()
+    """What was assumed, a line each."""
     legs: tuple[MissionLeg, ...] = ()
-
-    @property
-    def climb_gain_1ps(self) -> float:
-        """Climb rate over altitude error of the aircraft's altitude loop."""
-        return self.frame.gains.altitude
+    """The path leg by leg, for a law that flies to its waypoints."""
 
     @property
     def climb_mps(self) -> Callable[[float], tuple[float, float]]:
@@ -142,17 +131,12 @@ def planned(
     if altitude_m is None and ground is None and given.mission.above_ground:
         items = ", ".join(map(str, given.mission.above_ground[:6]))
         more = " and others" if len(given.mission.above_ground) > 6 else ""
-        notes = (
-            *notes,
-            f"items {items}{more}: above ground, which is taken to be as high as home everywhere",
-        )
-    loiters = [step.item for step in given.mission.steps if step.loiter is not None]
+        told = f"items {items}{more}: above ground, which is taken to be as high as home everywhere"
+        notes = (*notes, told)
+    loiters = any(step.loiter is not None for step in given.mission.steps)
     if loiters and scenario.guidance.follow == "waypoints":
-        how = (
-            "heads for its centre and then joins it"
-            if flying.heads_for_centres
-            else "joins it along a tangent"
-        )
+        heads, joins = "heads for its centre and then joins it", "joins it along a tangent"
+        how = heads if flying.heads_for_centres else joins
         notes = (*notes, f"to a loiter's circle the aircraft {how}, with the law {scenario.guidance.kind}")
     return PathPlan(route.way, profile, route.asked_mps, frame, route.marks, notes=notes, legs=route.legs)
 
@@ -262,7 +246,7 @@ def fly_along(
         guidance=guidance,
         sensor=None,
         planner=GivenPath(plan.way.waypoints_m, path),
-        vertical=AltitudeGuidance(plan.profile, plan.climb_gain_1ps, plan.climb_mps),
+        vertical=AltitudeGuidance(plan.profile, plan.frame.gains.altitude, plan.climb_mps),
         termination=PathEnd(where, route_length(route), loop.mission.goal_radius_m, limit_s),
     )
     return replace(fly(along, observers, progress), compute_ms=())  # nothing was searched for

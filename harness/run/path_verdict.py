@@ -278,8 +278,8 @@ def _kept_figures(seen: Kept) -> dict[str, Any]:
     return {
         "min_clearance_m": seen.margin_m if np.isfinite(seen.margin_m) else None,
         "contact": bool(seen.contacts),
-        "contacts": [each.plain() for each in seen.contacts],
-        "breaches": [each.plain() for each in seen.crossings],
+        "contacts": [dict(vars(each)) for each in seen.contacts],
+        "breaches": [dict(vars(each)) for each in seen.crossings],
         **({} if seen.height_m is None else {"height_above_ground_m": seen.height_m}),
     }
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from aircraft.guidance.altitude import LevelFlight
-from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import AircraftState, FlightModel
 from aircraft.start import Atmosphere, StartConditions
 from harness.analysis.flight_limits import FlightLimits
@@ -76,18 +75,13 @@ def make_loop(
         ),
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
-        guidance=guidance_law(scenario),
+        guidance=law_of(scenario.guidance, scenario.aircraft),
         termination=MissionEnd(world, mission, _given(scenario.mission.time_limit_s)),
         mission=mission,
         vertical=LevelFlight(scenario.mission.altitude_m, mission.speed_mps),
         scan_rate_hz=scenario.sensor.rate_hz,
         navigator=Navigator(scenario.navigation, _stream(scenario.seed, NAVIGATION_STREAM)),
     )
-
-
-def guidance_law(scenario: Scenario) -> GuidanceLaw:
-    """The guidance of a scenario's flight."""
-    return law_of(scenario.guidance, scenario.aircraft)
 
 
 def atmosphere(scenario: Scenario) -> Atmosphere:
@@ -170,13 +164,13 @@ def fly_to_folder(
         recording: whether to write `flight.rrd`.
         progress: told of the flight as it goes on.
         make: makes the parts of the flight.
+        flown_by: flies the parts to an end.
+        measured_by: gives the content of `metrics.json`.
         watching: observers besides those that write the folder.
         pilot: stands in the recording's name; default: the planner's kind.
         identity: of the recording among others; default: its name with a hash of all settings and versions.
         varied: keys that a campaign varied, for the recording's properties.
         thin: whether the recording has no more than track, plans and obstacles.
-        flown_by: flies the parts to an end.
-        measured_by: gives the content of `metrics.json`.
         command: what the manifest says was called; default: the command line.
         profile: altitudes to be held at arc lengths along the path, for the recording; None: the mission's.
 
