@@ -27,24 +27,35 @@ MOST_RETRIES = 8
 to be safe from elsewhere on the turn, or at another look."""
 
 
-class DeadEnds:
-    """Counts how often the aircraft had to turn before a place, and gives places up."""
+class GivingUp:
+    """Gives places up that the aircraft turned before, and tells what follows from searches that found no way.
+
+    Attributes:
+        stability: when something last moved or appeared.
+        effort: how often the work of a wide search is doubled; grows with every search that found nothing.
+        tried_again: what was given up has been tried again for want of another way.
+    """
 
     def __init__(self, mission: Mission, memory: ObstacleMemory) -> None:
         self._mission, self._memory = mission, memory
-        self._reach = 2.0 * mission.clearance_m  # places nearer to each other are one
-        self._places: list[Point] = []
-        self.stability = WorldStability()
-        """When something last moved or appeared."""
+        self._whole_turn_m = math.tau * mission.turn_radius_m
+        self._turned_before: list[Point] = []
         self._retry_s = math.inf
+        self._retries = 0
+        self._given_up_at_m = 0.0
+        self._loitered: object = None
+        self.stability = WorldStability()
+        self.effort = 0
+        self.tried_again = False
 
-    def turned_before(self, place: Point) -> bool:
+    def turned_twice(self, place: Point) -> bool:
         """Counts one more turn before a place; returns whether these are enough to give it up."""
-        self._places.append(place)
-        near = [each for each in self._places if math.dist(each, place) < self._reach]
+        self._turned_before.append(place)
+        reach_m = 2.0 * self._mission.clearance_m  # places nearer to each other are one
+        near = [each for each in self._turned_before if math.dist(each, place) < reach_m]
         if len(near) < ENOUGH:
             return False
-        self._places = [each for each in self._places if each not in near]
+        self._turned_before = [each for each in self._turned_before if each not in near]
         return True
 
     def note_change(self, time_s: float, seen: MapView) -> None:
@@ -52,7 +63,7 @@ class DeadEnds:
         if self.stability.note(time_s, seen):
             self._retry_s = self.stability.changed_s + RETRY_S
         if time_s > self._retry_s:
-            self._retry_s, self._places = math.inf, []
+            self._retry_s, self._turned_before = math.inf, []
             self._memory.forgive()
 
     @property
@@ -60,7 +71,7 @@ class DeadEnds:
         """Whether a time is set at which what was given up is tried again."""
         return self._retry_s < math.inf
 
-    def give_up(self, place: Pose) -> None:
+    def refuse(self, place: Pose) -> None:
         """Gives up a place on a course, and what lies to its sides: a turn takes so much room."""
         east, north, along_east, along_north = place
         clearance_m, radius_m = self._mission.clearance_m, self._mission.turn_radius_m
@@ -72,25 +83,6 @@ class DeadEnds:
             aside_m = i * clearance_m
             self._memory.refuse((east - aside_m * along_north, north + aside_m * along_east))
 
-
-class GivingUp:
-    """What follows from searches that found no way: more effort, places given up, and given-up places tried again.
-
-    Attributes:
-        dead_ends: the places.
-        effort: how often the work of a wide search is doubled; grows with every search that found nothing.
-        tried_again: what was given up has been tried again for want of another way.
-    """
-
-    def __init__(self, mission: Mission, memory: ObstacleMemory) -> None:
-        self._memory, self._whole_turn_m = memory, math.tau * mission.turn_radius_m
-        self.dead_ends = DeadEnds(mission, memory)
-        self.effort = 0
-        self.tried_again = False
-        self._retries = 0
-        self._given_up_at_m = 0.0
-        self._loitered: object = None
-
     def first_in_loiter(self, plan: object) -> bool:
         """Whether a plan is not the one whose loiter was entered last, which is remembered."""
         first, self._loitered = plan is not self._loitered, plan
@@ -100,14 +92,10 @@ class GivingUp:
         """A new plan is in effect: arc lengths are counted from its start."""
         self._given_up_at_m = 0.0
 
-    def settled(self, time_s: float) -> bool:
-        """Whether the world has stood still long enough for a verdict on it."""
-        return self.dead_ends.stability.settled(time_s)
-
     @property
     def certain(self) -> bool:
         """Whether all that was seen still stands, and nothing has contradicted seen-free space."""
-        return not (self._memory.ever_cleared or self.dead_ends.stability.ever)
+        return not (self._memory.ever_cleared or self.stability.ever)
 
     @property
     def out_of_effort(self) -> bool:
@@ -130,13 +118,13 @@ class GivingUp:
     def give_up(self, place: Pose, arc_length_m: float) -> None:
         """Gives up a place: the whole turn before it has shown nothing more of it."""
         self._given_up_at_m = arc_length_m
-        self.dead_ends.give_up(place)
+        self.refuse(place)
 
     def narrow(self, no_room: bool, settled: bool) -> bool:
         """Whether nothing is left but ways without room to turn."""
         # What moved may have closed the way. Where edge points were taken back the sensor errs, and a place that was
         # given up may be seen to be free at another look.
-        doubtful = self.dead_ends.stability.ever or self._memory.ever_cleared
+        doubtful = self.stability.ever or self._memory.ever_cleared
         return no_room and settled and not (doubtful and len(self._memory.refused_m))
 
     def retries_used(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, search_candidates
 from planner.rolling_window.pose_search import search_poses
 from planner.rolling_window.route_optimisation import FlyableRoute, optimise
-from planner.rolling_window.trail import Trail
 from planner.rolling_window.window import Window
 from planner.shield.room import Room
 
@@ -52,6 +52,9 @@ RETRACE = 0.25
 TRAIL_CLEARANCES = 4.0
 """Places within so many clearances of the flown trail count as where the aircraft has been."""
 
+AROUND = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1))
+"""A square and those around it, by columns and rows."""
+
 
 @dataclass(frozen=True)
 class Attempt:
@@ -73,6 +76,34 @@ class Start:
 
 Now = Callable[[], tuple[Start, Course | None]]
 """Tells where a plan would begin now, and the course that is flown."""
+
+
+class Trail:
+    """Where the aircraft has been: squares of the plane that were flown through, and those around them."""
+
+    def __init__(self, side_m: float) -> None:
+        self._side = side_m
+        self._last: tuple[int, int] | None = None
+        self._flown: set[tuple[int, int]] = set()
+
+    def add(self, place: Point) -> None:
+        """Takes in where the aircraft is."""
+        x, y = math.floor(place[0] / self._side), math.floor(place[1] / self._side)
+        if (x, y) != self._last:
+            self._last = x, y
+            self._flown.update((x + i, y + j) for i, j in AROUND)
+
+    def retraced_m(self, nodes: Sequence[Point]) -> float:
+        """How much of a polyline lies where the aircraft has been, to about a square."""
+        back_m = 0.0
+        for (ax, ay), (bx, by) in pairwise(nodes):
+            length = math.hypot(bx - ax, by - ay)
+            count = max(math.ceil(length / self._side), 1)
+            share = (np.arange(count) + 0.5) / count
+            x = np.floor((ax + share * (bx - ax)) / self._side).astype(np.int64).tolist()
+            y = np.floor((ay + share * (by - ay)) / self._side).astype(np.int64).tolist()
+            back_m += length / count * sum(place in self._flown for place in zip(x, y, strict=True))
+        return back_m
 
 
 class LocalPlanning:

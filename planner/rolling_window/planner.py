@@ -160,13 +160,13 @@ class RollingWindow:
     def _nothing_waits(self, seen: MapView) -> bool:
         """Whether, as long as nothing is seen, only the way flown can make a search due."""
         feared = self._threats is not None or len(seen.moving) > 0
-        waits = self._search.freed or self._monitor.waits or self._giving_up.dead_ends.waits
+        waits = self._search.freed or self._monitor.waits or self._giving_up.waits
         return self.state is PlanningState.FOLLOWING and not (feared or waits)
 
     def _take_in(self, request: PlanRequest) -> FloatArray:
         """Takes in what was seen and flown since the last request; returns (k, 2) edge points that have come in."""
         met = encounters(request, self._mission) if request.seen.moving else []
-        self._giving_up.dead_ends.note_change(request.time_s, request.seen)
+        self._giving_up.note_change(request.time_s, request.seen)
         fresh_m = self._memory.take_in(request.seen, met)
         self._local.trail.add(request.position_m)
         self._threats = self._escapes.threats(request)
@@ -264,8 +264,8 @@ class RollingWindow:
         if not plan.course.to_goal or not self._giving_up.first_in_loiter(plan):
             return
         place = self._commitment.unseen(plan.course, now.request.seen)
-        if self._giving_up.dead_ends.turned_before(place[:2]):
-            self._giving_up.dead_ends.give_up(place)
+        if self._giving_up.turned_twice(place[:2]):
+            self._giving_up.refuse(place)
 
     def _no_way_found(self, now: Situation) -> Plan:
         """After a search without a plan: goes on searching, escapes, proves that there is no way, or gives up."""
@@ -325,7 +325,9 @@ class RollingWindow:
     def _proved_closed(self, now: Situation) -> bool:
         """Whether the world stands still and the edge points seen leave no way at all."""
         request = now.request
-        return self._giving_up.settled(request.time_s) and self._proofs.no_way.closed(request.position_m)
+        return self._giving_up.stability.settled(request.time_s) and self._proofs.no_way.closed(
+            request.position_m
+        )
 
     def _give_up(
         self,
@@ -348,7 +350,7 @@ class RollingWindow:
             if turned:
                 giving_up.give_up(self._commitment.unseen(search.stuck, now.request.seen), arc_length_m)
             return Plan(PlanStatus.NO_PATH, NO_WAY_ON)
-        narrow = giving_up.narrow(no_room, giving_up.settled(now.request.time_s))
+        narrow = giving_up.narrow(no_room, giving_up.stability.settled(now.request.time_s))
         if narrow and giving_up.retries_used():
             return self._end_without_room_to_turn(now)
         # No way is left but those given up, or one that takes more looking for. Or none that can be flown from here:

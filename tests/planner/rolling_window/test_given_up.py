@@ -163,7 +163,7 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
         return statuses
 
     assert set(told(changed_s + SETTLED_S - 1.0)) == {PlanStatus.NO_PATH}
-    pilot._giving_up.dead_ends.give_up(Pose(3000.0, 0.0, 1.0, 0.0))
+    pilot._giving_up.refuse(Pose(3000.0, 0.0, 1.0, 0.0))
     ends_as = None if for_turns_alone else PlanStatus.UNREACHABLE
     assert told(changed_s + SETTLED_S + 1.0)[-1] is ends_as
     # Where it is for want of room to turn, what was given up was tried again before.
