@@ -90,17 +90,6 @@ def test_points_on_a_line_are_left_out() -> None:
     assert way.waypoints_m.tolist() == [[0.0, 0.0], [0.0, 1000.0]]
 
 
-def test_a_curve_may_have_a_point_every_few_millimetres() -> None:
-    curve = circle(300.0, 1.5, 0.005)
-    points = np.concatenate(([(300.0, -500.0)], curve, [curve[-1] + (-500.0, 500.0 / math.tan(1.5))]))
-    way = fly_by(points, 110.0, 1.0)
-    assert way.corners == ()
-    assert np.abs(way.segments[:, 4]).max() < 1.0 / 250.0
-    drawn = polylines([way.segments], 0.1)[0]
-    off = np.hypot(*drawn.T)[(drawn[:, 1] > 5.0) & (drawn[:, 0] > 30.0)] - 300.0
-    assert np.abs(off).max() < 1.0
-
-
 def test_corners_have_the_numbers_of_the_points_given() -> None:
     points = np.repeat(
         [(0.0, 0.0), (0.0, 1000.0), (0.004, 1000.0), (1000.0, 1000.0), (1000.0, 0.0)], 3, axis=0
@@ -108,21 +97,6 @@ def test_corners_have_the_numbers_of_the_points_given() -> None:
     way = fly_by(points, 110.0, 1.0)
     assert [corner.waypoint for corner in way.corners] == [3, 9]
     assert len(way.waypoints_m) == 4
-
-
-@pytest.mark.flights
-def test_a_zigzag_of_any_length_becomes_a_path() -> None:
-    count = 100_000
-    points = np.column_stack((4.0 * np.arange(count), np.arange(count) % 2))
-    assert len(fly_by(points, 110.0, 1.0).waypoints_m) == count
-
-
-def test_a_corner_between_dense_points_has_the_room_of_its_legs() -> None:
-    up = np.column_stack((np.zeros(101), np.linspace(0.0, 1000.0, 101)))
-    across = np.column_stack((np.linspace(10.0, 1000.0, 100), np.full(100, 1000.0)))
-    (corner,) = fly_by(np.concatenate((up, across)), 110.0, 1.0).corners
-    assert corner.waypoint == 100
-    assert corner.radius_m == pytest.approx(110.0)
 
 
 def test_a_path_may_cross_itself_at_one_of_its_points() -> None:

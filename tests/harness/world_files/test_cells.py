@@ -37,16 +37,6 @@ def test_outlines_are_the_union_of_the_cells(rows: int, columns: int, share: flo
     assert shapely.get_num_coordinates(whole) <= shapely.get_num_coordinates(wanted)
 
 
-def test_what_touches_at_corners_is_apart_outside_and_in() -> None:
-    checkers = np.indices((6, 6)).sum(axis=0) % 2 == 0
-    assert len(outlines(checkers)[0]) == 18
-    holes = np.ones((5, 5), dtype=np.bool_)
-    holes[1, 1] = holes[2, 2] = holes[3, 1] = False
-    (polygon,) = outlines(holes)[0]
-    assert polygon.is_valid
-    assert len(polygon.interiors) == 3
-
-
 def test_a_ragged_mask_is_made_coarser_and_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cells, "MAX_RUNS", 15)
     mask = np.random.default_rng(4).random((37, 53)) < 0.02

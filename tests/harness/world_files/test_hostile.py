@@ -75,63 +75,41 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "no features": (text("a.json", '{"type": "FeatureCollection", "features": []}'), "has no polygon"),
     "words for numbers": (
         lambda folder: geojson(folder / "a.json", feature({}, [["a", "b"], ["c", "d"], ["e", "f"]])),  # type: ignore[list-item]
-        "rings are not lists of positions",
-    ),
+        "rings are not lists of positions"),
     "words in KML": (
-        text(
-            "a.kml",
-            '<kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>'
-            "8,47 8.1,far 8.1,47.1 8,47</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></kml>",
-        ),
-        "corner 1: is 'far'; must be a finite number",
-    ),
+        text("a.kml", "<kml><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>8,47 8.1,far 8.1,47.1 8,47"
+            "</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></kml>"),
+        "corner 1: is 'far'; must be a finite number"),
     "entities": (text("a.osm", BOMB), "declares XML entities"),
     "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "is not whole XML"),
     "no building": (_no_building, "has no building"),
     "a ZIP bomb": (_zip_bomb, "unpacks to more than"),
-    "a ZIP of something": (
-        lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
-        "is a ZIP archive with 'readme.txt'",
-    ),
+    "a ZIP of something": (lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
+        "is a ZIP archive with 'readme.txt'"),
     "a torn tile": (data("N46E009.hgt", bytes(1000)), "it may be torn"),
     "a nameless tile": (data("tile.hgt", bytes(2 * 1201 * 1201)), "its name must say where it lies"),
     "a torn TIFF": (_torn_tiff, "cannot be read"),
     "a torn grid": (text("a.asc", GRID + "1 2 3\n"), "it may be torn"),
     "a grid of 10^12 cells": (
         text("a.asc", GRID.replace("ncols 2", "ncols 1000000").replace("nrows 2", "nrows 1000000")),
-        "cannot be read as a raster",
-    ),
+        "cannot be read as a raster"),
     "a grid of nothing": (text("a.asc", GRID + "-9999 " * 4), "has no cell with a height"),
-    "a NumPy archive": (
-        lambda folder: zipped(folder / "a.npz", elevation__npy=npy(np.array([1.0]))),
-        "must have numbers `elevation`",
-    ),
+    "a NumPy archive": (lambda folder: zipped(folder / "a.npz", elevation__npy=npy(np.array([1.0]))),
+        "must have numbers `elevation`"),
     "a vector file": (text("a.gpkg", "SQLite"), "is a vector file; make GeoJSON of it"),
-    "a Gazebo world": (
-        text("a.world", "<sdf><world/></sdf>"),
-        "is a Gazebo world; give its footprints as GeoJSON",
-    ),
+    "a Gazebo world": (text("a.world", "<sdf><world/></sdf>"), "is a Gazebo world; give its footprints as GeoJSON"),
     "a torn map": (text("a.map", "type octile\nheight 3\nwidth 3\nmap\n...\n"), "it may be torn"),
-    "an arc about nothing": (
-        text("a.txt", "AC R\nDA 5,0,90\n"),
-        "line 2: has an arc or circle before its centre",
-    ),
+    "an arc about nothing": (text("a.txt", "AC R\nDA 5,0,90\n"), "line 2: has an arc or circle before its centre"),
     "a place of words": (text("a.txt", "AC R\nDP here\n"), "line 2: has 'here'; must be a place"),
     "an airspace of nothing": (text("a.txt", "AC R\nAN x\n"), "has no airspace with an area"),
     "an empty fence": (text("a.plan", '{"fileType": "Plan", "geoFence": {}}'), "has an empty fence"),
-    "a fence of a line": (
-        text("fence.txt", "47.0 8.0\n47.0 8.0\n47.1 8.1\n47.0 8.0\n"),
-        "fewer than three corners",
-    ),
+    "a fence of a line": (text("fence.txt", "47.0 8.0\n47.0 8.0\n47.1 8.1\n47.0 8.0\n"), "fewer than three corners"),
     "a vertex that is not there": (
         text("a.json", json.dumps({"CityObjects": {"b": FLAT}, "vertices": [[0, 0, 0]]})),
-        "with a vertex that is not there",
-    ),
-    "a zone without a shape": (
-        text("a.json", '{"UASZoneList": [{"geometry": [{}]}]}'),
-        "without a horizontalProjection",
-    ),
-}
+        "with a vertex that is not there"),
+    "a zone without a shape": (text("a.json", '{"UASZoneList": [{"geometry": [{}]}]}'),
+        "without a horizontalProjection"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("make", "sentence"), HOSTILE.values(), ids=HOSTILE)

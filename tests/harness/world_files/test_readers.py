@@ -23,7 +23,7 @@ from harness.world_files.parts import (
     WorldFileError,
 )
 from harness.world_files.plane import Mapping, Place
-from harness.world_files.readers.limits import limit_of, metres_of
+from harness.world_files.readers.limits import limit_of
 from tests.harness.world_files.making import SQUARE, feature, geojson, osm, zipped
 
 
@@ -76,6 +76,9 @@ RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
     [
         ({"building": "yes", "height": "12.5"}, -math.inf, 12.5),
         ({"building": "yes", "height": "40 ft"}, -math.inf, 40 * FOOT_M),
+        ({"building": "yes", "height": "6'6''"}, -math.inf, 6.5 * FOOT_M),
+        ({"building": "yes", "height": "12,5 m"}, -math.inf, 12.5),
+        ({"building": "yes", "height": "0.3 km"}, -math.inf, 300.0),
         ({"building": "yes", "building:levels": "4"}, -math.inf, 12.0),
         ({"building": "yes", "building:levels": "4", "roof:levels": "1"}, -math.inf, 15.0),
         (
@@ -179,40 +182,6 @@ def test_limits_are_read_as_airspace_files_write_them(text: str, limit: Limit | 
         assert found is not None
         assert found.height_m == pytest.approx(limit.height_m)
         assert found.datum is limit.datum
-
-
-@pytest.mark.parametrize(
-    ("value", "metres"),
-    [
-        ("12", 12.0),
-        ("12,5 m", 12.5),
-        ("20 ft", 20 * FOOT_M),
-        ("6'6\"", 6.5 * FOOT_M),
-        ("6' 6\"", 6.5 * FOOT_M),
-        ("6'6''", 6.5 * FOOT_M),
-        ("6'6", 6.5 * FOOT_M),
-        ("6 ft 6 in", 6.5 * FOOT_M),
-        ("50'", 50 * FOOT_M),
-        ("50.5'", 50.5 * FOOT_M),
-        ("15m", 15.0),
-        ("15 m.", 15.0),
-        ("300cm", 3.0),
-        ("0.3 km", 300.0),
-        ("30 in", 2.5 * FOOT_M),
-        ("0,125 km", 125.0),
-        ("12,25", 12.25),
-        ("1,200 ft", None),
-        ("12,500", None),
-        ("~15", None),
-        ("15 yd", None),
-        ("15 m 3", None),
-        (True, None),
-        ("x", None),
-        (None, None),
-    ],
-)
-def test_heights_of_buildings_are_read_in_their_unit(value: object, metres: float | None) -> None:
-    assert metres_of(value) == (None if metres is None else pytest.approx(metres))
 
 
 def in_plane(shape: Any, longitude: float, latitude: float) -> Any:

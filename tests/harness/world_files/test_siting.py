@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ import shapely
 from pyproj import Geod
 
 from harness.world_files.expansion import FileSpec
-from harness.world_files.parts import WorldFileError
 from harness.world_files.siting import Craft, Site, site
 from tests.harness.world_files.making import feature, geojson
 
@@ -65,36 +63,8 @@ def test_a_zone_larger_than_an_area_is_flown_round_at_a_corner(tmp_path: Path) -
     assert (shapely.distance(ends, polygon) > CRAFT.clearance_m).all()
 
 
-def test_where_no_part_has_room_the_first_is_named(tmp_path: Path) -> None:
-    """A fence is not to be left, so there is nothing beyond what it holds."""
-    corners = [[46.2, 7.2], [47.8, 7.2], [47.8, 8.8], [46.2, 8.8]]
-    polygons = [{"inclusion": inside, "polygon": corners} for inside in (True, False)]
-    path = tmp_path / "a.plan"
-    path.write_text(json.dumps({"fileType": "Plan", "geoFence": {"polygons": polygons}}))
-    with pytest.raises(WorldFileError, match="0% free, are too small for aerosonde"):
-        site([FileSpec(path)], 100.0, CRAFT)
-
-
-def two_halls(path: Path, door: int) -> Path:
-    """A MovingAI map of 60 by 30 cells: two halls, a long and a short one, with a door of some cells between them."""
-    rows = [["."] * 60 for _ in range(30)]
-    for row in range(30):
-        rows[row][38] = "." if 15 - door / 2 <= row < 15 + door / 2 else "@"
-    path.write_text("type octile\nheight 30\nwidth 60\nmap\n" + "\n".join(map("".join, rows)) + "\n")
-    return path
-
-
 def occupancy(path: Path, metres_per_cell: float) -> Site:
     return site([FileSpec(path, metres_per_cell=metres_per_cell)], 100.0, CRAFT)
-
-
-def test_start_and_goal_are_joined_by_a_way_on_which_the_aircraft_can_turn_round(tmp_path: Path) -> None:
-    # With 50 m a cell the door of 6 is 300 m wide: more than twice the clearance, less than a turn needs as well.
-    narrow = occupancy(two_halls(tmp_path / "a.map", 6), 50.0)
-    assert max(narrow.start_m[0], narrow.goal_m[0]) < 38 * 50.0
-    assert not any("proved unreachable" in note for note in narrow.notes)
-    wide = occupancy(two_halls(tmp_path / "b.map", 12), 50.0)
-    assert wide.start_m[0] < 38 * 50.0 < wide.goal_m[0]
 
 
 def test_a_world_in_which_it_can_turn_round_nowhere_on_the_way_says_with_which_cells_it_can(

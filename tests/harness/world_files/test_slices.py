@@ -147,34 +147,6 @@ def test_buildings_are_what_gdal_reads(name: str, altitude_m: float) -> None:
 
 @pytest.mark.flights
 @real
-def test_city_objects_are_the_unions_of_their_surfaces() -> None:
-    path = SHARED / "buildings" / "delft.city.json"
-    content = json.loads(path.read_text())
-    vertices = (
-        np.array(content["vertices"]) * content["transform"]["scale"] + content["transform"]["translate"]
-    )
-    solid = []
-    for thing in content["CityObjects"].values():
-        if not thing["type"].startswith(("Building", "Bridge")):
-            continue
-        rings = [np.array(ring) for shape in thing["geometry"] for ring in flat(shape["boundaries"])]
-        z = np.concatenate([vertices[ring][:, 2] for ring in rings])
-        if z.max() >= 2.0 and z.min() <= 22.0:
-            polygons = [shapely.make_valid(shapely.Polygon(vertices[ring][:, :2])) for ring in rings]
-            solid.append(shapely.union_all([each for each in polygons if each.area > 0]))
-    found, mapping = cut(path, 12.0)
-    check_covers(found, shapely.union_all(mapping.geometries(np.array(solid, dtype=object))))
-
-
-def flat(boundaries: Any) -> list[list[int]]:
-    """Outer rings of nested boundaries."""
-    if isinstance(boundaries[0][0], int):
-        return [boundaries[0]]
-    return [ring for each in boundaries for ring in flat(each)]
-
-
-@pytest.mark.flights
-@real
 @pytest.mark.parametrize("altitude_m", [150.0, 500.0, 3000.0])
 def test_airspace_is_what_aerofiles_reads(altitude_m: float) -> None:
     openair = pytest.importorskip("aerofiles.openair")

@@ -21,7 +21,7 @@ from harness.world_files.parts import (
     Reading,
     WorldFileError,
 )
-from tests.harness.world_files.making import feature, geojson, osm
+from tests.harness.world_files.making import feature, geojson
 
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of rasterio's own
 
@@ -177,39 +177,6 @@ def test_limits_of_openair_that_are_missing_or_come_twice(
     assert len(found.notes) == len(notes) + 1
 
 
-def test_an_airspace_without_a_class_is_one_of_its_own(tmp_path: Path) -> None:
-    first = SPACE.format("GND", "FL65")
-    second = first.replace("AC R\n", "").replace("one", "two").replace("E\n", "W\n").replace("FL65", "FL95")
-    found = read_any(written(tmp_path / "a.txt", first + second))
-    assert [(part.name, round(part.top.height_m / FOOT_M)) for part in found.parts] == [
-        ("one", 6500),
-        ("two", 9500),
-    ]
-    assert found.parts[0].footprint.bounds[0] == pytest.approx(8.0)
-    assert found.parts[1].footprint.bounds[2] == pytest.approx(-8.0)
-    assert any("(1 R, 1 none)" in note for note in found.notes)
-    assert [part.name for part in read_any(written(tmp_path / "b.txt", second)).parts] == ["two"]
-    turned = "".join(
-        f"{b}\n{a}\n{c}" for a, b, c in (each.split("\n", 2) for each in (first, "AC Q\n" + second))
-    )
-    assert [part.name for part in read_any(written(tmp_path / "c.txt", turned)).parts] == ["one", "two"]
-    with pytest.raises(
-        WorldFileError, match="line 5: has the angle '47:75:00'; must be degrees, and minutes"
-    ):
-        read_any(written(tmp_path / "d.txt", first.replace("47:00:00", "47:75:00", 1)))
-
-
-def test_openair_names_what_it_passes_over(tmp_path: Path) -> None:
-    text = (
-        SPACE.format("GND", "FL65")
-        + "AA 2024-01-01T00:00Z/2024-01-02T00:00Z\nAT 47:00:00 N 008:00:00 E\nQQ 1\n"
-    )
-    notes = read_any(written(tmp_path / "a.txt", text)).notes
-    assert any("1 R" in note for note in notes)
-    assert any("activation" in note for note in notes)
-    assert any("'QQ'" in note for note in notes)
-
-
 ITEM = "{}\t0\t3\t{}\t{}\t0\t0\t0\t{}\t{}\t0\t1\n"
 
 
@@ -349,39 +316,6 @@ def test_limits_of_zones_by_the_names_that_authorities_use(
     assert same(part.top, top)
 
 
-@pytest.mark.parametrize(
-    ("tags", "said"),
-    [
-        ({"minAlt": 50, "maxAlt": 120}, True),
-        ({"lower": "GND", "upper": "2500 ft"}, True),
-        ({"lower": "GND", "upper": "FL 65"}, False),
-        ({"upper": 120, "upperReference": "AMSL"}, False),
-        ({"ceiling_msl": 120}, False),
-    ],
-)
-def test_a_limit_without_a_reference_is_noted(tags: dict[str, Any], said: bool, tmp_path: Path) -> None:
-    notes = read_any(geojson(tmp_path / "a.geojson", feature({"name": "A", **tags}))).notes
-    assert ("A: its limits name no reference; taken as above mean sea level" in notes) == said
-
-
-def test_limits_that_cannot_be_told_are_both_noted_and_facility_maps_refused(tmp_path: Path) -> None:
-    grid = {"CEILING": 200, "UNIT": "Feet", "APT1_FAAID": "SEA"}
-    with pytest.raises(WorldFileError, match="is a facility map of the FAA"):
-        read_any(geojson(tmp_path / "b.geojson", feature(grid)))
-    odd = {"lower": {"metric": 0}, "upper": {"metric": 9}, "name": "A"}
-    notes = read_any(geojson(tmp_path / "a.geojson", feature(odd))).notes
-    assert "A: its limits are not known; taken as without" in notes
-
-
-@pytest.mark.parametrize("before", ["", "\x1e"])
-def test_features_a_line_are_a_collection(before: str, tmp_path: Path) -> None:
-    lines = [before + json.dumps(feature({"height": 5 + k})) for k in range(3)]
-    found = read_any(written(tmp_path / "a.geojsonl", "\n".join(lines) + "\n"))
-    assert [part.top.height_m for part in found.parts] == [5.0, 6.0, 7.0]
-    with pytest.raises(WorldFileError, match="not whole JSON"):
-        read_any(written(tmp_path / "b.geojsonl", "\n".join(lines)[:-5]))
-
-
 def test_kml_with_blanks_after_commas_and_lines_beside_its_polygon(tmp_path: Path) -> None:
     ring = " ".join(f"{x}, {y}, 120" for x, y in [*CORNERS, CORNERS[0]])
     inner = f"<outerBoundaryIs><LinearRing><coordinates>{ring}</coordinates></LinearRing></outerBoundaryIs>"
@@ -397,13 +331,6 @@ def test_kml_with_blanks_after_commas_and_lines_beside_its_polygon(tmp_path: Pat
     assert "1 point, line or wall passed over" in found.notes
     lone = text.replace("LineString", "LinearRing")
     assert "1 point, line or wall passed over" in read_any(written(tmp_path / "b.kml", lone)).notes
-
-
-def test_chimneys_and_towers_stand_like_buildings_and_piers_do_not(tmp_path: Path) -> None:
-    kinds = [{"man_made": "chimney", "height": "150"}, {"man_made": "tower", "height": "80 m"}]
-    ways = [(tags, CORNERS) for tags in (*kinds, {"man_made": "pier", "height": "5"}, {"building": "yes"})]
-    found = read_any(osm(tmp_path / "a.osm", ways))
-    assert [part.top.height_m for part in found.parts] == [150.0, 80.0, 6.0]
 
 
 def zone(name: str, **more: Any) -> dict[str, Any]:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import shutil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -63,14 +61,6 @@ def test_a_hill_is_flown_round_and_the_expanded_scenario_flies_alone(
     again = fly_to_folder(load_scenario(alone / "s.yaml"), tmp_path / "again", recording=False)
     assert again["digest"] == figures["digest"]
     assert again["min_altitude_above_ground_m"] == figures["min_altitude_above_ground_m"]
-
-
-def test_the_command_that_flies_it_can_be_copied(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert run_world(Path("my hill.yaml"), str(hill(tmp_path)), "--altitude-m", "1250") == 0
-    assert "my hill.yaml: fly it with `wayproof fly 'my hill.yaml'`" in capsys.readouterr().out
 
 
 def test_an_expanded_scenario_is_read_back_as_it_was(tmp_path: Path) -> None:
@@ -171,17 +161,3 @@ def test_bad_usage_is_told_and_nothing_is_written(
     assert main([*given, *([] if "--altitude-m" in arguments else ["--altitude-m", "300"])]) == 2
     assert sentence in capsys.readouterr().err
     assert not out.exists()
-
-
-def test_zones_above_ground_and_terrain_together(tmp_path: Path) -> None:
-    zone: dict[str, Any] = feature(
-        {"name": "over the hill", "lowerLimit": "GND", "upperLimit": "100 m AGL"},
-        [[9.82, 46.80], [9.84, 46.80], [9.84, 46.82], [9.82, 46.82], [9.82, 46.80]],
-    )
-    out = tmp_path / "both.yaml"
-    files = (str(hill(tmp_path)), str(geojson(tmp_path / "zone.geojson", zone)))
-    assert run_world(out, *files, "--altitude-m", "1250") == 0
-    scenario = load_scenario(out)
-    assert scenario.sources is not None
-    assert [each.kind for each in scenario.sources] == ["geotiff", "geojson"]
-    assert json.loads(json.dumps([each.polygons for each in scenario.sources])) == [1, 1]

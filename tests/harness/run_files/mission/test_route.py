@@ -102,18 +102,6 @@ def test_a_circle_to_an_altitude_is_as_long_as_the_climb_takes() -> None:
     assert altitude(made, 2) == 700.0
 
 
-def test_circles_follow_one_another() -> None:
-    first, second = Loiter(100.0, True, turns=1.0), Loiter(150.0, False, turns=1.0)
-    made = route(
-        (step(1), 0j),
-        (step(2, loiter=first), 1000j),
-        (step(3, loiter=second), 800 + 2000j),
-        (step(4, 250.0, loiter=Loiter(150.0, False)), 800 + 2000j),
-        (step(5, 250.0), 3000j),
-    )
-    assert altitude(made, 4) == 650.0
-
-
 def test_a_mission_may_begin_on_a_circle() -> None:
     made = route((step(1, loiter=Loiter(100.0, True, turns=1.0)), 50 + 0j), (step(2), 2000j))
     assert math.dist(made.way.segments[0, :2], (50.0, 0.0)) == pytest.approx(100.0)
@@ -133,12 +121,6 @@ def test_speeds_are_those_the_aircraft_holds_and_others_are_told() -> None:
     assert made.notes[0].startswith("13 m/s asked for before item 2: flown at 20 m/s")
 
 
-def test_a_speed_of_0_is_that_of_the_flight() -> None:
-    made = route((step(1), 0j), (step(2, airspeed_mps=28.0), 1000j), (step(3, airspeed_mps=0.0), 2000j))
-    assert made.profile.airspeeds(np.array([500.0, 1500.0])).tolist() == [28.0, 25.0]
-    assert made.notes == ()
-
-
 def test_above_ground_the_ground_is_followed() -> None:
     def hill(east: FloatArray, north: FloatArray) -> FloatArray:
         return 400.0 + 80.0 * np.exp(-(((north - 1500.0) / 400.0) ** 2)) + 0.0 * east
@@ -153,12 +135,6 @@ def test_above_ground_the_ground_is_followed() -> None:
 def test_all_items_in_one_place_are_no_path() -> None:
     with pytest.raises(InputError, match="m: all its items are in one place"):
         route((step(1), 5j), (step(2), 5j))
-
-
-def test_a_mission_may_begin_on_a_circle_to_an_altitude() -> None:
-    made = route((step(1, 300.0, loiter=Loiter(100.0, True)), 50 + 0j), (step(2, 200.0), 2000j))
-    assert made.profile.altitude_m[0] == altitude(made, 1) == 700.0
-    assert altitude(made, 2) == 600.0
 
 
 @pytest.mark.parametrize("wide_m", [60.0, 400.0])
