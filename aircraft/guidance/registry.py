@@ -52,44 +52,23 @@ class GuidanceKind:
         return self.make(self.config(**keys).resolved(limits), limits)
 
 
-BUILT_IN = (
-    GuidanceKind(
-        "preview",
-        "path curvature ahead of the roll lag, and a second-order correction of the cross-track error",
-        PreviewConfig,
-        PreviewLaw,
-    ),
-    GuidanceKind(
-        "npfg",
-        "PX4's (Stastny, Siegwart): a look-ahead angle to the path, the wind triangle, curvature fed forward",
-        NpfgConfig,
-        NpfgLaw,
-    ),
-    GuidanceKind(
-        "l1",
-        "ArduPilot's (Park, Deyst, How): a point on the leg ahead; lines as legs, arcs as loiter circles",
-        L1Config,
-        L1Law,
-    ),
-    GuidanceKind(
-        "vector_field",
-        "Beard and McLain: a field of courses about lines and orbits, and course hold",
-        VectorFieldConfig,
-        VectorFieldLaw,
-    ),
-    GuidanceKind(
-        "pure_pursuit",
-        "Coulter: the arc to the point of the path at a look-ahead distance",
-        PurePursuitConfig,
-        PurePursuitLaw,
-    ),
-    GuidanceKind(
-        "bearing",
-        "simple autopilots': bank in proportion to the angle between course and the bearing to a point",
-        BearingConfig,
-        BearingLaw,
-    ),
-)
+BUILT_IN = tuple(
+    GuidanceKind(kind, summary, config, law)
+    for kind, config, law, summary in (
+        ("preview", PreviewConfig, PreviewLaw,
+         "path curvature ahead of the roll lag, and a second-order correction of the cross-track error"),
+        ("npfg", NpfgConfig, NpfgLaw,
+         "PX4's (Stastny, Siegwart): a look-ahead angle to the path, the wind triangle, curvature fed forward"),
+        ("l1", L1Config, L1Law,
+         "ArduPilot's (Park, Deyst, How): a point on the leg ahead; lines as legs, arcs as loiter circles"),
+        ("vector_field", VectorFieldConfig, VectorFieldLaw,
+         "Beard and McLain: a field of courses about lines and orbits, and course hold"),
+        ("pure_pursuit", PurePursuitConfig, PurePursuitLaw,
+         "Coulter: the arc to the point of the path at a look-ahead distance"),
+        ("bearing", BearingConfig, BearingLaw,
+         "simple autopilots': bank in proportion to the angle between course and the bearing to a point"),
+    )
+)  # fmt: skip
 
 
 _registered: dict[str, GuidanceKind] = {}

@@ -93,61 +93,73 @@ def planned(
         InputError: it cannot be made into a path: altitudes above a ground that is not known, an airspeed at which
             the wind is too strong.
     """
-    frame = airframe_of(scenario.aircraft)
-    wind_mps = complex(*steady_wind_mps(scenario))
-    free_m = FREE_SHARE * scenario.trackability.cross_track_m
-    speed = scenario.aircraft.airspeed_mps
     if given.mission is None:
-        limit_m = scenario.trackability.cross_track_m if corner_m is None else corner_m
-        tightest = Tightest(frame.least_radius_m(speed), limit_m, wind_mps / speed)
-        way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, tightest)
-        profile = _drawn_profile(given, way, scenario, altitude_m, ground)
-        bends = _bends(profile, BEND_SHARE * scenario.trackability.altitude_m)
-        places = way.waypoints_m[:, 0] + 1j * way.waypoints_m[:, 1]
-        ends = zip(pairwise(places.tolist()), pairwise(way.stations_m.tolist()), strict=True)
-        legs = tuple(straight(*each, None) for each in ends)
-        return PathPlan(way, profile, profile.airspeed_mps, frame, bends=bends, legs=legs)
+        return _planned_line(given, scenario, altitude_m, ground, corner_m)
+    frame = airframe_of(scenario.aircraft)
+    by_waypoints = scenario.guidance.follow == "waypoints"
     flying = Flying(
-        airspeed_mps=speed,
+        airspeed_mps=scenario.aircraft.airspeed_mps,
         airspeed_range_mps=(_slowest_turning_mps(frame), frame.airspeed_range_mps[1]),
         turn_radius_m=_turn_radius_of(given, scenario),
         climb_mps=_climb_of(frame),
-        free_cut_m=free_m,
+        free_cut_m=FREE_SHARE * scenario.trackability.cross_track_m,
         ground=ground,
         least_radius_m=frame.least_radius_m,
-        heads_for_centres=scenario.guidance.follow == "waypoints"
-        and scenario.guidance.kind in HEADING_FOR_CENTRES,
+        heads_for_centres=by_waypoints and scenario.guidance.kind in HEADING_FOR_CENTRES,
         corner_m=corner_m,
-        wind_mps=wind_mps,
+        wind_mps=complex(*steady_wind_mps(scenario)),
     )
     route = mission_route(given.mission, flying, given.source)
-    profile, notes = route.profile, route.notes
+    profile, notes = route.profile, list(route.notes)
     if altitude_m is not None:
         level = np.full_like(profile.altitude_m, altitude_m)
         profile = VerticalProfile(profile.arc_length_m, level, profile.speed_from_m, profile.airspeed_mps)
     else:
         profile, low = _no_lower(profile)
-        notes = (*notes, *low)
-    if altitude_m is None and ground is None and given.mission.above_ground:
-        items = ", ".join(map(str, given.mission.above_ground[:6]))
-        more = " and others" if len(given.mission.above_ground) > 6 else ""
-        told = f"items {items}{more}: above ground, which is taken to be as high as home everywhere"
-        notes = (*notes, told)
-    loiters = any(step.loiter is not None for step in given.mission.steps)
-    if loiters and scenario.guidance.follow == "waypoints":
+        notes += low
+        if ground is None and given.mission.above_ground:
+            items = ", ".join(map(str, given.mission.above_ground[:6]))
+            more = " and others" if len(given.mission.above_ground) > 6 else ""
+            notes.append(
+                f"items {items}{more}: above ground, which is taken to be as high as home everywhere"
+            )
+    if by_waypoints and any(step.loiter is not None for step in given.mission.steps):
         heads, joins = "heads for its centre and then joins it", "joins it along a tangent"
         how = heads if flying.heads_for_centres else joins
-        notes = (*notes, f"to a loiter's circle the aircraft {how}, with the law {scenario.guidance.kind}")
-    return PathPlan(route.way, profile, route.asked_mps, frame, route.marks, notes=notes, legs=route.legs)
+        notes.append(f"to a loiter's circle the aircraft {how}, with the law {scenario.guidance.kind}")
+    return PathPlan(
+        route.way, profile, route.asked_mps, frame, route.marks, notes=tuple(notes), legs=route.legs
+    )
 
 
-def _no_lower(profile: VerticalProfile) -> tuple[VerticalProfile, tuple[str, ...]]:
+def _planned_line(
+    given: PathAsGiven,
+    scenario: Scenario,
+    altitude_m: float | None,
+    ground: Ground | None,
+    corner_m: float | None,
+) -> PathPlan:
+    """The same of a drawn line."""
+    frame, speed = airframe_of(scenario.aircraft), scenario.aircraft.airspeed_mps
+    across_m = scenario.trackability.cross_track_m
+    limit_m = across_m if corner_m is None else corner_m
+    tightest = Tightest(frame.least_radius_m(speed), limit_m, complex(*steady_wind_mps(scenario)) / speed)
+    way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, FREE_SHARE * across_m, tightest)
+    profile = _drawn_profile(given, way, scenario, altitude_m, ground)
+    bends = _bends(profile, BEND_SHARE * scenario.trackability.altitude_m)
+    places = way.waypoints_m[:, 0] + 1j * way.waypoints_m[:, 1]
+    ends = zip(pairwise(places.tolist()), pairwise(way.stations_m.tolist()), strict=True)
+    legs = tuple(straight(*each, None) for each in ends)
+    return PathPlan(way, profile, profile.airspeed_mps, frame, bends=bends, legs=legs)
+
+
+def _no_lower(profile: VerticalProfile) -> tuple[VerticalProfile, list[str]]:
     """A profile that keeps above the lowest altitude that is simulated, and what is said of it."""
     lowest, highest = ALTITUDES_M
     if lowest <= profile.altitude_m.min() and profile.altitude_m.max() <= highest:
-        return profile, ()
+        return profile, []
     told = f"altitudes below {lowest:g} m or above {highest:g} m above the sea: flown at these"
-    return dataclasses.replace(profile, altitude_m=np.clip(profile.altitude_m, lowest, highest)), (told,)
+    return dataclasses.replace(profile, altitude_m=np.clip(profile.altitude_m, lowest, highest)), [told]
 
 
 def _drawn_profile(

@@ -124,8 +124,11 @@ def verdict(
         faults.append(str(figures["reason"]))
     if not faults and not figures["trackable"]:
         faults.append("no leg was flown")
-    if faults:
-        return False, "no: " + "; ".join(faults)
+    return (False, "no: " + "; ".join(faults)) if faults else (True, _yes(told, limits))
+
+
+def _yes(told: Mapping[str, Any], limits: FlightLimits) -> str:
+    """How a path was flown, and how much of the limits was used."""
     used, tolerance_m = told["limit_used"], limits.cross_track_threshold_m
     how = "as drawn" if told["drawn"] else "with its corners cut by no more than allowed"
     wide_m = max((corner["allowed_cut_m"] for corner in told["corners"]), default=0.0)
@@ -133,13 +136,9 @@ def verdict(
     most = max(used["off_path"] or 0.0, used["altitude"])
     limit_rad = limits.bank_limit_rad
     bank_deg = math.degrees(math.atan((used["bank"] or 0.0) * math.tan(limit_rad)))
-    bank = (
-        f", turns take {bank_deg:.0f} of {math.degrees(limit_rad):.0f} deg of bank" if bank_deg >= 1.0 else ""
-    )
-    return (
-        True,
-        f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most{bank}",
-    )
+    turns = f", turns take {bank_deg:.0f} of {math.degrees(limit_rad):.0f} deg of bank"
+    bank = turns if bank_deg >= 1.0 else ""
+    return f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most{bank}"
 
 
 def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven) -> float | None:
