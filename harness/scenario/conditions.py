@@ -16,6 +16,7 @@ import numpy as np
 from aircraft.start import profile_share
 from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
 from harness.scenario.keys import ScenarioKeys
+from harness.scenario.navigation import Navigation
 from harness.scenario.sections import (
     MOST_SHARE,
     MOST_SHIFT_M,
@@ -54,8 +55,7 @@ class Day:
         speed_change, direction_change_deg: 1 sigma of the wind's changes, of its speed as a share.
         turbulence: intensity.
         vertical_gust_mps, vertical_gust_every_s: of the discrete vertical gusts.
-        navigation: keys of a satellite receiver with a barometer.
-        latency_s: age of the state that guidance and autopilot work with.
+        navigation: keys of a satellite receiver with a barometer, and the age of its state.
         servos: of all surfaces and the throttle.
         uncertainty: 1 sigma of each deviation; that of the centre of gravity over the cube root of the mass (m/kg^1/3).
     """
@@ -68,66 +68,40 @@ class Day:
     vertical_gust_mps: float
     vertical_gust_every_s: float
     navigation: dict[str, Any]
-    latency_s: float
     servos: dict[str, float]
     uncertainty: dict[str, float]
 
 
-def _receiver(
-    position_m: float, velocity_mps: float, heading_deg: float, airspeed_mps: float, altitude_m: float
-) -> dict[str, Any]:
-    """Navigation keys of a satellite receiver with a barometer, by the sigma of each error."""
-    return {
-        "kind": "gnss",
-        "position_sigma_m": position_m,
-        "velocity_sigma_mps": velocity_mps,
-        "heading_sigma_deg": heading_deg,
-        "airspeed_sigma_mps": airspeed_mps,
-        "altitude_sigma_m": altitude_m,
-    }
-
-
-def _sigmas(
-    mass: float, thrust: float, drag: float, lift_slope: float, controls: float, centre_of_gravity_m: float
-) -> dict[str, float]:
-    """Uncertainty keys; that of `controls` holds for elevator, aileron and rudder each."""
-    shares = {"mass": mass, "thrust": thrust, "drag": drag, "lift_slope": lift_slope}
-    surfaces = dict.fromkeys(("elevator", "aileron", "rudder"), controls)
-    return {**shares, **surfaces, "centre_of_gravity_m": centre_of_gravity_m}
-
-
+# fmt: off
 DAYS: Final = {
     "typical": Day(
-        wind_mps=3.28,
-        most_wind=0.35,
-        speed_change=0.15,
-        direction_change_deg=15.0,
-        turbulence="light",
-        vertical_gust_mps=2.3,
-        vertical_gust_every_s=120.0,
-        navigation=_receiver(1.3, 0.05, heading_deg=1.0, airspeed_mps=0.65, altitude_m=2.1),
-        latency_s=0.12,
+        wind_mps=3.28, most_wind=0.35, speed_change=0.15, direction_change_deg=15.0,
+        turbulence="light", vertical_gust_mps=2.3, vertical_gust_every_s=120.0,
+        navigation={
+            "kind": "gnss", "position_sigma_m": 1.3, "velocity_sigma_mps": 0.05, "heading_sigma_deg": 1.0,
+            "airspeed_sigma_mps": 0.65, "altitude_sigma_m": 2.1, "latency_s": 0.12,
+        },
         servos={"lag_s": 0.03, "rate_limit_degps": 300.0, "deadband_deg": 0.0},
-        uncertainty=_sigmas(
-            mass=0.02, thrust=0.05, drag=0.1, lift_slope=0.05, controls=0.1, centre_of_gravity_m=0.002
-        ),
+        uncertainty={
+            "mass": 0.02, "thrust": 0.05, "drag": 0.1, "lift_slope": 0.05,
+            "elevator": 0.1, "aileron": 0.1, "rudder": 0.1, "centre_of_gravity_m": 0.002,
+        },
     ),
     "rough": Day(
-        wind_mps=(8.0, 10.7),
-        most_wind=0.5,
-        speed_change=0.15,
-        direction_change_deg=10.0,
-        turbulence="moderate",
-        vertical_gust_mps=4.6,
-        vertical_gust_every_s=60.0,
-        navigation=_receiver(3.3, 0.1, heading_deg=2.0, airspeed_mps=1.3, altitude_m=4.2),
-        latency_s=0.22,
+        wind_mps=(8.0, 10.7), most_wind=0.5, speed_change=0.15, direction_change_deg=10.0,
+        turbulence="moderate", vertical_gust_mps=4.6, vertical_gust_every_s=60.0,
+        navigation={
+            "kind": "gnss", "position_sigma_m": 3.3, "velocity_sigma_mps": 0.1, "heading_sigma_deg": 2.0,
+            "airspeed_sigma_mps": 1.3, "altitude_sigma_m": 4.2, "latency_s": 0.22,
+        },
         servos={"lag_s": 0.06, "rate_limit_degps": 150.0, "deadband_deg": 1.0},
-        uncertainty=_sigmas(
-            mass=0.05, thrust=0.1, drag=0.2, lift_slope=0.1, controls=0.2, centre_of_gravity_m=0.004
-        ),
+        uncertainty={
+            "mass": 0.05, "thrust": 0.1, "drag": 0.2, "lift_slope": 0.1,
+            "elevator": 0.2, "aileron": 0.2, "rudder": 0.2, "centre_of_gravity_m": 0.004,
+        },
     ),
 }
+# fmt: on
 
 
 def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
@@ -201,16 +175,15 @@ def _air(keys: ScenarioKeys, day: Day, rng: np.random.Generator) -> Environment:
     return air.filled(wind=wind, turbulence=Turbulence(intensity=day.turbulence), vertical_gusts=gusts)
 
 
-def _navigation(keys: ScenarioKeys, day: Day) -> Any:
+def _navigation(keys: ScenarioKeys, day: Day) -> Navigation:
     """The navigation: all of it where the file names no kind, else its latency alone."""
     given = keys.navigation
-    named = given.model_fields_set
-    figures = {} if "kind" in named else day.navigation
-    if given.kind == "perfect" and "kind" in named:
-        return given
-    figures = {**figures, "latency_s": day.latency_s}
-    own = {name: getattr(given, name) for name in named}
-    return type(given)(**{**figures, **own})
+    named = {name: getattr(given, name) for name in given.model_fields_set}
+    if "kind" not in named:
+        return Navigation(**day.navigation | named)
+    return (
+        given if given.kind == "perfect" else Navigation(**{"latency_s": day.navigation["latency_s"]} | named)
+    )
 
 
 def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float) -> UncertaintySpec | None:
@@ -242,23 +215,21 @@ def _stream(seed: int, number: int) -> np.random.Generator:
 
 def told(scenario: ScenarioKeys) -> str:
     """What kind of day a scenario is flown on, with its air and navigation, for the first lines of a summary."""
-    air, navigation = scenario.environment, scenario.navigation
-    windy = bool(air.wind and air.wind.fastest_mps)
-    other = [_wind_told(air.wind)] if air.wind and windy else []
-    if air.turbulence and air.turbulence.intensity != "none":
-        other.append(f"{air.turbulence.intensity} turbulence")
-    if air.vertical_gusts:
-        other.append("gusts")
+    air, navigation, deviation = scenario.environment, scenario.navigation, scenario.aircraft.deviation
+    wind = air.wind if air.wind and air.wind.fastest_mps else None
     exact = navigation.kind == "perfect" and not navigation.latency_s
-    if not exact:
-        other.append(f"{navigation.kind} navigation")
-    if navigation.latency_s:
-        other.append(f"state {navigation.latency_s:g} s old")
-    if scenario.aircraft.deviation and any(scenario.aircraft.deviation.model_dump().values()):
-        other.append("aircraft other than its model")
+    sayings = {
+        _wind_told(wind) if wind else "": wind,
+        f"{air.gusts} turbulence": air.gusts,
+        "gusts": air.vertical_gusts,
+        f"{navigation.kind} navigation": not exact,
+        f"state {navigation.latency_s:g} s old": navigation.latency_s,
+        "aircraft other than its model": deviation and any(deviation.model_dump().values()),
+    }
+    other = [saying for saying, holds in sayings.items() if holds]
     if scenario.conditions == "ideal" and other:
         return f"ideal, but for what the scenario sets: {', '.join(other)}"
-    said = [*([] if windy else ["calm"]), *other, *(["state known exactly"] if exact else [])]
+    said = [*([] if wind else ["calm"]), *other, *(["state known exactly"] if exact else [])]
     return f"{scenario.conditions}: {', '.join(said)}"
 
 
