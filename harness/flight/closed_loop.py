@@ -20,7 +20,7 @@ from harness.flight.signals import held_back
 from harness.flight.state_estimator import PerfectEstimator, StateEstimator
 from harness.flight.termination import Ending, Termination
 from harness.flight.timetable import intervals
-from harness.flight.track_log import FlightLog
+from harness.flight.track_log import flight_log
 from harness.mapping.sensed_map import SensedMap
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
@@ -130,7 +130,7 @@ class ClosedLoop:
         self._sensing = Sensing(loop.sensor, loop.seen, observers)
         self._fixes = FixEvents(loop.navigator, observers)
         self._true_error = TrueCrossTrack(self.plans)
-        self._log = FlightLog(loop.world, observers)
+        self._log = flight_log(loop.world, observers)
         self._roll_override_rad: float | None = None
         self._law_error: str | None = None
         timetable = intervals(loop.model.step_rate_hz, loop.scan_rate_hz if loop.sensor else 0.0)

@@ -57,6 +57,7 @@ class TrackLog:
         sinks: each is called with every finished block, in order.
         block_rows: rows a block.
         ground: height of the ground at east and north, vectorised; None where it is not known.
+        row_sinks: each is called with every row: true state, steering, and the plan in effect.
     """
 
     def __init__(
@@ -65,9 +66,10 @@ class TrackLog:
         sinks: Iterable[Callable[[Track], None]] = (),
         block_rows: int = BLOCK_ROWS,
         ground: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
+        row_sinks: Iterable[Callable[[AircraftState, GuidanceOutput, int], None]] = (),
     ) -> None:
         self._clearance, self._ground = clearance, ground
-        self._sinks = tuple(sinks)
+        self._sinks, self._row_sinks = tuple(sinks), tuple(row_sinks)
         self._rows = np.zeros(block_rows, LOGGED)
         self._bytes, self._used = self._rows.data.cast("B"), 0
         self._beliefs = np.full(block_rows, math.nan, BELIEVED)
@@ -117,6 +119,8 @@ class TrackLog:
         self._used += 1
         if self._used == len(self._rows):
             self.hand_on()
+        for told in self._row_sinks:
+            told(state, steering, plan_index)
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
@@ -166,32 +170,12 @@ class TrackLog:
             sink(block)
 
 
-class FlightLog(TrackLog):
-    """The track of one flight in a world, with those who look on row by row and block by block.
-
-    Args:
-        world: clearance and ground are measured in it.
-        observers: get every finished block; a `RowObserver` every row.
-    """
-
-    def __init__(self, world: World, observers: Sequence[Observer]) -> None:
-        super().__init__(
-            world.clearance, [observer.on_block for observer in observers], ground=world.ground_heights
-        )
-        self._row_observers = [each for each in observers if isinstance(each, RowObserver)]
-
-    def add(
-        self,
-        state: AircraftState,
-        steering: GuidanceOutput,
-        plan_index: int,
-        believed: AircraftState | None = None,
-        true_cross_track_m: float = math.nan,
-    ) -> None:
-        """Adds one row, as `TrackLog.add`."""
-        super().add(state, steering, plan_index, believed, true_cross_track_m)
-        for observer in self._row_observers:
-            observer.on_row(state, steering, plan_index)
+def flight_log(world: World, observers: Sequence[Observer]) -> TrackLog:
+    """The track of one flight in a world; the observers get every finished block, a `RowObserver` every row."""
+    rows = [each.on_row for each in observers if isinstance(each, RowObserver)]
+    return TrackLog(
+        world.clearance, [each.on_block for each in observers], ground=world.ground_heights, row_sinks=rows
+    )
 
 
 def _believed(rows: np.ndarray[Any, Any]) -> dict[str, FloatArray]:
