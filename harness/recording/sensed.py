@@ -17,16 +17,19 @@ class Sensed:
 
     def __init__(self, cell_m: float) -> None:
         self._cell_m = cell_m
-        self._once, self._known = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        self._once: set[int] = set()
+        self._known: set[int] = set()
 
     def new(self, points_m: FloatArray) -> FloatArray:
         """(k, 2) those places of the next scan, of what it returned (n, 2), that are shown for the second time."""
-        cells = np.round(points_m / self._cell_m).astype(np.int64) @ (1 << 32, 1)
-        cells, rows = np.unique(cells, return_index=True)
-        again, known = np.isin(cells, self._once), np.isin(cells, self._known)
-        fresh = again & ~known
-        self._once, self._known = np.append(self._once, cells[~again]), np.append(self._known, cells[fresh])
-        shown: FloatArray = points_m[rows[fresh]]
+        cells = (np.round(points_m / self._cell_m).astype(np.int64) @ (1 << 32, 1)).tolist()
+        rows = dict(
+            zip(reversed(cells), range(len(cells) - 1, -1, -1), strict=True)
+        )  # the first of each cell
+        fresh = (rows.keys() & self._once) - self._known
+        self._once |= rows.keys()
+        self._known |= fresh
+        shown: FloatArray = points_m[sorted(rows[cell] for cell in fresh)]
         return shown
 
 
