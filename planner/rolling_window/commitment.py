@@ -37,6 +37,8 @@ class Commitment:
         least_m: float,
         shielded: bool = True,
     ) -> None:
+        # A turn entered sooner than `least_m` ahead is taken only where neither the goal nor a turn about a place
+        # ahead is certified: in a pocket of narrow gaps those lead on.
         self._shielded = shielded
         self._mission, self._memory, self._local, self._least_m = mission, memory, local, least_m
 

@@ -63,7 +63,7 @@ class RollingWindow:
     """
 
     def __init__(self, config: RollingWindowConfig, mission: Mission, shielded: bool = True) -> None:
-        config, mission = config.resolved(mission), mission.spaced
+        config, widest_m, mission = config.resolved(mission), mission.turn_radius_m, mission.spaced
         assert config.margin_m is not None
         assert config.rolling_step_m is not None
         self._shielded = shielded
@@ -75,7 +75,7 @@ class RollingWindow:
         )
         self._start_tolerance_m = start_tolerance_m(mission)
         self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
-        least_m = self._lead_m + 2.0 * mission.turn_radius_m
+        least_m = self._lead_m + 2.0 * widest_m
         self._commitment = Commitment(mission, memory, self._local, least_m, shielded)
         self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
         self._giving_up = GivingUp(mission, memory)
@@ -83,7 +83,7 @@ class RollingWindow:
         self._monitor = PlanMonitor(
             mission,
             keep_m=0.5 * (mission.clearance_m + self._local.room.path_keeps_m),
-            urgent_m=least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps,
+            urgent_m=self._lead_m + 8.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps,
             lead_m=self._lead_m,
             step_m=config.rolling_step_m,
         )
