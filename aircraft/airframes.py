@@ -103,6 +103,8 @@ def _of_commands(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple
     made = []
     for control, actuator in real.items():
         travel_deg = travels[control]
+        if travel_deg <= 0.0 and not _names(found, control):
+            continue  # a flying wing has no rudder
         if travel_deg <= 0.0 and (actuator.rate_limit_degps is not None or actuator.deadband_deg):
             raise AircraftError(
                 f"{found.name}: its model does not show how far the {control} moves, so a rate limit or a deadband in "
@@ -110,6 +112,12 @@ def _of_commands(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple
             )
         made.append((control, actuator.of_command(travel_deg or 1.0)))
     return tuple(made)
+
+
+def _names(found: ModelFiles, control: str) -> bool:
+    """Whether a model's own files name a control at all."""
+    texts = (path.read_text("utf-8", errors="replace") for path in found.model.parent.rglob("*.xml"))
+    return any(f"fcs/{control}" in text for text in texts)
 
 
 def _of_survey(entry: AirframeEntry, found: ModelFiles, measured: Mapping[str, Any]) -> Airframe:

@@ -71,6 +71,8 @@ def deviate(root: ElementTree.Element, deviation: Deviation) -> None:
     _shift_centre_of_gravity(balance, deviation.centre_of_gravity_m)
     factors = [(name, 1.0 + getattr(deviation, name)) for name in SURFACES]
     for name, factor in factors:
+        if not any(f"fcs/{name}" in text for text in _texts(root)):
+            continue  # a flying wing has no rudder to differ
         _scale_properties(aerodynamics, [aerodynamics], _positions(aerodynamics, name), name, factor)
     lift = _axes(aerodynamics, LIFT_AXES)
     shared = _functions_for(aerodynamics, lift)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -10,11 +11,13 @@ import pytest
 from aircraft.actuators.actuator import Actuator, Actuators
 from aircraft.airframes import AircraftError, airframe
 from aircraft.autopilot import NEEDED_DEG, gains, pitch_margin_deg, roll_margin_deg
+from aircraft.deviation import Deviation
 from aircraft.frames import LocalPlane
 from aircraft.jsbsim_loading import linearised, surface_travel_deg, trimmed
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import model_files
 from aircraft.start import StartConditions
+from aircraft.survey import in_flight
 
 SERVO = Actuator(lag_s=0.05, rate_limit_degps=600.0, deadband_deg=0.2)
 START = StartConditions(0.0, 0.0, 300.0, 0.0, 25.0)
@@ -109,3 +112,10 @@ def test_servos_that_are_too_slow_are_refused() -> None:
 def test_degrees_mean_nothing_where_a_model_shows_no_surface() -> None:
     with pytest.raises(AircraftError, match=r"T38: its model does not show how far the aileron moves"):
         airframe("T38", Actuators.alike(SERVO))
+
+
+def test_a_flying_wing_has_servos_and_a_day_of_its_own_without_a_rudder() -> None:
+    frame = airframe("x8", Actuators.alike(SERVO))
+    assert [control for control, _ in frame.files.actuators] == ["aileron", "elevator", "throttle"]
+    other = replace(frame, files=replace(frame.files, deviation=Deviation(rudder=0.1, aileron=0.1)))
+    assert in_flight(other, 18.0).state().airspeed_mps == pytest.approx(18.0, abs=0.1)
