@@ -14,12 +14,10 @@ from harness.files.errors import RunFolderError
 
 
 class FolderLock:
-    """Holds a folder for this process (flock(2) on the folder itself, or on a file in it) until it is released.
+    """Holds a folder, which must exist, for this process (flock(2) on the folder itself) until it is released.
 
-    Args:
-        path: the folder; it must exist.
-        name: of a file in it to hold in its place, made where missing: on a network file system (NFS) only what
-            is open for writing can be held.
+    With a name, a file of that name in it is held in its place, made where missing: on a network file system (NFS) only
+    what is open for writing can be held.
 
     Raises:
         RunFolderError: another process, or another lock of this one, holds it.

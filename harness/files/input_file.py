@@ -27,14 +27,11 @@ _KINDS: Final = {
 def read_text(path: Path, max_bytes: int, what: str, utf_16: bool = False) -> str:
     """The text of a regular file, without a byte order mark.
 
-    Args:
-        path: the file.
-        max_bytes: the largest that is read.
-        what: what the file should be, for faults: "a scenario, in YAML".
-        utf_16: UTF-16 that says so is taken, too: Windows' editors write it.
+    `what` says what the file should be, for faults: "a scenario, in YAML". With `utf_16`, UTF-16 that says so is taken,
+    too: Windows' editors write it.
 
     Raises:
-        InputError: it cannot be opened, is not a regular file, is too large or is not UTF-8 text.
+        InputError: it cannot be opened, is not a regular file, is larger than `max_bytes` or is not UTF-8 text.
     """
     return decoded(read_data(path, max_bytes, what), str(path), what, utf_16)
 
@@ -57,17 +54,7 @@ def read_data(path: Path, max_bytes: int, what: str) -> bytes:
 
 
 def decoded(data: bytes, source: str, what: str, utf_16: bool = False) -> str:
-    """The text that some bytes are, without a byte order mark.
-
-    Args:
-        data: of a file.
-        source: its name, for faults.
-        what: as that of `read_text`.
-        utf_16: likewise.
-
-    Raises:
-        InputError: they are no UTF-8 text.
-    """
+    """The text that the bytes of a file are; arguments and faults are those of `read_text`."""
     if utf_16 and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         data = data.decode("utf-16", "replace").encode()
     if b"\0" in data:
@@ -98,13 +85,7 @@ def open_regular(path: Path) -> BinaryIO:
 
 
 def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any] | None:
-    """A JSON file that one of our folders has; None where there is none, or it is something else.
-
-    Args:
-        path: the file.
-        schema: what its key `schema` says.
-        max_bytes: the largest that is read.
-    """
+    """A JSON file that one of our folders has, by its key `schema`; None where there is none, or something else."""
     try:
         index = json.loads(read_text(path, max_bytes, "an index, in JSON"))
     except (ValueError, RecursionError):

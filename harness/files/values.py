@@ -12,13 +12,9 @@ from harness.files.input_file import InputError
 def parsed_json(text: str, source: str, once: bool = True) -> Any:
     """What a JSON text holds.
 
-    Args:
-        text: JSON.
-        source: begins a fault: the file, or nothing.
-        once: a key that stands twice in one place is a fault.
-
     Raises:
-        InputError: it is not JSON, has a key twice, or a number that is not finite.
+        InputError: it is not JSON, has a number that is not finite, or where `once` a key twice in one place; the text
+            begins with `source`, the file or nothing.
     """
 
     def fault(sentence: str, line: int | None = None) -> InputError:

@@ -59,16 +59,9 @@ class Craft:
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """An area with a mission.
+    """An area with a mission: the files, placed, obstacles and ground there, and notes on what was chosen.
 
-    Attributes:
-        specs: the files, placed.
-        place: origin of the plane; None where no file has a place on earth.
-        bounds_m: of the area.
-        start_m: east, north.
-        goal_m: east, north.
-        expanded: obstacles and ground there.
-        notes: what was chosen.
+    The place is the origin of the plane; None where no file has a place on earth.
     """
 
     specs: tuple[FileSpec, ...]
@@ -107,16 +100,10 @@ def site(
     given: Ends | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Site:
-    """Chooses an area with start and goal in what some files hold.
+    """Chooses an area with start and goal in what some files hold, at an altitude above mean sea level.
 
-    Of files larger than an area, other parts are tried where the first has no room for start and goal.
-
-    Args:
-        specs: the files.
-        altitude_m: of the flight, above mean sea level.
-        craft: what must have room.
-        given: start and goal, each latitude and longitude where the files have a place on earth, else x and y.
-        tell: told what is being done.
+    Of files larger than an area, other parts are tried where the first has no room for start and goal. Those that are
+    given are latitude and longitude where the files have a place on earth, else x and y.
 
     Raises:
         FileFault: a file cannot be used.

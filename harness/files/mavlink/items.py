@@ -81,13 +81,9 @@ class Item:
 def filled(
     params: Sequence[float | None], command: int, frame: int, missing: Callable[[int], str]
 ) -> tuple[float, ...]:
-    """Seven parameters with 0 for those that are left to the autopilot.
+    """Seven parameters with 0 in place of None for those that are left to the autopilot.
 
-    Args:
-        params: None where they are.
-        command: MAV_CMD.
-        frame: MAV_FRAME.
-        missing: what a fault says of one of them that is not there, by its index.
+    What a fault says of one that is not there is told by its index.
 
     Raises:
         InputError: half of a place is there, or no altitude where one is needed.

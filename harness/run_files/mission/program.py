@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError
 from harness.files.mavlink import commands
-from harness.files.mavlink.items import FRAMES, GROUND, HOME, MISSION, Item
+from harness.files.mavlink.items import GROUND, HOME, MISSION, Item
 from harness.files.wording import counted
 from harness.run_files.mission.mission_files import MissionAsRead
 
@@ -114,15 +114,16 @@ def program(mission: MissionAsRead) -> Program:
         raise InputError(f"{mission.source}: has no mission items; there is nothing to fly")
     run = _Run(mission)
     run.go()
-    if len(run.steps) == 1:
-        run.begin_at_home()
     if len(run.steps) < 2:
         told = f" ({run.steps[0].name}, item {run.steps[0].item})" if run.steps else ""
         raise InputError(
             f"{mission.source}: has {counted(len(run.steps), 'item')} to fly to{told}; a path has at least 2"
         )
-    items = tuple(run.told.get(item.number) or run.not_reached(item) for item in mission.items)
-    return Program(tuple(run.steps), items, mission.home_altitude_m)
+    items = (
+        run.told.get(item.number) or Told(item.number, commands.name_of(item.command), NOT_REACHED)
+        for item in mission.items
+    )
+    return Program(tuple(run.steps), tuple(items), mission.home_altitude_m)
 
 
 Flown = tuple[MissionStep | None, str]
@@ -163,23 +164,6 @@ class _Run:
                 raise InputError(
                     f"{item.place}: jumps make it more than {MOST_STEPS:,} legs; give fewer repeats"
                 )
-
-    def begin_at_home(self) -> None:
-        """The only step is flown to from above home, at its altitude, as nothing else says where from."""
-        (step,) = self.steps
-        if self.home is not None and step.position not in (None, self.home) and not step.landing:
-            self.steps.insert(0, MissionStep(step.item, "home", self.home, step.height_m, step.above))
-            told = self.told[step.item]
-            self.told[step.item] = replace(told, why=_joined(told.why, "from above home"))
-
-    def not_reached(self, item: Item) -> Told:
-        """What is said of an item that is not reached, and why autopilots may not load a mission for it."""
-        doubt = ""
-        if item.command == commands.JUMP and item.params[0] not in self.index:
-            doubt = f"to item {item.params[0]:g}, which does not exist: {NOT_LOADED}"
-        elif item.command in commands.FLOWN and item.position is not None and item.frame not in FRAMES:
-            doubt = f"has the frame {item.frame}: autopilots load no mission with it"
-        return Told(item.number, commands.name_of(item.command), NOT_REACHED, doubt)
 
     def _jump(self, item: Item, at: int) -> int:
         """Where it goes on after a jump."""
@@ -248,7 +232,8 @@ class _Run:
             self._over = ends
             return
         if item.frame == MISSION and step.height_m is not None:
-            why = _joined(why, "frame 2 says nothing of altitudes: above the sea, as ArduPilot has it")
+            why += "; " if why else ""
+            why += "frame 2 says nothing of altitudes: above the sea, as ArduPilot has it"
         self._tell(item, FLOWN, why)
         self.steps.append(replace(step, airspeed_mps=self._airspeed_mps))
         self._airspeed_mps = None
@@ -330,10 +315,6 @@ class _Run:
 
     def _tell(self, item: Item, what: str, why: str = "") -> None:
         self.told.setdefault(item.number, Told(item.number, commands.name_of(item.command), what, why))
-
-
-def _joined(*whys: str) -> str:
-    return "; ".join(filter(None, whys))
 
 
 def _fault(item: Item, sentence: str) -> InputError:

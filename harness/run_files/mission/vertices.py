@@ -140,11 +140,7 @@ def without_steps(
     """Altitudes along a route, where two at one place are a ramp: the aircraft climbs or sinks on the way on.
 
     At the end of the route it does so before. A ramp that would be longer than the way to the next altitude goes there.
-    There are as many altitudes as before.
-
-    Args:
-        points: arc length, not falling, and altitude (m).
-        slope: of a ramp; asked for where there is one.
+    Points, as many as before, are arc length, not falling, and altitude (m); the slope is asked for where it is needed.
     """
     ramped = [points[0]]
     for number, (along, high) in enumerate(points[1:], start=1):
@@ -166,10 +162,7 @@ def without_steps(
 def followed(
     ends: tuple[Vertex, Vertex], stations_m: tuple[float, float], ground_m: Callable[[complex], float]
 ) -> list[tuple[float, float]]:
-    """Altitudes on the way to a waypoint that is above ground: above it all the way, as ArduPilot flies it.
-
-    Args are the ends of the leg, of which the second has a height above ground, arc lengths at both, and the ground.
-    """
+    """Altitudes on the way to a waypoint that is above ground: above it all the way, as ArduPilot flies it."""
     (begin, end), (begin_m, end_m) = ends, stations_m
     assert end.agl_m is not None
     begin_agl_m = begin.altitude_m - ground_m(begin.place)

@@ -216,24 +216,6 @@ def test_what_its_user_should_know_is_said(
         assert failed not in said
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        (["--format", "gpx"], "'gpx' is not one of"),
-        ([], "Missing option"),
-    ],
-)
-def test_bad_usage_is_refused(
-    options: list[str], sentence: str, run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "way"
-    assert main(["export", str(run.folder), *options, "--out", str(out)]) == 2
-    said = capsys.readouterr()
-    assert sentence in said.err
-    assert len(said.err.splitlines()) == 1
-    assert not out.exists()
-
-
 def test_a_folder_without_a_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(tmp_path), "--format", "plan"]) == 2
     assert "is not a run folder" in capsys.readouterr().err

@@ -90,15 +90,6 @@ def test_points_on_a_line_are_left_out() -> None:
     assert way.waypoints_m.tolist() == [[0.0, 0.0], [0.0, 1000.0]]
 
 
-def test_corners_have_the_numbers_of_the_points_given() -> None:
-    points = np.repeat(
-        [(0.0, 0.0), (0.0, 1000.0), (0.004, 1000.0), (1000.0, 1000.0), (1000.0, 0.0)], 3, axis=0
-    )
-    way = fly_by(points, 110.0, 1.0)
-    assert [corner.waypoint for corner in way.corners] == [3, 9]
-    assert len(way.waypoints_m) == 4
-
-
 def test_a_path_may_cross_itself_at_one_of_its_points() -> None:
     points = np.array([(0.0, 0), (0, 2000), (1000, 1000), (0, 1000), (-1000, 1000), (0, 0), (500, -900)])
     way = fly_by(points, 50.0, 0.1)

@@ -140,23 +140,6 @@ def test_altitudes_of_kml_count_from_what_their_mode_says(tmp_path: Path) -> Non
     assert read_path(path).notes == ("altitudes passed over: their altitudeMode is relativeToSeaFloor",)
 
 
-def test_what_else_is_in_a_kml_is_told(tmp_path: Path) -> None:
-    path = tmp_path / "a.kml"
-    ring = "<LinearRing><coordinates>8,47 8.1,47 8.1,47.1 8,47</coordinates></LinearRing>"
-    more = (
-        f"<Placemark><name>r</name>{ring}</Placemark>"
-        f"<Placemark><name>p</name><Polygon><outerBoundaryIs>{ring}</outerBoundaryIs></Polygon></Placemark>"
-        "<NetworkLink/><GroundOverlay/><GroundOverlay/>"
-    )
-    path.write_text(kml(more=more))
-    found = read_path(path)
-    assert {"1 LinearRing beside the path passed over", "1 NetworkLink beside the path passed over"} <= {
-        *found.notes
-    }
-    assert "2 GroundOverlays beside the path passed over" in found.notes
-    assert "p" in [fence.name for fence in found.fences.every]
-
-
 def test_a_track_of_kml(tmp_path: Path) -> None:
     path = tmp_path / "a.kml"
     path.write_text(kml().replace("<Placemark><name>way</name>", "<!--").replace("</Placemark>", "-->", 1))

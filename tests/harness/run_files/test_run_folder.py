@@ -112,12 +112,6 @@ def test_a_name_that_tables_cannot_be_written_under_is_refused(tmp_path: Path) -
     assert not list(tmp_path.iterdir())
 
 
-def test_folder_with_a_foreign_manifest_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "manifest.json").write_text('{"name": "a web page"}')
-    with pytest.raises(RunFolderError, match="not a run folder"):
-        RunFolder.create(tmp_path, SCENARIO, [])
-
-
 def test_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "run").write_text("")
     with pytest.raises(RunFolderError, match="is a file"):
@@ -140,12 +134,6 @@ def test_former_run_is_removed_and_nothing_else(
     ]
     with pytest.raises(RunFolderError, match="incomplete"):
         load_run(tmp_path)
-
-
-def test_leftover_of_a_folder_killed_at_its_making_is_taken(tmp_path: Path) -> None:
-    (tmp_path / "manifest.json.partial").write_text('{"sch')
-    RunFolder.create(tmp_path, SCENARIO, [])
-    assert json.loads((tmp_path / "manifest.json").read_text())["complete"] is False
 
 
 def test_run_left_without_finish_stays_incomplete(tmp_path: Path) -> None:
@@ -189,14 +177,6 @@ def test_metric_that_json_cannot_hold_leaves_the_run_incomplete(
         run.finish(make_track(50), [], {"min_clearance_m": float("inf")})
     with pytest.raises(RunFolderError, match="incomplete"):
         load_run(tmp_path)
-
-
-def test_run_with_nothing_flown_cannot_finish(tmp_path: Path, make_track: Callable[..., Track]) -> None:
-    with (
-        RunFolder.create(tmp_path, SCENARIO, []) as run,
-        pytest.raises(RunFolderError, match="nothing was flown"),
-    ):
-        run.finish(make_track(0), [], {})
 
 
 def test_missing_and_damaged_runs_are_told_apart(

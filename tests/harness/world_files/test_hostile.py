@@ -80,8 +80,8 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
         text("a.kml", "<kml><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>8,47 8.1,far 8.1,47.1 8,47"
             "</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></kml>"),
         "corner 1: is 'far'; must be a finite number"),
-    "entities": (text("a.osm", BOMB), "declares XML entities"),
-    "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "is not whole XML"),
+    "entities": (text("a.osm", BOMB), "cannot be read by osmium .XML entities are not supported"),
+    "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "cannot be read by osmium .Can not read file"),
     "no building": (_no_building, "has no building"),
     "a ZIP bomb": (_zip_bomb, "unpacks to more than"),
     "a ZIP of something": (lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),

@@ -316,23 +316,6 @@ def test_limits_of_zones_by_the_names_that_authorities_use(
     assert same(part.top, top)
 
 
-def test_kml_with_blanks_after_commas_and_lines_beside_its_polygon(tmp_path: Path) -> None:
-    ring = " ".join(f"{x}, {y}, 120" for x, y in [*CORNERS, CORNERS[0]])
-    inner = f"<outerBoundaryIs><LinearRing><coordinates>{ring}</coordinates></LinearRing></outerBoundaryIs>"
-    mode = "<altitudeMode>relativeToGround</altitudeMode>"
-    line = f"<LineString><coordinates>{ring}</coordinates></LineString>"
-    text = (
-        '<kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><name>zone</name><MultiGeometry>'
-        f"<Polygon>{mode}{inner}</Polygon>{line}</MultiGeometry></Placemark></kml>"
-    )
-    found = read_any(written(tmp_path / "a.kml", text))
-    (part,) = found.parts
-    assert (part.bottom, part.top) == (NO_BOTTOM, Limit(120.0, Datum.GROUND))
-    assert "1 point, line or wall passed over" in found.notes
-    lone = text.replace("LineString", "LinearRing")
-    assert "1 point, line or wall passed over" in read_any(written(tmp_path / "b.kml", lone)).notes
-
-
 def zone(name: str, **more: Any) -> dict[str, Any]:
     """A zone of ED-269."""
     ring = [[8.0, 47.0], [8.01, 47.0], [8.01, 47.01], [8.0, 47.0]]
@@ -344,20 +327,6 @@ def zone(name: str, **more: Any) -> dict[str, Any]:
         "restriction": "PROHIBITED",
         "geometry": [{**limits, **references, **shape, **more}],
     }
-
-
-def test_zones_of_ed269_as_a_list_and_what_their_limits_are_counted_from(tmp_path: Path) -> None:
-    zones = [
-        zone("A"),
-        zone("B", upperVerticalReference="WGS84", lowerVerticalReference="WGS84"),
-        zone("C", upperVerticalReference=None),
-    ]
-    found = read_any(written(tmp_path / "a.json", json.dumps(zones)))
-    assert [part.name for part in found.parts] == ["A", "B", "C"]
-    assert found.notes == (
-        "B: its limits are above the ellipsoid; taken as above mean sea level",
-        "C: its limits name no reference; taken as above mean sea level",
-    )
 
 
 @pytest.mark.parametrize("reference", ["AGL", "AMSL"])

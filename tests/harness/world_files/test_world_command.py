@@ -13,7 +13,7 @@ import pytest
 from harness.cli.app import main
 from harness.run.scenario_flight import fly_to_folder
 from harness.run_files.run_folder import load_run
-from harness.scenario.scenario import dump_scenario, load_scenario, parse_scenario
+from harness.scenario.scenario import dump_scenario, load_scenario
 from harness.world.world import World
 from tests.harness.world_files.making import feature, geojson, geotiff
 
@@ -61,16 +61,6 @@ def test_a_hill_is_flown_round_and_the_expanded_scenario_flies_alone(
     again = fly_to_folder(load_scenario(alone / "s.yaml"), tmp_path / "again", recording=False)
     assert again["digest"] == figures["digest"]
     assert again["min_altitude_above_ground_m"] == figures["min_altitude_above_ground_m"]
-
-
-def test_an_expanded_scenario_is_read_back_as_it_was(tmp_path: Path) -> None:
-    out = tmp_path / "hill.yaml"
-    assert run_world(out, str(hill(tmp_path)), "--altitude-m", "1250") == 0
-    scenario = load_scenario(out)
-    assert parse_scenario(dump_scenario(scenario)) == scenario
-    assert scenario.sources is not None
-    assert scenario.sources[0].polygons == len(scenario.obstacles) == 1
-    assert scenario.obstacles[0].heights_m == (1240.0, 1240.0)
 
 
 def test_what_is_solid_follows_the_altitude(tmp_path: Path) -> None:

@@ -133,26 +133,3 @@ def test_what_is_no_mission_is_told(text: str, said: str, tmp_path: Path) -> Non
     with pytest.raises(InputError) as fault:
         read_path(path)
     assert said in str(fault.value)
-
-
-def test_a_world_names_rally_points(tmp_path: Path) -> None:
-    path = tmp_path / "m.txt"
-    path.write_text(wpl(*INSIDE, *RALLY))
-    notes = read_world(path, None, Reading()).notes
-    assert "2 rally points passed over: places to return to, no obstacles" in notes
-    path.write_text(wpl(*RALLY))
-    with pytest.raises(
-        WorldFileError, match="has an empty fence, but 2 rally points, which are no obstacles"
-    ):
-        read_world(path, None, Reading())
-    path.write_text("RALLY 47.0 8.0 100 40 0 0\n")
-    with pytest.raises(WorldFileError, match="is a list of rally points"):
-        read_world(path, None, Reading())
-    path = tmp_path / "m.plan"
-    path.write_text(
-        '{"fileType": "Plan", "rallyPoints": {"points": [[47.0, 8.0, 50]]}, "geoFence": {"polygons": '
-        '[{"inclusion": true, "polygon": [[47.0, 8.0], [47.1, 8.0], [47.1, 8.1]]}]}}'
-    )
-    assert any(
-        note.startswith("1 rally point passed over") for note in read_world(path, None, Reading()).notes
-    )

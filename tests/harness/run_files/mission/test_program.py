@@ -159,17 +159,6 @@ def test_frames_that_autopilots_do_not_load_are_refused(frame: int) -> None:
         run(at(1), item(2, 16, 0, 0, 0, 0, 47.1, 8, 100, frame=frame))
 
 
-def test_what_is_not_reached_and_would_not_be_loaded_is_told() -> None:
-    done = run(
-        at(1), at(2), item(3, 20), item(4, 177, 9, 1), item(5, 16, 0, 0, 0, 0, 47.1, 8, 9, frame=21), at(6)
-    )
-    assert [told(done)[number] for number in (4, 5, 6)] == [
-        ("not reached", "to item 9, which does not exist: ArduPilot and QGroundControl load no mission with it"),
-        ("not reached", "has the frame 21: autopilots load no mission with it"),
-        ("not reached", ""),
-    ]  # fmt: skip
-
-
 def test_a_landing_before_a_takeoff_is_flown_on_from() -> None:
     done = run(at(1), at(2, 85, 0.0), item(3, 189), at(4, 84, 35.0), at(5), at(6, 21, 0.0), at(7))
     assert flown(done) == [1, 2, 4, 5, 6]
@@ -186,16 +175,6 @@ def test_a_radius_of_one_metre_is_a_side(radius: float) -> None:
     assert (loiter.radius_m, loiter.clockwise) == (0.0, radius > 0)
 
 
-def test_one_item_is_flown_to_from_above_home() -> None:
-    """A loiter without a place is named, as nothing is before it; that is no reason to refuse the rest."""
-    done = run(item(1, 18, 3, 0, 100), item(2, 219, 120, 1), at(3))
-    assert [(step.position, step.height_m) for step in done.steps] == [(HOME, 100.0), ((47.03, 8.0), 100.0)]
-    assert told(done) == {
-        1: ("not flown", "has no position, and nothing is before it"),
-        2: ("not flown", "an aeroplane here cannot"),
-        3: ("flown", "from above home"),
-    }
+def test_one_item_is_no_path() -> None:
     with pytest.raises(InputError, match=r"has 1 item to fly to \(land, item 1\); a path has at least 2"):
         run(at(1, 21))
-    with pytest.raises(InputError, match="has 1 item to fly to"):
-        program(MissionAsRead("m", (at(1),), None, 0.0, Fences()))
