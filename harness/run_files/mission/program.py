@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError
 from harness.files.mavlink import commands
-from harness.files.mavlink.items import GROUND, HOME, MISSION, Item
+from harness.files.mavlink.items import FRAMES, GROUND, HOME, MISSION, Item
 from harness.files.wording import counted
 from harness.run_files.mission.mission_files import MissionAsRead
 
@@ -119,11 +119,8 @@ def program(mission: MissionAsRead) -> Program:
         raise InputError(
             f"{mission.source}: has {counted(len(run.steps), 'item')} to fly to{told}; a path has at least 2"
         )
-    items = (
-        run.told.get(item.number) or Told(item.number, commands.name_of(item.command), NOT_REACHED)
-        for item in mission.items
-    )
-    return Program(tuple(run.steps), tuple(items), mission.home_altitude_m)
+    items = tuple(run.told.get(item.number) or run.not_reached(item) for item in mission.items)
+    return Program(tuple(run.steps), items, mission.home_altitude_m)
 
 
 Flown = tuple[MissionStep | None, str]
@@ -164,6 +161,15 @@ class _Run:
                 raise InputError(
                     f"{item.place}: jumps make it more than {MOST_STEPS:,} legs; give fewer repeats"
                 )
+
+    def not_reached(self, item: Item) -> Told:
+        """What is said of an item that is not reached, and why autopilots may not load a mission for it."""
+        doubt = ""
+        if item.command == commands.JUMP and item.params[0] not in self.index:
+            doubt = f"to item {item.params[0]:g}, which does not exist: {NOT_LOADED}"
+        elif item.command in commands.FLOWN and item.position is not None and item.frame not in FRAMES:
+            doubt = f"has the frame {item.frame}: autopilots load no mission with it"
+        return Told(item.number, commands.name_of(item.command), NOT_REACHED, doubt)
 
     def _jump(self, item: Item, at: int) -> int:
         """Where it goes on after a jump."""
