@@ -201,11 +201,7 @@ def load_campaign(
     for name, text in settings:
         value = strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE)
         root = strict_yaml.replaced(root, ("seed",) if name == "seed" else ("set", name), value)
-    root = _with_world_files(root, path.parent)
-    entries = root.at(("aircraft",))
-    for index, entry in enumerate(entries.value if entries and isinstance(entries.value, tuple) else ()):
-        inside = ("model",) if isinstance(entry.value, dict) else ()
-        root = _with_folder(root, ("aircraft", index, *inside), path.parent)
+    root = _with_folders(_with_world_files(root, path.parent), path.parent)
     campaign = _validated(root, source)
 
     def fault(loc: Loc, sentence: str) -> InputError:
@@ -256,6 +252,15 @@ def _schema_of(path: Path) -> str:
 def campaign_schema() -> dict[str, Any]:
     """JSON Schema of the format."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Campaign.model_json_schema()}
+
+
+def _with_folders(root: Node, folder: Path) -> Node:
+    """The campaign's keys with every aircraft that is a folder given from the root of the file system on."""
+    entries = root.at(("aircraft",))
+    for index, entry in enumerate(entries.value if entries and isinstance(entries.value, tuple) else ()):
+        inside = ("model",) if isinstance(entry.value, dict) else ()
+        root = _with_folder(root, ("aircraft", index, *inside), folder)
+    return root
 
 
 def _validated(root: Node, source: str) -> Campaign:

@@ -33,7 +33,10 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
     Runs that did not reach the goal are crosses. A figure's axis ends at its 1st and 99th percentile where others lie
     far beyond them; those are triangles at its edge.
     """
-    varied = [key for key in keys if are_numbers(runs.values(key)) and len({*runs.values(key)} - {None}) > 1]
+    columns_of = {key: runs.values(key) for key in keys}
+    varied = [
+        key for key, values in columns_of.items() if are_numbers(values) and len({*values} - {None}) > 1
+    ]
     varied = varied[:MAX_KEYS]
     figures: Mapping[str, FloatArray] = {
         "clearance / wanted": runs.clearance_ratio,
@@ -44,9 +47,7 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
     if not varied or not figures:
         return None
     rows, columns = len(figures), len(varied)
-    end = (LABEL_LETTERS - len("...")) // 2
-    short = (key if len(key) <= LABEL_LETTERS else f"{key[:end]}...{key[-end:]}" for key in varied)
-    names = [key.replace(".", ".\n") for key in short]
+    names = [_below(key) for key in varied]
     dots = rows * columns * len(runs) > MAX_OUTLINES
     with styled(0.5 + PANEL_IN * rows + ROW_IN * max(name.count("\n") for name in names)) as figure:
         grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -82,3 +83,9 @@ def _panel(axes: Any, numbers: FloatArray, values: FloatArray, reached: Any, dot
         shown = np.clip(values[among], low, high) if is_outlying else values[among]
         axes.plot(numbers[among], shown, marker, ms=3.5, color=shade, alpha=0.7, rasterized=dots)
     axes.grid(color="0.9", lw=0.6)
+
+
+def _below(key: str) -> str:
+    """A key path below its panel, broken behind its dots."""
+    end = (LABEL_LETTERS - len("...")) // 2
+    return (key if len(key) <= LABEL_LETTERS else f"{key[:end]}...{key[-end:]}").replace(".", ".\n")

@@ -67,14 +67,19 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
             return _binned(key, values)
         names: dict[Any, str] = dict(zip(different, _told_apart(different), strict=True))
     else:
-        counts = Counter(_hashable(value) for value in values if value is not None)
-        common = counts if len(counts) <= MAX_NAMES else dict(counts.most_common(MAX_NAMES - 1))
-        others = f"{len(counts) - len(common)} others"
-        names = {value: _text(value) for value in counts if value in common}
-        names |= dict.fromkeys((value for value in counts if value not in common), others)
+        names = _names([_hashable(value) for value in values if value is not None])
     labels = [*dict.fromkeys(names.values()), *([NONE] if None in values else [])]
     texts = [NONE if value is None else names[_hashable(value)] for value in values]
     return Axis(key, tuple(labels)), np.array([labels.index(text) for text in texts], dtype=np.int64)
+
+
+def _names(given: Sequence[Any]) -> dict[Any, str]:
+    """A label for each value that is not a number."""
+    counts = Counter(given)
+    common = counts if len(counts) <= MAX_NAMES else dict(counts.most_common(MAX_NAMES - 1))
+    others = f"{len(counts) - len(common)} others"
+    first = {value: _text(value) for value in counts if value in common}
+    return first | {value: others for value in counts if value not in common}
 
 
 def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.analysis.metric import Metric, number
 from harness.analysis.registry import METRICS
@@ -31,6 +32,8 @@ TESTED: Final[tuple[Metric, ...]] = tuple(
     each for each in METRICS if each.title and each.short and each.worse and not each.rare
 )
 """The figures of the registry that are compared: those that people are shown and of which more, or less, is worse."""
+
+RATIO_LABEL: Final = next(each.label for each in TESTED if each.name == RATIO)
 
 
 @dataclass(frozen=True)
@@ -106,22 +109,29 @@ def duels(
             is_share = metric.kind == "bool"
             label = f"{metric.label}, %" if is_share else metric.label
             every[label] = figures[metric.name] * metric.factor * (100.0 if is_share else 1.0)
-    ratio = next(each.label for each in TESTED if each.name == RATIO)
-    found = []
-    for first, second in itertools.combinations(flown, 2):
-        common = [case for case in flown[first] if case in flown[second]]
-        ours, theirs = (np.array([flown[name][case] for case in common], int) for name in (first, second))
-        _, numbers = np.unique([str(case[0]) for case in common], return_inverse=True)
-        won, lost = (np.array(reached, dtype=bool)[rows] for rows in (ours, theirs))
-        tested = []
-        for label, values in every.items():
-            among = np.isfinite(values[ours]) & np.isfinite(values[theirs])
-            among &= won & lost if label == ratio else True
-            if among.any():
-                tested.append(_tested(label, values[ours][among], values[theirs][among], numbers[among]))
-        counts = (len(common), int((won & ~lost).sum()), int((lost & ~won).sum()), int((won & lost).sum()))
-        found.append(Duel(first, second, *counts, _corrected(tested)))
-    return tuple(found)
+    held = np.array(reached, dtype=bool)
+    return tuple(_duel(*pair, flown, held, every) for pair in itertools.combinations(flown, 2))
+
+
+def _duel(
+    first: str,
+    second: str,
+    flown: Mapping[str, Mapping[Any, int]],
+    reached: NDArray[np.bool_],
+    figures: Mapping[str, FloatArray],
+) -> Duel:
+    common = [case for case in flown[first] if case in flown[second]]
+    ours, theirs = (np.array([flown[name][case] for case in common], int) for name in (first, second))
+    _, numbers = np.unique([str(case[0]) for case in common], return_inverse=True)
+    won, lost = reached[ours], reached[theirs]
+    tested = []
+    for label, values in figures.items():
+        among = np.isfinite(values[ours]) & np.isfinite(values[theirs])
+        among &= won & lost if label == RATIO_LABEL else True
+        if among.any():
+            tested.append(_tested(label, values[ours][among], values[theirs][among], numbers[among]))
+    counts = (len(common), int((won & ~lost).sum()), int((lost & ~won).sum()), int((won & lost).sum()))
+    return Duel(first, second, *counts, _corrected(tested))
 
 
 def _tested(label: str, ours: FloatArray, theirs: FloatArray, cases: IntArray) -> Tested:

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Final, Protocol, TypeAlias
 
 from harness.campaign.flight import Answer, Job, NoMemoryError, fly_job
@@ -205,18 +205,24 @@ def dask_workers(
         )
     try:
         from distributed import Client
+        from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError as error:
         raise InputError("wayproof: --scheduler needs Dask; pip install 'wayproof[cluster]'") from error
     for logger in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)
-    if not unencrypted and _is_open(address):
-        raise InputError(
-            f"wayproof: {address} leads beyond this machine without encryption: whoever can change what is sent can "
-            "run code here; give tls://HOST:PORT, or --unencrypted in a network that is trusted"
-        )
     try:
-        _knock(address)
+        scheme, place = parse_address(address)
+        host, port = parse_host_port(place, SCHEDULER_PORT)
+        if scheme not in ("tls", "wss", "inproc") and not unencrypted and not _is_here(host):
+            raise InputError(
+                f"wayproof: {address} leads beyond this machine without encryption: whoever can change what is sent "
+                "can run code here; give tls://HOST:PORT, or --unencrypted in a network that is trusted"
+            )
+        if scheme != "inproc":  # a Client that finds nobody prints a traceback when it is thrown away
+            socket.create_connection((host, port), CONNECT_S).close()
         client: Any = Client(address, timeout=CONNECT_S, set_as_default=False)
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         raise InputError(f"wayproof: no Dask scheduler answers at {address}; start one there") from error
     with client:
@@ -229,31 +235,11 @@ def dask_workers(
         yield DaskWorkers(client, tell)
 
 
-def _knock(address: str) -> None:
-    """Tries whether anybody listens: a Client that finds nobody prints a traceback when it is thrown away.
-
-    Raises:
-        OSError: nobody does.
-        ValueError: it is no address.
-    """
-    from distributed.comm.addressing import parse_address, parse_host_port
-
-    scheme, place = parse_address(address)
-    if scheme in ("tcp", "tls"):
-        socket.create_connection(parse_host_port(place, SCHEDULER_PORT), CONNECT_S).close()
-
-
-def _is_open(address: str) -> bool:
-    """Whether an address leads beyond this machine without TLS."""
-    from distributed.comm.addressing import parse_address, parse_host_port
-
-    try:
-        scheme, place = parse_address(address)
-        host, _ = parse_host_port(place, SCHEDULER_PORT)
-        own = host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:  # a name, or no address at all
-        own = False
-    return not own and scheme not in ("tls", "wss", "inproc")
+def _is_here(host: str) -> bool:
+    """Whether a host is this machine, as far as its address says; a name may lead anywhere."""
+    with suppress(ValueError):
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    return False
 
 
 class DaskWorkers:

@@ -104,9 +104,8 @@ def certify(
         print_json(found.plain())
     elif not quiet:
         _print(found, f"{found.subject}: {found.planner}, {found.aircraft}", folder)
-        if found.failing_runs:
-            first = folder / "runs" / str(found.failing_runs[0])
-            say(f"view: {shlex.join(['wayproof', 'view', str(first)])}")
+        for run in found.failing_runs[:1]:
+            say(f"view: {shlex.join(['wayproof', 'view', str(folder / 'runs' / str(run))])}")
     return 0 if found.verdict == "shown" else FAILED
 
 

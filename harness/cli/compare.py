@@ -63,7 +63,6 @@ def compare(
     from harness.cli.terminal import step_bar
     from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
     from harness.files.errors import WriteError
-    from harness.run_files.run_folder import OVERLAY
 
     kinds = [kind.strip() for kind in planners.split(",")]
     laws = [law.strip() for law in guidance.split(",")] if guidance is not None else [None]
@@ -87,10 +86,16 @@ def compare(
     else:
         print_comparison(comparison.rows)
         say(f"report: {folder / 'report.html'}")
-        overlays = (folder / each.name / OVERLAY for each in loaded)
-        if overlay := next((each for each in overlays if each.is_file()), None):
-            say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
+        _print_view([folder / each.name for each in loaded])
     return 0 if comparison.all_reached else FAILED
+
+
+def _print_view(folders: Sequence[Path]) -> None:
+    """How to see the first overlay, if there is one."""
+    from harness.run_files.run_folder import OVERLAY
+
+    for overlay in [each / OVERLAY for each in folders if (each / OVERLAY).is_file()][:1]:
+        say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
 
 
 def _shown() -> list[Metric]:

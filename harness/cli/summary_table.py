@@ -7,6 +7,7 @@ from typing import Final
 
 from harness.analysis.metric import number
 from harness.campaign.cell import QUESTIONS, Cell
+from harness.campaign.paired import Duel
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.summary import Summary, Table
 from harness.cli.standard_output import folded, say
@@ -49,16 +50,8 @@ def _shown(value: Scalar) -> str:
 
 def print_summary(summary: Summary, all_tables: bool = False) -> None:
     """Prints the answers on standard output, with `all_tables` every table, not the first alone."""
-    total, missing = summary.total.runs, summary.missing
-    runs = f"{total} of {counted(summary.planned or 0, 'run')}" if missing else counted(total, "run")
-    ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
-    print_line(plain(f"{summary.name}: {runs}{ended and f': {ended}'}"))
-    if summary.never:
-        print_line(plain(summary.never))
-    if missing:
-        are, them = ("is missing", "it") if missing == 1 else ("are missing", "them")
-        print_line(f"[bold yellow]not complete[/]: {missing} {are}, --resume flies {them}")
-    if not total:
+    _print_counts(summary)
+    if not summary.total.runs:
         return
     heads = ("", "runs", *(question.short for question in QUESTIONS))
     whole = ("all runs", *_cells(summary.total))
@@ -69,14 +62,12 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         print_table("", [whole], heads)
     print_line(LEGEND, style="dim")
     for duel in summary.duels:
-        first, second = plain(duel.first), plain(duel.second)
-        differ = [each for each in duel.figures if each.p is not None and each.p < 0.05]
-        figures = "; ".join(f"{plain(each.figure)} {each.difference.text()}" for each in differ)
-        print_line(
-            f"{first} against {second} in {counted(duel.pairs, 'pair')} of flights ({duel.only_first} reached by "
-            f"{first} alone, {duel.only_second} by {second} alone): "
-            + (f"figures that differ at 5 %: {figures}" if figures else "no figure differs at 5 %")
-        )
+        _print_duel(duel)
+    _print_worst(summary)
+
+
+def _print_worst(summary: Summary) -> None:
+    """The runs that failed, and how to fly and to see one again."""
     failed = [run for run in summary.worst if run.outcome != "reached"]
     for run in failed[:SHOWN_WORST]:
         near = "" if run.min_clearance_m is None else f", least clearance {number(run.min_clearance_m)} m"
@@ -85,6 +76,31 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         say(f"again: {failed[0].command}")
     for view in [run.view for run in summary.worst if run.view][:1]:
         say(f"view: {view}")
+
+
+def _print_counts(summary: Summary) -> None:
+    """How many runs there are, how they ended, and what is missing."""
+    total, missing = summary.total.runs, summary.missing
+    runs = f"{total} of {counted(summary.planned or 0, 'run')}" if missing else counted(total, "run")
+    ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
+    print_line(plain(f"{summary.name}: {runs}{ended and f': {ended}'}"))
+    if summary.never:
+        print_line(plain(summary.never))
+    if missing:
+        are, them = ("is missing", "it") if missing == 1 else ("are missing", "them")
+        print_line(f"[bold yellow]not complete[/]: {missing} {are}, --resume flies {them}")
+
+
+def _print_duel(duel: Duel) -> None:
+    """Which figures of two planners differ beyond chance, at 5 %."""
+    first, second = plain(duel.first), plain(duel.second)
+    differ = [each for each in duel.figures if each.p is not None and each.p < 0.05]
+    figures = "; ".join(f"{plain(each.figure)} {each.difference.text()}" for each in differ)
+    print_line(
+        f"{first} against {second} in {counted(duel.pairs, 'pair')} of flights ({duel.only_first} reached by "
+        f"{first} alone, {duel.only_second} by {second} alone): "
+        + (f"figures that differ at 5 %: {figures}" if figures else "no figure differs at 5 %")
+    )
 
 
 def _cells(cell: Cell) -> list[str]:

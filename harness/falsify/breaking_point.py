@@ -11,7 +11,7 @@ import json
 import math
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -108,6 +108,21 @@ def vary_of(
         )
     given = [(_spelt("--vary", key), mild, hard) for key, mild, hard in given]
     valued = {_spelt("--set", key) for key in fixed}
+    _check_ranges(given, valued)
+    base = load([(key, number_text(mild)) for key, mild, _ in given])
+    vary = tuple(
+        Vary(key, mild, hard, takes_whole_numbers(base, loc_of(key)), _decimals(abs(hard - mild) * tolerance))
+        for key, mild, hard in given
+    )
+    ends = itertools.product(*((each.mild, each.hard) for each in vary))
+    diagonal = (tuple(each.value(step / 8) for each in vary) for step in range(9))
+    for values in dict.fromkeys([*ends, *diagonal]):
+        scenario_at(load, vary, values)
+    return vary
+
+
+def _check_ranges(given: Sequence[tuple[str, float, float]], valued: Collection[str]) -> None:
+    """Refuses a key that is varied twice, has a value or no range, and the seed."""
     for number, (key, mild, hard) in enumerate(given):
         if key == "seed":
             raise InputError("command line: --vary seed: a seed is no condition; --seed gives another")
@@ -121,16 +136,6 @@ def vary_of(
             raise InputError(
                 f"command line: --vary {key}: both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}"
             )
-    base = load([(key, number_text(mild)) for key, mild, _ in given])
-    vary = tuple(
-        Vary(key, mild, hard, takes_whole_numbers(base, loc_of(key)), _decimals(abs(hard - mild) * tolerance))
-        for key, mild, hard in given
-    )
-    ends = itertools.product(*((each.mild, each.hard) for each in vary))
-    diagonal = (tuple(each.value(step / 8) for each in vary) for step in range(9))
-    for values in dict.fromkeys([*ends, *diagonal]):
-        scenario_at(load, vary, values)
-    return vary
 
 
 def scenario_at(load: Load, vary: Sequence[Vary], values: Values) -> Scenario:

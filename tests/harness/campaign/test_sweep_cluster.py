@@ -168,10 +168,10 @@ def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
     """192.0.2.1 is an address for documentation (RFC 5737): nobody's, so not of this machine."""
     out = place / "beyond"
 
-    def knocked(address: str) -> None:
+    def knocked(*_: object) -> None:
         raise OSError
 
-    monkeypatch.setattr("harness.campaign.workers._knock", knocked)
+    monkeypatch.setattr("harness.campaign.workers.socket.create_connection", knocked)
 
     def said(*arguments: str) -> str:
         assert main(["sweep", str(place / "campaign.yaml"), "--out", str(out), *arguments]) == 2
