@@ -27,35 +27,23 @@ def faults(folder: Path) -> Iterator[str]:
     Args:
         folder: of a model, of engines or of systems. Only regular files count; other things are never opened.
     """
-    files = size = 0
+    count = size = 0
     for home, inner, names in os.walk(folder):
-        for path in (Path(home, name) for name in inner):
-            if _leads_out(path, folder):
-                yield f"{path}: is a link that leads out of the folder; must be a folder itself"
-        for name in sorted(names):
-            path = Path(home, name)
-            files += 1
-            if files > MAX_FILES:
+        for path in (Path(home, name) for name in sorted((*inner, *names))):
+            count += 1
+            if count > MAX_FILES:
                 yield f"{folder}: has more than {MAX_FILES} files; must be the folder of one aircraft"
                 return
-            if _leads_out(path, folder):
-                yield f"{path}: is a link that leads out of the folder; must be a file itself"
-                continue
-            if not path.is_file():
-                continue
-            size += path.stat().st_size
-            if size > MAX_FOLDER_BYTES:
-                yield (
-                    f"{path}: with it the files of {folder} have {size / 1e6:.0f} MB; "
-                    f"must be at most {MAX_FOLDER_BYTES // 10**6} MB together"
-                )
-                return
-            if name.lower().endswith(".xml"):
-                yield from _file_faults(path)
-
-
-def _leads_out(path: Path, folder: Path) -> bool:
-    return path.is_symlink() and not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
+            if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+                yield f"{path}: is a link that leads out of the folder; must be a file or folder in it"
+            elif path.is_file():
+                size += path.stat().st_size
+                if size > MAX_FOLDER_BYTES:
+                    told = f"{size / 1e6:.0f} MB; must be at most {MAX_FOLDER_BYTES // 10**6} MB together"
+                    yield f"{path}: with it the files of {folder} have {told}"
+                    return
+                if path.suffix.lower() == ".xml":
+                    yield from _file_faults(path)
 
 
 def _file_faults(path: Path) -> Iterator[str]:
@@ -71,10 +59,8 @@ def _file_faults(path: Path) -> Iterator[str]:
             raise ForeignError(f"is nested deeper than {MAX_DEPTH} elements; must be flatter")
         file = PurePath(attributes.get("file", ""))
         if file.is_absolute() or ".." in file.parts:
-            raise ForeignError(
-                f'<{name:.40} file="{str(file)[:80]}"> leads out of the folder; '
-                "copy the file into it and give its name"
-            )
+            told = f'<{name:.40} file="{str(file)[:80]}"> leads out of the folder'
+            raise ForeignError(f"{told}; copy the file into it and give its name")
 
     def end(name: str) -> None:
         nonlocal depth

@@ -77,12 +77,8 @@ class JsbsimModel:
         self.airframe.check_airspeed(start.airspeed_mps)
         self._step_rate_hz = step_rate_hz
         self._step, self._read_at_step = 0, -1
-        self._judged = (
-            math.nan,
-            math.nan,
-            math.nan,
-            math.nan,
-        )  # roll, airspeed, altitude, angle of attack, as read
+        # Roll, airspeed, altitude and angle of attack, as read.
+        self._judged = math.nan, math.nan, math.nan, math.nan
         atmosphere = atmosphere or Atmosphere()
         self._ground, self._terrain_ft = ground, 0.0
         height_m = start.altitude_m - self._ground_m(start.east_m, start.north_m)
@@ -120,12 +116,7 @@ class JsbsimModel:
         if self._windy:
             self._move_with_wind()
         self._settle()
-        if atmosphere.turbulence is not None and atmosphere.intensity is not None:
-            if ground is None:
-                self._start_turbulence(atmosphere.turbulence, atmosphere.intensity, atmosphere.seed)
-            else:
-                self._turbulence = DrydenGusts(atmosphere.intensity, atmosphere.seed)
-        self._vertical_gusts = atmosphere.vertical_gusts
+        self._start_gusts(atmosphere)
         self.engage()
 
     @property
@@ -331,10 +322,17 @@ class JsbsimModel:
         self._terrain_ft = self._ground_m(east_m, north_m) / FOOT_M
         self._write_terrain(min(self._terrain_ft, up_ft - TERRAIN_BELOW_FT))
 
-    def _start_turbulence(self, model: str, intensity: str, seed: int) -> None:
-        """Starts turbulence after MIL-F-8785C."""
+    def _start_gusts(self, atmosphere: Atmosphere) -> None:
+        """Starts discrete gusts and turbulence after MIL-F-8785C, over the sea JSBSim's own."""
+        self._vertical_gusts = atmosphere.vertical_gusts
+        model, intensity = atmosphere.turbulence, atmosphere.intensity
+        if model is None or intensity is None:
+            return
+        if self._ground is not None:
+            self._turbulence = DrydenGusts(intensity, atmosphere.seed)
+            return
         values = {
-            "atmosphere/randomseed": float(seed),
+            "atmosphere/randomseed": float(atmosphere.seed),
             "atmosphere/turb-type": float(TURBULENCE_TYPE[model]),
             "atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps": TURBULENCE_W20_FPS[intensity],
             "atmosphere/turbulence/milspec/severity": float(TURBULENCE_SEVERITY[intensity]),

@@ -124,35 +124,20 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
     Raises:
         AircraftError: it has no trim there, none that gains can be derived for, or is not held at any pace.
     """
-    best, least_m = None, math.inf
+    best, reason = None, ""
     try:
         at = linearised(trimmed(files, cruise))
-        reason: str | None = None
-        roll_lag_s, latency_s = _lag_s(files, "aileron"), files.latency_s
-        pitch_paces = _pitch_paces(at, _lag_s(files, "elevator"), latency_s)
+        pitch_paces = _pitch_paces(at, _lag_s(files, "elevator"), files.latency_s)
         for pace in (*PACES, LAST_PACE):
             if pace == LAST_PACE and best is not None:
                 break
-            placed = replace(gains(at, pace, *pitch_paces).rounded(GAIN_DIGITS), **entry.gains)
-            margin_deg = roll_margin_deg(at, placed, roll_lag_s, latency_s)
-            if (roll_lag_s or latency_s) and margin_deg < NEEDED_DEG:
-                reason = _too_slow("aileron", roll_lag_s + latency_s, "roll", margin_deg)
+            found = _at_pace(entry, files, cruise, at, pace, pitch_paces)
+            if isinstance(found, str):
+                reason = found
                 continue
-            frame = _provisional(entry, files, cruise, at, placed, pace)
-            if reason := not_held(frame, cruise, REVERSALS):
-                continue
-            if "turn_rate_share" not in entry.figures:
-                share = turn_rate_share(frame, cruise)
-                if not LEAST_TURN_SHARE <= share <= 2.0 - LEAST_TURN_SHARE:
-                    reason = f"it turns at {share:.2g} of the rate of a coordinated turn"
-                    continue
-                frame = replace(frame, turn_rate_share=share)
-            error_m = weaving_error_m(frame, cruise)
-            if error_m == math.inf:
-                reason = "control is lost on a weave of turns"
-            if error_m < least_m:
-                best, least_m = replace(frame, weave_error_m=error_m), error_m
-            if error_m <= WELL_TRACKED_S * cruise:
+            if best is None or found.weave_error_m < best.weave_error_m:
+                best = found
+            if found.weave_error_m <= WELL_TRACKED_S * cruise:
                 break
     except TrimError:
         raise
@@ -162,6 +147,36 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
         late = f" on a state {files.latency_s:g} s old" if files.latency_s else ""
         raise AircraftError(f"{files.name} cannot be held at {cruise:g} m/s{late}: {reason}")
     return best
+
+
+def _at_pace(
+    entry: AirframeEntry,
+    files: ModelFiles,
+    cruise: float,
+    at: Derivatives,
+    pace: float,
+    pitch_paces: tuple[float, float],
+) -> Airframe | str:
+    """The airframe with roll loops of a pace, or why it is not held with them."""
+    placed = replace(gains(at, pace, *pitch_paces).rounded(GAIN_DIGITS), **entry.gains)
+    late = _lag_s(files, "aileron"), files.latency_s
+    margin_deg = roll_margin_deg(at, placed, *late)
+    if any(late) and margin_deg < NEEDED_DEG:
+        return _too_slow("aileron", sum(late), "roll", margin_deg)
+    frame = _provisional(entry, files, cruise, at, placed, pace)
+    if reason := not_held(frame, cruise, REVERSALS):
+        return reason
+    if "turn_rate_share" not in entry.figures:
+        share = turn_rate_share(frame, cruise)
+        if not LEAST_TURN_SHARE <= share <= 2.0 - LEAST_TURN_SHARE:
+            return f"it turns at {share:.2g} of the rate of a coordinated turn"
+        frame = replace(frame, turn_rate_share=share)
+    error_m = weaving_error_m(frame, cruise)
+    return (
+        "control is lost on a weave of turns"
+        if error_m == math.inf
+        else replace(frame, weave_error_m=error_m)
+    )
 
 
 def _lag_s(files: ModelFiles, control: str) -> float:

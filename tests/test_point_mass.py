@@ -66,19 +66,9 @@ def test_big_strides_agree_with_single_steps(steps: int, roll: float) -> None:
     assert (a.up_m, a.airspeed_mps) == (310.0, 27.0)
 
 
-@pytest.mark.parametrize(
-    ("bad", "message"),
-    [
-        ({"wind_east_mps": math.inf}, "the wind must be finite"),
-        ({"turbulence": "dryden", "intensity": "light"}, "turbulence must be tustin"),
-        ({"turbulence": "tustin"}, "come together"),
-        ({"turbulence": "tustin", "intensity": "mild"}, "intensity must be light"),
-        ({"seed": -1}, "seed must be in"),
-    ],
-)
-def test_air_that_does_not_exist_is_refused(bad: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        Atmosphere(**bad)  # type: ignore[arg-type]
+def test_air_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(ValueError, match="the wind must be finite"):
+        Atmosphere(wind_east_mps=math.inf)
 
 
 def test_a_start_that_does_not_exist_is_refused() -> None:

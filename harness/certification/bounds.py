@@ -43,13 +43,21 @@ def sequential_bounds(held: int, runs: int, confidence: float) -> tuple[float, f
         runs: how often it was tried so far.
         confidence: of each bound, between 0 and 1.
     """
-    failed, wanted = runs - held, math.log(1.0 / (1.0 - confidence))
     if not runs:
         return 0.0, 1.0
-    rate = failed / runs
-    most = 1.0 if not held else _crossing(lambda f: _fewer(f, failed, runs) - wanted, rate, 1.0)
-    least = 0.0 if not failed else _crossing(lambda f: _more(f, failed, runs) - wanted, rate, 0.0)
-    return 1.0 - most, 1.0 - least
+    failed, wanted = runs - held, math.log(1.0 / (1.0 - confidence))
+
+    def end(outer: float, *, above: bool) -> float:
+        """Failure rate at which the evidence is enough, rounded outwards: a bound is never tighter than the test."""
+        inner = failed / runs
+        while (middle := 0.5 * (inner + outer)) not in (inner, outer):
+            if _evidence(middle, failed, runs, above=above) >= wanted:
+                outer = middle
+            else:
+                inner = middle
+        return outer
+
+    return 1.0 - (end(1.0, above=False) if held else 1.0), 1.0 - (end(0.0, above=True) if failed else 0.0)
 
 
 def verdict(held: int, runs: int, probability: float, confidence: float) -> Verdict:
@@ -61,26 +69,14 @@ def verdict(held: int, runs: int, probability: float, confidence: float) -> Verd
         probability: what is claimed, between 0 and 1.
         confidence: with which a claim is shown or refuted, over all looks together.
     """
-    wanted = math.log(1.0 / (1.0 - confidence))
-    if _fewer(1.0 - probability, runs - held, runs) >= wanted:
+    rate, failed, wanted = 1.0 - probability, runs - held, math.log(1.0 / (1.0 - confidence))
+    if _evidence(rate, failed, runs, above=False) >= wanted:
         return "shown"
-    if _more(1.0 - probability, runs - held, runs) >= wanted:
-        return "refuted"
-    return "undecided"
-
-
-def _fewer(rate: float, failed: int, runs: int) -> float:
-    """Logarithm of the evidence that failures are rarer than `rate`."""
-    return _evidence(rate, failed, runs, above=False)
-
-
-def _more(rate: float, failed: int, runs: int) -> float:
-    """Logarithm of the evidence that failures are more frequent than `rate`."""
-    return _evidence(rate, failed, runs, above=True)
+    return "refuted" if _evidence(rate, failed, runs, above=True) >= wanted else "undecided"
 
 
 def _evidence(rate: float, failed: int, runs: int, *, above: bool) -> float:
-    """Logarithm of the likelihood averaged over the rates on one side of `rate`, over the likelihood at `rate`."""
+    """Logarithm of the likelihood averaged over the failure rates on one side of `rate`, over the likelihood at it."""
     from scipy import special
 
     share = special.betaincc if above else special.betainc
@@ -92,20 +88,3 @@ def _evidence(rate: float, failed: int, runs: int, *, above: bool) -> float:
     prior = math.log(float(share(PRIOR, PRIOR, rate))) + special.betaln(PRIOR, PRIOR)
     likelihood = special.xlogy(failed, rate) + special.xlog1py(runs - failed, -rate)
     return float(averaged - prior - likelihood)
-
-
-def _crossing(excess: object, inner: float, outer: float) -> float:
-    """Where a function that is negative at `inner` and positive towards `outer` is zero, or the end it stays below.
-
-    The result is rounded outwards, so that a bound is never tighter than the test allows.
-    """
-    assert callable(excess)
-    for _ in range(200):
-        middle = 0.5 * (inner + outer)
-        if middle in (inner, outer):
-            break
-        if excess(middle) >= 0.0:
-            outer = middle
-        else:
-            inner = middle
-    return outer

@@ -24,7 +24,7 @@ from harness.campaign.journal import read_journal
 from harness.campaign.results import RUNS
 from harness.campaign.sweep import fly_missing, told_left
 from harness.campaign.workers import Workers
-from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
+from harness.certification.bounds import clopper_pearson, sequential_bounds, verdict
 from harness.certification.certificate import Certificate, failures
 from harness.certification.days import Days, PathDays
 from harness.certification.explained import differing, explained
@@ -38,21 +38,13 @@ CONFIDENCE: Final = 0.95
 
 @dataclass(frozen=True)
 class Terms:
-    """What is to be shown.
-
-    Attributes:
-        probability: the claim is to hold on at least this share of the days; None: nothing is to be shown.
-        confidence: of each bound.
-
-    Raises:
-        InputError: one is not between 0 and 1.
-    """
+    """What is to be shown: the claim holds on at least a share of the days (None: nothing), at this confidence."""
 
     probability: float | None = None
     confidence: float = CONFIDENCE
 
     def __post_init__(self) -> None:
-        """Checks both."""
+        """Raises `InputError` if one is not between 0 and 1."""
         for name, value in asdict(self).items():
             if value is not None and not 0.0 < value < 1.0:
                 raise InputError(f"wayproof: the {name} is {value:g}; must be above 0 and below 1")
@@ -141,15 +133,6 @@ def _leave_only(runs: Path, kept: set[int]) -> None:
 def _certificate(days: Days, out: Path, tally: Tally, terms: Terms, command: str | None) -> Certificate:
     over = [(run, each) for run, each in sorted(read_journal(out).runs.items()) if run < tally.runs]
     failing = [{**each.row, "run": run} for run, each in over if not each.held]
-    counted = tally.held, tally.runs
-    if terms.probability is None:
-        said: Verdict = "undecided"
-        method = "Clopper-Pearson, number of runs fixed beforehand"
-        low, high = clopper_pearson(*counted, terms.confidence) if tally.runs else (0.0, 1.0)
-    else:
-        said = verdict(*counted, terms.probability, terms.confidence)
-        method = "sequential mixture test, valid at every look"
-        low, high = sequential_bounds(*counted, terms.confidence)
     first = days.flown(0)
     quantities: dict[str, list[Any]] = {}
     if failing:
@@ -159,12 +142,9 @@ def _certificate(days: Days, out: Path, tally: Tally, terms: Terms, command: str
         claim=days.claim,
         runs=tally.runs,
         held=tally.held,
-        probability_lower=low,
-        probability_upper=high,
         confidence=terms.confidence,
-        verdict=said,
         probability=terms.probability,
-        method=method,
+        **_sure(tally, terms),
         most_runs=len(days),
         subject=days.campaign.name,
         planner="given" if isinstance(days, PathDays) else first.planner.label,
@@ -178,3 +158,16 @@ def _certificate(days: Days, out: Path, tally: Tally, terms: Terms, command: str
         command=command or shlex.join(["wayproof", *sys.argv[1:]]),
         versions=versions(),
     )
+
+
+def _sure(tally: Tally, terms: Terms) -> dict[str, Any]:
+    """Verdict, bounds and method of a certificate."""
+    counted, said = (tally.held, tally.runs), "undecided"
+    if terms.probability is None:
+        method = "Clopper-Pearson, number of runs fixed beforehand"
+        low, high = clopper_pearson(*counted, terms.confidence) if tally.runs else (0.0, 1.0)
+    else:
+        method = "sequential mixture test, valid at every look"
+        low, high = sequential_bounds(*counted, terms.confidence)
+        said = verdict(*counted, terms.probability, terms.confidence)
+    return {"verdict": said, "method": method, "probability_lower": low, "probability_upper": high}

@@ -6,13 +6,12 @@ Day k has a seed of its own and a draw of every varied quantity, both from the r
 from __future__ import annotations
 
 import json
-import math
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -25,58 +24,11 @@ from harness.run.path_check import PathCheck
 from harness.scenario.scenario import Scenario
 from harness.scenario.validation import input_error
 
-FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
-
 Settings = Sequence[tuple[str, str]]
 
 
-def distribution_of(text: str) -> tuple[str, dict[str, Any]]:
-    """A varied quantity as a campaign file has it under `random`.
-
-    Args:
-        text: as `FORMS` says.
-
-    Returns:
-        The key path, and the distribution.
-
-    Raises:
-        ValueError: it is no such text.
-    """
-    key, equals, values = (part.strip() for part in text.partition("="))
-    if not (key and equals and values):
-        raise ValueError(f"{text[:60]!r} is not {FORMS}")
-    for sign, name in ((":", "uniform"), ("~", "normal")):
-        parts = values.split(sign)
-        if len(parts) == 2:
-            first, second = (_number(part, text) for part in parts)
-            return key, {name: [first, second] if name == "uniform" else {"mean": first, "sigma": second}}
-    return key, {"choice": [_value(part) for part in values.split(",")]}
-
-
-def _number(part: str, text: str) -> float:
-    try:
-        number = float(part)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise ValueError(f"{text[:60]!r} is not {FORMS}: {part[:20]!r} is not a number")
-    return number
-
-
-def _value(part: str) -> Any:
-    try:
-        return json.loads(part)
-    except ValueError:
-        return part.strip()
-
-
 class Days(CampaignRuns):
-    """The days of a scenario.
-
-    Attributes:
-        claim: what is claimed of each.
-        vary: what is drawn, by key path.
-    """
+    """The days of a scenario."""
 
     def __init__(
         self,
@@ -89,7 +41,7 @@ class Days(CampaignRuns):
         sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
         band: bool = False,
     ) -> None:
-        """Makes the days; nothing is flown.
+        """Makes the days of a scenario; nothing is flown.
 
         Args:
             base: the scenario.

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from harness.analysis.claims import CLAIMS, Claim
 from harness.campaign.campaign_file import Base, absolute_paths, is_scenario
-from harness.certification.days import Days, PathDays, Settings, distribution_of
+from harness.certification.days import Days, PathDays, Settings
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.files.strict_yaml import Node
@@ -24,16 +26,16 @@ from harness.scenario.shipped import scenario_path, shipped_scenarios
 
 DEFAULT_AIRCRAFT: Final = "aerosonde"
 DEFAULT_SEED: Final = 1
+FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
 
 Vary = Mapping[str, Any] | Sequence[str]
 
 
 def distributions(vary: Vary) -> dict[str, dict[str, Any]]:
-    """Varied quantities as `Days` takes them.
+    """Varied quantities by key path, as a campaign file has them under `random`.
 
     Args:
-        vary: texts as `wayproof.certify` takes them; or by key path a text, `(low, high)`, or a distribution as a
-            campaign file has it.
+        vary: texts KEY=DRAW; or by key path the text DRAW, `(low, high)`, or a distribution of a campaign file.
 
     Raises:
         ValueError: one is none of these, or is there twice.
@@ -41,25 +43,46 @@ def distributions(vary: Vary) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for each in vary.items() if isinstance(vary, Mapping) else vary:
         if isinstance(each, str):
-            key, drawn = distribution_of(each)
-        elif isinstance(each[1], str):
-            key, drawn = distribution_of("=".join(each))
+            key, drawn = _distribution(each)
         elif isinstance(each[1], Mapping):
             key, drawn = each[0], dict(each[1])
         else:
-            key, drawn = distribution_of(f"{each[0]}={':'.join(map(str, each[1]))}")
+            draw = each[1] if isinstance(each[1], str) else ":".join(map(str, each[1]))
+            key, drawn = _distribution(f"{each[0]}={draw}")
         if key in found:
             raise ValueError(f"{key} is varied twice; leave one out")
         found[key] = drawn
     return found
 
 
-def is_path(subject: object) -> bool:
-    """Whether something is a given path, and not a scenario or the name of one.
+def _distribution(text: str) -> tuple[str, dict[str, Any]]:
+    """Key path and distribution of a text."""
+    key, equals, values = (part.strip() for part in text.partition("="))
+    if not (key and equals and values):
+        raise ValueError(f"{text[:60]!r} is not {FORMS}")
+    for sign, name in ((":", "uniform"), ("~", "normal")):
+        parts = values.split(sign)
+        if len(parts) == 2:
+            first, second = (_number(part, text) for part in parts)
+            return key, {name: [first, second] if name == "uniform" else {"mean": first, "sigma": second}}
+    return key, {"choice": [_value(part) for part in values.split(",")]}
 
-    Args:
-        subject: a scenario, a name, a file or points.
-    """
+
+def _number(part: str, text: str) -> float:
+    with suppress(ValueError):
+        if math.isfinite(number := float(part)):
+            return number
+    raise ValueError(f"{text[:60]!r} is not {FORMS}: {part[:20]!r} is not a number")
+
+
+def _value(part: str) -> Any:
+    with suppress(ValueError):
+        return json.loads(part)
+    return part.strip()
+
+
+def is_path(subject: object) -> bool:
+    """Whether something is a given path, and not a scenario or the name of one."""
     if isinstance(subject, Scenario):
         return False
     if not isinstance(subject, str | Path):

@@ -70,15 +70,15 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
         InputError: it cannot be read or has no track.
     """
     suffix = path.suffix.lower()
-    if suffix not in (*TABLES, *READERS):
-        raise InputError(
-            f"{path}: is no flight log that is read; must end in {', '.join((*TABLES, *READERS))}"
-        )
-    columns, notes = (
-        (_of_table(path, plane), []) if suffix in TABLES else read_log(path, plane or LocalPlane(0.0, 0.0))
-    )
-    if suffix in READERS and not any(name in columns for name in AIRSPEEDS):
-        notes.append("airspeed: the log has none; taken to be constant where wind is fitted")
+    if suffix in TABLES:
+        columns, notes = _of_table(path, plane), list[str]()
+    elif suffix in READERS:
+        columns, notes = read_log(path, plane or LocalPlane(0.0, 0.0))
+        if not any(name in columns for name in AIRSPEEDS):
+            notes.append("airspeed: the log has none; taken to be constant where wind is fitted")
+    else:
+        told = ", ".join((*TABLES, *READERS))
+        raise InputError(f"{path}: is no flight log that is read; must end in {told}")
     if len(columns["time_s"]) < 3 or not (np.diff(columns["time_s"]) > 0.0).all():
         raise InputError(f"{path}: time_s: must have at least 3 rows, each later than the one before")
     if "ve_mps" not in columns or "vn_mps" not in columns:

@@ -29,14 +29,7 @@ SCHEMA: Final = "wayproof/replay/1"
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """A flown flight beside the same mission simulated.
-
-    Attributes:
-        told: content of `replay.json`.
-        flown, simulated: columns of both.
-        corners_m: (k, 2) of the mission.
-        folder: where it was written.
-    """
+    """A flown flight beside the same mission simulated: content of `replay.json`, columns of both, (k, 2) corners."""
 
     told: dict[str, Any]
     flown: Mapping[str, FloatArray]
@@ -176,11 +169,11 @@ def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
 
         tracks = {
             name: {
-                **side.columns,
-                "height_m": side.columns["up_m"] - side.height_m,
-                "outside_m": side.outside,
+                **each.columns,
+                "height_m": each.columns["up_m"] - each.height_m,
+                "outside_m": each.outside,
             }
-            for name, side in sides.items()
+            for name, each in sides.items()
         }
         write_tracks(f"replay of {found.told['log']}", found.corners_m, tracks, found.folder / RECORDING)
     replace_text(found.folder / "report.html", replay_html(found))

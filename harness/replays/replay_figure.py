@@ -22,20 +22,17 @@ def replay_figure(found: Replay) -> Figure:
         axes.plot(*corners.T, color="0.7", lw=1.0, marker="s", ms=4, label="corners of the mission")
         axes.plot(found.flown["east_m"], found.flown["north_m"], color="0.2", lw=1.4, label="flown")
         simulated = found.simulated
-        axes.plot(
-            simulated["east_m"],
-            simulated["north_m"],
-            color=COLOURS[1],
-            lw=1.2,
-            ls=(0, (6, 1.5)),
-            label="simulated",
+        line = axes.plot(
+            simulated["east_m"], simulated["north_m"], color=COLOURS[1], lw=1.2, label="simulated"
         )
+        line[0].set_linestyle((0, (6, 1.5)))
         wind = found.told["wind"]
         towards = math.radians(wind["from_deg"]) + math.pi
+        half = 0.08 * np.array((math.sin(towards), math.cos(towards)))
         axes.annotate(
             f"wind {wind['speed_mps']:.1f} m/s",
-            xy=(0.5 + 0.08 * math.sin(towards), 0.5 + 0.08 * math.cos(towards)),
-            xytext=(0.5 - 0.08 * math.sin(towards), 0.5 - 0.08 * math.cos(towards)),
+            xy=(0.5 + half).tolist(),
+            xytext=(0.5 - half).tolist(),
             xycoords="axes fraction",
             arrowprops={"arrowstyle": "->", "color": "0.4"},
             color="0.4",

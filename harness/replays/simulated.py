@@ -30,6 +30,10 @@ DEFAULT_LAW: Final = "bearing"
 LATENCY_S: Final = 0.2
 """Age of the state that the law works with: what ArduPilot takes of a satellite receiver that it does not know
 (AP_GPS_Backend::get_lag), as a log does not tell which it was."""
+EXACT: Final = (
+    *("position_sigma_m", "altitude_sigma_m", "heading_sigma_deg"),
+    *("velocity_sigma_mps", "airspeed_sigma_mps"),
+)
 ABOUT_M: Final = 1000.0
 LOW_M: Final = 50.0
 UNKNOWN_ALTITUDE_M: Final = 300.0
@@ -44,9 +48,7 @@ class Asked:
     """What is flown anew.
 
     Attributes:
-        flight: what was flown.
-        mission: its mission.
-        first: number of the corner that it was heading for at its first row.
+        first: number of the corner that the flight was heading for at its first row.
         winds: as fitted, time rising from the first row.
         airspeed_mps: true airspeed that was commanded.
         height_m: that was commanded, as `up_m` has it.
@@ -100,16 +102,7 @@ class LapsEnd:
 
 
 def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-    """The flight as a scenario.
-
-    Args:
-        asked: what is flown anew.
-        aircraft: a name that `wayproof list aircraft` prints, or a folder.
-        overrides: keys to replace, as `harness.scenario.scenario.load_scenario` takes them.
-
-    Raises:
-        InputError: the aircraft cannot fly it.
-    """
+    """The flight as a scenario, some keys of it replaced; `InputError` if the aircraft cannot fly it."""
     flight, mission, origin = asked.flight, asked.mission, asked.mission.origin
     places = np.vstack((np.column_stack((flight["east_m"], flight["north_m"])), mission.corners_m))
     bounds = (*(places.min(axis=0) - ABOUT_M).tolist(), *(places.max(axis=0) + ABOUT_M).tolist())
@@ -118,13 +111,6 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
     altitude_m = asked.height_m + (origin.altitude_m if origin else 0.0)
     changes = [[wind.time_s, wind.speed_mps, wind.from_deg] for wind in asked.winds if wind.time_s > 0.0]
     wind = {"speed_mps": asked.winds[0].speed_mps, "from_deg": asked.winds[0].from_deg, "changes": changes}
-    exact = (
-        "position_sigma_m",
-        "velocity_sigma_mps",
-        "heading_sigma_deg",
-        "airspeed_sigma_mps",
-        "altitude_sigma_m",
-    )
     keys: dict[str, Any] = {
         "schema": "wayproof/scenario/1",
         "name": "replay",
@@ -143,7 +129,7 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
             "autopilot": {"state_latency_s": 0.0},
         },
         "guidance": {"kind": DEFAULT_LAW, "follow": "waypoints"},
-        "navigation": {"kind": "gnss", **dict.fromkeys(exact, 0.0), "latency_s": LATENCY_S},
+        "navigation": {"kind": "gnss", **dict.fromkeys(EXACT, 0.0), "latency_s": LATENCY_S},
         "environment": {"wind": wind},
     }
     if mission.bank_limit_deg is not None:
