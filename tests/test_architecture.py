@@ -115,6 +115,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
     "aircraft": (
         ("airframes", "climb", "law_cards"),
         ("card_cache", "survey"),
+        ("trials",),
         ("jsbsim_model",),
         ("envelope", "jsbsim_loading"),
         ("airframe", "injection", "start"),

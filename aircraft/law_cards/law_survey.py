@@ -6,21 +6,15 @@ error from obstacles.
 
 from __future__ import annotations
 
-import math
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
 from aircraft.airframe import Airframe
 from aircraft.envelope import performance
-from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
-from aircraft.guidance.latency import as_it_was
-from aircraft.interface import AircraftState, Route
-from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
+from aircraft.guidance.interface import GuidanceLaw
 from aircraft.model_files import AircraftError
 from aircraft.route import weave
-from aircraft.start import Atmosphere
-from aircraft.survey import in_flight
+from aircraft.trials import tracked
 
 WIND_SHARES = (0.0, 0.3, 0.6)
 """Winds that are flown, along the weave and against it, over the airspeed."""
@@ -56,10 +50,10 @@ def measured(frame: Airframe, kind: str, speed_mps: float, make: Make, waypoints
         else:
             how = f" in a wind of {share:.0%} of the airspeed" if share else ""
             how += f" on a state {frame.files.latency_s:g} s old" if frame.files.latency_s else ""
-            tracked = WAYPOINTS_TRACKED_SHARE if waypoints else TRACKED_SHARE
+            most = WAYPOINTS_TRACKED_SHARE if waypoints else TRACKED_SHARE
             raise AircraftError(
                 f"the guidance law {kind} does not track with {frame.name}{how}: on turns of {factors[-1]:g} times "
-                f"the radius that the aircraft needs it is off by more than {tracked:.0%} of the radius, or its bank "
+                f"the radius that the aircraft needs it is off by more than {most:.0%} of the radius, or its bank "
                 "is cut"
             )
         points.append({"wind_share": share, "radius_factor": factor, "error_m": float(f"{error_m:.3g}")})
@@ -73,34 +67,14 @@ def _error_m(
     radius_m = factor * performance(frame, speed_mps, wind_mps).turn_radius_m
     worst_m = 0.0
     for north_mps in (wind_mps, -wind_mps) if wind_mps else (0.0,):
-        error_m, cut = _flown(frame, speed_mps, make(), weave(radius_m), north_mps)
+        route = weave(radius_m)
+        most_s = SLOWEST_SHARE * float(route.segments[:, 5].sum()) / (speed_mps - abs(north_mps))
+        error_m, cut = tracked(frame, speed_mps, make(), route, north_mps, most_s)
         if waypoints:
-            tracked = error_m <= WAYPOINTS_TRACKED_SHARE * radius_m
+            kept = error_m <= WAYPOINTS_TRACKED_SHARE * radius_m
         else:
-            tracked = error_m <= TRACKED_SHARE * radius_m and cut <= CUT_SHARE
-        if not tracked:
+            kept = error_m <= TRACKED_SHARE * radius_m and cut <= CUT_SHARE
+        if not kept:
             return None
         worst_m = max(worst_m, error_m)
     return worst_m
-
-
-def _flown(
-    frame: Airframe, speed_mps: float, law: GuidanceLaw, route: Route, north_mps: float
-) -> tuple[float, float]:
-    """Largest cross-track error (m), infinite if lost, and the share of the time for which the bank was cut."""
-    law.follow(route)
-    model = in_flight(frame, speed_mps, Atmosphere(wind_north_mps=north_mps))
-    most_s = SLOWEST_SHARE * float(route.segments[:, 5].sum()) / (speed_mps - abs(north_mps))
-    worst_m, cut, updates = 0.0, 0, 0
-    past: deque[AircraftState] = deque()
-    while True:
-        state = as_it_was(past, model.state(), frame.files.latency_s)
-        output = law.update(state)
-        if model.fault() or state.time_s > most_s:
-            return math.inf, 1.0
-        if output.past_end:
-            return worst_m, cut / max(updates, 1)
-        worst_m = max(worst_m, abs(output.cross_track_m))
-        cut, updates = cut + output.bank_saturated, updates + 1
-        model.command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed_mps)
-        model.advance(model.step_rate_hz // UPDATE_RATE_HZ)

@@ -85,7 +85,7 @@ def envelope_card(
 
 
 def _page(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, Any]:
-    from aircraft.survey import roll_in_s
+    from aircraft.trials import roll_in_s
 
     banks = (*(bank for bank in BANKS_DEG if bank < frame.bank_limit_deg), frame.bank_limit_deg)
     climb, descent = climb_rates(frame).at(speed)
@@ -108,7 +108,7 @@ def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, floa
         greatest `load_factor`; `altitude_lost_m` and `airspeed_lost_mps`, the most below what was commanded from
         the roll-in on.
     """
-    from aircraft.survey import in_flight
+    from aircraft.trials import in_flight
 
     model = in_flight(frame, speed)
     steps = model.step_rate_hz // UPDATE_RATE_HZ

@@ -17,7 +17,7 @@ from aircraft.jsbsim_loading import linearised, surface_travel_deg, trimmed
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import model_files
 from aircraft.start import StartConditions
-from aircraft.survey import in_flight
+from aircraft.trials import in_flight
 
 SERVO = Actuator(lag_s=0.05, rate_limit_degps=600.0, deadband_deg=0.2)
 START = StartConditions(0.0, 0.0, 300.0, 0.0, 25.0)

@@ -14,7 +14,7 @@ from aircraft.guidance.latency import as_it_was
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw, bandwidth_of_delay_margin
 from aircraft.interface import AircraftState, FloatArray
 from aircraft.route import weave
-from aircraft.survey import in_flight
+from aircraft.trials import in_flight
 
 
 def rolled(keys: AutopilotKeys, seconds: float = 3.0) -> FloatArray:

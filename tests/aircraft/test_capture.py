@@ -10,7 +10,7 @@ from aircraft.guidance.npfg import NpfgConfig
 from aircraft.guidance.registry import guidance_kinds
 from aircraft.interface import Route
 from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
-from aircraft.survey import in_flight
+from aircraft.trials import in_flight
 
 BESIDE_S, RETURNED_S = 2.0, 0.02
 """Flying times: so far beside the line it begins, and so near it comes."""

@@ -16,7 +16,7 @@ LEAN = sorted(
         if path.stem != "__init__"
     }
     - {"aircraft.jsbsim_loading", "aircraft.jsbsim_model", "aircraft.survey", "aircraft.law_cards.law_survey"}
-    - {"aircraft.climb", "aircraft.kernels"}
+    - {"aircraft.climb", "aircraft.kernels", "aircraft.trials"}
 )
 
 

@@ -18,7 +18,8 @@ from aircraft.autopilot import gains
 from aircraft.interface import AircraftState
 from aircraft.jsbsim_loading import linearised, mass_kg, trimmed
 from aircraft.model_files import model_files
-from aircraft.survey import departure, in_flight, not_held, survey, turn_rate_share, weaving_error_m
+from aircraft.survey import survey
+from aircraft.trials import departure, in_flight, not_held, turn_rate_share, weaving_error_m
 from tests.longer import longer
 
 AEROSONDE = Path(aircraft.__path__[0], "aerosonde")

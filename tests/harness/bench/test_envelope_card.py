@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from aircraft import survey
+from aircraft import trials
 from aircraft.airframes import AircraftError, airframe
 from aircraft.envelope import performance
 from harness.bench import envelope_card as module
@@ -76,7 +76,7 @@ def test_the_command_prints_the_card_and_measures_once(
 
     (file,) = cache.glob("aerosonde-envelope-*.json")
     with monkeypatch.context() as patch:
-        patch.setattr(survey, "in_flight", None)
+        patch.setattr(trials, "in_flight", None)
         assert envelope_card("aerosonde", winds_mps=[5.0]) == card
     file.write_text("wreck", "utf-8")
     assert envelope_card("aerosonde", winds_mps=[5.0]) == card
