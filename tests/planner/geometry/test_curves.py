@@ -200,18 +200,6 @@ def test_a_fillet_is_smooth_and_passes_its_corners_as_near_as_asked(
         assert line.distance(shapely.Point(corner)) <= max(cut, tightest) + 0.05
 
 
-@given(radius=st.floats(50.0, 300.0), turn=st.floats(0.2, 2.2), cut=st.floats(1.0, 400.0))
-def test_one_corner_is_cut_by_what_is_asked_and_room_allows(radius: float, turn: float, cut: float) -> None:
-    leg = 4000.0
-    nodes = [(leg, 0.0), (leg + leg * math.cos(turn), leg * math.sin(turn))]
-    path = fillet(EAST, nodes, Limits(radius, 50.0), cut)
-    assert path is not None
-    sharpness = 1.0 / math.cos(0.5 * turn) - 1.0
-    # No corner takes more than half of the leg that leads to it, unless the turn radius needs it.
-    widest = 0.5 * leg / math.tan(0.5 * turn)
-    assert 1.0 / path.max_curvature_1pm == pytest.approx(max(radius, min(cut / sharpness, widest)), rel=1e-6)
-
-
 def test_a_turn_against_the_one_before_begins_after_the_room_to_roll() -> None:
     limits = Limits(100.0, 40.0)
     behind_right = [(-1000.0, -500.0)]

@@ -48,14 +48,6 @@ def test_before_a_wall_the_turn_is_begun_where_there_is_room(
     assert 50.0 - 0.02 <= room < 50.0 + 25.0 + 1.0
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_it_turns_to_the_side_that_has_room(side: float, wall: MakePoints) -> None:
-    points = wall((-500.0, 120.0 * side), (3000.0, 120.0 * side), 12.0)
-    turn = divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, terrain(points))
-    assert turn is not None
-    assert turn.segments[-1, 4] == pytest.approx(-side / 100.0)
-
-
 @pytest.mark.parametrize("curvature", [1 / 400.0, -1 / 400.0])
 def test_a_turn_against_the_one_being_flown_begins_after_the_room_to_roll(
     curvature: float, assert_flyable: AssertFlyable

@@ -11,11 +11,11 @@ import pytest
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose
-from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdges
+from planner.interface import FloatArray, MapView, Mission
 from planner.memory import ObstacleMemory
-from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.local_planning import LocalPlanning, Start
+from tests.planner.rolling_window.test_rolling_window import seen_at_once
 
 MakePoints = Callable[..., FloatArray]
 Known = Callable[[FloatArray], MapView]
@@ -31,6 +31,7 @@ MISSION = Mission(
     tracking_error_m=3.0,
     sensor_range_m=8000.0,
 )
+
 START = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
 
 
@@ -115,34 +116,16 @@ def test_walled_in_the_proof_ends_it(ring: MakePoints, known: Known) -> None:
     assert asked
 
 
-class Growing:
-    """Edge points of which more and more are in sight."""
-
-    spacing_m, last_removal_revision = 50.0, 0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-    distance_m = distance_to_edges
-
-    def __init__(self, *scans: FloatArray) -> None:
-        self._scans, self.revision = scans, 1
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return np.concatenate([np.zeros((0, 2)), *self._scans[max(revision, 0) : self.revision]])
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return np.ones(len(points_m), dtype=np.bool_)
-
-
 def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(wall: MakePoints) -> None:
     """The near end of a wall is passed although more of the wall behind that end is seen before the search ends."""
     across = wall((3000.0, -700.0), (3000.0, 6000.0), 50.0)
     behind = wall((3000.0, -700.0), (6000.0, -700.0), 50.0)
-    seen, memory = Growing(across, behind), ObstacleMemory(MISSION.clearance_m)
+    seen, memory = seen_at_once(across), ObstacleMemory(MISSION.clearance_m)
     memory.take_in(seen)
     local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
     thinking = AnytimeSearch(local, len(memory.points_m), 0, lambda: False)
     assert not list(thinking.courses(START, None, 2))
-    seen.revision = 2
+    seen.show(behind)
     memory.take_in(seen)
     later = Start((100.0, 0.0), Pose(100.0, 0.0, 1.0, 0.0))
     course = next(iter(thinking.courses(later, None, 10**6)))

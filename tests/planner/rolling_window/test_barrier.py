@@ -13,11 +13,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner.geometry.curves import Point
-from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdges
+from planner.interface import FloatArray, MapView, Mission
 from planner.memory import ObstacleMemory
-from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.barrier import PROVED_AT_ONCE, THIN, Barrier, Proof
 from tests.examples import examples
+from tests.planner.rolling_window.test_rolling_window import Seen
 
 MakePoints = Callable[..., FloatArray]
 Known = Callable[[FloatArray], MapView]
@@ -179,16 +179,11 @@ def test_a_proof_with_what_was_refused_holds_until_that_is_forgiven(wall: MakePo
     assert not given_up.closed(START)
 
 
-class TakingBack:
+class TakingBack(Seen):
     """A wall of which only some is left at the second look; what is new then closes the gap or does not."""
 
-    spacing_m, revision, last_removal_revision = 50.0, 1, 0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-    distance_m = distance_to_edges
-
     def __init__(self, first: FloatArray, left: FloatArray, new: FloatArray) -> None:
-        self._first, self._left, self._new = first, left, new
+        self.revision, self._first, self._left, self._new = 1, first, left, new
 
     def second_look(self) -> None:
         self.revision = self.last_removal_revision = 2
@@ -197,9 +192,6 @@ class TakingBack:
         if self.revision == 1:
             return self._first if revision < 1 else self._first[:0]
         return np.concatenate((self._left, self._new)) if revision < 1 else self._new
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return np.ones(len(points_m), dtype=np.bool_)
 
 
 @pytest.mark.parametrize("closes", [False, True])

@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 
 from planner.geometry.curves import Point
 from planner.geometry.terrain import WorkCount
-from planner.interface import FloatArray, MovingEdges
+from planner.interface import FloatArray
 from planner.memory import ObstacleMemory
-from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, search_candidates
 from planner.rolling_window.window import Window
 from tests.examples import examples
+from tests.planner.rolling_window.test_rolling_window import seen_at_once
 
 MakePoints = Callable[..., FloatArray]
 SPACING, KEEP, OUTER = 50.0, 212.0, 220.0
@@ -29,28 +29,10 @@ START, GOAL = (0.0, 0.0), (20_000.0, 0.0)
 BOUNDS = (-15_000.0, -15_000.0, 35_000.0, 15_000.0)
 
 
-class _Still:
-    """Edge points that are all known from the start."""
-
-    spacing_m, revision, last_removal_revision = SPACING, 1, 0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-    distance_m = distance_to_edges
-
-    def __init__(self, points: FloatArray) -> None:
-        self._points = points
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return self._points if revision < 1 else self._points[:0]
-
-    def seen_free(self, points_m: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        return np.ones(len(points_m), dtype=np.bool_)
-
-
 def window_of(*obstacles: FloatArray) -> Window:
     points = np.concatenate((np.zeros((0, 2)), *obstacles))
     memory = ObstacleMemory(200.0)
-    memory.take_in(_Still(points))
+    memory.take_in(seen_at_once(points))
     return Window(START, points, memory.labels.copy(), SPACING, np.full(len(points), KEEP))
 
 
@@ -132,18 +114,6 @@ def assert_near_the_optimum(window: Window, share: float = 1.02) -> None:
     assert 0.995 * optimum < tracks[0].cost_m < share * optimum
 
 
-def test_round_one_circle(ring: MakePoints) -> None:
-    window = window_of(ring(9000.0, 800.0, 3000.0, SPACING))
-    assert_near_the_optimum(window)
-    # The exact length is that of two tangents and the arc between them.
-    (x, y), r = (9000.0, 800.0), 3000.0 + KEEP
-    near, far = math.hypot(x, y), math.hypot(GOAL[0] - x, y)
-    seen = math.acos((x * (x - GOAL[0]) + y * y) / (near * far))
-    arc = r * (seen - math.acos(r / near) - math.acos(r / far))
-    exact = math.sqrt(near**2 - r**2) + math.sqrt(far**2 - r**2) + arc
-    assert tracks_in(window)[0].cost_m == pytest.approx(exact, rel=0.005)
-
-
 @pytest.mark.flights
 @settings(max_examples=examples(12))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 4))
@@ -160,16 +130,6 @@ def test_fields_of_circles(seed: int, count: int, ring: MakePoints) -> None:
     assume(ends.min() > OUTER + 200.0)
     window = window_of(*(ring(x, y, r, SPACING) for x, y, r in circles.tolist()))
     assert_near_the_optimum(window, 1.03)
-
-
-def test_bounds_force_the_longer_way_round(ring: MakePoints) -> None:
-    window = window_of(ring(9000.0, 800.0, 3000.0, SPACING))
-    free = tracks_in(window)[0]
-    assert min(y for _, y in free.nodes) < -2000.0
-    # What passes south lies outside; the way round the north is left.
-    bound = tracks_in(window, bounds=(-15_000.0, -1500.0, 35_000.0, 15_000.0))[0]
-    assert max(y for _, y in bound.nodes) > 3500.0
-    assert bound.cost_m > free.cost_m
 
 
 CELL, CELLS = 1000.0, 4

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from planner.geometry.curves import Limits, along, between, end_of, pose_at, sample
 from planner.geometry.path_samples import poses_at
 from planner.geometry.terrain import Terrain
-from planner.interface import BoolArray, FloatArray, MovingEdges, Path
-from planner.nearest_edge import distance_to_edges
+from planner.interface import BoolArray, FloatArray, Path
 from planner.shield.certificate import Certified, Certifier, disc_radius_m
 from tests.examples import examples
+from tests.planner.rolling_window.test_rolling_window import Seen
 
 AssertFlyable = Callable[[Path, float], None]
 
@@ -35,19 +35,12 @@ PIECES = st.lists(
 )
 
 
-class FreeDiscs:
+class FreeDiscs(Seen):
     """Space seen to be free: some discs."""
 
-    spacing_m, revision, last_removal_revision = SPACING, 0, 0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-    distance_m = distance_to_edges
-
     def __init__(self, discs: FloatArray) -> None:
+        super().__init__(np.zeros((0, 2)))
         self._discs = discs
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return np.zeros((0, 2))
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         free = np.zeros(len(points_m), dtype=np.bool_)
@@ -243,6 +236,7 @@ class FreeBox(FreeDiscs):
     """Free are all places of a rectangle."""
 
     def __init__(self, low: tuple[float, float], high: tuple[float, float]) -> None:
+        super().__init__(np.zeros((0, 3)))
         self._low, self._high = low, high
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:

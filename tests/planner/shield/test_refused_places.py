@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
-from planner.interface import BoolArray, FloatArray, MovingEdges
+from planner.interface import FloatArray
 from planner.memory import ObstacleMemory
-from planner.nearest_edge import distance_to_edges
 from planner.shield.refused_places import RefusedPlaces
+from tests.planner.rolling_window.test_rolling_window import Seen
 
 
-class Growing:
+class Growing(Seen):
     """A map that gets one edge point more at every step, and loses its first one at one of them."""
-
-    spacing_m = 10.0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-    distance_m = distance_to_edges
 
     def __init__(self) -> None:
         self.edges: list[tuple[int, float]] = []
@@ -34,9 +27,6 @@ class Growing:
 
     def edges_since(self, revision: int) -> FloatArray:
         return np.array([(east, 0.0) for at, east in self.edges if at > revision]).reshape(-1, 2)
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return np.ones(len(points_m), dtype=np.bool_)
 
 
 def test_every_edge_and_every_refused_place_is_remembered_once() -> None:
