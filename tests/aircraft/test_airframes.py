@@ -25,16 +25,6 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
         airframe("nope")
 
 
-def test_the_fleet_has_those_that_are_asked_for_most() -> None:
-    assert {"c172x", "J3Cub", "OV10", "T38", "f16"} < set(aircraft_names())
-
-
-def test_guidance_limits_are_in_radians() -> None:
-    limits = airframe("aerosonde").guidance_limits()
-    assert limits.bank_limit_rad == pytest.approx(math.pi / 4)
-    assert limits.roll_rate_radps == pytest.approx(math.radians(74.0))
-
-
 def test_turn_radius_of_the_aerosonde() -> None:
     calm = performance(airframe("aerosonde"), 25.0)
     assert calm.turn_radius_m == pytest.approx(110.4, abs=0.1)

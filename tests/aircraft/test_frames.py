@@ -108,12 +108,6 @@ def test_a_patch_ends_where_its_terms_no_longer_hold() -> None:
     assert math.dist(rim[:2], middle[:2]) == pytest.approx(0.99 * PATCH_M, rel=0.01)
 
 
-def test_the_origin_is_the_origin() -> None:
-    plane = LocalPlane(47.0, 8.0)
-    assert plane.project(math.radians(47.0), math.radians(8.0)) == (0.0, 0.0, 0.0)
-    assert plane.geodetic(0.0, 0.0) == pytest.approx((47.0, 8.0), abs=1e-12)
-
-
 def test_meridians_converge_to_the_nearer_pole() -> None:
     assert LocalPlane(47.0, 8.0).convergence_rad(50e3, 0.0) > 0.0
     assert LocalPlane(47.0, 8.0).convergence_rad(-50e3, 0.0) < 0.0

@@ -14,7 +14,7 @@ import pytest
 
 from aircraft.airframes import AircraftError, airframe
 from aircraft.frames import LocalPlane
-from aircraft.interface import AircraftState, FlightModel
+from aircraft.interface import AircraftState
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.properties import STATE_PROPERTIES
 from aircraft.start import Atmosphere, StartConditions
@@ -43,11 +43,6 @@ def test_state_has_the_throttle_that_holds_the_airspeed() -> None:
         for speed in (20.0, 30.0)
     )
     assert 0.0 < slow.state().throttle < fast.state().throttle < 1.0
-
-
-def test_is_a_flight_model() -> None:
-    model: FlightModel = model_of("aerosonde")
-    assert model.step_rate_hz == SECOND
 
 
 def test_a_model_that_is_not_used_any_more_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
