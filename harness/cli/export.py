@@ -32,7 +32,7 @@ def export(
     from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
 
     try:
-        file = exported(load_run(run_dir), form, what)
+        content, notes = exported(load_run(run_dir), form, what)
     except InputError:
         raise
     except RunFolderError as error:
@@ -40,10 +40,10 @@ def export(
     except WRONG_CONTENT as error:
         raise bad_input(damaged(run_dir, error)) from error
     if out is None:
-        _write(file.content)
+        _write(content)
     else:
-        replace_bytes(out, file.content)
-    for note in file.notes:
+        replace_bytes(out, content)
+    for note in notes:
         say(note, err=True)
     return 0
 

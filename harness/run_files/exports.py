@@ -55,16 +55,10 @@ class ExportedPath:
     started: datetime
 
 
-@dataclass(frozen=True)
-class Exported:
-    """What an exported file holds, and what its user should know, a sentence each."""
+def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
+    """A run as a file of another tool, and what its user should know, a sentence each.
 
-    content: bytes
-    notes: tuple[str, ...] = ()
-
-
-def exported(run: Run, form: str, what: str) -> Exported:
-    """A run as a file of another tool, in one of `FORMATS`: what was flown, or of every plan what was in effect.
+    In one of `FORMATS`: what was flown, or of every plan what was in effect.
 
     Raises:
         RunFolderError: the run has no such path.
@@ -79,7 +73,7 @@ def exported(run: Run, form: str, what: str) -> Exported:
     if origin == Origin():  # nobody knows any more whether it was given
         place = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
         notes.append(f"area.origin is the default: the file lies about {place}")
-    return Exported(FORMATS[form](path).encode(), tuple(notes))
+    return FORMATS[form](path).encode(), notes
 
 
 def _path_of(run: Run, what: str) -> ExportedPath:
