@@ -115,13 +115,16 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     _add_items(check["items"], rows)
     for number, note in enumerate(check["notes"]):
         rows["notes" if not number else " " * (number + 1)] = plain(note)
-    for name, figures in (("as given", check["given"]), ("as flown", metrics["smoothness"]["flown"])):
-        curvature_1pm = figures["max_curvature_1pm"]
-        rows[f"smoothness {name}"] = (
-            f"turns {figures['heading_change_deg']:,.0f} deg, energy {figures['bending_energy_1pm']:.2g} /m, "
-            + (f"tightest {1.0 / curvature_1pm:,.0f} m" if curvature_1pm > 1e-9 else "no turn")
-        )
+    rows["smoothness as given"] = _smoothness(check["given"])
+    rows["smoothness as flown"] = _smoothness(metrics["smoothness"]["flown"])
     return rows
+
+
+def _smoothness(figures: Mapping[str, float]) -> str:
+    curvature_1pm = figures["max_curvature_1pm"]
+    tightest = f"tightest {1.0 / curvature_1pm:,.0f} m" if curvature_1pm > 1e-9 else "no turn"
+    energy = f"energy {figures['bending_energy_1pm']:.2g} /m"
+    return f"turns {figures['heading_change_deg']:,.0f} deg, {energy}, {tightest}"
 
 
 def _add_deviations(metrics: Mapping[str, Any], rows: dict[str, str]) -> None:
