@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +49,22 @@ class Obstacle:
     core: Any
     rings: tuple[Any, ...]
     border: bool
+
+
+class Tangent(NamedTuple):
+    """Where a line from a place touches an obstacle.
+
+    Attributes:
+        place: the corner.
+        side: 1: it lies on the left of the line, -1: on the right.
+        seen: nothing lies before it.
+        dent: the line leads on to the same obstacle within reach.
+    """
+
+    place: Point
+    side: float
+    seen: bool
+    dent: bool
 
 
 class GrownObstacles:
@@ -233,22 +249,22 @@ class GrownObstacles:
         import shapely
 
         self._unite()
-        beside_m = TOUCH_SHARE * self.keep_m + self._margin_m
-        away = shapely.distance([each.discs for each in self._obstacles], shapely.Point(place))
-        mine = [self._obstacles[i] for i in np.flatnonzero(away < beside_m)]
-        shapes = [each.discs & self._hole() if each.border else each.discs for each in mine]
-        away = shapely.distance(shapes, shapely.Point(self._mission.goal_m))
-        return float(np.nanmin(away, initial=math.inf))
+        beside_m, here = TOUCH_SHARE * self.keep_m + self._margin_m, shapely.Point(place)
+        mine = [each for each in self._obstacles if shapely.distance(each.discs, here) < beside_m]
+        # What the border joins are obstacles of their own.
+        shapes = [
+            shapely.get_parts(each.discs & self._hole() if each.border else each.discs) for each in mine
+        ]
+        parts = np.concatenate([np.array([]), *shapes])
+        beside = parts[shapely.distance(parts, here) < beside_m]
+        return float(shapely.distance(beside, shapely.Point(self._mission.goal_m)).min(initial=math.inf))
 
-    def tangents(self, place: Point, parts: set[int], reach_m: float) -> list[tuple[Point, float, bool]]:
-        """The corners within reach at which lines from a place touch some obstacles, sides, and which are in sight.
-
-        Lines that lead on to the same obstacle do not count. Of side 1 are those that lie on the left of the line.
-        """
+    def tangents(self, place: Point, parts: set[int], reach_m: float) -> list[Tangent]:
+        """Where lines from a place touch some obstacles within reach: at corners."""
         import shapely
 
         self._unite()
-        found: list[tuple[Point, float, bool]] = []
+        found: list[Tangent] = []
         for own, ring in (
             (self._obstacles[i], ring) for i in sorted(parts) for ring in self._obstacles[i].rings
         ):
@@ -259,15 +275,14 @@ class GrownObstacles:
             away = np.hypot(*to.T)
             touched = (sides[0] * sides[1] >= 0.0) & (_cross(before, after) < 0.0)
             chosen = np.flatnonzero(touched & (away < reach_m) & (away > 1e-6))
-            if not own.border:  # beyond a dent there is the same obstacle again
-                beyond = place + reach_m * to[chosen] / away[chosen, None]
-                rays = shapely.linestrings(np.stack((corners[chosen], beyond), axis=1))
-                chosen = chosen[~shapely.intersects(own.core, rays)]
             lines = shapely.linestrings(np.stack(np.broadcast_arrays(place, corners[chosen]), axis=1))
             hidden = shapely.intersects(self._cores[:, None], lines).any(axis=0)
-            for i, out in zip(chosen.tolist(), hidden.tolist(), strict=True):
+            beyond = place + reach_m * to[chosen] / away[chosen, None]
+            rays = shapely.linestrings(np.stack((corners[chosen], beyond), axis=1))
+            dents = shapely.intersects(own.core, rays) & (not own.border)
+            for i, out, dent in zip(chosen.tolist(), hidden.tolist(), dents.tolist(), strict=True):
                 side = math.copysign(1.0, float(sides[:, i].sum()))
-                found.append(((float(corners[i, 0]), float(corners[i, 1])), side, not out))
+                found.append(Tangent((float(corners[i, 0]), float(corners[i, 1])), side, not out, dent))
         return found
 
     def encloses_nothing(self, outline: FloatArray) -> bool:

@@ -79,12 +79,13 @@ TangentBugState = Toward | BoundaryFollowing | Enclosed
 
 @dataclass(frozen=True)
 class TangentNode:
-    """A place V of the local tangent graph, and on which side it touches an obstacle (0: none)."""
+    """A place V of the local tangent graph, on which side it touches an obstacle (0: none), and whether at a dent."""
 
     place: Point
     to_goal_m: float
     way_m: float
     side: float
+    dent: bool = False
 
 
 class TangentBugConfig(PointConfig):
@@ -174,16 +175,16 @@ class TangentBug(Walker[TangentBugState]):
             parts.add(self.known.part_at(also))
         touched = self.known.tangents(place, parts, reach)
         # Where something hides an edge, the edges of that are taken as well.
-        hiding = {self.known.first_hit(place, corner)[1] for corner, _, seen in touched if not seen} - parts
+        hiding = {self.known.first_hit(place, each.place)[1] for each in touched if not each.seen} - parts
         touched += self.known.tangents(place, hiding, reach)
-        return nodes + [self._node(place, corner, side) for corner, side, seen in touched if seen]
+        return nodes + [self._node(place, each.place, each.side, each.dent) for each in touched if each.seen]
 
-    def _node(self, place: Point, touch: Point, side: float) -> TangentNode:
+    def _node(self, place: Point, touch: Point, side: float, dent: bool = False) -> TangentNode:
         to_goal = math.dist(touch, self.goal)
-        return TangentNode(touch, to_goal, math.dist(place, touch) + to_goal, side)
+        return TangentNode(touch, to_goal, math.dist(place, touch) + to_goal, side, dent)
 
     def _best(self, place: Point, nodes: list[TangentNode], limit_m: float) -> TangentNode | None:
-        """The node to move to; None at a local minimum."""
+        """The node to move to, past an obstacle rather than into a dent of it; None at a local minimum."""
         here = math.dist(place, self.goal)
         nearer = []
         for node in nodes:
@@ -192,7 +193,7 @@ class TangentBug(Walker[TangentBugState]):
             touching = math.hypot(dx, dy) < self.keep_m
             if node.side and onward and node.to_goal_m < limit_m and (touching or node.to_goal_m < here):
                 nearer.append(node)
-        return min(nearer, key=lambda node: node.way_m, default=None)
+        return min(nearer, key=lambda node: (node.dent, node.way_m), default=None)
 
     def _slide(self, place: Point, node: TangentNode) -> FloatArray:
         """To a node and along the obstacle while that leads nearer to the goal and the goal is behind it."""

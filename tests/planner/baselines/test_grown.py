@@ -113,24 +113,39 @@ def test_tangents_touch_a_disc_on_either_side() -> None:
     """From a place d from the centre of a disc of radius r they are sqrt(d^2 - r^2) long."""
     known = grown(np.array([(5000.0, 5000.0)]))
     found = known.tangents((4000.0, 5000.0), {known.part_at((4780.0, 5000.0))}, 3000.0)
-    assert sorted(side for _, side, _ in found) == [-1.0, 1.0]
-    for (east, north), side, seen in found:
+    assert sorted(each.side for each in found) == [-1.0, 1.0]
+    for (east, north), side, seen, dent in found:
         assert seen
+        assert not dent
         assert math.copysign(1.0, 5000.0 - north) == side  # the disc is on the left of the southern one
         assert math.dist((east, north), (4000.0, 5000.0)) == pytest.approx(
             math.sqrt(1000.0**2 - KEEP**2), abs=45.0
         )
 
 
-def test_a_line_that_only_passes_a_dent_of_an_obstacle_is_no_tangent() -> None:
+def test_a_line_past_one_disc_and_onto_another_of_the_same_obstacle_touches_a_dent() -> None:
     """Two discs that overlap: the line north past the first one runs into the second one."""
     known = grown(np.array([(5000.0, 5000.0), (5300.0, 5150.0)]))
     place = (4000.0, 5000.0)
-    found = known.tangents(place, {known.part_at((4780.0, 5000.0))}, 3000.0)
-    lengths = {side: math.dist(corner, place) for corner, side, seen in found if seen}
-    assert sum(seen for _, _, seen in found) == 2
-    assert lengths[1.0] == pytest.approx(math.sqrt(1000.0**2 - KEEP**2), abs=45.0)
+    found = [each for each in known.tangents(place, {known.part_at((4780.0, 5000.0))}, 3000.0) if each.seen]
+    lengths = {each.side: math.dist(each.place, place) for each in found if not each.dent}
+    (dent,) = (each for each in found if each.dent)
+    first = math.sqrt(1000.0**2 - KEEP**2)
+    assert lengths[1.0] == pytest.approx(first, abs=45.0)
     assert lengths[-1.0] == pytest.approx(math.sqrt(1300.0**2 + 150.0**2 - KEEP**2), abs=45.0)
+    assert math.dist(dent.place, place) == pytest.approx(first, abs=45.0)
+    assert dent.place[1] > 5000.0
+
+
+def test_two_walls_that_the_border_joins_are_as_near_to_the_goal_as_each_is(wall: MakePoints) -> None:
+    """A planner that takes them for one leaves neither, and calls a goal unreachable that is not."""
+    far = wall((0.0, 3000.0), (3000.0, 3000.0), 50.0)
+    near = wall((10_000.0, 8000.0), (8000.0, 8000.0), 50.0)
+    known = grown(np.concatenate((far, near)))
+    assert known.part_at((1500.0, 3000.0 + KEEP)) == known.part_at((9500.0, 8000.0 + KEEP))
+    told = known.nearest_to_goal_m((1500.0, 3000.0 + KEEP))
+    assert told == pytest.approx(math.dist((3000.0, 3000.0), MISSION.goal_m) - KEEP, abs=SIMPLER_M)
+    assert known.nearest_to_goal_m((9500.0, 8000.0 + KEEP)) == pytest.approx(1000.0 - KEEP, abs=SIMPLER_M)
 
 
 @pytest.mark.parametrize("what", ["comes", "goes"])
