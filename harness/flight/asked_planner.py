@@ -44,10 +44,6 @@ class AskedPlanner:
 
     The planner reads the map but cannot change it, and prints to standard error. What it answers has been checked
     (`planner.plan_checks`) when the loop gets it.
-
-    Args:
-        planner: the planner.
-        mission: of the flight.
     """
 
     def __init__(self, planner: Planner, mission: Mission) -> None:

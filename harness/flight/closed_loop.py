@@ -64,10 +64,7 @@ class Loop:
 def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None) -> Flight:
     """Flies a mission to its end. Ctrl-C is taken between two guidance intervals.
 
-    Args:
-        loop: all parts of the flight; used up by it.
-        observers: are told of scans, plans, rows and events.
-        progress: told of the flight every few simulated seconds.
+    The loop is used up by it. `progress` is told of the flight every `PROGRESS_EVERY_S`.
 
     Raises:
         KeyboardInterrupt: after Ctrl-C; the observers have all rows up to it.
@@ -97,11 +94,7 @@ class ClosedLoop:
 
     Guidance and log have one rate, scans have the sensor's. The planner is asked after a scan, and twice a guidance
     interval while it wants more time. A scan or a plan that is late counts from the first of these instants after its
-    delay. Time is a count of steps of the flight model.
-
-    Args:
-        loop: all parts of the flight; used up by it.
-        observers: are told of scans, plans, rows and events.
+    delay. Time is a count of steps of the flight model. The loop is used up by the flight.
 
     Raises:
         ValueError: the scan rate does not divide the simulation rate.
@@ -141,11 +134,7 @@ class ClosedLoop:
             self._finish(ending)
 
     def step(self, roll_command_rad: float | None = None) -> None:
-        """Flies one guidance interval, or up to the end of the flight if that comes first.
-
-        Args:
-            roll_command_rad: held in place of the command of the guidance law; None: the law steers.
-        """
+        """Flies one guidance interval, or up to the end of the flight; a roll command is held in place of the law's."""
         self._roll_override_rad = roll_command_rad
         for guidance, scan, steps in next(self._intervals):
             if scan:

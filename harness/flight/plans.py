@@ -22,14 +22,7 @@ LATE_S = 1e-9
 
 
 class Plans:
-    """Asks the planner, and hands its plans to the guidance when they take effect.
-
-    Args:
-        planner: planner under test.
-        mission: of the flight.
-        seen: obstacle map, all that the planner sees.
-        observers: look on.
-    """
+    """Asks the planner, which sees nothing but the map, and hands its plans to the guidance when they take effect."""
 
     def __init__(
         self, planner: Planner, mission: Mission, seen: MapView, observers: Sequence[Observer]
@@ -112,11 +105,7 @@ class Plans:
         return None
 
     def take_effect(self, state: AircraftState, guidance: GuidanceLaw) -> Ending | None:
-        """Hands the plan on its way to the guidance, if it is due.
-
-        Args:
-            state: what the aircraft believes.
-            guidance: follows it from now on.
+        """Hands the plan on its way to the guidance, if it is due at the believed state.
 
         Returns:
             How the flight ends, if the guidance law raised an exception; the plan is then not in effect.

@@ -13,12 +13,7 @@ from harness.flight.state_estimator import StateEstimator
 
 
 class FixEvents:
-    """Notices when satellite navigation loses its fix, and when the fix is back.
-
-    Args:
-        navigator: the state estimator.
-        observers: are told of both.
-    """
+    """Notices when satellite navigation loses its fix, and when the fix is back, and tells the observers."""
 
     def __init__(self, navigator: StateEstimator, observers: Sequence[Observer]) -> None:
         self._navigator, self._observers = navigator, observers
@@ -45,24 +40,14 @@ class FixEvents:
 
 
 class TrueCrossTrack:
-    """Distance of the true position from the plan being flown, where navigation is not perfect.
-
-    Args:
-        plans: the plans of the flight.
-    """
+    """Distance of the true position from the plan being flown, where navigation is not perfect."""
 
     def __init__(self, plans: Plans) -> None:
         self._plans, self._index = plans, -1
         self._progress: RouteProgress | None = None
 
     def cross_track_m(self, true: AircraftState, arc_length_m: float, index: int) -> float:
-        """Distance to the right of the plan of an index; NaN before the first plan.
-
-        Args:
-            true: the true state.
-            arc_length_m: where guidance is on the plan; the search of a new plan begins there.
-            index: of the plan being flown.
-        """
+        """Distance of a true state to the right of the plan of an index, looked for from an arc length on; or NaN."""
         if index < 0:
             return math.nan
         if self._progress is None or index != self._index:

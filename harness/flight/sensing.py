@@ -14,13 +14,7 @@ from harness.world.range_sensor import RangeSensor
 
 
 class Sensing:
-    """The range sensor, its scans that are not available yet, and the map.
-
-    Args:
-        sensor: range sensor; None: nothing is sensed.
-        seen: obstacle map.
-        observers: are told of every scan.
-    """
+    """The range sensor, its scans that are not available yet, and the map; without a sensor nothing is sensed."""
 
     def __init__(self, sensor: RangeSensor | None, seen: SensedMap, observers: Sequence[Observer]) -> None:
         self._sensor, self._seen, self._observers = sensor, seen, observers

@@ -33,13 +33,9 @@ class StateEstimator(Protocol):
         ...
 
     def believed(self, state: AircraftState) -> AircraftState:
-        """What the aircraft believes its state to be.
+        """What the aircraft believes a true state to be; the very object given where nothing is wrong with it.
 
-        Args:
-            state: the true one. Times never go back from one call to the next; one may come twice.
-
-        Returns:
-            The believed one; the very object given where nothing is wrong with it.
+        Times never go back from one call to the next; one may come twice.
         """
         ...
 

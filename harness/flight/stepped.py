@@ -41,12 +41,7 @@ class Status(NamedTuple):
 
 
 class SteppedLoop:
-    """The closed loop of one scenario, flown as often as it is reset, one guidance interval a step.
-
-    Args:
-        make: makes all parts of a flight, anew for each.
-        observers: look on, at every flight.
-    """
+    """The closed loop of one scenario, made anew and flown as often as it is reset, one guidance interval a step."""
 
     def __init__(self, make: Callable[[], Loop], observers: Sequence[Observer] = ()) -> None:
         self._make, self._observers = make, observers

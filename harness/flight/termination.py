@@ -34,23 +34,12 @@ class Termination(Protocol):
         ...
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
-        """How the flight ends now; None while it goes on.
-
-        Args:
-            state: the true state.
-            fault: how control of the aircraft was lost, None while it is not.
-        """
+        """How the flight ends at a true state, control lost by a fault or not; None while it goes on."""
         ...
 
 
 class MissionEnd:
-    """A flight to a goal: reached, contact, bounds, time limit. Implements `Termination`.
-
-    Args:
-        world: the truth.
-        mission: goal and speed.
-        time_limit_s: simulated.
-    """
+    """A flight to a goal: reached, contact, bounds, time limit (simulated). Implements `Termination`."""
 
     def __init__(self, world: World, mission: Mission, time_limit_s: float) -> None:
         self._world, self._mission, self._time_limit_s = world, mission, time_limit_s

@@ -84,17 +84,14 @@ class TrackLog:
         believed: AircraftState | None = None,
         true_cross_track_m: float = math.nan,
     ) -> None:
-        """Adds one row.
-
-        A state that is not finite, with which control is lost, is no row of the track.
+        """Adds one row. A state that is not finite, with which control is lost, is no row of the track.
 
         Args:
             state: the true state.
             steering: what guidance decided last; before the first plan its cross-track error and arc length are NaN.
             plan_index: row of `plans.parquet` being flown, -1 before the first.
             believed: what the aircraft believes; None where it knows its state exactly.
-            true_cross_track_m: distance of the true position from the plan, where `believed` is given; `steering` has
-                that of the believed one.
+            true_cross_track_m: of the true position, where `believed` is given; `steering` has the believed one's.
         """
         if believed is not None:
             self._believes = True

@@ -111,14 +111,10 @@ class FreeSpace:
         return min(scan.max_range_m, self._least_width / between_rad)
 
     def take_back(self, scan: RangeScan, edges_m: FloatArray) -> bool:
-        """Something stands where space was seen to be free: it, and what it hides, is not known to be free any more.
-
-        Args:
-            scan: that it was seen with.
-            edges_m: (k, 2) its edge points.
+        """What a scan saw to stand, (k, 2) edge points, and what it hides, is not known to be free any more.
 
         Returns:
-            Whether any of it does: an edge point with free cells all about it.
+            Whether any of it stands in space that was seen to be free: an edge point with free cells all about it.
         """
         free = np.zeros(len(edges_m), dtype=np.bool_)
         if not self._count_free(free, edges_m):

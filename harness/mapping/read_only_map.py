@@ -11,9 +11,6 @@ class ReadOnlyMap:
     """A map through which nothing can be changed (`planner.interface.MapView`).
 
     It guards against mistakes. Code in the same process that means to reach what is behind it can always do so.
-
-    Args:
-        seen: the map itself.
     """
 
     __slots__ = ("_seen",)

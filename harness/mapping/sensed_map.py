@@ -102,11 +102,7 @@ class SensedMap:
             self._moving = MovingObstacles(self._clearance, self._shifted, self._false_returns)
 
     def start_over(self, time_s: float) -> None:
-        """Forgets everything: the believed position has jumped, and what was entered before lies elsewhere.
-
-        Args:
-            time_s: now.
-        """
+        """Forgets everything: the believed position has jumped, and what was entered before lies elsewhere."""
         self._begin(self.revision + 1)
         self.revision, self.moving, self.last_contradiction_s = self._edges.revision, (), time_s
 

@@ -34,11 +34,7 @@ class _Unread(RangeScan):
 
     @classmethod
     def of(cls, attributes: dict[str, Any]) -> _Unread:
-        """A scan of which all is known but the ranges.
-
-        Args:
-            attributes: by name; either the ranges are among them or, as `_follow`, what gives them.
-        """
+        """A scan of its attributes by name; either the ranges are among them or, as `_follow`, what gives them."""
         scan = cls.__new__(cls)
         # At once: a frozen dataclass would set them one by one, and that is most of the cost of a scan.
         scan.__dict__.update(attributes)
@@ -65,12 +61,8 @@ class RangeSensor:
     3. False return: the beam returns a range uniform in (0, range], whatever there was.
 
     Each imperfection draws from a stream of its own, for every beam of every scan, so that neither what is
-    seen nor another imperfection shifts its draws; one that is off draws nothing.
-
-    Args:
-        world: the truth.
-        config: the `sensor` part of a scenario.
-        seed_sequence: root of the three streams; it is not changed.
+    seen nor another imperfection shifts its draws; one that is off draws nothing. The root of the three streams,
+    `seed_sequence`, is not changed.
     """
 
     def __init__(self, world: World, config: Sensor, seed_sequence: np.random.SeedSequence) -> None:
