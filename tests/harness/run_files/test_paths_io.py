@@ -275,19 +275,6 @@ def test_parameters_that_are_no_number_are_left_to_the_autopilot_and_places_must
         read_path(path)
 
 
-@pytest.mark.parametrize("place", [("nan", "nan", "nan"), (0, 0, "nan"), ("nan", 8, 50)])
-def test_no_number_in_the_place_of_an_item_that_has_none_is_left_to_the_autopilot(
-    place: tuple[object, ...], tmp_path: Path
-) -> None:
-    """The mission was refused for a servo, a camera, or a return."""
-    path = tmp_path / "a.waypoints"
-    items = [line(number, 0, 2, command, *(0,) * 4, *place, 1) for number, command in ((4, 183), (5, 206))]
-    path.write_text(wpl(*wpl_items(), *items))
-    found = read_path(path)
-    assert found.mission is not None
-    assert [each.what for each in found.mission.items] == ["flown"] * 3 + ["passed over"] * 2
-
-
 @pytest.mark.parametrize(
     ("command", "frame", "params", "name"),
     [

@@ -55,18 +55,6 @@ def as_kml(path: Path, longitude: float) -> Path:
     return path
 
 
-def dms(longitude: float) -> str:
-    east = turned(longitude)
-    seconds = round(abs(east) * 3600)
-    return f"{seconds // 3600:03}:{seconds // 60 % 60:02}:{seconds % 60:02} {'E' if east >= 0 else 'W'}"
-
-
-def as_openair(path: Path, longitude: float) -> Path:
-    path = path.with_suffix(".txt")
-    path.write_text(f"AC R\nAN Taveuni\nAL SFC\nAH 9000 MSL\nV X=16:48:00 S {dms(longitude + 0.01)}\nDC 2\n")
-    return path
-
-
 def as_fence(path: Path, longitude: float) -> Path:
     corners = [[y, x] for x, y in square(longitude, 0.04)[:-1]]
     path = path.with_suffix(".plan")
@@ -89,7 +77,7 @@ def as_grid(path: Path, longitude: float) -> Path:
     return path
 
 
-@pytest.mark.parametrize("make", [as_geojson, as_cut_geojson, as_kml, as_openair, as_fence, as_grid])
+@pytest.mark.parametrize("make", [as_geojson, as_cut_geojson, as_kml, as_fence, as_grid])
 @pytest.mark.parametrize("longitude", [180.0, 179.99, -179.995, -150.0])
 def test_a_world_is_the_same_at_every_longitude(
     make: Callable[[Path, float], Path], longitude: float, tmp_path: Path
