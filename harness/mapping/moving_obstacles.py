@@ -258,15 +258,9 @@ class MovingObstacles:
         kept: list[FollowedOutline] = []
         for track in self._tracks:
             mine = self._found_again(track, hits, places, scan)
-            if scan.time_s - track.seen_s > (COASTS_S if track.moves else LOST_S):
+            known = track.moves
+            if not self._goes_on(track, places[mine], scan):
                 continue
-            age_s, known = scan.time_s - track.begun_s, track.moves
-            if age_s >= DECIDED_S:
-                track.moves = track.moves or (
-                    track.seems_to_move(self._sure) and self._has_come_or_gone(track, places[mine], scan)
-                )
-                if track.surely_stands() or (age_s > UNDECIDED_S and not track.moves):
-                    continue
             kept.append(track)
             if track.moves:
                 moving[hits[mine]] = True
@@ -276,6 +270,18 @@ class MovingObstacles:
                 self._new += [] if known else [track]
         self._tracks = kept
         return moving if moving.any() else None
+
+    def _goes_on(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
+        """Whether a track is followed on; whether it moves is decided here, once it has been followed long enough."""
+        if scan.time_s - track.seen_s > (COASTS_S if track.moves else LOST_S):
+            return False
+        age_s = scan.time_s - track.begun_s
+        if age_s < DECIDED_S:
+            return True
+        track.moves = track.moves or (
+            track.seems_to_move(self._sure) and self._has_come_or_gone(track, places, scan)
+        )
+        return not (track.surely_stands() or (age_s > UNDECIDED_S and not track.moves))
 
     def _has_come_or_gone(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
         """Whether it is seen where nothing was, or nothing where it was.
