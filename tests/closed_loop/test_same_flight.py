@@ -14,6 +14,8 @@ import pytest
 from harness.run.scenario_flight import fly_to_folder
 from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
+from planner.interface import PlanRequest
+from planner.rolling_window.planner import RollingWindow
 from tests.longer import longer
 
 ROOT = Path(__file__).parents[2]
@@ -61,3 +63,22 @@ def test_the_seed_counts_where_something_is_random(scenario: str, random: bool, 
 
     one, two = flown("1"), flown("2")
     assert (one["digest"] != two["digest"]) is random
+
+
+@pytest.mark.parametrize("scenario", ["aerosonde_forest", "one_of_everything"])
+def test_a_plan_that_serves_on_is_kept_as_if_all_had_been_looked_at(
+    scenario: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The early answer is left out in the second flight; it was given in the first."""
+    loaded, early = load_scenario(scenario_path(scenario), [("mission.time_limit_s", "100")]), []
+    asked = RollingWindow._serves_on
+
+    def serves_on(planner: RollingWindow, request: PlanRequest) -> bool:
+        early.append(asked(planner, request))
+        return early[-1]
+
+    monkeypatch.setattr(RollingWindow, "_serves_on", serves_on)
+    first = fly_to_folder(loaded, tmp_path / "a", recording=False)["digest"]
+    assert any(early)
+    monkeypatch.setattr(RollingWindow, "_serves_on", lambda _planner, _request: False)
+    assert fly_to_folder(loaded, tmp_path / "b", recording=False)["digest"] == first
