@@ -30,6 +30,9 @@ TOUCH_SHARE = 0.05
 QUARTER_CORNERS = 12
 """Corners of a quarter of a disc."""
 
+DENT_SHARE = 4.0
+"""A line that touches an obstacle and meets it again within so many kept distances leads into a dent."""
+
 CELL_SHARE = 0.35
 """Points in one square of this share of the kept distance are grown as one, with what lies between them."""
 
@@ -58,7 +61,7 @@ class Tangent(NamedTuple):
         place: the corner.
         side: 1: it lies on the left of the line, -1: on the right.
         seen: nothing lies before it.
-        dent: the line leads on to the same obstacle within reach.
+        dent: the line leads on to the same obstacle soon.
     """
 
     place: Point
@@ -277,7 +280,7 @@ class GrownObstacles:
             chosen = np.flatnonzero(touched & (away < reach_m) & (away > 1e-6))
             lines = shapely.linestrings(np.stack(np.broadcast_arrays(place, corners[chosen]), axis=1))
             hidden = shapely.intersects(self._cores[:, None], lines).any(axis=0)
-            beyond = place + reach_m * to[chosen] / away[chosen, None]
+            beyond = corners[chosen] + DENT_SHARE * self.keep_m * to[chosen] / away[chosen, None]
             rays = shapely.linestrings(np.stack((corners[chosen], beyond), axis=1))
             dents = shapely.intersects(own.core, rays) & (not own.border)
             for i, out, dent in zip(chosen.tolist(), hidden.tolist(), dents.tolist(), strict=True):

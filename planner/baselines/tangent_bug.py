@@ -63,7 +63,7 @@ class BoundaryFollowing:
         anchor: the place on the boundary from which it is followed on.
         walked_m: how much of it lies before the anchor.
         on_boundary: at the anchor, not on a straight way to it.
-        followed_m: d_followed, how near to the goal this boundary and all left before come.
+        followed_m: d_followed, how near to the goal this boundary comes.
     """
 
     hit: Mark
@@ -152,7 +152,7 @@ class TangentBug(Walker[TangentBugState]):
             slide = self._slide(place, node) if node is not None else NOWHERE
             onto = place_at_end(slide, place)
             if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self._progress_m:
-                state = self._caught(place, place_at_end(line, place), state.limit_m)
+                state = self._caught(place, place_at_end(line, place))
             else:
                 yield WalkLeg(state, slide)
                 place = onto
@@ -212,13 +212,16 @@ class TangentBug(Walker[TangentBugState]):
             last += 1
         return np.concatenate((way, along[: last + 1]))
 
-    def _caught(self, place: Point, hit: Point, limit_m: float) -> BoundaryFollowing:
-        """A local minimum: the boundary ahead is followed to the side of the better node."""
+    def _caught(self, place: Point, hit: Point) -> BoundaryFollowing:
+        """A local minimum: the boundary ahead is followed to the side of the better node.
+
+        d_followed is of this boundary alone: else a round of it would prove nothing.
+        """
         nodes = [node for node in self._nodes(place) if node.side]
         side = min(nodes, key=lambda node: node.way_m).side if nodes else self.side
         first = mark_at(self.known.boundary(hit, side, self.keep_m), 0.0)
         on_boundary = math.dist(place, hit) < self._progress_m
-        return BoundaryFollowing(first, side, hit, 0.0, on_boundary, min(limit_m, self._nearest_m(hit)))
+        return BoundaryFollowing(first, side, hit, 0.0, on_boundary, self._nearest_m(hit))
 
     def _nearest_m(self, anchor: Point) -> float:
         """How near to the goal the boundary at a place comes, as far as it has been sensed."""
