@@ -280,7 +280,7 @@ def fly_check(
     make = partial(_loop, check.plan.climb_limit_mps)
     if out is None:
         flight = flown_by(make(check.scenario), (), progress)
-        return CheckedPath(check, measured(check, flight, flight_limits(check.scenario)))
+        return CheckedPath(check, measured(check, flight, flight_limits(check.scenario, planned=False)))
     figures = fly_to_folder(
         check.scenario,
         out,

@@ -111,6 +111,17 @@ def test_a_given_path_is_certified_as_given(tmp_path: Path) -> None:
     assert not kept.metrics.check.ok
 
 
+def test_the_days_of_a_path_have_the_limits_of_its_check(tmp_path: Path) -> None:
+    """A given path has no planner that keeps a margin in hand: 10 m are 10 m, satellite navigation or not."""
+    gnss = {"navigation.kind": "gnss"}
+    wayproof.certify([(0, 0), (2000, 0)], runs=2, settings=gnss, out=tmp_path / "days", workers=1)
+    days = pq.read_table(tmp_path / "days" / "results.parquet").to_pylist()
+    checked = wayproof.check([(0, 0), (2000, 0)], settings=gnss).metrics.check
+    assert checked is not None
+    assert "within 10 m;" in checked.verdict
+    assert all("within 10 m;" in day["check.verdict"] for day in days)
+
+
 def test_who_flies_a_path_is_told_where_nobody_was_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
