@@ -118,10 +118,10 @@ def verdict(
 ) -> tuple[bool, str]:
     """Whether a path can be flown as given, and a sentence that says so or why not."""
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
-    faults = _touched(seen) + ([tallied(bad, "legs")] if bad else [])
-    faults += _how_far(told, figures["altitude_error_m"]["max"])
-    if figures["outcome"] not in ("reached", "collision"):
-        faults.append(str(figures["reason"]))
+    touched, high_m = _touched(seen), figures["altitude_error_m"]["max"]
+    ended = [] if figures["outcome"] in ("reached", "collision") else [str(figures["reason"])]
+    corners_alone = not touched and not ended and _at_speed(figures["trackability"], limits)
+    faults = touched + ([tallied(bad, "legs")] if bad else []) + _how_far(told, high_m, corners_alone) + ended
     if not faults and not figures["trackable"]:
         faults.append("no leg was flown")
     return (False, "no: " + "; ".join(faults)) if faults else (True, _yes(told, limits))
@@ -163,8 +163,20 @@ def _touched(seen: Kept) -> list[str]:
     return faults
 
 
-def _how_far(told: Mapping[str, Any], high_m: float) -> list[str]:
-    """How far off the path, a corner and its altitude an aircraft was, where that was too far."""
+def _at_speed(legs: Sequence[Mapping[str, Any]], limits: FlightLimits) -> bool:
+    """Whether airspeed and load factor were within their limits on every leg."""
+    return all(
+        leg["max_load_factor"] <= limits.max_load_factor
+        and (leg["max_airspeed_error_mps"] or 0.0) <= limits.max_airspeed_error_mps
+        for leg in legs
+    )
+
+
+def _how_far(told: Mapping[str, Any], high_m: float, corners_alone: bool) -> list[str]:
+    """How far off the path, a corner and its altitude an aircraft was, where that was too far.
+
+    Another limit at the corners makes a yes only where nothing else is wrong (`corners_alone`, and the altitude).
+    """
     worst, used, enough_m = told["worst"], told["limit_used"], told["corner_m_that_would_do"]
     off = [corner for corner in told["corners"] if not corner["kept"]]
     noun, faults = "waypoint" if told["drawn"] else "item", []
@@ -177,7 +189,8 @@ def _how_far(told: Mapping[str, Any], high_m: float) -> list[str]:
         )
         faults.append(f"{noun} {off[0]['waypoint']} {reached}, {off[0]['allowed_cut_m']:.3g} m are allowed")
     if faults and enough_m is not None:
-        faults.append(f"--corner-m {enough_m:g} would be yes")
+        would = "be yes" if corners_alone and used["altitude"] <= 1.0 else "do for the corners alone"
+        faults.append(f"--corner-m {enough_m:g} would {would}")
     if used["altitude"] > 1.0:
         faults.append(f"{high_m:.3g} m off in altitude where {high_m / used['altitude']:.3g} m are allowed")
     return faults

@@ -111,6 +111,17 @@ def test_what_lies_beyond_a_corner_counts_and_a_no_names_the_limit_that_would_be
     assert worst["off_m"] == pytest.approx(off_polyline_m(np.array([place]), SQUARE[:3])[0], abs=0.5)
 
 
+@pytest.mark.parametrize(("up_m", "promise"), [(0.0, "be yes"), (600.0, "do for the corners alone")])
+def test_a_corner_limit_is_called_a_yes_where_nothing_else_is_wrong(up_m: float, promise: str) -> None:
+    """No aerosonde climbs 600 m on 2.4 km, whatever the corner's limit."""
+    path = [(*place, 300.0 + up_m * n / 2) for n, place in enumerate(SQUARE_CORNER)]
+    metrics, _ = flown(path)
+    limit_m = metrics["check"]["corner_m_that_would_do"]
+    assert f"--corner-m {limit_m:g} would {promise}" in metrics["check"]["verdict"]
+    again, _ = flown(path, corner_m=limit_m)
+    assert again["check"]["ok"] is (up_m == 0.0)
+
+
 def rounded_corner(radius_m: float) -> np.ndarray[Any, Any]:
     """900 m north, an arc to the right, 900 m east."""
     angle = np.linspace(0.0, 0.5 * math.pi, round(0.4 * radius_m))
