@@ -86,7 +86,7 @@ def tracked(
     Returns:
         Largest cross-track error (m), infinite if lost, and the share of the time for which the bank was cut.
     """
-    law.follow(route)
+    law.follow(route, 0.0)
     model = in_flight(frame, speed, Atmosphere(wind_north_mps=north_mps))
     worst_m, cut, updates = 0.0, 0, 0
     past: deque[AircraftState] = deque()

@@ -179,7 +179,7 @@ class WaypointLaw:
     def _begin_next(self) -> None:
         self._leg += 1
         leg = self._legs[self._leg]
-        self.law.follow(leg.route)
+        self.law.follow(leg.route, 0.0)
         if isinstance(self.law, PointLaw) and leg.end_m is not None:
             self.law.fly_to(*leg.end_m)
         self._on_leg = RouteProgress(leg.route)

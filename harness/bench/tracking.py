@@ -168,7 +168,7 @@ def fly_course(
     if not isinstance(navigator, PerfectEstimator):
         start = navigator.believed(model.state())
         route = _moved(route, start.east_m, start.north_m)
-    law.follow(route)
+    law.follow(route, 0.0)
     progress = RouteProgress(route)
     steps = model.step_rate_hz // UPDATE_RATE_HZ
     cross, altitude, saturated = [], [], 0

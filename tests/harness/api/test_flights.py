@@ -130,7 +130,7 @@ def test_a_guidance_law_is_given_as_a_class(
         def __init__(self, limits: wayproof.GuidanceLimits) -> None:
             self.law = guidance_kinds()["preview"].law(limits)
 
-        def follow(self, route: wayproof.Route, arc_length_m: float = 0.0) -> None:
+        def follow(self, route: wayproof.Route, arc_length_m: float) -> None:
             self.law.follow(route, arc_length_m)
 
         def update(self, state: wayproof.AircraftState) -> wayproof.GuidanceOutput:
