@@ -89,7 +89,8 @@ def _ring(points: Sequence[Point]) -> tuple[Point, ...]:
 
 KindName = Literal[
     "geotiff", "ascii_grid", "srtm", "numpy_dem", "osm", "osm_pbf", "cityjson", "geojson", "kml", "openair",
-    "ed269", "ed318", "plan_fence", "ardupilot_fence", "ros_map", "moving_ai"
+    "ed269", "ed318", "plan_fence", "ardupilot_fence", "ros_map", "moving_ai",
+    "terrain", "buildings", "airspace", "fences", "occupancy",
 ]  # fmt: skip
 
 
@@ -99,7 +100,7 @@ class WorldFile(Section):
     path: Annotated[str, Field(min_length=1, max_length=1000)]
     """The file, from the scenario's folder or from here; package:path lies in an installed Python package."""
     kind: KindName | None = None
-    """Its kind. Default: told from the file."""
+    """Its kind, or what it holds: terrain, buildings, airspace, fences or occupancy. Default: told from the file."""
     vertical_clearance_m: Annotated[float, Field(ge=0, le=10_000)] = 10.0
     """A part is an obstacle where it reaches into the band of so much below and above mission.altitude_m."""
     metres_per_cell: Annotated[float | None, Field(gt=0, le=MAX_COORDINATE_M)] = None

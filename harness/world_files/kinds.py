@@ -45,6 +45,15 @@ KINDS: Final[dict[str, Callable[[Path, Reading], Contents]]] = {
 }
 """Readers by the name of their kind."""
 
+GROUPS: Final = {
+    "terrain": ("geotiff", "ascii_grid", "srtm", "numpy_dem"),
+    "buildings": ("osm", "osm_pbf", "cityjson", "geojson"),
+    "airspace": ("geojson", "kml", "openair", "ed269", "ed318"),
+    "fences": ("plan_fence", "ardupilot_fence"),
+    "occupancy": ("ros_map", "moving_ai"),
+}
+"""Kinds by what they hold. The name of a group may stand for any of its kinds, which is then told from the file."""
+
 PACKED: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}
 """Kind of a ZIP archive by the ending of a file in it."""
 IMAGE: Final = "an image; give the YAML file of its ROS map"
@@ -83,13 +92,15 @@ _JSON_KINDS: Final = (
 
 
 def read(path: Path, kind: str | None, reading: Reading) -> Contents:
-    """Reads a world file of a kind of `KINDS`; without one, it is told from the file.
+    """Reads a world file of a kind of `KINDS`; without one, or with one of `GROUPS`, it is told from the file.
 
     Raises:
         WorldFileError: it is of none of the kinds, or cannot be used.
     """
     try:
-        found = kind or kind_of(path)
+        found = kind if kind in KINDS else kind_of(path)
+        if kind in GROUPS and found not in GROUPS[kind]:
+            raise WorldFileError(f"is of the kind {found}, not {kind}; leave kind out, or give {found}")
         contents = footprints.finished(KINDS[found](path, reading))
     except InputError as error:
         raise WorldFileError(str(error)) from error

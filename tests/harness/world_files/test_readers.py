@@ -313,3 +313,11 @@ def test_kinds_are_told_from_what_stands_in_a_file(tmp_path: Path) -> None:
     ):
         path.write_text(text)
         assert kind_of(path) == kind
+
+
+def test_the_name_of_a_group_stands_for_its_kinds_and_no_others(tmp_path: Path) -> None:
+    path = tmp_path / "map.txt"
+    path.write_text("type octile\nheight 1\nwidth 1\nmap\n@\n")
+    assert read(path, "occupancy", Reading()).kind == "moving_ai"
+    with pytest.raises(WorldFileError, match="is of the kind moving_ai, not terrain; leave kind out"):
+        read(path, "terrain", Reading())
