@@ -165,6 +165,31 @@ def test_a_guidance_law_is_given_as_a_class(
         wayproof.fly(back.scenario)
 
 
+@pytest.mark.flights
+def test_a_law_that_is_defined_anew_is_measured_anew() -> None:
+    def define(share: float) -> type:
+        class Weak:
+            def __init__(self, limits: wayproof.GuidanceLimits) -> None:
+                self.law = guidance_kinds()["preview"].law(limits)
+
+            def follow(self, route: wayproof.Route, arc_length_m: float = 0.0) -> None:
+                self.law.follow(route, arc_length_m)
+
+            def update(self, state: wayproof.AircraftState) -> wayproof.GuidanceOutput:
+                output = self.law.update(state)
+                return output._replace(roll_command_rad=share * output.roll_command_rad)
+
+        return Weak
+
+    first = wayproof.fly(small(), guidance=define(0.95))
+    first_m = mission_of(first.scenario).tracking_error_m
+    second = wayproof.fly(small(), guidance=define(0.7))
+    assert first.scenario.guidance == second.scenario.guidance
+    assert mission_of(second.scenario).tracking_error_m != first_m
+    with pytest.raises(wayproof.InputError, match="does not track"):
+        wayproof.fly(small(), guidance=define(0.0))
+
+
 def test_a_planner_from_a_file_flies_in_python_and_on_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
