@@ -119,6 +119,10 @@ def test_the_same_check_gives_the_same_digest(strip: Path, tmp_path: Path) -> No
             ["--aircraft", "aerosonde", "--airspeed-mps", "90"],
             "aircraft.airspeed_mps: aerosonde cannot hold 90",
         ),
+        (
+            ["--aircraft", "aerosonde", "--airspeed-mps", "3", "--wind", "8,270"],
+            "aircraft.airspeed_mps: aerosonde cannot hold 3",
+        ),
         (["--aircraft", "aerosonde", "--wind", "8"], "'8' is not SPEED,FROM such as 8,270"),
         (
             ["--aircraft", "aerosonde", "--wind", "24,0"],
