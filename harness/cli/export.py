@@ -42,7 +42,12 @@ def export(
     if out is None:
         _write(content)
     else:
-        replace_bytes(out, content)
+        try:
+            replace_bytes(out, content)
+        except OSError as error:
+            raise InputError(
+                f"{out}: cannot be written ({error.strerror}); give the path of a file"
+            ) from error
     for note in notes:
         say(note, err=True)
     return 0

@@ -62,6 +62,8 @@ def world(
     from harness.world_files.siting import site
 
     given = _ends(start, goal)
+    if not out.absolute().parent.is_dir():
+        raise InputError(f"{out}: cannot be written (its folder is not there); make the folder first")
     craft = _craft(aircraft, clearance_m)
     specs = [
         FileSpec(

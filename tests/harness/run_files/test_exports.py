@@ -216,9 +216,13 @@ def test_what_its_user_should_know_is_said(
         assert failed not in said
 
 
-def test_a_folder_without_a_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_without_a_run_and_a_file_without_a_folder_are_refused(
+    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["export", str(tmp_path), "--format", "plan"]) == 2
     assert "is not a run folder" in capsys.readouterr().err
+    assert main(["export", str(run.folder), "--format", "kml", "--out", str(tmp_path / "no" / "a.kml")]) == 2
+    assert "a.kml: cannot be written" in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

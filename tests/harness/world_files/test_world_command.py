@@ -137,6 +137,7 @@ def test_a_map_too_small_names_the_cell_that_would_do(
         (["--start", "48,9", "--goal", "48.1,9"], "lies outside the area"),
         (["--start", "47.005,8.005", "--goal", "47.005,8.05"], "the scenario would not fly"),
         (["--altitude-m", "1"], "at least 5"),
+        (["--out", "no_folder/w.yaml"], "no_folder/w.yaml: cannot be written (its folder is not there)"),
         (
             ["--altitude-m", "12000"],
             "would not fly: mission.altitude_m: is 12000; must be at most 7200: aerosonde cannot be trimmed",
