@@ -129,26 +129,29 @@ class JsbsimModel:
         (
             latitude_rad,
             longitude_rad,
-            up_ft,
-            north_fps,
-            east_fps,
+            read_up_ft,
+            read_north_fps,
+            read_east_fps,
             climb_fps,
             true_heading_rad,
-            roll_rad,
+            read_roll_rad,
             pitch_rad,
-            airspeed_fps,
+            read_airspeed_fps,
             load_factor,
             throttle,
-            elevator,
+            read_elevator,
             pitch_trim,
-            aileron,
+            read_aileron,
             roll_trim,
-            rudder,
+            read_rudder,
             yaw_trim,
-            alpha_rad,
-        ) = [read() for read in self._read]
-        elevator, aileron, rudder = elevator + pitch_trim, aileron + roll_trim, rudder + yaw_trim
-        east_m, north_m, convergence_rad = self._plane.project(latitude_rad, longitude_rad)
+            read_alpha_rad,
+        ) = self._read  # the functions that read them: to collect what they return first takes half as long again
+        up_ft, north_fps, east_fps = read_up_ft(), read_north_fps(), read_east_fps()
+        roll_rad, airspeed_fps, alpha_rad = read_roll_rad(), read_airspeed_fps(), read_alpha_rad()
+        elevator, aileron = read_elevator() + pitch_trim(), read_aileron() + roll_trim()
+        rudder = read_rudder() + yaw_trim()
+        east_m, north_m, convergence_rad = self._plane.project(latitude_rad(), longitude_rad())
         self._place, self._read_at_step = (east_m, north_m, up_ft), self._step
         self._judged = roll_rad, airspeed_fps, up_ft, alpha_rad
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
@@ -160,13 +163,13 @@ class JsbsimModel:
             up_ft * FOOT_M,
             east_fps * cosine_m - north_fps * sine_m,
             east_fps * sine_m + north_fps * cosine_m,
-            climb_fps * FOOT_M,
-            (true_heading_rad - convergence_rad) % math.tau,
+            climb_fps() * FOOT_M,
+            (true_heading_rad() - convergence_rad) % math.tau,
             roll_rad,
-            pitch_rad,
+            pitch_rad(),
             airspeed_fps * FOOT_M,
-            load_factor,
-            throttle,
+            load_factor(),
+            throttle(),
             sum(read() for read in self._limited) / self._step_rate_hz if self._limited else 0.0,
             sum(read() for read in self._vertical_limited) / self._step_rate_hz if self._limited else 0.0,
             elevator if -1.0 <= elevator <= 1.0 else max(-1.0, min(elevator, 1.0)),
