@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from harness.files.crash import sentence, trace
 from harness.files.printing import PrintingAside
-from planner.interface import Mission, Plan, Planner, PlanRequest
+from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport
 
@@ -51,7 +51,8 @@ class AskedPlanner:
         self.shielded = self.shield is not None
         """Whether there is a shield around the planner."""
         self.compute_ms = math.nan
-        """Processor time of the planner's thread for the last answer: what else the machine does is not in it."""
+        """Processor time of the planner's thread for the last answer that was not to keep the plan in effect: what else
+        the machine does is not in it."""
         self.wall_ms = math.nan
         """Wall-clock time for the same."""
 
@@ -77,8 +78,9 @@ class AskedPlanner:
         try:
             with PrintingAside():
                 own = self._planner.plan(request)
-                self.compute_ms = 1e3 * (time.thread_time() - begun)
-                self.wall_ms = 1e3 * (time.perf_counter() - began)
+                if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
+                    self.compute_ms = 1e3 * (time.thread_time() - begun)
+                    self.wall_ms = 1e3 * (time.perf_counter() - began)
                 return Answer(checked_plan(own, request.position_m, self._mission), own)
         except KeyboardInterrupt:
             raise
