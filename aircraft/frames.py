@@ -161,13 +161,14 @@ class PatchedPlane:
 
         from aircraft import kernels  # half a second
 
-        self._plane, self._place_in_patch, self._array = plane, kernels.place_in_patch, np.array
+        self._plane, self._array = plane, np.array
         self._patch = self._array(plane.patch(latitude_rad, longitude_rad))
+        self._place_in_patch = kernels.for_types_of(kernels.place_in_patch, self._patch, math.nan, math.nan)
 
     def project(self, latitude_rad: float, longitude_rad: float) -> tuple[float, float, float]:
         """East and north (m) of a geodetic point, and the meridian convergence there (rad); NaN of one not finite."""
-        east_m, north_m, convergence_rad = self._place_in_patch(self._patch, latitude_rad, longitude_rad)
-        if math.isnan(east_m) and math.isfinite(latitude_rad + longitude_rad):
+        place: tuple[float, float, float] = self._place_in_patch(self._patch, latitude_rad, longitude_rad)
+        if math.isnan(place[0]) and math.isfinite(latitude_rad + longitude_rad):
             self._patch = self._array(self._plane.patch(latitude_rad, longitude_rad))
-            return self._place_in_patch(self._patch, latitude_rad, longitude_rad)
-        return east_m, north_m, convergence_rad
+            place = self._place_in_patch(self._patch, latitude_rad, longitude_rad)
+        return place

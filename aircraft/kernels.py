@@ -49,6 +49,15 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     return machine_code
 
 
+def for_types_of(function: Any, *arguments: Any) -> Any:
+    """The machine code of a compiled function for arguments of the types of these, to be called many times.
+
+    numba looks at the types at every call of the function, which takes as long as the arithmetic. The code does not:
+    it must get arrays of the same layout.
+    """
+    return function.compile(tuple(map(numba.typeof, arguments)))
+
+
 @compiled
 def place_in_patch(
     patch: FloatArray, latitude_rad: float, longitude_rad: float

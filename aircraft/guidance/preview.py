@@ -55,7 +55,6 @@ class PreviewLaw:
     def __init__(self, config: PreviewConfig, limits: GuidanceLimits) -> None:
         from aircraft import kernels  # half a second
 
-        self._update = kernels.preview_update
         update_s = 1.0 / UPDATE_RATE_HZ
         self._gains = np.zeros(1, kernels.PREVIEW_GAINS)
         self._gains["bandwidth_radps"] = config.bandwidth_radps
@@ -72,8 +71,13 @@ class PreviewLaw:
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         """Takes a new route; the roll command goes on from where it is."""
-        self._rows = route_rows(route)
+        first, self._rows = self._rows is None, route_rows(route)
         self._memory["row"], self._memory["along_m"] = place_on_rows(self._rows, arc_length_m)
+        if first:
+            from aircraft import kernels
+
+            arrays = self._rows, self._gains, self._memory
+            self._update = kernels.for_types_of(kernels.preview_update, *arrays, *[math.nan] * 6)
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Decides the roll command for the next update interval."""
