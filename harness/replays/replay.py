@@ -142,11 +142,13 @@ def _flown(asked: Asked) -> tuple[Side, int]:
     columns = dict(flight.columns)
     legs = legs_of(columns, mission.corners_m, asked.first, mission.acceptance_m)
     laps = columns["lap"] if "lap" in columns else 1.0 + _laps(legs, asked)
-    # The log ends where a lap does: at corner 0, as near as it comes in two rows.
+    # The log ends where a lap does: as near to corner 0, in two rows, as counts as reached or as the laps before ended.
     step_s = float(np.diff(flight["time_s"])[-1])
     step_m = float(np.hypot(flight["ve_mps"][-1], flight["vn_mps"][-1])) * step_s
-    away_m = np.hypot(*(mission.corners_m[0] - (flight["east_m"][-1], flight["north_m"][-1])))
-    ended = bool(away_m <= (mission.acceptance_m or 0.0) + 2.0 * step_m)
+    away_m = np.hypot(*(mission.corners_m[:1] - np.column_stack((flight["east_m"], flight["north_m"]))).T)
+    turned_m = away_m[1:][(np.diff(laps) > 0) & (laps[:-1] >= 1)]
+    near_m = mission.acceptance_m if mission.acceptance_m is not None else turned_m.max(initial=0.0)
+    ended = bool(away_m[-1] <= near_m + 2.0 * step_m)
     columns["time_s"] = columns["time_s"] - columns["time_s"][0]
     if flight.airspeed_mps is not None:
         columns["airspeed_mps"] = flight.airspeed_mps

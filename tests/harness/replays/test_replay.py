@@ -71,6 +71,19 @@ def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(tmp_
     assert f"{told['flown']['outside_p95_m']:.2f}" in page
 
 
+@pytest.mark.parametrize(("rows", "settled"), [(1600, [2, 3, 4]), (1480, [2, 3])])
+def test_a_last_lap_is_whole_where_it_ends_as_near_to_its_corner_as_those_before(
+    rows: int, settled: list[int], tmp_path: Path
+) -> None:
+    """Four laps of 40 s at 10 Hz, and the same log cut 12 s before the end; no radius of acceptance is known."""
+    log, mission = circles(tmp_path, (4.0, -3.0))
+    pq.write_table(pq.read_table(log).slice(0, rows), log)
+    mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": 45.0}}))
+    settings = {"aircraft.airspeed_mps": "18"}
+    found = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=settings)
+    assert found.told["settled_laps"] == settled
+
+
 @needs_flown
 def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
