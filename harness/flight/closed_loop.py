@@ -13,7 +13,7 @@ from aircraft.interface import FlightModel
 from harness.files.crash import sentence, trace
 from harness.flight.observer import PROGRESS_EVERY_S, Caution, Observer, Progress
 from harness.flight.plans import Plans
-from harness.flight.position_errors import FixEvents, TrueCrossTrack
+from harness.flight.position_errors import CrossTrack, FixEvents
 from harness.flight.record import Flight, Outcome
 from harness.flight.sensing import Sensing
 from harness.flight.signals import held_back
@@ -122,7 +122,8 @@ class ClosedLoop:
         self._model, self._navigator, self._guidance = loop.model, loop.navigator, loop.guidance
         self._sensing = Sensing(loop.sensor, loop.seen, observers)
         self._fixes = FixEvents(loop.navigator, observers)
-        self._true_error = TrueCrossTrack(self.plans)
+        self._true_error, self._believed_error = CrossTrack(self.plans), CrossTrack(self.plans)
+        self._law_measures = type(loop.guidance).__module__.startswith("aircraft.guidance.")
         self._log = flight_log(loop.world, observers)
         self._roll_override_rad: float | None = None
         self._law_error: str | None = None
@@ -210,6 +211,9 @@ class ClosedLoop:
                     f"{steering.airspeed_mps} m/s, {steering.cross_track_m} m beside its route after "
                     f"{steering.arc_length_m} m; all must be finite, the airspeed finite or NaN",
                 )
+            if not self._law_measures:  # a law that comes from elsewhere is not asked how well it flies
+                beside_m = self._believed_error.of(self.believed, steering.arc_length_m, self.plans.index)
+                steering = steering._replace(cross_track_m=beside_m)
             self.steering = steering
         if self._roll_override_rad is not None:
             self.steering = self.steering._replace(roll_command_rad=self._roll_override_rad)
@@ -240,7 +244,7 @@ class ClosedLoop:
         if self.believed is true:
             self._log.add(true, steering, index)
         else:
-            true_m = self._true_error.cross_track_m(true, steering.arc_length_m, index)
+            true_m = self._true_error.of(true, steering.arc_length_m, index)
             self._log.add(true, steering, index, self.believed, true_m)
 
     def _finish(self, ending: Ending) -> None:

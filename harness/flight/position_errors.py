@@ -39,18 +39,18 @@ class FixEvents:
             observer.on_event(time_s, text)
 
 
-class TrueCrossTrack:
-    """Distance of the true position from the plan being flown, where navigation is not perfect."""
+class CrossTrack:
+    """Distance of a position from the plan being flown, where no law of `aircraft.guidance` has measured it."""
 
     def __init__(self, plans: Plans) -> None:
         self._plans, self._index = plans, -1
         self._progress: RouteProgress | None = None
 
-    def cross_track_m(self, true: AircraftState, arc_length_m: float, index: int) -> float:
-        """Distance of a true state to the right of the plan of an index, looked for from an arc length on; or NaN."""
+    def of(self, state: AircraftState, arc_length_m: float, index: int) -> float:
+        """Distance of a state (m) to the right of the plan of an index, looked for from an arc length on; or NaN."""
         if index < 0:
             return math.nan
         if self._progress is None or index != self._index:
             plan, self._index = self._plans.accepted[index], index
             self._progress = RouteProgress(Route(plan.segments, plan.loiter), arc_length_m)
-        return self._progress.nearest(true.east_m, true.north_m).cross_track_m
+        return self._progress.nearest(state.east_m, state.north_m).cross_track_m

@@ -8,7 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pyarrow.parquet as pq
 import pytest
+import shapely
 
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState, Route
@@ -69,3 +72,28 @@ def test_ends_as_lost_control(law: dict[str, Any], after: int, said: str, tmp_pa
     assert said in figures["reason"]
     assert json.loads((tmp_path / "run" / "manifest.json").read_text())["complete"] is True
     assert (tmp_path / "run" / "track.parquet").exists()
+
+
+def test_a_law_that_says_it_is_on_its_route_is_measured_beside_it(tmp_path: Path) -> None:
+    """It flies straight on at 20 degrees, where each plan turns north to the goal."""
+    figures = fly_to_folder(
+        parse_scenario(TEXT.replace("goal_m:", "course_deg: 20, goal_m:")),
+        tmp_path / "run",
+        recording=False,
+        make=lambda scenario: replace(make_loop(scenario), guidance=Broken(after=10**9)),
+    )
+    (segments, *_) = pq.read_table(tmp_path / "run" / "plans.parquet").column("segments").to_pylist()
+    line: list[tuple[float, float]] = []
+    for x, y, tx, ty, curvature_1pm, length_m in segments:
+        for s in np.arange(0.0, length_m, 0.5):
+            ahead, left = s, 0.0
+            if curvature_1pm:
+                angle = curvature_1pm * s
+                ahead, left = math.sin(angle) / curvature_1pm, (1.0 - math.cos(angle)) / curvature_1pm
+            line.append((x + ahead * tx - left * ty, y + ahead * ty + left * tx))
+    track = pq.read_table(tmp_path / "run" / "track.parquet").to_pylist()
+    rows = [row for row in track if row["plan_index"] == 0]
+    off_m = [shapely.Point(row["east_m"], row["north_m"]).distance(shapely.LineString(line)) for row in rows]
+    assert max(off_m) > 1.0
+    assert [abs(row["cross_track_m"]) for row in rows] == pytest.approx(off_m, abs=0.05)
+    assert figures["cross_track_m"]["max"] >= max(off_m) - 0.05
