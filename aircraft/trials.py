@@ -97,6 +97,11 @@ def tracked(
             return math.inf, 1.0
         if output.past_end:
             return worst_m, cut / max(updates, 1)
+        if not math.isfinite(output.roll_command_rad + output.cross_track_m):
+            raise ValueError(
+                f"it asks for a roll of {output.roll_command_rad} rad, {output.cross_track_m} m beside its route; both "
+                "must be finite"
+            )
         worst_m = max(worst_m, abs(output.cross_track_m))
         cut, updates = cut + output.bank_saturated, updates + 1
         model.command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed)
