@@ -6,6 +6,7 @@ What `preview` does at its defaults is in the aircraft's survey.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import asdict, replace
 from hashlib import sha256
@@ -30,8 +31,9 @@ def law_card(
     airspeed_mps: float | None = None,
     waypoints: bool = False,
     acceptance_radius_m: float | None = None,
+    before_flying: Callable[[], object] = bool,
 ) -> LawCard | None:
-    """The card of a law with its keys, flown unless that has been done before.
+    """The card of a law with its keys, flown unless that has been done before; `before_flying` is called first then.
 
     Returns:
         The card; None for `preview` at its defaults, which the survey of the aircraft has.
@@ -46,6 +48,7 @@ def law_card(
     keys = json.dumps(asdict(resolved), sort_keys=True, default=repr)
 
     def flown() -> dict[str, Any]:
+        before_flying()
         from aircraft.law_cards.law_survey import measured  # loads JSBSim
 
         # A copy: a law that was given as an object is flown as it was given.

@@ -121,6 +121,7 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
                 aircraft.airspeed_mps,
                 waypoints=waypoints,
                 acceptance_radius_m=spec.acceptance_radius_m,
+                before_flying=seal,
             )
     except AircraftError as error:
         raise KeyFault(("guidance", "kind"), str(error)) from error

@@ -101,3 +101,22 @@ def test_what_a_survey_compiles_is_sealed(tmp_path: Path) -> None:
     files = [file.read_bytes() for file in tmp_path.rglob("*.nbc")]
     assert files
     assert all(sha256(data[:-32]).digest() == data[-32:] for data in files)
+
+
+CARD = """
+import wayproof
+wayproof.load_scenario("aerosonde_forest").with_({"guidance.kind": "l1", "guidance.period_s": PERIOD})
+"""
+
+
+@pytest.mark.flights
+def test_what_the_card_of_a_law_compiles_is_sealed(tmp_path: Path) -> None:
+    """The second time the aircraft has been surveyed, but no card of the law is there, nor any machine code."""
+    for period_s in (18.0, 19.0):
+        code = tmp_path / f"code{period_s:g}"
+        keys = {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(code)}
+        text = CARD.replace("PERIOD", str(period_s))
+        subprocess.run([sys.executable, "-c", text], env={**os.environ, **keys}, check=True)
+        files = [file.read_bytes() for file in code.rglob("*.nbc")]
+        assert files
+        assert all(sha256(data[:-32]).digest() == data[-32:] for data in files)
