@@ -15,6 +15,7 @@ from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
 from aircraft.guidance.latency import as_it_was
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
+from aircraft.guidance.progress import RouteProgress, measures_itself
 from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState, Route
 from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.jsbsim_model import JsbsimModel
@@ -87,6 +88,7 @@ def tracked(
         Largest cross-track error (m), infinite if lost, and the share of the time for which the bank was cut.
     """
     law.follow(route, 0.0)
+    progress = None if measures_itself(law) else RouteProgress(route)
     model = in_flight(frame, speed, Atmosphere(wind_north_mps=north_mps))
     worst_m, cut, updates = 0.0, 0, 0
     past: deque[AircraftState] = deque()
@@ -102,7 +104,10 @@ def tracked(
                 f"it asks for a roll of {output.roll_command_rad} rad, {output.cross_track_m} m beside its route; both "
                 "must be finite"
             )
-        worst_m = max(worst_m, abs(output.cross_track_m))
+        beside_m = output.cross_track_m
+        if progress is not None:  # a law that comes from elsewhere is not asked how well it flies
+            beside_m = progress.nearest(state.east_m, state.north_m).cross_track_m
+        worst_m = max(worst_m, abs(beside_m))
         cut, updates = cut + output.bank_saturated, updates + 1
         model.command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed)
         model.advance(UPDATE_STEPS)

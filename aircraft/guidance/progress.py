@@ -75,6 +75,11 @@ class RouteProgress:
         )
 
 
+def measures_itself(law: object) -> bool:
+    """Whether a law tells its cross-track error by `RouteProgress`: those of this package do, others may not."""
+    return type(law).__module__.startswith("aircraft.guidance.")
+
+
 def route_rows(route: Route) -> FloatArray:
     """(n, 9) the segments of a route as kernels take them; one without a loiter goes on straight for ever.
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput, VerticalLaw
+from aircraft.guidance.progress import measures_itself
 from aircraft.interface import FlightModel
 from harness.files.crash import sentence, trace
 from harness.flight.observer import PROGRESS_EVERY_S, Caution, Observer, Progress
@@ -123,7 +124,7 @@ class ClosedLoop:
         self._sensing = Sensing(loop.sensor, loop.seen, observers)
         self._fixes = FixEvents(loop.navigator, observers)
         self._true_error, self._believed_error = CrossTrack(self.plans), CrossTrack(self.plans)
-        self._law_measures = type(loop.guidance).__module__.startswith("aircraft.guidance.")
+        self._law_measures = measures_itself(loop.guidance)
         self._log = flight_log(loop.world, observers)
         self._roll_override_rad: float | None = None
         self._law_error: str | None = None

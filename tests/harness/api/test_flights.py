@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import pickle
 import re
 import shutil
@@ -177,7 +178,8 @@ def test_a_law_that_is_defined_anew_is_measured_anew() -> None:
 
             def update(self, state: wayproof.AircraftState) -> wayproof.GuidanceOutput:
                 output = self.law.update(state)
-                return output._replace(roll_command_rad=share * output.roll_command_rad)
+                weak_rad = share * output.roll_command_rad
+                return output._replace(roll_command_rad=weak_rad, cross_track_m=0.0)  # as if on its route
 
         return Weak
 
@@ -188,6 +190,8 @@ def test_a_law_that_is_defined_anew_is_measured_anew() -> None:
     assert mission_of(second.scenario).tracking_error_m != first_m
     with pytest.raises(wayproof.InputError, match="does not track"):
         wayproof.fly(small(), guidance=define(0.0))
+    with pytest.raises(wayproof.InputError, match="it asks for a roll of nan rad"):
+        wayproof.fly(small(), guidance=define(math.nan))
 
 
 def test_a_planner_from_a_file_flies_in_python_and_on_the_command_line(
