@@ -151,11 +151,12 @@ def directions(
 def sectors_at(window: Window, track: Track, most_rad: float) -> list[Sector]:
     """Section 3.2, (1): the parts of free sectors at the end of a track that a step can turn to by a whole Delta.
 
-    Where all directions meet something in the window, only obstacles count that a step can meet; the paper is silent on
-    that.
+    Where all directions meet something in the window, only obstacles count that a step, or a turn at R after it, can
+    meet; the paper is silent on that.
     """
     here, course, config = track.nodes[-1], track.course_rad, window.config
-    for reach_m in (math.inf, config.resolved_step_m + window.keep_m):
+    near_m = config.resolved_step_m + window.mission.turn_radius_m + window.keep_m
+    for reach_m in (math.inf, near_m):
         free = fan_shaped_sectors(within(window.points_m, here, reach_m), window.keep_m, here)
         parts = [part for sector in free for part in clip(sector, course, most_rad)]
         parts = [part for part in parts if whole_units(part, course, course, config.unit_rad) is not None]
