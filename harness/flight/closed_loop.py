@@ -213,8 +213,11 @@ class ClosedLoop:
                     f"{steering.arc_length_m} m; all must be finite, the airspeed finite or NaN",
                 )
             if not self._law_measures:  # a law that comes from elsewhere is not asked how well it flies
-                beside_m = self._believed_error.of(self.believed, steering.arc_length_m, self.plans.index)
-                steering = steering._replace(cross_track_m=beside_m)
+                plans = self.plans
+                place = self._believed_error.place(self.believed, plans.entered_m, plans.index)
+                steering = steering._replace(
+                    cross_track_m=place.cross_track_m, arc_length_m=place.arc_length_m
+                )
             self.steering = steering
         if self._roll_override_rad is not None:
             self.steering = self.steering._replace(roll_command_rad=self._roll_override_rad)

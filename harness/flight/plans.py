@@ -34,6 +34,7 @@ class Plans:
         self._own: Plan | None = None  # the plan in effect, as the planner gave it
         self.scan_s = math.nan
         """When the latest scan that the map has was taken."""
+        self.entered_m = 0.0  # where along the plan in effect it took effect
         self._due_s = math.inf  # when the plan on its way takes effect
         self.index = -1
         """Index of the plan in effect, -1 before the first."""
@@ -116,7 +117,8 @@ class Plans:
         late_s = state.time_s - (self._due_s - self._latency_s)
         self.coming, self._due_s = None, math.inf
         try:
-            guidance.follow(route, arc_length_m=late_s * state.groundspeed_mps)
+            self.entered_m = late_s * state.groundspeed_mps
+            guidance.follow(route, arc_length_m=self.entered_m)
         except Exception as error:  # a law of somebody else's may raise anything
             self.error = trace(error)
             return Ending(

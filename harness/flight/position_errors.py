@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from aircraft.guidance.progress import RouteProgress
+from aircraft.guidance.progress import PathPoint, RouteProgress
 from aircraft.interface import AircraftState, Route
 from harness.flight.observer import Caution, Observer
 from harness.flight.plans import Plans
@@ -48,9 +48,11 @@ class CrossTrack:
 
     def of(self, state: AircraftState, arc_length_m: float, index: int) -> float:
         """Distance of a state (m) to the right of the plan of an index, looked for from an arc length on; or NaN."""
-        if index < 0:
-            return math.nan
+        return math.nan if index < 0 else self.place(state, arc_length_m, index).cross_track_m
+
+    def place(self, state: AircraftState, arc_length_m: float, index: int) -> PathPoint:
+        """The point of the plan of an index that is nearest to a state, looked for from an arc length on."""
         if self._progress is None or index != self._index:
             plan, self._index = self._plans.accepted[index], index
             self._progress = RouteProgress(Route(plan.segments, plan.loiter), arc_length_m)
-        return self._progress.nearest(state.east_m, state.north_m).cross_track_m
+        return self._progress.nearest(state.east_m, state.north_m)

@@ -76,11 +76,12 @@ def test_ends_as_lost_control(law: dict[str, Any], after: int, said: str, tmp_pa
 
 def test_a_law_that_says_it_is_on_its_route_is_measured_beside_it(tmp_path: Path) -> None:
     """It flies straight on at 20 degrees, where each plan turns north to the goal."""
+    far = FINE._replace(arc_length_m=9e5)
     figures = fly_to_folder(
         parse_scenario(TEXT.replace("goal_m:", "course_deg: 20, goal_m:")),
         tmp_path / "run",
         recording=False,
-        make=lambda scenario: replace(make_loop(scenario), guidance=Broken(after=10**9)),
+        make=lambda scenario: replace(make_loop(scenario), guidance=Broken(after=1, then=far)),
     )
     (segments, *_) = pq.read_table(tmp_path / "run" / "plans.parquet").column("segments").to_pylist()
     line: list[tuple[float, float]] = []
@@ -95,5 +96,6 @@ def test_a_law_that_says_it_is_on_its_route_is_measured_beside_it(tmp_path: Path
     rows = [row for row in track if row["plan_index"] == 0]
     off_m = [shapely.Point(row["east_m"], row["north_m"]).distance(shapely.LineString(line)) for row in rows]
     assert max(off_m) > 1.0
+    assert max(row["arc_length_m"] for row in rows) < 2000.0
     assert [abs(row["cross_track_m"]) for row in rows] == pytest.approx(off_m, abs=0.05)
     assert figures["cross_track_m"]["max"] >= max(off_m) - 0.05
