@@ -98,14 +98,14 @@ def replay(
     aircraft: str,
     mission: str | Path | None = None,
     *,
-    out: str | Path,
+    out: str | Path | None = None,
     settings: Mapping[str, str] | None = None,
     steady_wind: bool = False,
     recording: bool = False,
 ) -> Replay:
     """Flies the mission of a flown log with the simulated aircraft, in the wind of that day, and compares the two.
 
-        found = wayproof.replay("flight.parquet", "ultrastick25e", "mission.json", out="replay")
+        found = wayproof.replay("flight.parquet", "ultrastick25e", "mission.json")
         found.told["simulated"]["lap_mean_s"] - found.told["flown"]["lap_mean_s"]
 
     Args:
@@ -113,7 +113,7 @@ def replay(
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
         mission: a file that `wayproof check` takes, or a JSON with `mission.corners_east_north_m`; None: the mission
             that an ArduPilot log (.bin) has.
-        out: the folder to write.
+        out: the folder to write; None: `runs/replay/NAME` of the log.
         settings: keys of the simulated flight's scenario, by key path; values as YAML.
         steady_wind: one wind, not the wind as it changed in the log.
         recording: whether to record both flights for rerun.
@@ -127,7 +127,7 @@ def replay(
         return flown_anew(
             Path(log),
             aircraft,
-            Path(out),
+            None if out is None else Path(out),
             None if mission is None else Path(mission),
             list((settings or {}).items()),
             windows=not steady_wind,

@@ -228,9 +228,10 @@ def replay(
     from harness.cli.terminal import print_table
     from harness.files.errors import WriteError
     from harness.replays.page import rows_of
+    from harness.replays.replay import default_folder
     from harness.replays.replay import replay as flown_anew
 
-    folder = out or Path("runs") / "replay" / log.stem
+    folder = out or default_folder(log)
     try:
         with faults_told(lambda: f"what was written is in {folder}"):
             found = flown_anew(

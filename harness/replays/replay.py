@@ -43,10 +43,15 @@ class Replay:
         return f"Replay({self.told['log']}: tracks {between['p50']:.1f} m apart (median))"
 
 
+def default_folder(log: Path) -> Path:
+    """`runs/replay/NAME` for the log NAME.parquet."""
+    return Path("runs") / "replay" / log.stem
+
+
 def replay(
     log: Path,
     aircraft: str,
-    out: Path,
+    out: Path | None = None,
     mission: Path | None = None,
     overrides: Sequence[tuple[str, str]] = (),
     windows: bool = True,
@@ -57,7 +62,7 @@ def replay(
     Args:
         log: as `harness.replays.flown.read_flown` takes it.
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
-        out: folder to write.
+        out: folder to write; None: `default_folder`.
         mission: as `harness.replays.mission.read_mission` takes it; None: that of the log, or
             of its column `target_index`.
         overrides: keys of the simulated flight's scenario to replace, `guidance.kind` for one, as
@@ -70,6 +75,7 @@ def replay(
         RunFolderError: the folder holds something else or cannot be written.
         AircraftError: the aircraft cannot be loaded or trimmed.
     """
+    out = default_folder(log) if out is None else out
     if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / INDEX).exists())):
         raise RunFolderError(f"{out} holds other things; give a new folder")
     flown_mission, flight, notes = _read(log, mission)

@@ -50,11 +50,13 @@ def circles(tmp_path: Path, wind: tuple[float, float], laps: int = 4) -> tuple[P
     return log, mission
 
 
-def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(tmp_path: Path) -> None:
+def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     log, mission = circles(tmp_path, (4.0, -3.0))
-    found = wayproof.replay(
-        log, "aerosonde", mission, out=tmp_path / "out", settings={"aircraft.airspeed_mps": "18"}
-    )
+    monkeypatch.chdir(tmp_path)
+    found = wayproof.replay(log, "aerosonde", mission, settings={"aircraft.airspeed_mps": "18"})
+    assert found.folder == Path("runs/replay/log")
     told = found.told
     assert told["wind"]["speed_mps"] == pytest.approx(5.0, abs=0.01)
     assert told["wind"]["from_deg"] == pytest.approx(math.degrees(math.atan2(-4.0, 3.0)) % 360, abs=0.2)
@@ -66,8 +68,8 @@ def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(tmp_
     )
     assert told["flown"]["outside_p95_m"] == pytest.approx(np.percentile(beyond[settled], 95), abs=1e-6)
     assert told["flown"]["lap_mean_s"] == pytest.approx(40.0, abs=0.11)
-    assert json.loads((tmp_path / "out" / "replay.json").read_text()) == told
-    page = (tmp_path / "out" / "report.html").read_text()
+    assert json.loads((found.folder / "replay.json").read_text()) == told
+    page = (found.folder / "report.html").read_text()
     assert f"{told['flown']['outside_p95_m']:.2f}" in page
 
 
