@@ -193,7 +193,11 @@ def _renamed(chunks: Sequence[rr.chunk.Chunk], run: str, place: int, name: str) 
 
 
 def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], place: int, name: str) -> None:
-    """The events of one run, in its colour and after its name."""
+    """The events of one run, in its colour and after its name.
+
+    They have an entity of their own: where the rows of several runs share one, rerun's log takes colours from the
+    wrong run.
+    """
     for chunk in chunks:
         if chunk.entity_path == f"/{look.EVENTS}":
             batch = chunk.to_record_batch()
@@ -203,7 +207,7 @@ def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], plac
             # As numbers: as Python objects, times in nanoseconds need pandas.
             times_s = columns[look.TIMELINE].cast("int64").to_numpy() / 1e9
             rec.send_columns(
-                look.EVENTS,
+                f"{look.EVENTS}/{place}",
                 [look.time_column(times_s)],
                 rr.TextLog.columns(
                     text=[f"{name}, {text}" for (text,) in texts],
