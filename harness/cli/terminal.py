@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,7 +11,7 @@ from contextlib import contextmanager
 from typing import Final, TypeAlias
 
 from rich import box
-from rich.console import Console, JustifyMethod
+from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -33,6 +34,9 @@ MOST_COLUMNS: Final = 80
 
 LEAST_NAME: Final = 14
 """Figures are kept in one line where they leave the first column this width."""
+
+BREAKS: Final = re.compile(r"(?<=[ _+./:=-])")
+"""Places within a name at which it may go on in the next line."""
 
 OUTCOME_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
 """Colour of an outcome; all others are bold red."""
@@ -104,26 +108,45 @@ def print_table(
         columns: heading of each column; all but the first hold figures and are aligned to the right.
     """
     console = Console()
+    width = min(MOST_COLUMNS, console.width)
     table = Table(
         title=plain(title), box=box.SIMPLE, show_header=bool(columns), title_justify="left", pad_edge=False
     )
-    if len(columns) > 4:
-        table.padding = 0
-    width, lines = min(MOST_COLUMNS, console.width), list(rows.items() if isinstance(rows, Mapping) else rows)
-    figures = zip(columns[1:], *(cells[1:] for cells in lines if columns and len(cells) > 1), strict=True)
-    narrow = (
-        sum(1 + max(Text.from_markup(cell).cell_len for cell in each) for each in figures)
-        <= width - LEAST_NAME
-    )
-    for index, heading in enumerate(columns):
-        side: JustifyMethod = "right" if index else "left"
-        table.add_column(printable(heading), justify=side, overflow="fold", no_wrap=bool(index) and narrow)
-    if not columns:
+    lines = [[*map(printable, cells)] for cells in (rows.items() if isinstance(rows, Mapping) else rows)]
+    if columns:
+        table.padding = 0 if len(columns) > 4 else (0, 1)
+        between = 1 if len(columns) > 4 else 3
+        figures = zip(columns[1:], *(cells[1:] for cells in lines if len(cells) > 1), strict=True)
+        taken = sum(between + max(Text.from_markup(cell).cell_len for cell in each) for each in figures)
+        fits = taken <= width - LEAST_NAME
+        room = width - 2 - taken if fits else LEAST_NAME - 4
+        table.add_column(printable(columns[0]), overflow="fold")
+        for heading in columns[1:]:
+            table.add_column(printable(heading), justify="right", overflow="fold", no_wrap=fits)
+        for name, *cells in lines:
+            table.add_row(_broken(name, room), *cells)
+    else:
         table.add_column(style="dim", no_wrap=True)
         table.add_column(overflow="fold")
-    for cells in lines:
-        table.add_row(*map(printable, cells))
+        for cells in lines:
+            table.add_row(*cells)
     console.print(table, width=width)
+
+
+def _broken(name: str, room: int) -> Text:
+    """A name in lines of `room` letters: what is longer goes on below, from behind a space or punctuation on."""
+    shown: list[Text] = []
+    for line in Text.from_markup(name).split():
+        ends: list[int] = []
+        last = begin = 0
+        for place in [*(found.start() for found in BREAKS.finditer(line.plain)), len(line)]:
+            if place - begin > room - bool(ends) and line.plain[begin:last].strip():
+                ends.append(last)
+                begin = last
+            last = place
+        first, *others = line.divide(ends)
+        shown += [first, *(Text(" ") + other for other in others)]
+    return Text("\n").join(shown)
 
 
 def print_line(text: str, style: str | None = None) -> None:

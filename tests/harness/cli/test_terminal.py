@@ -58,6 +58,31 @@ def test_the_table_of_a_flight_fits_80_columns_and_says_what_happened(
     assert "\x1b" not in shown
 
 
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [
+        ("rolling_window+shield", ["rolling_window+", " shield"]),
+        ("improved_bug+shield\n vector_field", ["improved_bug+", " shield", " vector_field"]),
+        ("[bold]campaign.yaml: slow[/]", ["campaign.yaml:", " slow"]),
+        ("AwordLongerThanItsColumn", ["AwordLongerThan", "ItsColumn"]),
+        ("bug2", ["bug2"]),
+    ],
+)
+def test_a_long_name_in_a_table_goes_on_below_from_behind_its_punctuation_on(
+    name: str, lines: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    figures = ("planner_failed", "104.6", "1.0003", "-0.0695", "0.34", "yes", "39.1", "25.7")
+    heads = ("planner", "outcome", "km", "ratio", "clear m", "κ·R", "tracks", "tse max", "p99 ms")
+    print_table("", [(name, *figures)], heads)
+    shown = capsys.readouterr().out.splitlines()
+    assert max(map(len, shown)) <= 80
+    (first,) = (place for place, line in enumerate(shown) if "planner_failed" in line)
+    assert [line.partition(figures[0])[0][1:].rstrip() for line in shown[first : first + len(lines)]] == lines
+    assert shown[first + len(lines)].strip() == ""
+    assert " ".join(shown[first].split()).endswith(" ".join(figures))
+
+
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp\r\x7f\ud800"
 SPELT = r"\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp\r\x7f\ud800"
 
