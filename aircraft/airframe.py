@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from aircraft.actuators.actuator import Actuators
+from aircraft.actuators import Actuators
 from aircraft.autopilot import Gains
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.interface import GRAVITY_MPS2
@@ -18,76 +18,6 @@ PITCH_LIMITS_DEG = (-30.0, 30.0)
 
 LEAST_SHARE = 0.97
 """Share of the lowest airspeed of level flight below which the autopilot lets height go for speed."""
-
-
-@dataclass(frozen=True)
-class AutopilotKeys:
-    """What a scenario says of an aircraft's autopilot, `aircraft.autopilot` and `navigation.latency_s`.
-
-    Attributes:
-        bank_limit_deg: largest bank that guidance may command; None: of the survey.
-        roll_rate_limit_degps: fastest roll that is commanded; None: of the survey.
-        roll_time_constant_s: of roll behind its command; None: of the survey.
-        pitch_limits_deg: least and largest pitch that is commanded.
-        least_airspeed_mps: below this true airspeed height goes before speed; None: `LEAST_SHARE` of the lowest of
-            level flight.
-        latency_s: age of the attitude, airspeed, height and climb that the autopilot works with.
-    """
-
-    bank_limit_deg: float | None = None
-    roll_rate_limit_degps: float | None = None
-    roll_time_constant_s: float | None = None
-    pitch_limits_deg: tuple[float, float] = PITCH_LIMITS_DEG
-    least_airspeed_mps: float | None = None
-    latency_s: float = 0.0
-
-    def figures(self) -> dict[str, float]:
-        """What replaces figures of `FIGURES` that the survey would find."""
-        named = {
-            "bank_limit_deg": self.bank_limit_deg,
-            "roll_rate_dps": self.roll_rate_limit_degps,
-            "roll_lag_s": self.roll_time_constant_s,
-        }
-        return {name: value for name, value in named.items() if value is not None}
-
-    def gains(self) -> dict[str, float]:
-        """What replaces derived gains."""
-        replaced = {}
-        if self.roll_rate_limit_degps is not None:
-            replaced["roll_rate_limit"] = math.radians(self.roll_rate_limit_degps)
-        if self.roll_time_constant_s is not None:
-            replaced["roll"] = 1.0 / self.roll_time_constant_s
-        return replaced
-
-
-DERIVED = AutopilotKeys()
-"""The autopilot as the survey derives it, without latency."""
-
-
-@dataclass(frozen=True)
-class AirframeEntry:
-    """One entry of airframes.yaml: what is known of an airframe before it flies.
-
-    Attributes:
-        name: as in `aircraft.model` of a scenario.
-        summary: one line for lists.
-        cruise_mps: default true airspeed; None: from the speeds at which the model can be trimmed.
-        verified: flown against the tracking figures of the tests.
-        figures: attributes of `Airframe` that replace what the survey makes of the model.
-        gains: gains of the autopilot that replace derived ones, by field of `Gains`.
-        actuators: its servos.
-        autopilot: what a scenario says of its autopilot.
-    """
-
-    name: str
-    summary: str
-    cruise_mps: float | None = None
-    verified: bool = False
-    figures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
-    gains: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
-    actuators: Actuators = field(default_factory=Actuators)
-    autopilot: AutopilotKeys = DERIVED
-
 
 FIGURES = (
     "bank_limit_deg",
@@ -102,49 +32,76 @@ FIGURES = (
 
 
 @dataclass(frozen=True)
-class Airframe:
-    """One airframe, as flown.
+class AutopilotKeys:
+    """What a scenario says of an aircraft's autopilot, `aircraft.autopilot` and `navigation.latency_s`.
 
-    Attributes:
-        name: as in `aircraft.model` of a scenario; of a folder, that of its model.
-        summary: one line for lists.
-        files: the JSBSim model.
-        mass_kg: as flown.
-        airspeed_range_mps: lowest and highest true airspeed of level flight, near sea level.
-        cruise_mps: default true airspeed.
-        bank_limit_deg: largest bank the guidance may command.
-        roll_rate_dps: fastest change of the roll command.
-        roll_in_s: time from wings level to 90 % of 30 degrees, or of the bank limit if that is less,
-            the command a step, at cruise.
-        stall_angle_deg: angle of attack beyond which control counts as lost.
-        roll_lag_s: time constant of roll behind its command.
-        roll_delay_s: further delay of roll behind its command.
-        guidance_bandwidth_radps: natural frequency of the cross-track correction.
-        turn_rate_share: turn rate in a steady turn over that of a coordinated one, g tan(bank) / V.
-        level_banks: (true airspeed m/s, bank deg) pairs, airspeed rising: the steepest bank up to the limit at
-            which speed and altitude are kept.
-        weave_error_m: largest cross-track error on a weave of lines and arcs as planned, at cruise in calm air.
-        gains: of the autopilot.
-        verified: flown against the tracking figures of the tests.
-        autopilot: what a scenario says of its autopilot.
+    None stands for what the survey finds.
     """
 
-    name: str
+    bank_limit_deg: float | None = None  # largest bank that guidance may command
+    roll_rate_limit_degps: float | None = None  # fastest roll that is commanded
+    roll_time_constant_s: float | None = None  # of roll behind its command
+    pitch_limits_deg: tuple[float, float] = PITCH_LIMITS_DEG
+    least_airspeed_mps: float | None = None  # true; below it height goes before speed
+    latency_s: float = 0.0  # age of the attitude, airspeed, height and climb that the autopilot works with
+
+    def figures(self) -> dict[str, float]:
+        """What replaces figures of `FIGURES` that the survey would find."""
+        named = {
+            "bank_limit_deg": self.bank_limit_deg,
+            "roll_rate_dps": self.roll_rate_limit_degps,
+            "roll_lag_s": self.roll_time_constant_s,
+        }
+        return {name: value for name, value in named.items() if value is not None}
+
+    def gains(self) -> dict[str, float]:
+        """What replaces derived gains."""
+        rate, time_s = self.roll_rate_limit_degps, self.roll_time_constant_s
+        replaced = {} if rate is None else {"roll_rate_limit": math.radians(rate)}
+        return replaced if time_s is None else {**replaced, "roll": 1.0 / time_s}
+
+
+DERIVED = AutopilotKeys()
+"""The autopilot as the survey derives it, without latency."""
+
+
+@dataclass(frozen=True)
+class AirframeEntry:
+    """One entry of airframes.yaml: what is known of an airframe before it flies."""
+
+    name: str  # as in `aircraft.model` of a scenario
+    summary: str  # one line for lists
+    cruise_mps: float | None = None  # default true airspeed; None: from the speeds that the model trims at
+    verified: bool = False  # flown against the tracking figures of the tests
+    figures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
+    """Of `FIGURES`, in place of what the survey makes of the model."""
+    gains: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
+    """In place of derived ones, by field of `Gains`."""
+    actuators: Actuators = field(default_factory=Actuators)
+    autopilot: AutopilotKeys = DERIVED
+
+
+@dataclass(frozen=True)
+class Airframe:
+    """One airframe, as flown."""
+
+    name: str  # as in `aircraft.model` of a scenario; of a folder, that of its model
     summary: str
     files: ModelFiles
     mass_kg: float
-    airspeed_range_mps: tuple[float, float]
-    cruise_mps: float
-    bank_limit_deg: float
-    roll_rate_dps: float
-    roll_in_s: float
-    stall_angle_deg: float
-    roll_lag_s: float
-    roll_delay_s: float
-    guidance_bandwidth_radps: float
-    turn_rate_share: float
+    airspeed_range_mps: tuple[float, float]  # lowest and highest true airspeed of level flight near sea level
+    cruise_mps: float  # default true airspeed
+    bank_limit_deg: float  # largest bank that guidance may command
+    roll_rate_dps: float  # fastest change of the roll command
+    roll_in_s: float  # from wings level to 90 % of 30 degrees, or of the bank limit if less, at cruise
+    stall_angle_deg: float  # angle of attack beyond which control counts as lost
+    roll_lag_s: float  # time constant of roll behind its command
+    roll_delay_s: float  # further delay of roll behind its command
+    guidance_bandwidth_radps: float  # natural frequency of the cross-track correction
+    turn_rate_share: float  # turn rate in a steady turn over that of a coordinated one, g tan(bank) / V
     level_banks: tuple[tuple[float, float], ...]
-    weave_error_m: float
+    """True airspeeds (m/s, rising), and the steepest bank (deg) up to the limit that keeps speed and altitude."""
+    weave_error_m: float  # largest cross-track error on a weave as planned, at cruise in calm air
     gains: Gains
     verified: bool
     autopilot: AutopilotKeys = DERIVED

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from hashlib import sha256
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from aircraft.actuators.actuator import Actuator, Actuators, NormActuator
+from aircraft.actuators import Actuator, Actuators, NormActuator
 from aircraft.airframe import DERIVED, FIGURES, Airframe, AirframeEntry, AutopilotKeys
 from aircraft.autopilot import Gains
 from aircraft.card_cache import cached, is_kept
@@ -28,22 +28,38 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
     """The airframe of a name or folder, surveyed by flying it unless that has been done before.
 
     Args:
-        name: a name of `aircraft_names`, of another aircraft of the JSBSim wheel, or a folder that holds a
-            JSBSim model.
+        name: of `aircraft_names`, of another aircraft of the JSBSim wheel, or a folder that holds a JSBSim model.
         actuators: its servos; None: those of the airframe table, or none.
         autopilot: what is known of its autopilot.
 
     Raises:
         AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
     """
-    entry, found = _as_flown(name, actuators, autopilot)
+    entry, found, kept = _as_flown(name, actuators, autopilot)
 
     def surveyed() -> dict[str, Any]:
         from aircraft.survey import survey
 
         return survey(entry, found)
 
-    return cached(_title(found), _survey_digest(entry, found), surveyed, partial(_of_survey, entry, found))
+    def read(measured: Mapping[str, Any]) -> Airframe:
+        low, high = measured["airspeed_range_mps"]
+        return Airframe(
+            name=found.name,
+            summary=entry.summary,
+            files=found,
+            airspeed_range_mps=(low, high),
+            level_banks=tuple((speed, bank) for speed, bank in measured["level_banks"]),
+            gains=Gains(**measured["gains"]),
+            verified=entry.verified,
+            autopilot=entry.autopilot,
+            **{
+                key: measured[key]
+                for key in ("mass_kg", "cruise_mps", "roll_in_s", "weave_error_m", *FIGURES)
+            },
+        )
+
+    return cached(*kept, surveyed, read)
 
 
 def is_surveyed(name: str) -> bool:
@@ -52,14 +68,16 @@ def is_surveyed(name: str) -> bool:
     Raises:
         AircraftError: there is none.
     """
-    entry, found = _as_flown(name, None, DERIVED)
-    return is_kept(_title(found), _survey_digest(entry, found))
+    return is_kept(*_as_flown(name, None, DERIVED)[2])
 
 
 def _as_flown(
     name: str, actuators: Actuators | None, autopilot: AutopilotKeys
-) -> tuple[AirframeEntry, ModelFiles]:
-    """What is known of an airframe before it flies, and its model with the servos; see `airframe`."""
+) -> tuple[AirframeEntry, ModelFiles, tuple[str, str]]:
+    """What is known of an airframe before it flies, its model with the servos, and the title and digest of its survey.
+
+    The digest is SHA-256 of all that a survey depends on: the model's files, and what is known of it.
+    """
     try:
         found = model_files(name)
     except AircraftError as error:
@@ -74,17 +92,9 @@ def _as_flown(
         gains={**entry.gains, **autopilot.gains()},
         autopilot=autopilot,
     )
-    return entry, replace(found, latency_s=autopilot.latency_s)
-
-
-def _survey_digest(entry: AirframeEntry, found: ModelFiles) -> str:
-    """SHA-256 of all that a survey depends on: the model's files, and what is known of it before it flies."""
-    known = (entry.cruise_mps, sorted(entry.figures.items()), sorted(entry.gains.items()), entry.autopilot)
-    return sha256((found.digest() + repr(known)).encode()).hexdigest()
-
-
-def _title(found: ModelFiles) -> str:
-    return f"{found.name}-airframe"
+    found = replace(found, latency_s=autopilot.latency_s)
+    known = repr((entry.cruise_mps, sorted(entry.figures.items()), sorted(entry.gains.items()), autopilot))
+    return entry, found, (f"{found.name}-airframe", sha256((found.digest() + known).encode()).hexdigest())
 
 
 def _of_commands(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:
@@ -100,10 +110,11 @@ def _of_commands(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple
         return surface_travel_deg(found)
 
     travels = cached(f"{found.name}-travel", found.digest(), measured, dict)
+    texts = [path.read_text("utf-8", errors="replace") for path in found.model.parent.rglob("*.xml")]
     made = []
     for control, actuator in real.items():
         travel_deg = travels[control]
-        if travel_deg <= 0.0 and not _names(found, control):
+        if travel_deg <= 0.0 and not any(f"fcs/{control}" in text for text in texts):
             continue  # a flying wing has no rudder
         if travel_deg <= 0.0 and (actuator.rate_limit_degps is not None or actuator.deadband_deg):
             raise AircraftError(
@@ -112,28 +123,6 @@ def _of_commands(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple
             )
         made.append((control, actuator.of_command(travel_deg or 1.0)))
     return tuple(made)
-
-
-def _names(found: ModelFiles, control: str) -> bool:
-    """Whether a model's own files name a control at all."""
-    texts = (path.read_text("utf-8", errors="replace") for path in found.model.parent.rglob("*.xml"))
-    return any(f"fcs/{control}" in text for text in texts)
-
-
-def _of_survey(entry: AirframeEntry, found: ModelFiles, measured: Mapping[str, Any]) -> Airframe:
-    """The airframe that a survey measured."""
-    low, high = measured["airspeed_range_mps"]
-    return Airframe(
-        name=found.name,
-        summary=entry.summary,
-        files=found,
-        airspeed_range_mps=(low, high),
-        level_banks=tuple((speed, bank) for speed, bank in measured["level_banks"]),
-        gains=Gains(**measured["gains"]),
-        verified=entry.verified,
-        autopilot=entry.autopilot,
-        **{key: measured[key] for key in ("mass_kg", "cruise_mps", "roll_in_s", "weave_error_m", *FIGURES)},
-    )
 
 
 @cache
@@ -157,6 +146,4 @@ def _entry(
     assert {*gains} <= {each.name for each in fields(Gains)}, name
     assert {*figures} <= {*FIGURES}, name
     servos = Actuators(**{control: Actuator(**keys) for control, keys in actuators.items()})
-    return AirframeEntry(
-        name, summary, cruise_mps, verified, MappingProxyType(figures), MappingProxyType(dict(gains)), servos
-    )
+    return AirframeEntry(name, summary, cruise_mps, verified, figures, gains, servos)

@@ -69,62 +69,36 @@ class Derivatives:
 
 @dataclass(frozen=True)
 class Gains:
-    """Gains of systems/autopilot.xml; the field `a_b` is the property `wayproof/gain/a-b`.
+    """Gains of systems/autopilot.xml; the field `a_b` is the property `wayproof/gain/a-b`."""
 
-    Attributes:
-        qbar_psf: dynamic pressure that the gains hold at, lbf/ft2; the autopilot scales them to others.
-        roll: roll rate over roll error, 1/s.
-        roll_rate_limit: rad/s.
-        aileron_p, aileron_p_integral: aileron over roll rate error, s, and over its integral.
-        aileron_p_forward, aileron_r_forward: aileron that holds a roll rate, and a yaw rate in a turn, s.
-        rudder_r: rudder over yaw rate beyond that of the coordinated turn, s.
-        rudder_p_forward, rudder_r_forward: rudder that keeps sideslip at zero in a roll, and in a turn, s.
-        altitude: climb rate over altitude error, 1/s.
-        climb_limit_fps: limit of the climb command, ft/s.
-        climb, climb_integral: pitch over flight path angle error, and over its integral (1/s).
-        pitch: pitch rate over pitch error, 1/s.
-        pitch_bank_forward: pitch added per (1 - cos roll), rad.
-        alpha: angle of attack of the trim, rad.
-        alpha_per_load: angle of attack over load factor there, rad.
-        elevator_q, elevator_q_integral: elevator over pitch rate error, s, and over its integral.
-        elevator_q_forward: elevator that makes a steady pull-up rate, s.
-        elevator_turn_forward: elevator against pitch damping in a turn, s.
-        elevator_load_forward: elevator per unit of load factor beyond 1.
-        speed: energy rate (as a climb rate) over airspeed error.
-        speed_by_pitch: share of it that pitch makes where the throttle has nothing left.
-        throttle_integral: throttle over the integral of the energy rate error, 1/ft.
-        throttle_energy_forward: throttle over energy rate, s/ft.
-        throttle_load_forward: throttle against induced drag, per (load factor squared - 1).
-    """
-
-    qbar_psf: float
-    roll: float
-    roll_rate_limit: float
-    aileron_p: float
-    aileron_p_integral: float
-    aileron_p_forward: float
-    aileron_r_forward: float
-    rudder_r: float
-    rudder_p_forward: float
-    rudder_r_forward: float
-    altitude: float
-    climb_limit_fps: float
-    climb: float
-    climb_integral: float
-    pitch: float
-    pitch_bank_forward: float
-    alpha: float
-    alpha_per_load: float
-    elevator_q: float
-    elevator_q_integral: float
-    elevator_q_forward: float
-    elevator_turn_forward: float
-    elevator_load_forward: float
-    speed: float
-    speed_by_pitch: float
-    throttle_integral: float
-    throttle_energy_forward: float
-    throttle_load_forward: float
+    qbar_psf: float  # dynamic pressure that they hold at, lbf/ft2; the autopilot scales them to others
+    roll: float  # roll rate over roll error, 1/s
+    roll_rate_limit: float  # rad/s
+    aileron_p: float  # aileron over roll rate error, s
+    aileron_p_integral: float  # and over its integral
+    aileron_p_forward: float  # aileron that holds a roll rate, s
+    aileron_r_forward: float  # and a yaw rate in a turn
+    rudder_r: float  # rudder over yaw rate beyond that of the coordinated turn, s
+    rudder_p_forward: float  # rudder that keeps sideslip at zero in a roll, s
+    rudder_r_forward: float  # and in a turn
+    altitude: float  # climb rate over altitude error, 1/s
+    climb_limit_fps: float  # of the climb command, ft/s
+    climb: float  # pitch over flight path angle error
+    climb_integral: float  # and over its integral, 1/s
+    pitch: float  # pitch rate over pitch error, 1/s
+    pitch_bank_forward: float  # pitch added per (1 - cos roll), rad
+    alpha: float  # angle of attack of the trim, rad
+    alpha_per_load: float  # angle of attack over load factor there, rad
+    elevator_q: float  # elevator over pitch rate error, s
+    elevator_q_integral: float  # and over its integral
+    elevator_q_forward: float  # elevator that makes a steady pull-up rate, s
+    elevator_turn_forward: float  # elevator against pitch damping in a turn, s
+    elevator_load_forward: float  # elevator per unit of load factor beyond 1
+    speed: float  # energy rate (as a climb rate) over airspeed error
+    speed_by_pitch: float  # share of it that pitch makes where the throttle has nothing left
+    throttle_integral: float  # throttle over the integral of the energy rate error, 1/ft
+    throttle_energy_forward: float  # throttle over energy rate, s/ft
+    throttle_load_forward: float  # throttle against induced drag, per (load factor squared - 1)
 
     def rounded(self, digits: int) -> Gains:
         """The same to a number of significant digits."""

@@ -11,47 +11,32 @@ from dataclasses import dataclass, fields
 from typing import Final
 
 SURFACES: Final = ("elevator", "aileron", "rudder")
-ALPHA: Final = ("aero/alpha-rad", "aero/alpha-deg")
+ALPHA: Final = {"aero/alpha-rad", "aero/alpha-deg"}
 LIFT_AXES: Final = ("LIFT", "NORMAL", "Z")
 DRAG_AXES: Final = ("DRAG", "AXIAL", "X")
 PREFIX: Final = "wayproof/flown/"
 """Properties of an aircraft's aerodynamics that stand for those of JSBSim, times their factor."""
-THRUST: Final = "wayproof-thrust-deviation"
 UNITS_M: Final = {"IN": 0.0254, "FT": 0.3048, "M": 1.0}
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """By how much the flown aircraft differs from its model.
+    """By how much the flown aircraft differs from its model, in shares but for the centre of gravity."""
 
-    Attributes:
-        mass: share of the empty weight, inertias included.
-        thrust: share of the thrust of engines and of external forces along the body's x axis.
-        drag: share of all drag.
-        lift_slope: share of the change of the lift with the angle of attack.
-        elevator, aileron, rudder: share of the effect of a surface on every force and moment.
-        centre_of_gravity_m: how far behind that of the model the centre of gravity of the empty aircraft is.
-    """
-
-    mass: float = 0.0
-    thrust: float = 0.0
+    mass: float = 0.0  # of the empty weight, inertias included
+    thrust: float = 0.0  # of engines and of external forces along the body's x axis
     drag: float = 0.0
-    lift_slope: float = 0.0
-    elevator: float = 0.0
+    lift_slope: float = 0.0  # of the change of the lift with the angle of attack
+    elevator: float = 0.0  # of the effect of a surface on every force and moment
     aileron: float = 0.0
     rudder: float = 0.0
-    centre_of_gravity_m: float = 0.0
+    centre_of_gravity_m: float = 0.0  # behind that of the model, of the empty aircraft
 
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
             if not math.isfinite(value) or (each.name != "centre_of_gravity_m" and value <= -1.0):
                 raise ValueError(f"{each.name} must be finite, a share above -1; got {value}")
-
-    @property
-    def any(self) -> bool:
-        """Whether anything differs."""
-        return any(getattr(self, each.name) for each in fields(self))
 
 
 AS_MODELLED: Final = Deviation()
@@ -67,46 +52,39 @@ def deviate(root: ElementTree.Element, deviation: Deviation) -> None:
     balance, aerodynamics = root.find("mass_balance"), root.find("aerodynamics")
     if balance is None or aerodynamics is None:
         raise ValueError("it has no <mass_balance> or no <aerodynamics>")
-    _scale_mass(balance, 1.0 + deviation.mass)
-    _shift_centre_of_gravity(balance, deviation.centre_of_gravity_m)
-    factors = [(name, 1.0 + getattr(deviation, name)) for name in SURFACES]
-    for name, factor in factors:
-        if not any(f"fcs/{name}" in text for text in _texts(root)):
+    _change_balance(balance, deviation)
+    shown = _texts(root)
+    for name in SURFACES:
+        if not any(f"fcs/{name}" in text for text in shown):
             continue  # a flying wing has no rudder to differ
-        _scale_properties(aerodynamics, [aerodynamics], _positions(aerodynamics, name), name, factor)
-    lift = _axes(aerodynamics, LIFT_AXES)
-    shared = _functions_for(aerodynamics, lift)
-    _scale_properties(aerodynamics, [*lift, *shared], list(ALPHA), "lift slope", 1.0 + deviation.lift_slope)
+        positions = {
+            text for text in _texts(aerodynamics) if text.startswith("fcs/") and f"{name}-pos" in text
+        }
+        _scale_properties(aerodynamics, [aerodynamics], positions, name, 1.0 + getattr(deviation, name))
+    lift = [axis for axis in aerodynamics.findall("axis") if axis.get("name") in LIFT_AXES]
+    places = [*lift, *_functions_for(aerodynamics, lift)]
+    _scale_properties(aerodynamics, places, ALPHA, "lift slope", 1.0 + deviation.lift_slope)
     if deviation.drag:
-        for function in (
-            each for axis in _axes(aerodynamics, DRAG_AXES) for each in axis.findall("function")
-        ):
-            _wrap(function, 1.0 + deviation.drag)
+        for axis in aerodynamics.findall("axis"):
+            for function in axis.findall("function") if axis.get("name") in DRAG_AXES else ():
+                _wrap(function, 1.0 + deviation.drag)
     if deviation.thrust:
         _add_thrust(root, deviation.thrust)
 
 
-def _scale_mass(balance: ElementTree.Element, factor: float) -> None:
-    if factor == 1.0:
-        return
-    for name in ("emptywt", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"):
+def _change_balance(balance: ElementTree.Element, deviation: Deviation) -> None:
+    """Scales the empty weight and its inertias, and moves the centre of gravity."""
+    for name in ("emptywt", "ixx", "iyy", "izz", "ixy", "ixz", "iyz") if deviation.mass else ():
         element = balance.find(name)
         if element is not None and element.text:
-            element.text = repr(float(element.text) * factor)
-
-
-def _shift_centre_of_gravity(balance: ElementTree.Element, metres: float) -> None:
-    if not metres:
-        return
-    location = next((each for each in balance.findall("location") if each.get("name") == "CG"), None)
-    x = None if location is None else location.find("x")
-    if location is None or x is None or not x.text:
-        raise ValueError("its <mass_balance> has no place of the centre of gravity")
-    x.text = repr(float(x.text) + metres / UNITS_M[location.get("unit", "IN").upper()])
-
-
-def _axes(aerodynamics: ElementTree.Element, names: tuple[str, ...]) -> list[ElementTree.Element]:
-    return [axis for axis in aerodynamics.findall("axis") if axis.get("name") in names]
+            element.text = repr(float(element.text) * (1.0 + deviation.mass))
+    if deviation.centre_of_gravity_m:
+        location = balance.find("location[@name='CG']")
+        x = None if location is None else location.find("x")
+        if location is None or x is None or not x.text:
+            raise ValueError("its <mass_balance> has no place of the centre of gravity")
+        unit_m = UNITS_M[location.get("unit", "IN").upper()]
+        x.text = repr(float(x.text) + deviation.centre_of_gravity_m / unit_m)
 
 
 def _functions_for(
@@ -123,23 +101,14 @@ def _texts(element: ElementTree.Element) -> set[str]:
     return {each.text.strip() for each in element.iter() if each.text}
 
 
-def _positions(aerodynamics: ElementTree.Element, surface: str) -> list[str]:
-    """Properties that tell where a surface is, as far as the aerodynamics read them."""
-    return sorted(
-        text
-        for text in _texts(aerodynamics)
-        if text.startswith("fcs/") and f"{surface}-pos" in text and " " not in text
-    )
-
-
 def _scale_properties(
     aerodynamics: ElementTree.Element,
     places: list[ElementTree.Element],
-    properties: list[str],
+    properties: set[str],
     what: str,
     factor: float,
 ) -> None:
-    """Has some elements read a property times a factor, which is computed first of all aerodynamics."""
+    """Has some elements read properties times a factor, which is computed first of all aerodynamics."""
     if factor == 1.0:
         return
     found = set()
@@ -150,19 +119,15 @@ def _scale_properties(
     if not found:
         raise ValueError(f"its aerodynamics do not show the effect of its {what}")
     for name in sorted(found):
-        function = ElementTree.Element("function", name=PREFIX + name)
-        product = ElementTree.SubElement(function, "product")
-        ElementTree.SubElement(product, "property").text = name
-        ElementTree.SubElement(product, "value").text = repr(factor)
-        aerodynamics.insert(0, function)
+        product = f"<product><property>{name}</property><value>{factor!r}</value></product>"
+        scaled = ElementTree.fromstring(f"<function name='{PREFIX}{name}'>{product}</function>")
+        aerodynamics.insert(0, scaled)
 
 
 def _wrap(function: ElementTree.Element, factor: float) -> None:
     """Multiplies what a function gives."""
-    inner = [each for each in function if each.tag not in ("description",)]
-    product = ElementTree.Element("product")
-    ElementTree.SubElement(product, "value").text = repr(factor)
-    for each in inner:
+    product = ElementTree.fromstring(f"<product><value>{factor!r}</value></product>")
+    for each in [each for each in function if each.tag != "description"]:
         function.remove(each)
         product.append(each)
     function.append(product)
@@ -176,14 +141,9 @@ def _add_thrust(root: ElementTree.Element, share: float) -> None:
     external = root.find("external_reactions")
     if external is None:
         external = ElementTree.SubElement(root, "external_reactions")
-    force = ElementTree.SubElement(external, "force", name=THRUST, frame="BODY")
-    function = ElementTree.SubElement(force, "function")
-    product = ElementTree.SubElement(function, "product")
-    ElementTree.SubElement(product, "value").text = repr(share)
-    total = ElementTree.SubElement(product, "sum")
-    for name in ("forces/fbx-prop-lbs", "forces/fbx-external-lbs"):
-        ElementTree.SubElement(total, "property").text = name
-    for tag, x in (("location", None), ("direction", "1")):
-        vector = ElementTree.SubElement(force, tag, {"unit": "M"} if x is None else {})
-        for axis in "xyz":
-            ElementTree.SubElement(vector, axis).text = x if x and axis == "x" else "0"
+    force = f"""<force name="wayproof-thrust-deviation" frame="BODY">
+        <function><product><value>{share!r}</value><sum>
+        <property>forces/fbx-prop-lbs</property><property>forces/fbx-external-lbs</property></sum></product></function>
+        <location unit="M"><x>0</x><y>0</y><z>0</z></location>
+        <direction><x>1</x><y>0</y><z>0</z></direction></force>"""
+    external.append(ElementTree.fromstring(force))

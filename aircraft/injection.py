@@ -1,4 +1,7 @@
-"""Makes a JSBSim model with the autopilot inside, for the time of loading it."""
+"""Makes a JSBSim model with the autopilot, its servos and the age of its state inside, for the time of loading it.
+
+A command goes through JSBSim's `<actuator>`, which is given what differs from the trim: a deadband lies about the trim.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from aircraft.actuators.actuator import NormActuator
-from aircraft.actuators.components import insert
+from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation, deviate
 
 THROTTLE = "fcs/throttle-cmd-norm"
@@ -25,6 +27,9 @@ ESTIMATED = {
 }
 """What the autopilot reads of the state that its navigation estimates, and the gyro that tells how it changes."""
 
+LIMITED_SHARE = 0.999
+"""A servo that moves by this share of the most it can in a step is at its rate limit."""
+
 
 @contextmanager
 def with_autopilot(
@@ -33,22 +38,25 @@ def with_autopilot(
     deviation: Deviation = AS_MODELLED,
     latency: tuple[float, int] = (0.0, 0),
 ) -> Iterator[Path]:
-    """Derives an aircraft folder whose model starts with the autopilot system.
+    """Yields a folder with <name>/<name>.xml, the model with the autopilot, until the context ends.
 
     The other files of the model are linked, so that references from the model resolve as before.
 
-    Yields:
-        A folder that holds <name>/<name>.xml, gone when the context ends.
+    Args:
+        model: its main file.
+        actuators: controls and their servos.
+        deviation: by how much the aircraft differs.
+        latency: age of the state that the autopilot reads, in s and in steps.
 
     Raises:
-        ValueError: if the model is not well-formed XML or not a JSBSim model.
+        ValueError: the model is not well-formed XML or not a JSBSim model.
     """
     try:
         with_system = _with_system(model.read_bytes(), actuators, deviation, latency)
     except ElementTree.ParseError as error:
         raise ValueError(f"{model} is not well-formed XML: {error}") from None
-    except _NoModel as error:
-        raise ValueError(f"{model} is not a JSBSim model: {error}") from None
+    if with_system is None:
+        raise ValueError(f"{model} is not a JSBSim model: its root element is not <fdm_config>")
     with TemporaryDirectory(prefix="wayproof-") as folder:
         derived = Path(folder, model.stem)
         derived.mkdir()
@@ -59,30 +67,29 @@ def with_autopilot(
         yield Path(folder)
 
 
-class _NoModel(ValueError):
-    """XML that is no JSBSim model."""
-
-
 @lru_cache(maxsize=8)
 def _with_system(
     model: bytes,
     actuators: tuple[tuple[str, NormActuator], ...],
     deviation: Deviation,
     latency: tuple[float, int],
-) -> bytes:
-    """The XML of a model that starts with the autopilot system, writes no files of its own and listens to nobody."""
+) -> bytes | None:
+    """The XML of a model that starts with the autopilot system, writes no files of its own and listens to nobody.
+
+    None where it is no JSBSim model.
+    """
     root = ElementTree.fromstring(model)
     if root.tag != "fdm_config":
-        raise _NoModel(f"its root element is <{root.tag}>, not <fdm_config>")
+        return None
     system = ElementTree.fromstring(files("aircraft").joinpath("systems", "autopilot.xml").read_bytes())
-    if deviation.any:
+    if deviation != AS_MODELLED:
         deviate(root, deviation)
-    engines = len(root.findall("propulsion/engine"))
     for component in system.iter("fcs_function"):
         if any(output.text == THROTTLE for output in component.findall("output")):
-            for index in range(1, engines):
+            for index in range(1, len(root.findall("propulsion/engine"))):
                 ElementTree.SubElement(component, "output").text = f"{THROTTLE}[{index}]"
-    insert(system, dict(actuators))
+    for control, actuator in actuators:
+        _put_servo(system, control, actuator)
     if latency[1]:
         _age(system, *latency)
     # A model's own output would leave files where the command was given; its input would listen on the network.
@@ -92,6 +99,48 @@ def _with_system(
     root.insert(0, system)
     derived: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return derived
+
+
+def _put_servo(system: ElementTree.Element, control: str, actuator: NormActuator) -> None:
+    """Puts a servo behind a command; it counts at `wayproof/<control>-limited` the steps at its rate limit."""
+    name = f"wayproof/{control}-norm"
+    channel, component = next(
+        (each, part) for each in system.findall("channel") for part in each if part.get("name") == name
+    )
+    asked, servo, before = (f"wayproof/{control}-{each}-norm" for each in ("asked", "servo", "before"))
+    trim, moved = f"wayproof/trim/{control}-norm", f"fcs/{control}-cmd-norm"
+    rate = actuator.rate_limit_1ps
+    lag = f"<lag>{1.0 / actuator.lag_s!r}</lag>" if actuator.lag_s else ""
+    limit = "" if rate is None else f"<rate_limit>{rate!r}</rate_limit>"
+    band = f"<deadband_width>{actuator.deadband!r}</deadband_width>" if actuator.deadband else ""
+    parts = [
+        f"""<fcs_function name="{before}"><function><property>{servo}</property></function></fcs_function>""",
+        f"""<fcs_function name="{asked}"><function><product><property>wayproof/enable</property>
+        <difference><property>{name}</property><property>{trim}</property></difference>
+        </product></function></fcs_function>""",
+        f"""<actuator name="{servo}"><input>{asked}</input>{lag}{limit}{band}</actuator>""",
+        f"""<fcs_function name="wayproof/{control}-moved-norm"><function><ifthen>
+        <property>wayproof/enable</property>
+        <sum><property>{trim}</property><property>{servo}</property></sum>
+        <property>{moved}</property>
+        </ifthen></function><clipto><min>{0 if control == "throttle" else -1}</min><max>1</max></clipto>
+        </fcs_function>""",
+    ]
+    if rate is not None:
+        parts.append(
+            f"""<fcs_function name="wayproof/{control}-limited"><function><sum>
+            <property>wayproof/{control}-limited</property>
+            <product><property>wayproof/enable</property><ge>
+            <abs><difference><property>{servo}</property><property>{before}</property></difference></abs>
+            <product><property>simulation/dt</property><value>{LIMITED_SHARE * rate!r}</value></product>
+            </ge></product></sum></function></fcs_function>"""
+        )
+    made = [ElementTree.fromstring(part) for part in parts]
+    for output in component.findall("output"):
+        component.remove(output)
+        made[3].append(output)
+    after = list(channel).index(component) + 1
+    channel[after:after] = made
 
 
 def _age(system: ElementTree.Element, latency_s: float, steps: int) -> None:
@@ -105,15 +154,13 @@ def _age(system: ElementTree.Element, latency_s: float, steps: int) -> None:
         for each in system.iter():
             if each.text and each.text.strip() == name:
                 each.text = old if rate is None else f"{old}-now"
-        sensor = ElementTree.SubElement(channel, "sensor", name=old)
-        ElementTree.SubElement(sensor, "input").text = name
-        ElementTree.SubElement(sensor, "delay", type="frames").text = str(steps + 1)  # one is now
+        sensor = (
+            f"""<sensor name="{old}"><input>{name}</input><delay type="frames">{steps + 1}</delay></sensor>"""
+        )
+        channel.append(ElementTree.fromstring(sensor))  # one of the frames is now
         if rate is not None:
-            channel.append(
-                ElementTree.fromstring(
-                    f"""<fcs_function name="{old}-now"><function><sum><property>{old}</property>
-                    <product><value>{latency_s!r}</value><property>{rate}</property></product>
-                    </sum></function></fcs_function>"""
-                )
-            )
+            now = f"""<fcs_function name="{old}-now"><function><sum><property>{old}</property>
+                <product><value>{latency_s!r}</value><property>{rate}</property></product>
+                </sum></function></fcs_function>"""
+            channel.append(ElementTree.fromstring(now))
     system.insert([each.tag for each in system].index("channel"), channel)

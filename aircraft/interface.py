@@ -18,43 +18,38 @@ FloatArray = NDArray[np.float64]
 GRAVITY_MPS2 = 9.80665
 """Standard acceleration of free fall (ISO 80000-3)."""
 
+FOOT_M = 0.3048
+
 STEP_RATE_HZ = 60
 """Steps of a flight model a second, where nothing else is said. Flown on the 14-turn courses of
 `harness.bench.tracking`, the track of the Aerosonde lies within 0.03 m of that with 480 steps."""
 
 
 class AircraftState(NamedTuple):
-    """One instant of flight. SI units; velocities are over the ground, in the local ENU plane."""
+    """One instant of flight. SI units; velocities are over the ground, in the local ENU plane.
+
+    Surfaces are commanded deflections with their trim, from -1 to 1, where the surface is at its stop.
+    """
 
     time_s: float
     east_m: float
     north_m: float
-    up_m: float
-    """Altitude above mean sea level."""
+    up_m: float  # altitude above mean sea level
     velocity_east_mps: float
     velocity_north_mps: float
     velocity_up_mps: float
     heading_rad: float
     roll_rad: float
     pitch_rad: float
-    airspeed_mps: float
-    """True airspeed."""
-    load_factor: float
-    """Normal load factor, 1 in level flight."""
-    throttle: float = math.nan
-    """Throttle command, 0 to 1; NaN for a model without an engine."""
-    actuator_limited_s: float = 0.0
-    """Time since the start in which a servo was at its rate limit, each counted."""
-    vertical_actuator_limited_s: float = 0.0
-    """That of the servos of elevator and throttle alone."""
+    airspeed_mps: float  # true
+    load_factor: float  # normal, 1 in level flight
+    throttle: float = math.nan  # command, 0 to 1; NaN for a model without an engine
+    actuator_limited_s: float = 0.0  # time since the start with a servo at its rate limit, each counted
+    vertical_actuator_limited_s: float = 0.0  # that of the servos of elevator and throttle alone
     elevator: float = math.nan
-    """Commanded deflection with its trim, from -1 to 1, where the surface is at its stop; NaN where not known."""
     aileron: float = math.nan
-    """The same of the ailerons."""
     rudder: float = math.nan
-    """The same of the rudder."""
-    angle_of_attack_rad: float = math.nan
-    """Angle of the air to the body's x axis in its plane of symmetry; NaN where not known."""
+    angle_of_attack_rad: float = math.nan  # of the air to the body's x axis in its plane of symmetry
 
     @property
     def groundspeed_mps(self) -> float:
@@ -97,32 +92,23 @@ class Route:
 
 @dataclass(frozen=True)
 class Performance:
-    """What planning must know of an aircraft at one airspeed.
+    """What planning must know of an aircraft at one true airspeed.
 
-    Attributes:
-        airspeed_mps: true airspeed the figures hold for.
-        turn_radius_m: smallest radius a plan may ask for, margins for wind and turbulence included.
-        roll_in_s: time from wings level to 90 % of 30 degrees, or of the bank limit if that is less, at cruise.
-        tracking_error_m: cross-track error that the guidance stays within on such a plan.
-        hold_radius_m: smallest radius of a full turn that is held. It is less than `turn_radius_m`: a hold
-            needs no bank in reserve for changes of curvature, only for gusts.
-        spaced_radius_m: smallest radius of turns with a straight between them on which the aircraft rolls. It lies
-            between the two, and is `turn_radius_m` in calm air.
+    A full turn that is held needs no bank in reserve for changes of curvature, only for gusts, so its radius is the
+    least; turns with a straight between them on which the aircraft rolls come between, and need `turn_radius_m` in
+    calm air.
     """
 
     airspeed_mps: float
-    turn_radius_m: float
-    roll_in_s: float
-    tracking_error_m: float
+    turn_radius_m: float  # smallest that a plan may ask for, margins for wind and turbulence included
+    roll_in_s: float  # from wings level to 90 % of 30 degrees, or of the bank limit if less, at cruise
+    tracking_error_m: float  # cross-track error that the guidance stays within on such a plan
     hold_radius_m: float
     spaced_radius_m: float
 
 
 class FlightModel(Protocol):
-    """An aircraft in the air, its inner loops closed.
-
-    A model is made at its start state and is used for one flight.
-    """
+    """An aircraft in the air, its inner loops closed. It is made at its start state, for one flight."""
 
     @property
     def step_rate_hz(self) -> int:

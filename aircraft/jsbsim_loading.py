@@ -10,15 +10,15 @@ from typing import Any
 import jsbsim
 import numpy as np
 
-from aircraft.actuators.actuator import CONTROLS, THROTTLE_TRAVEL_DEG
+from aircraft.actuators import CONTROLS, THROTTLE_TRAVEL_DEG
 from aircraft.autopilot import Derivatives, derivatives
 from aircraft.frames import LocalPlane
 from aircraft.injection import with_autopilot
-from aircraft.interface import STEP_RATE_HZ
+from aircraft.interface import FOOT_M, STEP_RATE_HZ
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
-from aircraft.properties import FOOT_M, SLUG_KG
 from aircraft.start import StartConditions
 
+SLUG_KG = 14.59390
 REFERENCE_ALTITUDE_M = 300.0
 LONGITUDINAL_TRIM, FULL_TRIM = 0, 1
 RUDDER_NEEDED = "rdot doesn't appear to be trimmable"

@@ -5,22 +5,41 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from aircraft.actuators import CONTROLS
 from aircraft.airframe import Airframe
 from aircraft.frames import LocalPlane, PatchedPlane
-from aircraft.interface import STEP_RATE_HZ, AircraftState
+from aircraft.interface import FOOT_M, STEP_RATE_HZ, AircraftState
 from aircraft.jsbsim_loading import load, node, trim
 from aircraft.model_files import AircraftError
-from aircraft.properties import (
-    COMMAND_PROPERTIES,
-    CONTROLS,
-    FOOT_M,
-    STATE_PROPERTIES,
-    TURBULENCE_SEVERITY,
-    TURBULENCE_TYPE,
-    TURBULENCE_W20_FPS,
-    WIND_PROPERTIES,
+from aircraft.start import TURBULENCE_W20_FPS, Atmosphere, DrydenGusts, StartConditions, VerticalGusts
+
+STATE_PROPERTIES = (
+    "position/lat-geod-rad",  # geodetic; lat-gc is up to 21 km off
+    "position/long-gc-rad",
+    "position/h-sl-ft",
+    "velocities/v-north-fps",
+    "velocities/v-east-fps",
+    "velocities/h-dot-fps",
+    "attitude/psi-rad",  # from true north, clockwise
+    "attitude/phi-rad",  # right wing down
+    "attitude/theta-rad",  # nose up
+    "velocities/vtrue-fps",
+    "accelerations/Nz",  # 1 in level flight
+    "fcs/throttle-cmd-norm",
+    "fcs/elevator-cmd-norm",
+    "fcs/pitch-trim-cmd-norm",
+    "fcs/aileron-cmd-norm",
+    "fcs/roll-trim-cmd-norm",
+    "fcs/rudder-cmd-norm",
+    "fcs/yaw-trim-cmd-norm",
+    "aero/alpha-rad",
 )
-from aircraft.start import Atmosphere, DrydenGusts, StartConditions, VerticalGusts
+"""Read for `AircraftState`, in this order. JSBSim writes the unit into the name: fps is ft/s."""
+COMMAND_PROPERTIES = ("wayproof/roll-cmd-rad", "wayproof/altitude-cmd-ft", "wayproof/airspeed-cmd-fps")
+WIND_PROPERTIES = ("atmosphere/wind-east-fps", "atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
+"""The direction that the wind blows towards."""
+TURBULENCE_TYPE = {"milspec": 3.0, "tustin": 4.0}
+TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}
 
 GROUND_FT = 2.0 / FOOT_M
 """Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
@@ -41,10 +60,7 @@ INTEGRATOR_MEMORY = 6
 
 
 class JsbsimModel:
-    """Flight model for one flight of one airframe. Implements `FlightModel`.
-
-    The aircraft starts trimmed, in straight level flight along the given course, moving with the wind.
-    """
+    """Flight model for one flight of one airframe, which starts trimmed in the wind. Implements `FlightModel`."""
 
     def __init__(
         self,
@@ -59,10 +75,10 @@ class JsbsimModel:
         """Loads, trims and starts the aircraft.
 
         Args:
-            frame: the airframe, see `aircraft.airframes.airframe`.
-            start: where and how fast it starts.
-            plane: the local plane that all positions refer to.
-            atmosphere: wind, gusts and turbulence; default: calm.
+            frame: see `aircraft.airframes.airframe`.
+            start: in straight level flight.
+            plane: that all positions refer to.
+            atmosphere: default: calm.
             step_rate_hz: integration steps per second.
             climb_limit_mps: the fastest climb or descent that the altitude loop asks for; None: its own, for flight
                 at one altitude.
@@ -74,7 +90,7 @@ class JsbsimModel:
                 trimmed or held.
         """
         self.airframe = frame
-        self.airframe.check_airspeed(start.airspeed_mps)
+        frame.check_airspeed(start.airspeed_mps)
         self._step_rate_hz = step_rate_hz
         self._step, self._read_at_step = 0, -1
         # Roll, airspeed, altitude and angle of attack, as read.
@@ -85,8 +101,8 @@ class JsbsimModel:
         try:
             heading_rad = start.heading_rad(Atmosphere(*atmosphere.wind_at(0.0, height_m)))
         except ValueError as error:
-            raise AircraftError(f"{self.airframe.name}: {error}") from None
-        self._stall_rad = math.radians(self.airframe.stall_angle_deg)
+            raise AircraftError(f"{frame.name}: {error}") from None
+        self._stall_rad = math.radians(frame.stall_angle_deg)
         self._plane = PatchedPlane(plane, *map(math.radians, plane.geodetic(start.east_m, start.north_m)))
         convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
@@ -98,12 +114,11 @@ class JsbsimModel:
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
         self._place = (start.east_m, start.north_m, start.altitude_m / FOOT_M)
 
-        fdm = self._fdm = load(self.airframe.files, step_rate_hz)
-        trim(fdm, self.airframe.name, plane, start, heading_rad + convergence_rad)
+        fdm = self._fdm = load(frame.files, step_rate_hz)
+        trim(fdm, frame.name, plane, start, heading_rad + convergence_rad)
         self._read = tuple(node(fdm, path).get_double_value for path in STATE_PROPERTIES)
         self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
         self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
-        self._write_wind_down = node(fdm, "atmosphere/wind-down-fps").set_double_value
         self._write_terrain = node(fdm, "position/terrain-elevation-asl-ft").set_double_value
         self._enable = node(fdm, "wayproof/enable").set_double_value
         servos = [name for name, servo in frame.files.actuators if servo.rate_limit_1ps is not None]
@@ -126,27 +141,12 @@ class JsbsimModel:
 
     def state(self) -> AircraftState:
         """The state now, in the local plane."""
-        (
-            latitude_rad,
-            longitude_rad,
-            read_up_ft,
-            read_north_fps,
-            read_east_fps,
-            climb_fps,
-            true_heading_rad,
-            read_roll_rad,
-            pitch_rad,
-            read_airspeed_fps,
-            load_factor,
-            throttle,
-            read_elevator,
-            pitch_trim,
-            read_aileron,
-            roll_trim,
-            read_rudder,
-            yaw_trim,
-            read_alpha_rad,
-        ) = self._read  # the functions that read them: to collect what they return first takes half as long again
+        # The functions that read them: to collect what they return first takes half as long again.
+        latitude_rad, longitude_rad, read_up_ft, read_north_fps, read_east_fps, climb_fps, *others = (
+            self._read
+        )
+        true_heading_rad, read_roll_rad, pitch_rad, read_airspeed_fps, load_factor, throttle, *others = others
+        read_elevator, pitch_trim, read_aileron, roll_trim, read_rudder, yaw_trim, read_alpha_rad = others
         up_ft, north_fps, east_fps = read_up_ft(), read_north_fps(), read_east_fps()
         roll_rad, airspeed_fps, alpha_rad = read_roll_rad(), read_airspeed_fps(), read_alpha_rad()
         elevator, aileron = read_elevator() + pitch_trim(), read_aileron() + roll_trim()
@@ -180,10 +180,7 @@ class JsbsimModel:
         return tuple.__new__(AircraftState, values)  # three times as fast as by name
 
     def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
-        """Sets what the inner loops hold.
-
-        Keeps the wind's direction steady in the local plane, with the convergence of the last `state`.
-        """
+        """Sets what the inner loops hold, and the wind's direction, steady in the local plane."""
         roll, altitude, airspeed = self._write
         roll(roll_rad)
         altitude(altitude_m / FOOT_M)
@@ -233,14 +230,13 @@ class JsbsimModel:
 
     def _set_up_autopilot(self, climb_limit_mps: float | None) -> None:
         """Gives the autopilot its gains and the trim that they hold for."""
-        fdm = self._fdm
-        values = self.airframe.gains.properties()
+        fdm, frame = self._fdm, self.airframe
+        values = frame.gains.properties()
         if climb_limit_mps is not None:
             values["wayproof/gain/climb-limit-fps"] = climb_limit_mps / FOOT_M
         for control in CONTROLS:
             values[f"wayproof/trim/{control}-norm"] = fdm[f"fcs/{control}-cmd-norm"]
         values["wayproof/trim/pitch-rad"] = fdm["attitude/theta-rad"]
-        frame = self.airframe
         least_deg, most_deg = frame.autopilot.pitch_limits_deg
         values["wayproof/limit/least-pitch-rad"] = math.radians(least_deg)
         values["wayproof/limit/most-pitch-rad"] = math.radians(most_deg)
@@ -296,7 +292,7 @@ class JsbsimModel:
 
     def _apply_wind(self) -> None:
         """Writes the wind of now: towards true east and north, and down."""
-        write_east, write_north = self._write_wind
+        write_east, write_north, write_down = self._write_wind
         east_fps, north_fps = self._wind_true()
         down_fps = 0.0
         if self._vertical_gusts is not None:
@@ -312,7 +308,7 @@ class JsbsimModel:
         write_east(east_fps)
         write_north(north_fps)
         if self._vertical_gusts is not None or self._turbulence is not None:
-            self._write_wind_down(down_fps)
+            write_down(down_fps)
 
     def _ground_m(self, east_m: float, north_m: float) -> float:
         """Height of the ground; where it is not known, as it was last."""
@@ -336,9 +332,9 @@ class JsbsimModel:
             return
         values = {
             "atmosphere/randomseed": float(atmosphere.seed),
-            "atmosphere/turb-type": float(TURBULENCE_TYPE[model]),
+            "atmosphere/turb-type": TURBULENCE_TYPE[model],
             "atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps": TURBULENCE_W20_FPS[intensity],
-            "atmosphere/turbulence/milspec/severity": float(TURBULENCE_SEVERITY[intensity]),
+            "atmosphere/turbulence/milspec/severity": TURBULENCE_SEVERITY[intensity],
         }
         for path, value in values.items():
             node(self._fdm, path).set_double_value(value)

@@ -1,21 +1,35 @@
-"""Where an aircraft's JSBSim files lie, and a digest of all that its flight depends on."""
+"""Where an aircraft's JSBSim files lie, what keeps them from being loaded, and a digest of what a flight depends on.
+
+JSBSim reads XML with nothing to bound it: a deep file overflows its stack, and what a file refers to may lie anywhere.
+So somebody's folder is looked through first, its XML by expat, without building a tree.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+import xml.parsers.expat as expat
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
-from pathlib import Path
+from itertools import islice
+from pathlib import Path, PurePath
 
-from aircraft.actuators.actuator import NormActuator
+from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation
-from aircraft.foreign_model import faults
 
 OWN = Path(__file__).parent
+MAX_FILES = 1000
+MAX_BYTES = 5_000_000
+"""Largest size of an XML file."""
+MAX_FOLDER_BYTES = 200_000_000
+"""Largest size of all files together; all go into the digest, also those that JSBSim does not read."""
+MAX_ENTITY = 100
+MAX_DEPTH = 60
+"""Deepest nesting of elements; the deepest of JSBSim's own models has 13."""
 
 
 class AircraftError(ValueError):
@@ -28,23 +42,14 @@ class TrimError(AircraftError):
 
 @dataclass(frozen=True)
 class ModelFiles:
-    """The files of one JSBSim model.
+    """The files of one JSBSim model, and what they are flown with."""
 
-    Attributes:
-        model: its main file, <folder>/<name>.xml.
-        engines: folder that its engines and propellers are read from.
-        systems: folder that its shared systems are read from.
-        actuators: controls, and what moves each where it does not do what it is told at once.
-        deviation: by how much the flown aircraft differs; no survey is flown with it.
-        latency_s: age of the attitude, airspeed, height and climb that the autopilot works with.
-    """
-
-    model: Path
-    engines: Path
-    systems: Path
-    actuators: tuple[tuple[str, NormActuator], ...] = ()
-    deviation: Deviation = AS_MODELLED
-    latency_s: float = 0.0
+    model: Path  # <folder>/<name>.xml
+    engines: Path  # folder of its engines and propellers
+    systems: Path  # folder of its shared systems
+    actuators: tuple[tuple[str, NormActuator], ...] = ()  # controls that do not do what they are told at once
+    deviation: Deviation = AS_MODELLED  # of the flown aircraft; no survey is flown with it
+    latency_s: float = 0.0  # age of the attitude, airspeed, height and climb that the autopilot works with
 
     @property
     def name(self) -> str:
@@ -63,9 +68,11 @@ class ModelFiles:
         known = (self.model.parent, OWN, _wheel())
         shared = {each for each in (self.engines, self.systems) if not any(map(each.is_relative_to, known))}
         for folder in (self.model.parent, OWN, *sorted(shared)):
-            for path in sorted(_content(folder)):
-                sha.update(f"\0{path.relative_to(folder).as_posix()}\0".encode())
-                sha.update(path.read_bytes())
+            for path in sorted(each for each in folder.rglob("*") if each.is_file() and each.suffix != ".md"):
+                place = path.relative_to(folder)
+                if not any(part.startswith((".", "__")) for part in place.parts):
+                    sha.update(f"\0{place.as_posix()}\0".encode())
+                    sha.update(path.read_bytes())
         return sha.hexdigest()
 
 
@@ -80,12 +87,14 @@ def model_files(name: str) -> ModelFiles:
         AircraftError: there is no such model.
     """
     wheel = _wheel()
-    if Path(name).name == name:
-        for home in (OWN, wheel / "aircraft"):
+    folder = None
+    with suppress(OSError, RuntimeError):  # too long, not allowed, or the home of nobody
+        for home in (OWN, wheel / "aircraft") if Path(name).name == name else ():
             main = home / name / f"{name}.xml"
             if main.is_file():
                 return _with_engines(main, wheel)
-    folder = _folder(name)
+        if Path(name).expanduser().is_dir():
+            folder = Path(name).expanduser().resolve()
     if folder is None:
         raise AircraftError(f"unknown aircraft {name[:100]!r}")
     _refuse(folder)
@@ -96,19 +105,63 @@ def model_files(name: str) -> ModelFiles:
     return found
 
 
-def _folder(name: str) -> Path | None:
-    """The folder that a name means; None if it means none."""
-    try:
-        folder = Path(name).expanduser()
-        return folder.resolve() if folder.is_dir() else None
-    except (OSError, RuntimeError):  # too long, not allowed, or the home of nobody
-        return None
-
-
 def _refuse(folder: Path) -> None:
-    """Raises AircraftError if a folder holds what must not be loaded."""
-    for fault in faults(folder):
-        raise AircraftError(fault)
+    """Raises AircraftError if a folder holds what must not be loaded. Only regular files are opened."""
+    found = (Path(home, name) for home, inner, names in os.walk(folder) for name in sorted((*inner, *names)))
+    size = 0
+    for number, path in enumerate(islice(found, MAX_FILES + 1)):
+        if number == MAX_FILES:
+            raise AircraftError(
+                f"{folder}: has more than {MAX_FILES} files; must be the folder of one aircraft"
+            )
+        if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+            raise AircraftError(
+                f"{path}: is a link that leads out of the folder; must be a file or folder in it"
+            )
+        if not path.is_file():
+            continue
+        size += path.stat().st_size
+        if size > MAX_FOLDER_BYTES:
+            told = f"{size / 1e6:.0f} MB; must be at most {MAX_FOLDER_BYTES // 10**6} MB together"
+            raise AircraftError(f"{path}: with it the files of {folder} have {told}")
+        if path.suffix.lower() == ".xml":
+            _refuse_file(path)
+
+
+def _refuse_file(path: Path) -> None:
+    """Raises AircraftError if an XML file is large or deep, refers to other places, or has entities that grow."""
+    if path.stat().st_size > MAX_BYTES:
+        raise AircraftError(f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a JSBSim file")
+    parser, depth = expat.ParserCreate(), 0
+
+    def fault(said: str) -> AircraftError:
+        return AircraftError(f"{path}:{parser.CurrentLineNumber}: {said}")
+
+    def begin(name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > MAX_DEPTH:
+            raise fault(f"is nested deeper than {MAX_DEPTH} elements; must be flatter")
+        file = PurePath(attributes.get("file", ""))
+        if file.is_absolute() or ".." in file.parts:
+            told = f'<{name:.40} file="{str(file)[:80]}"> leads out of the folder'
+            raise fault(f"{told}; copy the file into it and give its name")
+
+    def end(name: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    def entity(name: str, parameter: bool, value: str | None, *_: object) -> None:
+        if parameter or value is None or "&" in value or len(value) > MAX_ENTITY:
+            raise fault(f"declares the entity {name:.40}, which is not a short text of its own; write it out")
+
+    parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = begin, end, entity
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except expat.ExpatError:
+        return  # whoever loads the model says where it is broken
+    except OSError as error:
+        raise AircraftError(f"{path}: cannot be read ({error.strerror})") from None
 
 
 @cache
@@ -124,44 +177,30 @@ def _main_file(folder: Path) -> Path:
     main = folder / f"{folder.name}.xml"
     if main.is_file():
         return main
-    models = [path for path in sorted(folder.glob("*.xml")) if _root_tag(path) == "fdm_config"]
+    models = [path for path in sorted(folder.glob("*.xml")) if _root(path).tag == "fdm_config"]
     if len(models) == 1:
         return models[0]
     have = "no JSBSim model" if not models else f"{len(models)} JSBSim models"
     raise AircraftError(f"{folder} holds {have}; must hold {folder.name}.xml with the root <fdm_config>")
 
 
-def _root_tag(path: Path) -> str:
-    try:
-        return str(next(element.tag for _, element in ElementTree.iterparse(path, events=("start",))))
-    except (ElementTree.ParseError, OSError):
-        return ""
+def _root(path: Path) -> ElementTree.Element:
+    """The root element of a file, of a broken one up to there: whoever loads the model says where it is broken."""
+    root = ElementTree.Element("broken")
+    with suppress(ElementTree.ParseError, OSError, StopIteration):
+        elements = ElementTree.iterparse(path, events=("start",))
+        _, root = next(elements)
+        for _ in elements:
+            pass
+    return root
 
 
 def _with_engines(main: Path, wheel: Path) -> ModelFiles:
     """Engines beside the model or in the tree that it is part of go before those of the wheel."""
-    tree = main.parent.parent.parent
-    wanted = _engine_names(main)
+    root, tree = _root(main), main.parent.parent.parent
+    named = (*root.iterfind("propulsion/engine"), *root.iterfind("propulsion/engine/thruster"))
+    wanted = {file.removesuffix(".xml") for element in named if (file := element.get("file"))}
     places = (main.parent, main.parent / "engine", tree / "engine")
     near = (place for place in places if wanted and all((place / f"{e}.xml").is_file() for e in wanted))
     systems = tree / "systems" if (tree / "systems").is_dir() else wheel / "systems"
     return ModelFiles(main, next(near, wheel / "engine"), systems)
-
-
-def _engine_names(main: Path) -> set[str]:
-    try:
-        root = ElementTree.parse(main).getroot()
-    except ElementTree.ParseError:
-        return set()  # whoever loads the model says where it is broken
-    named = (*root.iterfind("propulsion/engine"), *root.iterfind("propulsion/engine/thruster"))
-    return {file.removesuffix(".xml") for element in named if (file := element.get("file"))}
-
-
-def _content(folder: Path) -> Iterator[Path]:
-    return (
-        path
-        for path in folder.rglob("*")
-        if path.is_file()
-        and path.suffix != ".md"
-        and not any(part.startswith((".", "__")) for part in path.relative_to(folder).parts)
-    )

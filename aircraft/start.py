@@ -7,24 +7,20 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from aircraft.properties import FOOT_M, TURBULENCE_W20_FPS
+from aircraft.interface import FOOT_M
+
+TURBULENCE_W20_FPS = {"light": 25.0, "moderate": 50.0, "severe": 75.0}
+"""Wind at 20 ft of MIL-F-8785C: 15, 30 and 45 knots."""
 
 
 @dataclass(frozen=True)
 class VerticalGusts:
-    """Discrete vertical gusts one after the other, upwards and downwards in turn, each 1 - cosine (CS 25.341).
+    """Discrete vertical gusts one after the other, upwards and downwards in turn, each 1 - cosine (CS 25.341)."""
 
-    Attributes:
-        speed_mps: of a gust at its strongest.
-        duration_s: of one gust.
-        every_s: from the beginning of one to that of the next.
-        start_s: when the first begins, upwards.
-    """
-
-    speed_mps: float
-    duration_s: float
-    every_s: float
-    start_s: float = 0.0
+    speed_mps: float  # of a gust at its strongest
+    duration_s: float  # of one gust
+    every_s: float  # from the beginning of one to that of the next
+    start_s: float = 0.0  # when the first begins, upwards
 
     def up_mps(self, time_s: float) -> float:
         """How fast the air rises at a time."""
@@ -92,27 +88,17 @@ def profile_share(height_m: float, measured_at_m: float) -> float:
 
 @dataclass(frozen=True)
 class Atmosphere:
-    """Wind, gusts and turbulence.
+    """Wind, gusts and turbulence."""
 
-    Attributes:
-        wind_east_mps, wind_north_mps: wind at time 0 in the local plane, the direction it blows towards.
-        turbulence: "tustin", "milspec" or None.
-        intensity: "light", "moderate" or "severe"; None exactly if `turbulence` is.
-        seed: of the turbulence, 0 to 2^31 - 1.
-        changes: (time s, east m/s, north m/s) rows, time rising from above 0: the wind goes over linearly from one to
-            the next, and stays as the last has it.
-        measured_at_m: height over ground at which the wind is as told, which has the profile of `profile_share`;
-            None: it is the same at all heights.
-        vertical_gusts: discrete gusts, or None.
-    """
-
-    wind_east_mps: float = 0.0
+    wind_east_mps: float = 0.0  # at time 0 in the local plane, the direction it blows towards
     wind_north_mps: float = 0.0
-    turbulence: str | None = None
-    intensity: str | None = None
-    seed: int = 0
+    turbulence: str | None = None  # tustin or milspec
+    intensity: str | None = None  # light, moderate or severe; None exactly if `turbulence` is
+    seed: int = 0  # of the turbulence, 0 to 2^31 - 1
     changes: tuple[tuple[float, float, float], ...] = ()
+    """(time s, east m/s, north m/s), time rising from above 0: the wind goes over linearly, and stays as the last."""
     measured_at_m: float | None = None
+    """Height over ground at which a wind with the profile of `profile_share` is as told; None: the same everywhere."""
     vertical_gusts: VerticalGusts | None = None
 
     def __post_init__(self) -> None:
@@ -147,20 +133,13 @@ class Atmosphere:
 
 @dataclass(frozen=True)
 class StartConditions:
-    """Straight level flight in the local plane.
-
-    Attributes:
-        east_m, north_m: position.
-        altitude_m: above mean sea level.
-        course_rad: direction over the ground, clockwise from the plane's north.
-        airspeed_mps: true airspeed.
-    """
+    """Straight level flight in the local plane."""
 
     east_m: float
     north_m: float
-    altitude_m: float
-    course_rad: float
-    airspeed_mps: float
+    altitude_m: float  # above mean sea level
+    course_rad: float  # over the ground, clockwise from the plane's north
+    airspeed_mps: float  # true
 
     def __post_init__(self) -> None:
         for f in fields(self):

@@ -119,8 +119,8 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("jsbsim_model",),
         ("envelope", "jsbsim_loading"),
         ("airframe", "injection", "start"),
-        ("autopilot", "frames", "guidance", "model_files", "properties"),
-        ("actuators", "deviation", "foreign_model", "kernels", "route"),
+        ("autopilot", "frames", "guidance", "model_files"),
+        ("actuators", "deviation", "kernels", "route"),
         ("interface",),
     ),
     "harness": (

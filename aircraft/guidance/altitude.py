@@ -24,19 +24,12 @@ SPEED_CHANGE_PER_S = 0.02
 
 @dataclass(frozen=True, eq=False)
 class VerticalProfile:
-    """Altitude and airspeed along a route.
+    """Altitude and airspeed along a route."""
 
-    Attributes:
-        arc_length_m: (k,) along the route, not falling.
-        altitude_m: (k,) above mean sea level there; linear in between, level beyond the ends.
-        speed_from_m: (j,) along the route, not falling; the first is 0.
-        airspeed_mps: (j,) true airspeed from there on.
-    """
-
-    arc_length_m: FloatArray
-    altitude_m: FloatArray
-    speed_from_m: FloatArray
-    airspeed_mps: FloatArray
+    arc_length_m: FloatArray  # (k,) along the route, not falling
+    altitude_m: FloatArray  # (k,) above mean sea level there; linear in between, level beyond the ends
+    speed_from_m: FloatArray  # (j,) along the route, not falling; the first is 0
+    airspeed_mps: FloatArray  # (j,) true airspeed from there on
 
     @property
     def level(self) -> bool:
@@ -84,7 +77,7 @@ def slewed(airspeeds_mps: FloatArray, time_s: FloatArray, before_mps: float) -> 
 
 
 class LevelFlight:
-    """One altitude and one airspeed all along. Implements `VerticalLaw`."""
+    """One altitude and one airspeed all along."""
 
     def __init__(self, altitude_m: float, airspeed_mps: float) -> None:
         self._held = altitude_m, airspeed_mps
@@ -95,7 +88,7 @@ class LevelFlight:
 
 
 class AltitudeGuidance:
-    """Commands altitude and airspeed so that the inner loops fly a profile. Implements `VerticalLaw`.
+    """Commands altitude and airspeed so that the inner loops fly a profile, by the believed state.
 
     The inner loop climbs at its gain times the altitude error. The command is put where that gives the climb of the
     profile, plus what takes the present error back, within what the aircraft can climb and sink at its airspeed. A
@@ -110,7 +103,7 @@ class AltitudeGuidance:
         self._level = profile.level
 
     def command(self, state: AircraftState, arc_length_m: float) -> tuple[float, float]:
-        """Altitude above mean sea level and true airspeed to be held until the next update."""
+        """Altitude above mean sea level (m) and true airspeed (m/s) to be held until the next update."""
         if self._level:
             return float(self._profile.altitude_m[0]), self._airspeed_mps
         here, ahead = np.array(arc_length_m), np.array(arc_length_m + LEAD_S * state.groundspeed_mps)

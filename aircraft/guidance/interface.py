@@ -15,28 +15,17 @@ command is held for half an update more, which the preview makes up for."""
 
 @dataclass(frozen=True)
 class GuidanceLimits:
-    """What guidance may ask of an aircraft.
+    """What guidance may ask of an aircraft."""
 
-    Attributes:
-        airspeed_mps: true airspeed that the autopilot holds.
-        max_airspeed_mps: fastest level flight.
-        bank_limit_rad: largest roll command.
-        roll_rate_radps: fastest change of the roll command.
-        roll_lag_s: time constant of roll behind its command; the command leads by it.
-        roll_delay_s: further delay of roll (actuators, the roll mode).
-        bandwidth_radps: natural frequency omega of the cross-track correction, about a third of 1 / roll_lag_s.
-        turn_rate_share: turn rate in a steady turn over that of a coordinated one, g tan(bank) / V. It is less than 1
-            where a side force acts outwards, as on an aircraft that slips in turns.
-    """
-
-    airspeed_mps: float
-    max_airspeed_mps: float
-    bank_limit_rad: float
-    roll_rate_radps: float
-    roll_lag_s: float
-    roll_delay_s: float
-    bandwidth_radps: float
+    airspeed_mps: float  # true, that the autopilot holds
+    max_airspeed_mps: float  # fastest level flight
+    bank_limit_rad: float  # largest roll command
+    roll_rate_radps: float  # fastest change of the roll command
+    roll_lag_s: float  # time constant of roll behind its command; the command leads by it
+    roll_delay_s: float  # further delay of roll: actuators, the roll mode
+    bandwidth_radps: float  # natural frequency of the cross-track correction, about a third of 1 / roll_lag_s
     turn_rate_share: float = 1.0
+    """Turn rate in a steady turn over that of a coordinated one, g tan(bank) / V; less for an aircraft that slips."""
 
     @property
     def slowest_roll_s(self) -> float:
@@ -52,18 +41,12 @@ class GuidanceLimits:
 class GuidanceOutput(NamedTuple):
     """One decision of a guidance law."""
 
-    roll_command_rad: float
-    """Held until the next update, positive right wing down."""
-    cross_track_m: float
-    """Distance from the route, positive to its right."""
-    arc_length_m: float
-    """Distance along the route of the nearest point; grows on in a loiter."""
-    bank_saturated: bool
-    """The bank limit cut the command."""
-    past_end: bool
-    """The aircraft is past the end of the route and goes straight on along its last tangent."""
-    airspeed_mps: float = math.nan
-    """True airspeed that the law asks for; NaN: that of the mission."""
+    roll_command_rad: float  # held until the next update, positive right wing down
+    cross_track_m: float  # distance from the route, positive to its right
+    arc_length_m: float  # of the nearest point along the route; grows on in a loiter
+    bank_saturated: bool  # the bank limit cut the command
+    past_end: bool  # past the end of the route, straight on along its last tangent
+    airspeed_mps: float = math.nan  # true, that the law asks for; NaN: that of the mission
 
     def airspeed_or(self, held_mps: float) -> float:
         """The airspeed to be commanded (m/s): what the law asks for, else what the mission holds."""
@@ -77,40 +60,9 @@ class GuidanceLaw(Protocol):
     """
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
-        """Takes a new route; the roll command goes on from its present value.
-
-        Args:
-            route: what to fly.
-            arc_length_m: where on it to begin looking for the nearest point, m from its start.
-        """
+        """Takes a new route, whose nearest point is looked for from an arc length on; roll goes on from where it is."""
         ...
 
     def update(self, state: AircraftState) -> GuidanceOutput:
-        """Decides the roll command for the next update interval.
-
-        Args:
-            state: the aircraft now.
-
-        Returns:
-            Roll command, and where the aircraft is relative to the route.
-
-        Raises:
-            RuntimeError: there is no route yet.
-        """
-        ...
-
-
-class VerticalLaw(Protocol):
-    """Says at which altitude and airspeed the aircraft flies, asked `UPDATE_RATE_HZ` times a second.
-
-    One object serves one flight. It gets the believed state.
-    """
-
-    def command(self, state: AircraftState, arc_length_m: float) -> tuple[float, float]:
-        """Altitude above mean sea level (m) and true airspeed (m/s) to be held until the next update.
-
-        Args:
-            state: the aircraft now.
-            arc_length_m: distance of the aircraft along the route; NaN before the first route.
-        """
+        """Decides the roll command for the next update interval; RuntimeError if there is no route yet."""
         ...

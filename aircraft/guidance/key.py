@@ -17,13 +17,7 @@ def key(
 ) -> Any:
     """A field of a frozen dataclass with the metadata that scenario files are checked with.
 
-    Args:
-        default: what it is where nobody says it; None where that depends on the aircraft.
-        doc: what it is, and what its default comes from.
-        unit: of the number; None for a switch.
-        minimum: least value.
-        above: every value must be larger than this.
-        maximum: largest value.
+    A default of None depends on the aircraft; `doc` says what that comes from; a switch has no unit.
     """
     metadata = {"doc": doc, "unit": unit, "minimum": minimum, "above": above, "maximum": maximum}
     return field(

@@ -16,17 +16,12 @@ class PathPoint(NamedTuple):
 
     east_m: float
     north_m: float
-    tangent_east: float
-    """Unit tangent in the direction of flight."""
+    tangent_east: float  # unit tangent in the direction of flight
     tangent_north: float
-    curvature_1pm: float
-    """Positive for a left turn."""
-    cross_track_m: float
-    """Distance of the aircraft from the route, positive to its right."""
-    arc_length_m: float
-    """Distance along the route; grows on in a loiter."""
-    past_end: bool
-    """The route is flown out: the point lies on its last tangent, beyond the end."""
+    curvature_1pm: float  # positive for a left turn
+    cross_track_m: float  # distance of the aircraft from the route, positive to its right
+    arc_length_m: float  # along the route; grows on in a loiter
+    past_end: bool  # the route is flown out: the point lies on its last tangent, beyond the end
 
 
 class RouteProgress:

@@ -13,7 +13,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from aircraft.actuators.actuator import Actuators
+from aircraft.actuators import Actuators
 from aircraft.airframe import Airframe
 from aircraft.airframes import airframe
 from aircraft.envelope import performance

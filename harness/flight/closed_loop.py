@@ -8,7 +8,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput, VerticalLaw
+from aircraft.guidance.altitude import AltitudeGuidance, LevelFlight
+from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput
 from aircraft.guidance.progress import measures_itself
 from aircraft.interface import FlightModel
 from harness.files.crash import sentence, trace
@@ -57,7 +58,7 @@ class Loop:
     guidance: GuidanceLaw
     termination: Termination
     mission: Mission
-    vertical: VerticalLaw
+    vertical: LevelFlight | AltitudeGuidance
     scan_rate_hz: float
     navigator: StateEstimator = field(default_factory=PerfectEstimator)
 

@@ -40,7 +40,7 @@ def airframe_of(spec: AircraftSpec) -> Airframe:
     Raises:
         AircraftError: there is none, or it cannot be flown.
     """
-    from aircraft.actuators.actuator import Actuator, Actuators
+    from aircraft.actuators import Actuator, Actuators
     from aircraft.airframe import DERIVED, AutopilotKeys
     from aircraft.airframes import airframe
 

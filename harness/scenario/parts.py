@@ -106,7 +106,7 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
         KeyFault: the law does not track with this aircraft, or raised an exception.
     """
     from aircraft.airframes import AircraftError
-    from aircraft.law_cards.cards import law_card
+    from aircraft.law_cards import law_card
 
     kind, config = _kind_and_config(spec)
     waypoints = spec.follow == "waypoints"

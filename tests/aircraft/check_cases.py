@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from aircraft.interface import FOOT_M as FOOT_M
 from aircraft.jsbsim_loading import load
 from aircraft.model_files import model_files
-from aircraft.properties import FOOT_M as FOOT_M
 
 SECONDS = 30.0
 EARTH_DEGPS = 0.004178073

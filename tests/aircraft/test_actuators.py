@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from aircraft.actuators.actuator import Actuator, Actuators
+from aircraft.actuators import Actuator, Actuators
 from aircraft.airframes import AircraftError, airframe
 from aircraft.autopilot import NEEDED_DEG, gains, pitch_margin_deg, roll_margin_deg
 from aircraft.deviation import Deviation

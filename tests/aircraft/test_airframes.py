@@ -21,8 +21,11 @@ def test_known_aircraft() -> None:
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(AircraftError, match=r"unknown aircraft 'nope'; known are: aerosonde, ultrastick25e"):
-        airframe("nope")
+    for name in ("nope", "x" * 300, "~nobody/nope"):
+        with pytest.raises(
+            AircraftError, match=r"unknown aircraft '.*'; known are: aerosonde, ultrastick25e"
+        ):
+            airframe(name)
 
 
 def test_turn_radius_of_the_aerosonde() -> None:

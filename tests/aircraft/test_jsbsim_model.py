@@ -15,8 +15,7 @@ import pytest
 from aircraft.airframes import AircraftError, airframe
 from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState
-from aircraft.jsbsim_model import JsbsimModel
-from aircraft.properties import STATE_PROPERTIES
+from aircraft.jsbsim_model import STATE_PROPERTIES, JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
 
 PLANE = LocalPlane(47.0, 8.0)

@@ -8,14 +8,13 @@ from typing import Any
 
 import pytest
 
+from aircraft import law_cards
 from aircraft.airframes import airframe
 from aircraft.envelope import LawCard, WindPoint, performance
 from aircraft.guidance.interface import GuidanceLimits, GuidanceOutput
 from aircraft.guidance.progress import RouteProgress
 from aircraft.guidance.registry import GuidanceKind, guidance_kinds
 from aircraft.interface import AircraftState, Route
-from aircraft.law_cards import cards, law_survey
-from aircraft.law_cards.cards import law_card
 from aircraft.model_files import AircraftError
 from tests.longer import longer
 
@@ -24,14 +23,14 @@ AEROSONDE = airframe("aerosonde")
 
 @pytest.fixture(autouse=True)
 def _own_cache(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cards, "_kept", {})
+    monkeypatch.setattr(law_cards, "_kept", {})
 
 
 @pytest.fixture
 def _calm_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Cards of calm air alone, kept elsewhere."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(law_survey, "WIND_SHARES", (0.0,))
+    monkeypatch.setattr(law_cards, "WIND_SHARES", (0.0,))
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,8 @@ class Straight:
 @pytest.mark.usefixtures("_calm_only")
 def test_preview_at_its_defaults_has_the_card_of_the_survey() -> None:
     preview = guidance_kinds()["preview"]
-    assert law_card(AEROSONDE, preview, preview.config()) is None
-    slow = law_card(AEROSONDE, preview, preview.config(bandwidth_radps=0.7))
+    assert law_cards.law_card(AEROSONDE, preview, preview.config()) is None
+    slow = law_cards.law_card(AEROSONDE, preview, preview.config(bandwidth_radps=0.7))
     assert slow is not None
     assert slow.points[0].error_m > AEROSONDE.weave_error_m
 
@@ -66,7 +65,7 @@ def test_preview_at_its_defaults_has_the_card_of_the_survey() -> None:
 @pytest.mark.parametrize("kind", ["pure_pursuit", *longer(["npfg", "l1", "vector_field"])])
 def test_laws_that_autopilots_fly_track_and_their_error_is_kept_from_obstacles(kind: str) -> None:
     law = guidance_kinds()[kind]
-    card = law_card(AEROSONDE, law, law.config())
+    card = law_cards.law_card(AEROSONDE, law, law.config())
     assert card is not None
     assert [point.wind_share for point in card.points] == [0.0, 0.3, 0.6]
     for wind_mps in (0.0, 7.5):
@@ -91,7 +90,7 @@ def test_between_winds_a_card_is_linear_and_beyond_them_its_error_grows() -> Non
 @pytest.mark.usefixtures("_calm_only")
 def test_a_slow_law_gets_wider_turns() -> None:
     l1 = guidance_kinds()["l1"]
-    usual, slow = (law_card(AEROSONDE, l1, l1.config(period_s=period)) for period in (17.0, 60.0))
+    usual, slow = (law_cards.law_card(AEROSONDE, l1, l1.config(period_s=period)) for period in (17.0, 60.0))
     assert usual is not None
     assert slow is not None
     assert slow.points[0].radius_factor > usual.points[0].radius_factor
@@ -104,7 +103,7 @@ def test_a_law_that_does_not_track_is_refused() -> None:
     with pytest.raises(
         AircraftError, match="the guidance law straight does not track with aerosonde: on turns"
     ):
-        law_card(AEROSONDE, kind, NoKeys())
+        law_cards.law_card(AEROSONDE, kind, NoKeys())
 
 
 @pytest.mark.usefixtures("_calm_only")
@@ -112,12 +111,12 @@ def test_a_card_is_kept_and_one_of_wrong_content_is_made_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kind = guidance_kinds()["pure_pursuit"]
-    card = law_card(AEROSONDE, kind, kind.config())
+    card = law_cards.law_card(AEROSONDE, kind, kind.config())
     (file,) = (tmp_path / "wayproof").glob("*law*.json")
-    monkeypatch.setattr(cards, "_kept", {})
+    monkeypatch.setattr(law_cards, "_kept", {})
     with monkeypatch.context() as patched:
-        patched.setattr(law_survey, "weave", None)  # nothing is flown
-        assert law_card(AEROSONDE, kind, kind.config()) == card
+        patched.setattr(law_cards, "weave", None)  # nothing is flown
+        assert law_cards.law_card(AEROSONDE, kind, kind.config()) == card
     file.write_text(file.read_text().replace('"error_m": ', '"error_m": -'))
-    monkeypatch.setattr(cards, "_kept", {})
-    assert law_card(AEROSONDE, kind, kind.config()) == card
+    monkeypatch.setattr(law_cards, "_kept", {})
+    assert law_cards.law_card(AEROSONDE, kind, kind.config()) == card

@@ -15,7 +15,7 @@ LEAN = sorted(
         for path in (ROOT / "aircraft").rglob("*.py")
         if path.stem != "__init__"
     }
-    - {"aircraft.jsbsim_loading", "aircraft.jsbsim_model", "aircraft.survey", "aircraft.law_cards.law_survey"}
+    - {"aircraft.jsbsim_loading", "aircraft.jsbsim_model", "aircraft.survey"}
     - {"aircraft.climb", "aircraft.kernels", "aircraft.trials"}
 )
 

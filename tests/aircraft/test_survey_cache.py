@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 import wayproof
-from aircraft import airframes
-from aircraft.law_cards import cards
+from aircraft import airframes, law_cards
 from aircraft.model_files import model_files
 
 
@@ -21,7 +20,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _forget() -> None:
     airframes.airframe.cache_clear()
-    cards._kept.clear()
+    law_cards._kept.clear()
 
 
 def _digest(**changes: object) -> str:

@@ -21,7 +21,7 @@ from aircraft.airframe import Airframe
 from aircraft.airframes import AircraftError, airframe
 from aircraft.envelope import performance
 from aircraft.guidance.registry import guidance_kinds
-from aircraft.law_cards.cards import law_card
+from aircraft.law_cards import law_card
 from harness.analysis.metrics import metrics
 from harness.bench.tracking import CASES
 from harness.certification.bounds import clopper_pearson

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from typing import Final
 
-from aircraft.actuators.actuator import Actuator, Actuators
+from aircraft.actuators import Actuator, Actuators
 from aircraft.interface import STEP_RATE_HZ
 from harness.bench.tracking import CASES, Tracking, tracked
 from tests.closed_loop.laws_table import LAWS

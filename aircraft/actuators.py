@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, fields
 
 CONTROLS = ("aileron", "elevator", "rudder", "throttle")
+"""The command of each is fcs/<control>-cmd-norm."""
 
 THROTTLE_TRAVEL_DEG = 60.0
 """Travel of the servo's arm from idle to full throttle."""
@@ -13,17 +14,11 @@ THROTTLE_TRAVEL_DEG = 60.0
 
 @dataclass(frozen=True)
 class Actuator:
-    """One servo.
-
-    Attributes:
-        lag_s: time constant of the first-order lag of the surface behind its command.
-        rate_limit_degps: fastest motion of the surface; None: no limit.
-        deadband_deg: width of the band about the trim in which a command moves nothing.
-    """
+    """One servo: time constant of its first-order lag, fastest motion, width of the band in which nothing moves."""
 
     lag_s: float = 0.0
-    rate_limit_degps: float | None = None
-    deadband_deg: float = 0.0
+    rate_limit_degps: float | None = None  # None: no limit
+    deadband_deg: float = 0.0  # about the trim
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.lag_s <= 10.0:
@@ -33,32 +28,19 @@ class Actuator:
         if not 0.0 <= self.deadband_deg <= 90.0:
             raise ValueError(f"deadband_deg is {self.deadband_deg!r}; must be from 0 to 90")
 
-    @property
-    def ideal(self) -> bool:
-        """Whether it does whatever it is told at once."""
-        return not self.lag_s and self.rate_limit_degps is None and not self.deadband_deg
-
     def of_command(self, travel_deg: float) -> NormActuator:
         """The same in units of the command, for a surface that moves by so much for a command of 1."""
-        rate = self.rate_limit_degps
-        return NormActuator(
-            self.lag_s, None if rate is None else rate / travel_deg, self.deadband_deg / travel_deg
-        )
+        rate = None if self.rate_limit_degps is None else self.rate_limit_degps / travel_deg
+        return NormActuator(self.lag_s, rate, self.deadband_deg / travel_deg)
 
 
 @dataclass(frozen=True)
 class NormActuator:
-    """A servo in units of the normalised command.
-
-    Attributes:
-        lag_s: time constant.
-        rate_limit_1ps: fastest change of the command, 1/s; None: no limit.
-        deadband: width of the band about the trim.
-    """
+    """A servo in units of the normalised command."""
 
     lag_s: float
-    rate_limit_1ps: float | None
-    deadband: float
+    rate_limit_1ps: float | None  # None: no limit
+    deadband: float  # about the trim
 
 
 @dataclass(frozen=True)
@@ -78,5 +60,5 @@ class Actuators:
     @property
     def real(self) -> dict[str, Actuator]:
         """Those that are not ideal, by control."""
-        every = ((each.name, getattr(self, each.name)) for each in fields(self))
-        return {name: actuator for name, actuator in every if actuator and not actuator.ideal}
+        every = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: servo for name, servo in every.items() if servo not in (None, Actuator())}

@@ -1,0 +1,140 @@
+"""How each guidance law tracks with an aircraft, which planning allows for: cards, flown and kept.
+
+A law flies lines and arcs, in calm air and in wind, at ever wider turns until it stays near them: planning then gives
+it turns of that radius, and keeps its error from obstacles. What `preview` does at its defaults is in the survey.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import asdict, replace
+from hashlib import sha256
+from inspect import getsourcefile
+from pathlib import Path
+from typing import Any
+
+from aircraft.airframe import Airframe
+from aircraft.card_cache import cached
+from aircraft.envelope import LawCard, WindPoint, performance
+from aircraft.guidance.interface import GuidanceLaw
+from aircraft.guidance.preview import PreviewConfig
+from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind, installed_kinds
+from aircraft.guidance.waypoints import waypoint_law
+from aircraft.model_files import AircraftError, ModelFiles
+from aircraft.route import weave
+
+WIND_SHARES = (0.0, 0.3, 0.6)
+"""Winds that are flown, along the weave and against it, over the airspeed."""
+RADIUS_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
+"""Turns are widened by these until the law tracks them."""
+TRACKED_SHARE = 0.1
+"""Cross-track error over turn radius up to which a law counts as tracking the turns."""
+WAYPOINTS_TRACKED_SHARE = 1.0
+"""The same where a law flies the legs between the corners of the turns, with all the bank there is at each. They are
+not widened then: the wider the arc, the further its corner lies outside."""
+CUT_SHARE = 0.05
+"""Share of the time for which the bank may be cut meanwhile."""
+SLOWEST_SHARE = 4.0
+"""A weave is given up after this many times the time it takes."""
+
+
+def law_card(
+    frame: Airframe,
+    kind: GuidanceKind,
+    config: Any,
+    airspeed_mps: float | None = None,
+    waypoints: bool = False,
+    acceptance_radius_m: float | None = None,
+    before_flying: Callable[[], object] = bool,
+) -> LawCard | None:
+    """The card of a law with its keys, flown unless that has been done before; `before_flying` is called first then.
+
+    Returns:
+        The card; None for `preview` at its defaults, which the survey of the aircraft has.
+
+    Raises:
+        AircraftError: the law does not track with this aircraft.
+    """
+    limits = frame.guidance_limits(airspeed_mps)
+    resolved = config.resolved(limits)
+    if not waypoints and kind.kind == DEFAULT_KIND and resolved == PreviewConfig().resolved(limits):
+        return None
+    keys = json.dumps(asdict(resolved), sort_keys=True, default=repr)
+
+    def make() -> GuidanceLaw:
+        law = deepcopy(
+            kind.make(resolved, limits)
+        )  # one that was given as an object is flown as it was given
+        if not waypoints:
+            return law
+        return waypoint_law(law, kind.kind, resolved, limits, acceptance_radius_m)
+
+    def flown() -> dict[str, Any]:
+        before_flying()
+        return _measured(frame, kind.kind, limits.airspeed_mps, make, waypoints)
+
+    legs = f"waypoints {acceptance_radius_m!r}" if waypoints else ""
+    flies = repr(replace(frame, files=None))  # type: ignore[arg-type]  # the files count by their content
+    known = (flies, frame.files, kind, keys, legs, limits.airspeed_mps)
+    if known not in _kept and installed_kinds().get(kind.kind) != kind:
+        _kept[known] = _card(flown())  # nothing tells what it depends on
+    if known not in _kept:
+        file = getsourcefile(kind.make)  # one of another distribution is not in the digest of this package
+        source = Path(file).read_text("utf-8") if file else ""
+        what = (frame.files.digest(), flies, kind.kind, keys, repr(limits.airspeed_mps), source, legs)
+        digest = sha256("\0".join(what).encode()).hexdigest()
+        _kept[known] = cached(f"{frame.name}-{kind.kind}-law", digest, flown, _card)
+    return _kept[known]
+
+
+_kept: dict[tuple[str, ModelFiles, GuidanceKind, str, str, float], LawCard] = {}
+
+
+def _card(measured: dict[str, Any]) -> LawCard:
+    return LawCard(measured["kind"], tuple(WindPoint(**point) for point in measured["points"]))
+
+
+def _measured(
+    frame: Airframe, kind: str, speed_mps: float, make: Callable[[], GuidanceLaw], waypoints: bool
+) -> dict[str, Any]:
+    """The law's name, and `points`: the attributes of a `WindPoint` in every wind.
+
+    Raises:
+        AircraftError: the law does not track.
+    """
+    most = WAYPOINTS_TRACKED_SHARE if waypoints else TRACKED_SHARE
+    points: list[dict[str, float]] = []
+    factors: tuple[float, ...] = RADIUS_FACTORS[:1] if waypoints else RADIUS_FACTORS
+    for share in WIND_SHARES:
+        for factor in factors:
+            radius_m = factor * performance(frame, speed_mps, share * speed_mps).turn_radius_m
+            error_m, cut = _worst(frame, speed_mps, make, radius_m, share * speed_mps)
+            if error_m <= most * radius_m and (waypoints or cut <= CUT_SHARE):
+                break
+        else:
+            how = f" in a wind of {share:.0%} of the airspeed" if share else ""
+            how += f" on a state {frame.files.latency_s:g} s old" if frame.files.latency_s else ""
+            raise AircraftError(
+                f"the guidance law {kind} does not track with {frame.name}{how}: on turns of {factors[-1]:g} times "
+                f"the radius that the aircraft needs it is off by more than {most:.0%} of the radius, or its bank "
+                "is cut"
+            )
+        points.append({"wind_share": share, "radius_factor": factor, "error_m": float(f"{error_m:.3g}")})
+        factors = factors[factors.index(factor) :]
+    return {"kind": kind, "points": points}
+
+
+def _worst(
+    frame: Airframe, speed_mps: float, make: Callable[[], GuidanceLaw], radius_m: float, wind_mps: float
+) -> tuple[float, float]:
+    """Largest cross-track error (m) on the weave along and against a wind, and the share of the time with bank cut."""
+    from aircraft.trials import tracked  # loads JSBSim
+
+    route, worst = weave(radius_m), (0.0, 0.0)
+    for north_mps in (wind_mps, -wind_mps) if wind_mps else (0.0,):
+        most_s = SLOWEST_SHARE * float(route.segments[:, 5].sum()) / (speed_mps - abs(north_mps))
+        flown = tracked(frame, speed_mps, make(), route, north_mps, most_s)
+        worst = max(worst[0], flown[0]), max(worst[1], flown[1])
+    return worst

@@ -1,1 +1,0 @@
-"""How well each guidance law tracks with each aircraft, which planning then allows for."""
