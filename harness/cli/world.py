@@ -139,13 +139,13 @@ def _scenario(
     if found.place is not None:
         place = found.place
         area["origin"] = {"latitude_deg": place.latitude_deg, "longitude_deg": place.longitude_deg}
-    ends = {"start_m": list(found.start_m), "goal_m": list(found.goal_m)}
+    start_m, goal_m = found.ends_m.tolist()
     return {
         "schema": "wayproof/scenario/1",
         "name": re.sub(r"[^a-z0-9._-]+", "_", out.stem.lower())[:100].strip(".") or "world",
         "area": area,
         "obstacles": [{"file": _file_keys(spec, out)} for spec in found.specs],
-        "mission": {**ends, "altitude_m": float(altitude_m)},
+        "mission": {"start_m": start_m, "goal_m": goal_m, "altitude_m": float(altitude_m)},
         "aircraft": {"model": aircraft},
         **({} if clearance_m is None else {"planner": {"clearance_m": float(clearance_m)}}),
     }
@@ -199,7 +199,7 @@ def _print(found: Site, out: Path) -> None:
         "area": f"{(xmax - xmin) / 1e3:.4g} x {(ymax - ymin) / 1e3:.4g} km",
         "origin": where,
         "obstacles": f"{counted(len(solid), 'polygon')}, {inside:.0%} of the area",
-        "start to goal": f"{math.dist(found.start_m, found.goal_m) / 1e3:.4g} km",
+        "start to goal": f"{math.dist(*found.ends_m) / 1e3:.4g} km",
         "ground": "from terrain" if found.expanded.ground is not None else "not known",
         **{f"note {number}": plain(note) for number, note in enumerate(_notes(found), 1)},
     }

@@ -43,7 +43,7 @@ def test_a_file_of_a_continent_has_its_origin_where_the_area_is(tmp_path: Path) 
     # One zone's true size on the ellipsoid, and not one that the plane of a far origin would stretch.
     area_m2, _ = Geod(ellps="WGS84").geometry_area_perimeter(shapely.box(115.89, -31.91, 115.91, -31.89))
     assert polygons[0].area == pytest.approx(abs(area_m2), rel=1e-3)
-    assert math.dist(found.start_m, found.goal_m) > 5000.0
+    assert math.dist(*found.ends_m) > 5000.0
 
 
 def test_another_part_is_taken_where_the_most_crowded_has_no_room(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_a_zone_larger_than_an_area_is_flown_round_at_a_corner(tmp_path: Path) -
     (polygon,) = found.expanded.sources[0].polygons
     xmin, ymin, xmax, ymax = found.bounds_m
     assert 0.5 < polygon.area / ((xmax - xmin) * (ymax - ymin)) < 1.0
-    ends = shapely.points([found.start_m, found.goal_m])
+    ends = shapely.points(found.ends_m)
     assert (shapely.distance(ends, polygon) > CRAFT.clearance_m).all()
 
 
