@@ -5,12 +5,13 @@ Notches of outlines are filled, nothing solid is ever cut away.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
+import shapely
 
+from harness.world_files.height_field import window_of
 from harness.world_files.parts import BoolArray, Box, FloatArray, Raster
 from harness.world_files.plane import Mapping
 
@@ -31,8 +32,6 @@ def outlines(mask: BoolArray) -> tuple[list[Any], int]:
     The cell in column i and row j of a (rows, columns) mask covers i to i + 1 and j to j + 1. Of a mask so ragged that
     nobody could fly with its outlines, coarser cells are taken, each set if any of its cells is.
     """
-    import shapely
-
     factor = 1
     rows, begins, ends = _runs(mask)
     while len(rows) > MAX_RUNS:
@@ -64,8 +63,6 @@ def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -
 
     Also how many cells a side were taken together.
     """
-    import shapely
-
     rows, columns = window_of(raster, mapping, box)
     polygons, factor = outlines(solid[rows, columns])
 
@@ -78,22 +75,6 @@ def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -
     return list(shapely.transform(dense, place)), factor
 
 
-def window_of(raster: Raster, mapping: Mapping, box: Box) -> tuple[slice, slice]:
-    """Rows and columns that cover a box of the plane."""
-    share = np.linspace(0.0, 1.0, 33)
-    x, y = (low + share * (high - low) for low, high in ((box[0], box[2]), (box[1], box[3])))
-    across, along = np.meshgrid(x, box[1::2]), np.meshgrid(box[::2], y)
-    east, north = (np.concatenate((across[k].ravel(), along[k].ravel())) for k in (0, 1))
-    column, row = raster.cells(*mapping.from_plane(east, north, raster.middle_x))
-    spans = []
-    for places, size in ((row, raster.values.shape[0]), (column, raster.values.shape[1])):
-        known = np.clip(places[np.isfinite(places)], -1e9, 1e9)
-        low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
-        begin = min(max(math.floor(low) - 2, 0), size)
-        spans.append(slice(begin, max(min(math.ceil(high) + 2, size), begin)))
-    return spans[0], spans[1]
-
-
 def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     """Polygons with fewer corners that cover the given ones, which are valid.
 
@@ -101,8 +82,6 @@ def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     small notches first, until `MOST_GROWTH` of the polygon's area has been added; corners on a straight line are
     left out as well. Each of at most `PASSES` passes moves an edge by no more than the tolerance.
     """
-    import shapely
-
     given = shapely.orient_polygons(np.array(polygons, dtype=object))
     convex = shapely.area(shapely.convex_hull(given)) <= shapely.area(given) * (1.0 + 1e-12)
     result = list(given[convex])

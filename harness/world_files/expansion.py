@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import shapely
 
 from harness.files.input_file import open_regular
 from harness.files.wording import counted
@@ -132,8 +133,6 @@ def blaming(index: int) -> Iterator[None]:
 
 
 def _check_size(sources: Sequence[Source]) -> None:
-    import shapely
-
     every = [each for source in sources for each in source.polygons]
     corners = int(shapely.get_num_coordinates(np.array(every, dtype=object)).sum())
     if corners > MAX_CORNERS or len(every) > MAX_POLYGONS:
@@ -177,8 +176,6 @@ def _digest(path: Path, stamp: tuple[int, int]) -> str:
 
 def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
     """X and y, in the file, of the corners of all that it holds, of many those of their hull; empty without any."""
-    import shapely
-
     found = [np.zeros((0, 2))]
     for raster in (contents.terrain, contents.occupied):
         if raster is not None:
@@ -266,8 +263,6 @@ def _solid_cells(
 
 def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     """The union of polygons, simplified."""
-    import shapely
-
     merged = shapely.get_parts(shapely.disjoint_subset_union_all(polygons)) if polygons else []
     grown = simplified([each for each in merged if each.geom_type == "Polygon"], tolerance_m)
     if tolerance_m > 0 and grown:
@@ -277,8 +272,6 @@ def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
 
 def _heights(polygons: Sequence[Any], solids: Sequence[Solid]) -> Iterator[tuple[float, float]]:
     """Bottom and top of each polygon: the lowest and the highest of the solids that it was made of."""
-    import shapely
-
     tree = shapely.STRtree(shapely.point_on_surface(np.array([each.shape for each in solids], dtype=object)))
     for polygon in polygons:
         inside = [solids[index] for index in tree.query(polygon, predicate="intersects").tolist()]
@@ -289,8 +282,6 @@ def _heights(polygons: Sequence[Any], solids: Sequence[Solid]) -> Iterator[tuple
 
 def _rounded(polygons: Sequence[Any]) -> list[Any]:
     """The same with corners on a fine grid, valid."""
-    import shapely
-
     shapes = np.array(polygons, dtype=object)
     placed = shapely.transform(shapes, lambda points: np.round(points, DECIMALS))
     bad = ~shapely.is_valid(placed)  # a sliver that the grid makes a line, too: of it nothing is left

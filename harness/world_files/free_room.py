@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from harness.world_files.parts import Box, FloatArray
@@ -38,7 +39,6 @@ class FreeRoom:
 
 def free_room(polygons: Sequence[Any], bounds_m: Box) -> FreeRoom:
     """Distances in an area from solid polygons and from its border."""
-    import shapely
     from scipy import ndimage
 
     xmin, ymin, xmax, ymax = bounds_m

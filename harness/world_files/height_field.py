@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from harness.world_files.cells import window_of
 from harness.world_files.parts import Box, FloatArray, Raster
 
 if TYPE_CHECKING:
@@ -142,6 +141,22 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
     if not np.isfinite(heights).any():
         return None, []
     return HeightField((xmin, ymin), (right, up), heights.reshape(rows, columns)), notes
+
+
+def window_of(raster: Raster, mapping: Mapping, box: Box) -> tuple[slice, slice]:
+    """Rows and columns that cover a box of the plane."""
+    share = np.linspace(0.0, 1.0, 33)
+    x, y = (low + share * (high - low) for low, high in ((box[0], box[2]), (box[1], box[3])))
+    across, along = np.meshgrid(x, box[1::2]), np.meshgrid(box[::2], y)
+    east, north = (np.concatenate((across[k].ravel(), along[k].ravel())) for k in (0, 1))
+    column, row = raster.cells(*mapping.from_plane(east, north, raster.middle_x))
+    spans = []
+    for places, size in ((row, raster.values.shape[0]), (column, raster.values.shape[1])):
+        known = np.clip(places[np.isfinite(places)], -1e9, 1e9)
+        low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
+        begin = min(max(math.floor(low) - 2, 0), size)
+        spans.append(slice(begin, max(min(math.ceil(high) + 2, size), begin)))
+    return spans[0], spans[1]
 
 
 def _spacing(raster: Raster, mapping: Mapping, box: Box) -> tuple[float, float] | None:

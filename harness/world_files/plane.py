@@ -12,6 +12,9 @@ from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+import shapely
+from pyproj import CRS, Transformer
+from pyproj.exceptions import CRSError
 
 from harness.world_files.parts import WGS84, FloatArray, WorldFileError
 
@@ -60,15 +63,11 @@ class Mapping:
 
     def geometries(self, shapes: Any) -> Any:
         """Shapely geometries of the file in the plane."""
-        import shapely
-
         return shapely.transform(shapes, lambda p: np.column_stack(self.to_plane(p[:, 0], p[:, 1])))
 
     @cached_property
     def _transformer(self) -> Any:
         """From the file to the plane. Its datum must be named: of an ellipsoid alone no datum shift is made."""
-        from pyproj import Transformer
-
         latitude, longitude = self.place
         plane = f"+proj=aeqd +lat_0={latitude!r} +lon_0={longitude!r} +datum=WGS84"
         return Transformer.from_crs(_system(self.crs or WGS84).to_2d(), plane, always_xy=True)
@@ -96,9 +95,6 @@ def in_degrees(name: str | None) -> bool:
 
 
 def _system(name: str) -> Any:
-    from pyproj import CRS
-    from pyproj.exceptions import CRSError
-
     try:
         return CRS.from_user_input(name)
     except CRSError as error:
@@ -124,8 +120,6 @@ def short_way(longitudes_deg: FloatArray) -> FloatArray:
 
 def geodetic(crs: str, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Latitude and longitude (WGS84, degrees) of places in a file."""
-    from pyproj import Transformer
-
     transformer = Transformer.from_crs(_system(crs).to_2d(), WGS84, always_xy=True)
     longitude, latitude = transformer.transform(x, y)
     return np.asarray(latitude, dtype=np.float64), np.asarray(longitude, dtype=np.float64)

@@ -203,19 +203,19 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
         yield at, box, [f"{told} (--start and --goal choose another)"]
 
 
-def _crowded(files: _Files, half: FloatArray) -> FloatArray:
-    """(1, 2) where the most corners of obstacles are, of each its box; (0, 2) of rasters alone."""
-    from scipy.spatial import KDTree
-
+def _crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
+    """The middle of the most corners of obstacles, each its box, that fit in one part; none of rasters alone."""
     corners = [
-        mapping.to_plane(*corners_of(replace(each, terrain=None, occupied=None)))
+        np.stack(mapping.to_plane(*corners_of(replace(each, terrain=None, occupied=None))))
         for each, mapping in files.placed()
     ]
-    places = np.hstack([np.stack(each) for each in corners]).T
+    places = np.hstack(corners).T
     places = places[np.isfinite(places).all(axis=1)]
-    near = KDTree(places).query_ball_point(places, half.min(), p=np.inf, return_length=True)
-    best: FloatArray = places[np.argsort(-near, kind="stable")[:1]]
-    return best
+    if not len(places):
+        return []
+    parts = np.floor((places - places.min(axis=0)) / (2.0 * half))
+    _, part, count = np.unique(parts, axis=0, return_inverse=True, return_counts=True)
+    return [places[part.ravel() == count.argmax()].mean(axis=0)]
 
 
 def _covered(files: _Files) -> tuple[list[Box], list[Box]]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 
 from harness.files.wording import counted
 from harness.world_files.cells import outlines
@@ -54,8 +55,6 @@ def sliced_parts(
     Raises:
         WorldFileError: a limit above ground decides, and the ground is not known there.
     """
-    import shapely
-
     if not parts:
         return []
     shapes = mapping.geometries(np.array([part.footprint for part in parts], dtype=object))
@@ -85,8 +84,6 @@ def sliced_parts(
 
 def clipped(solids: Sequence[Solid], box: Box) -> list[Solid]:
     """Valid polygons of what lies in a box, each with the heights of what it is a piece of."""
-    import shapely
-
     window = shapely.box(*box)
     valid = np.array([each.shape for each in solids], dtype=object)
     bad = ~shapely.is_valid(valid)
@@ -103,8 +100,6 @@ def clipped(solids: Sequence[Solid], box: Box) -> list[Solid]:
 
 def _solid(part: Part, shape: Any, band: HeightBand, ground: KnownGround) -> list[Solid] | None:
     """A part as far as it reaches into the band, where its limits make it largest; None: the ground is not known."""
-    import shapely
-
     if _is_out(part, band):
         return []
     on_ground = Datum.GROUND in (part.bottom.datum, part.top.datum)
@@ -138,8 +133,6 @@ def _ground_below(part: Part, shape: Any, ground: KnownGround) -> tuple[FloatArr
 
     Of what is rigid at its corners, of which some may lie outside of the terrain.
     """
-    import shapely
-
     heights, corner = np.array([[math.nan]]), (0.0, 0.0)
     if ground.field is not None and part.rigid:
         heights = ground.field.at(*shapely.get_coordinates(shape).T)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import shapely
 
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import Contents, FloatArray, Limit, Part, Reading, WorldFileError
@@ -109,8 +110,6 @@ def _part(
     name: str, thing: dict[str, Any], vertices: FloatArray, reading: Reading, doubts: limits.Doubts
 ) -> Part | None:
     """An object at its highest level of detail: its surfaces from above, between its lowest and highest vertex."""
-    import shapely
-
     shapes, low, high = [], math.inf, -math.inf
     for surface in _best_surfaces(thing):
         rings = [_places(ring, vertices, name) for ring in surface if len(ring) >= 3]

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import shapely
+
 from harness.files.mavlink import commands
 from harness.files.mavlink.fences import Fence, item_fences, plan_fences
 from harness.files.mavlink.items import WPL, wpl_items
@@ -55,8 +57,6 @@ def read_ardupilot(path: Path, reading: Reading) -> Contents:
 
 
 def _shape(fence: Fence) -> Any:
-    import shapely
-
     places = [on_earth(east, north) for north, east in fence.places]
     if fence.center is not None:
         return circle(places[0], fence.radius_m)
@@ -69,8 +69,6 @@ def _contents(
     kind: str, fences: Sequence[Fence], any_of: bool, rally: int, told: tuple[str, ...] = ()
 ) -> Contents:
     """The fences as parts; where the aircraft has to be inside any of several, those are one."""
-    import shapely
-
     points = counted(rally, "rally point")
     if not fences:
         held = f", but {points}, which are no obstacles" if rally else ""

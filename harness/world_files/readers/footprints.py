@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from typing import Any, Final
 
 import numpy as np
+import shapely
+from pyproj import Geod
 
 from harness.files.wording import counted
 from harness.world_files.parts import Contents, FloatArray, WorldFileError
@@ -19,14 +20,13 @@ CIRCLE_POINTS: Final = 96
 LARGEST_M: Final = 2_000_000.0
 """Largest radius of a circle."""
 
+GEOD: Final = Geod(ellps="WGS84")
 Place = tuple[float, float]
 """Longitude and latitude, degrees."""
 
 
 def finished(contents: Contents) -> Contents:
     """Contents whose footprints are valid, on earth, have an area (others are counted), and go the short way round."""
-    import shapely
-
     if contents.terrain is not None or contents.occupied is not None:
         return contents
     if not contents.parts:
@@ -61,8 +61,6 @@ def finished(contents: Contents) -> Contents:
 
 def _short_way(shape: Any) -> Any:
     """A shape wider than half the earth with longitudes from 0 to 360 degrees, where that makes it narrower."""
-    import shapely
-
     turned = shapely.transform(shape, lambda p: np.column_stack((p[:, 0] % TURN_DEG, p[:, 1])))
     west, _, east, _ = shapely.bounds(turned)
     return turned if east - west < TURN_DEG / 2 and turned.area > 0.0 else shape
@@ -70,8 +68,6 @@ def _short_way(shape: Any) -> Any:
 
 def circle(center: Place, radius_m: float) -> Any:
     """A polygon round a circle on the ellipsoid."""
-    import shapely
-
     if not 0.0 < radius_m <= LARGEST_M:
         raise WorldFileError(
             f"has a circle of radius {radius_m:g} m; must be positive and at most {LARGEST_M:g} m"
@@ -83,8 +79,8 @@ def circle(center: Place, radius_m: float) -> Any:
 
 def _around(center: Place, azimuth_deg: FloatArray, distance_m: FloatArray) -> list[Place]:
     """Places at azimuths and distances from another."""
-    start = (np.full(len(azimuth_deg), each) for each in center)
-    longitude, latitude, _ = _geod().fwd(*start, azimuth_deg, distance_m)
+    east, north = (np.full(len(azimuth_deg), each) for each in center)
+    longitude, latitude, _ = GEOD.fwd(east, north, azimuth_deg, distance_m)
     return list(zip(longitude.tolist(), latitude.tolist(), strict=True))
 
 
@@ -99,14 +95,12 @@ def arc(
 
 def polar(center: Place, place: Place) -> tuple[float, float]:
     """Azimuth (deg) and distance (m) of a place from another."""
-    azimuth, _, distance = _geod().inv(*center, *place)
+    azimuth, _, distance = GEOD.inv(*center, *place)
     return float(azimuth), float(distance)
 
 
 def corridor(line: Sequence[Place], width_m: float) -> Any:
     """All that lies within half a width of a line."""
-    import shapely
-
     (east, north), stretch = line[0], math.cos(math.radians(line[0][1]))
     # The short way from the first place of the line.
     plane = [((math.remainder(x - east, TURN_DEG)) * stretch, y - north) for x, y in line]
@@ -121,10 +115,3 @@ def on_earth(longitude: float, latitude: float) -> Place:
             f"has a place at latitude {latitude:g}, longitude {longitude:g}; must be degrees, WGS84"
         )
     return longitude, latitude
-
-
-@cache
-def _geod() -> Any:
-    from pyproj import Geod
-
-    return Geod(ellps="WGS84")

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import shapely
+
 from harness.files.wording import counted
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import WGS84, Contents, Reading, WorldFileError
@@ -63,13 +65,10 @@ def simple(geometry: Any) -> Iterator[dict[str, Any]]:
 
 def polygon_of(geometry: dict[str, Any]) -> Any:
     """The shapely geometry of a Polygon or MultiPolygon; None of anything else."""
-    import shapely
-    from shapely.geometry import shape
-
     if geometry.get("type") not in ("Polygon", "MultiPolygon"):
         return None
     try:
-        return shapely.force_2d(shape(geometry))
+        return shapely.force_2d(shapely.geometry.shape(geometry))
     except (TypeError, ValueError, LookupError, AttributeError, shapely.GEOSException) as error:
         said = " ".join(str(error).split())[:60]
         raise WorldFileError(f"has a polygon whose rings are not lists of positions ({said})") from error

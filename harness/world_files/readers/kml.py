@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
+import shapely
+
 from harness.files.kml import Shape, read_kml
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes
@@ -63,8 +65,6 @@ def _part(shape: Shape, notes: list[str]) -> Part:
 
 
 def _polygon(rings: list[list[tuple[float, float]]], name: str) -> Any:
-    import shapely
-
     try:
         return shapely.Polygon(rings[0], [ring for ring in rings[1:] if ring])
     except ValueError as error:  # of one or two corners

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -31,25 +31,24 @@ _UNITS: Final = {"FL": 100.0 * FOOT_M, **_FEET, **_METRES}
 _ON_GROUND: Final = ("SURFACE", "GROUND", "RELATIVE", "ASFC", "AGL", "GND", "SFC")
 _AT_SEA: Final = ("AMSL", "MSL", "SEA", "STD", "QNH", "ALT", "GEOID", "MEAN", "LEVEL")
 _DATUMS: Final = {**dict.fromkeys(_ON_GROUND, Datum.GROUND), **dict.fromkeys(_AT_SEA, Datum.SEA)}
-_WORDS: Final = sorted((*_UNITS, *_DATUMS, "ABOVE"), key=len, reverse=True)
-_TOKEN: Final = re.compile(rf"-?\s*(?:\d+(?:\.\d*)?|\.\d+)|{'|'.join(_WORDS)}|[^\s()'./+\N{{DEGREE SIGN}}]")
-"""A number, or a word that a limit may consist of. Nothing is guessed of a limit with others, as `ASK 123.5`."""
+_WORD: Final = re.compile("|".join(sorted((*_UNITS, *_DATUMS, "ABOVE"), key=len, reverse=True)))
+_BESIDE: Final = rf"((?:{_WORD.pattern}|[\s()'./+\N{{DEGREE SIGN}}])*)"
+_LIMIT: Final = re.compile(rf"{_BESIDE}(-?\s*(?:\d+(?:\.\d*)?|\.\d+)){_BESIDE}")
+"""A number among words that a limit may consist of. Nothing is guessed of a limit with others, as `ASK 123.5`."""
 _PLAIN: Final = (
     (re.compile(r"SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?"), NO_BOTTOM),
     (re.compile(r"(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b.*"), NO_TOP),
     (re.compile("MSL|AMSL|SEA LEVEL"), Limit(0.0)),
 )
 """Limits without a number."""
-_NOT_KNOWN_M: Final = -2700.0
-"""A limit as low as this stands for one that is not known, as -9998 (ft) in files of the FAA."""
-_SIDES: Final = {"lower": ("lower|floor|bottom", "min"), "upper": ("upper|ceiling|top", "max")}
+_LOWEST_M: Final = {Datum.SEA: -2700.0, Datum.GROUND: 0.0}
+"""A lower limit stands for one that is not known, as -9998 (ft) in files of the FAA, or is two, as in SFC-2500."""
+_SIDES: Final = (("lower", "floor", "bottom", "min"), ("upper", "ceiling", "top", "max"))
 """Beginnings of the names of attributes with a limit; the last belong to altitudes only."""
-_NAMES: Final = {
-    side: re.compile(
-        rf"(?:(?:{words})(?:limit)?(?:val|altitude)?|{end}alt(?:itude)?)((?:ft|feet|m|metres|agl|amsl|msl|gnd)*)"
-    )
-    for side, (words, end) in _SIDES.items()
-}
+_NAME: Final = re.compile(
+    "(?:(?:lower|floor|bottom|upper|ceiling|top)(?:limit)?(?:val|altitude)?|(?:min|max)alt(?:itude)?)"
+    "((?:ft|feet|m|metres|agl|amsl|msl|gnd)*)"
+)
 """Names of attributes with a limit, without underscores; unit and reference may follow, as in `floor_ft_agl`."""
 _OWN: Final = re.compile("uom|unit|ref|code|datum|type")
 """Parts of the names of attributes with the unit or the reference of one limit."""
@@ -75,12 +74,12 @@ _HEIGHT: Final = (
 _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")
 
 
-def _told(words: Iterable[str]) -> tuple[str | None, Datum | None]:
-    """Unit and datum that some words name; the ground goes before the sea, a flight level before other units."""
-    units = [each for each in words if each in _UNITS]
-    datums = {_DATUMS[each] for each in words if each in _DATUMS}
-    datum = Datum.GROUND if Datum.GROUND in datums else Datum.SEA if datums else None
-    return ("FL", Datum.SEA) if "FL" in units else (next(iter(units), None), datum)
+def _told(text: str) -> tuple[str | None, Datum | None]:
+    """Unit and datum that a text names; the ground goes before the sea, a flight level before other units."""
+    words = _WORD.findall(text.upper())
+    unit = "FL" if "FL" in words else next((each for each in words if each in _UNITS), None)
+    datums = [_DATUMS[each] for each in words if each in _DATUMS] + [Datum.SEA] * (unit == "FL")
+    return unit, Datum.GROUND if Datum.GROUND in datums and unit != "FL" else next(iter(datums), None)
 
 
 def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | None:
@@ -90,18 +89,12 @@ def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | N
     """
     word = " ".join(text.upper().split())
     plain = next((limit for pattern, limit in _PLAIN if pattern.fullmatch(word)), None)
-    if plain is not None:
+    match = _LIMIT.fullmatch(word)
+    if plain is not None or match is None:
         return plain
-    tokens = _TOKEN.findall(word)
-    numbers = [each for each in tokens if each[-1] in "0123456789."]
-    words = [each for each in tokens if each not in numbers]
-    if len(numbers) != 1 or not set(words) <= set(_WORDS):
-        return None
-    own_unit, own_datum = _told(words)
-    limit = Limit(float(numbers[0].replace(" ", "")) * _UNITS[own_unit or unit], own_datum or datum)
-    if limit.height_m <= _NOT_KNOWN_M or (limit.datum is Datum.GROUND and limit.height_m < 0.0):
-        return None  # as in SFC-2500, which says where a zone begins as well
-    return limit
+    own_unit, own_datum = _told(f"{match[1]} {match[3]}")
+    limit = Limit(float(match[2].replace(" ", "")) * _UNITS[own_unit or unit], own_datum or datum)
+    return limit if limit.height_m >= _LOWEST_M[limit.datum] else None
 
 
 def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | None:
@@ -109,22 +102,19 @@ def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | No
 
     The value is a number or a text; where it has none, `said` has its unit and reference, as `FT AGL`, `m AMSL`, `FL`.
     """
-    text, said = "" if isinstance(value, bool | Mapping | list | None) else str(value), said.upper()
-    own_unit, own_datum = _told(_TOKEN.findall(text.upper()))
-    unit, datum = _told(re.findall(r"[A-Z]+", said))
-    if own_unit and unit == "FL":
-        datum = None
+    text = str(value) if isinstance(value, str | int | float) else ""
+    (own_unit, own_datum), (unit, datum) = _told(text), _told(said)
     limit = limit_of(text, unit or "M", datum or Datum.SEA)
-    if limit is None or not re.search(r"[1-9]", text):  # the surface, or nothing that is known
-        return limit
-    told = [] if unit or own_unit else ["its limits name no unit; taken as metres"]
-    told += [] if datum or own_datum else [f"its limits {_undated(said)}; taken as above mean sea level"]
-    notes += [new for each in told if (new := f"{name or 'a part'}: {each}") not in notes[-4:]]
+    if limit is not None and re.search(r"[1-9]", text):  # else the surface, or nothing that is known
+        round_ = re.search("WGS|W84|HAE|ELLIPS", said.upper())
+        undated = "are above the ellipsoid" if round_ else "name no reference"
+        missing = {
+            "name no unit; taken as metres": unit or own_unit,
+            f"{undated}; taken as above mean sea level": datum or own_datum,
+        }
+        told = [f"{name or 'a part'}: its limits {what}" for what, known in missing.items() if not known]
+        notes += [each for each in told if each not in notes[-4:]]
     return limit
-
-
-def _undated(said: str) -> str:
-    return "are above the ellipsoid" if re.search("WGS|W84|HAE|ELLIPS", said) else "name no reference"
 
 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:
@@ -133,9 +123,8 @@ def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: st
     Files write an upper limit of 0 where there is none; a zone of no height would forbid nothing.
     """
     told = f"{name or 'a part'}: its"
-    unknown = [side for side, limit in (("lower", lower), ("upper", upper)) if limit is None]
-    if unknown:
-        which = "limits are" if len(unknown) == 2 else f"{unknown[0]} limit is"
+    if lower is None or upper is None:
+        which = "limits are" if lower is upper else f"{'lower' if lower is None else 'upper'} limit is"
         notes.append(f"{told} {which} not known; taken as without")
     bottom, top = lower or NO_BOTTOM, upper or NO_TOP
     if top == NO_BOTTOM or (top.height_m == 0.0 and bottom.height_m in (0.0, -math.inf)):
@@ -147,35 +136,40 @@ def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: st
     return bottom, top
 
 
+def _plain_names(tags: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes that have a value, by their names in small letters without underscores."""
+    return {key.lower().replace("_", ""): value for key, value in tags.items() if value is not None}
+
+
 def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
     """Limits of an airspace from attributes, named in any case; a number alone is metres above mean sea level.
 
     Raises:
         WorldFileError: it is a facility map, whose ceilings are those up to which one may fly.
     """
-    given = {key.lower().replace("_", ""): value for key, value in tags.items() if value is not None}
+    given = _plain_names(tags)
     if "ceiling" in given and any(key.startswith(("apt1", "mapeff")) for key in given):
         raise WorldFileError(
             "is a facility map of the FAA, up to whose ceilings one may fly; give the airspace"
         )
     both = [str(value) for key, value in given.items() if _BOTH.fullmatch(key)]
     found: list[Limit | None] = []
-    for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
-        match = next((match for key in given if (match := _NAMES[side].fullmatch(key))), None)
-        if match is None:
-            found.append(none)
-            continue
-        begins = tuple("|".join(_SIDES[side]).split("|"))
-        own = [str(value) for key, value in given.items() if key.startswith(begins) and _OWN.search(key)]
-        words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
-        found.append(limit_told(given[match[0]], " ".join((*words, *own, *both)), notes, name))
+    for begins, none in zip(_SIDES, (NO_BOTTOM, NO_TOP), strict=True):
+        side = {key: value for key, value in given.items() if key.startswith(begins)}
+        match = next((match for key in side if (match := _NAME.fullmatch(key))), None)
+        own = [str(value) for key, value in side.items() if _OWN.search(key)]
+        said = (
+            " ".join((*re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1]), *own, *both))
+            if match
+            else ""
+        )
+        found.append(limit_told(side[match[0]], said, notes, name) if match else none)
     return band_of(found[0], found[1], notes, name)
 
 
 def has_limits(tags: Mapping[str, Any]) -> bool:
     """Whether attributes give the limits of an airspace."""
-    named = [key.lower().replace("_", "") for key, value in tags.items() if value is not None]
-    return any(pattern.fullmatch(key) for key in named for pattern in _NAMES.values())
+    return any(map(_NAME.fullmatch, _plain_names(tags)))
 
 
 def metres_of(value: Any) -> float | None:

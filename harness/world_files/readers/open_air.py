@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+import shapely
+
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, text_of
 from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Limit, Part, Reading, WorldFileError
@@ -82,8 +84,6 @@ class _Airspace:
 
     def parts(self, notes: list[str]) -> list[Part]:
         """What it is; a limit that is missing, or given more than once, is none."""
-        import shapely
-
         found = self.shapes + ([shapely.Polygon(self.ring)] if len(set(self.ring)) >= 3 else [])
         found += [corridor(self.line, self.width_m)] if len(self.line) > 1 and self.width_m > 0 else []
         if not found:

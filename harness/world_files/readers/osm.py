@@ -15,6 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
+import shapely
+
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_BYTES, read_bytes
 from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
@@ -95,8 +97,6 @@ class _Found:
 
     def take(self, each: Any, tags: dict[str, str]) -> None:
         """An object of osmium."""
-        import shapely
-
         if each.is_area():
             name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
             if is_building(tags) and each.num_rings()[0]:
@@ -117,8 +117,6 @@ class _Found:
 
     def contents(self) -> Contents:
         """All buildings, those with an open outline closed."""
-        import shapely
-
         whole = {name: (tags, ring) for name, (tags, ring) in self.ways.items() if len(set(ring)) >= 3}
         for name, (tags, ring) in whole.items():
             self._add(tags, shapely.Polygon(ring), name)
