@@ -4,15 +4,15 @@ Everything is SI; angles are degrees in the track, because the track is a file f
 x = east, y = north, z = up above mean sea level; course and heading clockwise from north.
 """
 
+# ruff: noqa: RUF009 (the functions give fields)
 from __future__ import annotations
 
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from enum import Enum
-from types import MappingProxyType
-from typing import Annotated, NamedTuple, get_type_hints
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +45,25 @@ class Column(NamedTuple):
     """Of its values, as numpy writes it."""
     in_digest: bool = True
     """The digest covers it."""
+    left_out: float | None = None
+    """Of a column that may be left out, the value of all rows then."""
     believed: bool = False
     """It is of what the aircraft believed; a track of perfect navigation does without it."""
+
+
+Floats = FloatArray | None
+"""A column that may be left out when a track is made; a track has all of them."""
+
+
+def _column(doc: str, *, digested: bool = True, **kind: Any) -> Any:
+    """A column of the track, as a field of `Track`."""
+    column = Column(doc, in_digest=digested, **kind)
+    kept = {"column": column}
+    return field(metadata=kept) if column.left_out is None else field(default=None, metadata=kept)
+
+
+def _optional(doc: str, left_out: float = math.nan, *, believed: bool = False) -> Any:
+    return _column(doc, digested=False, left_out=left_out, believed=believed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,95 +74,60 @@ class Track:
     the file's schema.
     """
 
-    time_s: Annotated[FloatArray, Column("simulated time")]
-    east_m: Annotated[FloatArray, Column("position in the local plane")]
-    north_m: Annotated[FloatArray, Column("position in the local plane")]
-    up_m: Annotated[FloatArray, Column("altitude above mean sea level")]
-    course_deg: Annotated[FloatArray, Column("direction of the ground velocity, in [0, 360)")]
-    heading_deg: Annotated[FloatArray, Column("direction of the nose, in [0, 360)")]
-    roll_deg: Annotated[FloatArray, Column("positive right wing down")]
-    pitch_deg: Annotated[FloatArray, Column("positive nose up")]
-    airspeed_mps: Annotated[FloatArray, Column("true airspeed")]
-    groundspeed_mps: Annotated[FloatArray, Column("horizontal speed over the ground")]
-    load_factor: Annotated[FloatArray, Column("normal load factor, 1 in level flight")]
-    roll_command_deg: Annotated[FloatArray, Column("what guidance asked of the inner loops")]
-    cross_track_m: Annotated[
-        FloatArray,
-        Column("distance from the plan being flown, positive right of it; NaN before the first plan"),
-    ]
-    clearance_m: Annotated[
-        FloatArray,
-        Column("true distance to the nearest active obstacle edge, negative inside, inf with none"),
-    ]
-    plan_index: Annotated[IntArray, Column("row of plans.parquet being flown, -1 before the first", "<i8")]
-    arc_length_m: Annotated[
-        FloatArray, Column("distance along the plan being flown; NaN before the first plan", in_digest=False)
-    ]
-    throttle: Annotated[
-        FloatArray,
-        Column("throttle command, 0 to 1; NaN for a flight model without an engine", in_digest=False),
-    ]
-    altitude_above_ground_m: Annotated[
-        FloatArray | None,
-        Column("height above the true ground; NaN where that is not known, the default", in_digest=False),
-    ] = None
-    actuator_limited_s: Annotated[
-        FloatArray | None,
-        Column(
-            "time since the start in which a servo was at its rate limit, each counted; 0 without such servos",
-            in_digest=False,
-        ),
-    ] = None
-    vertical_actuator_limited_s: Annotated[
-        FloatArray | None, Column("that of the servos of elevator and throttle alone", in_digest=False)
-    ] = None
-    elevator: Annotated[
-        FloatArray | None,
-        Column(
-            "commanded deflection of the elevator with its trim, -1 to 1, where it is at its stop; NaN where not known",
-            in_digest=False,
-        ),
-    ] = None
-    aileron: Annotated[
-        FloatArray | None,
-        Column(
-            "that of the ailerons, -1 to 1, where it is at its stop; NaN where not known", in_digest=False
-        ),
-    ] = None
-    rudder: Annotated[
-        FloatArray | None,
-        Column("that of the rudder, -1 to 1, where it is at its stop; NaN where not known", in_digest=False),
-    ] = None
-    angle_of_attack_deg: Annotated[
-        FloatArray | None, Column("angle of attack; NaN where not known", in_digest=False)
-    ] = None
-    believed_east_m: Annotated[
-        FloatArray | None, Column("where the aircraft believed to be", in_digest=False, believed=True)
-    ] = None
-    believed_north_m: Annotated[
-        FloatArray | None, Column("where the aircraft believed to be", in_digest=False, believed=True)
-    ] = None
-    believed_up_m: Annotated[
-        FloatArray | None, Column("altitude that it believed to have", in_digest=False, believed=True)
-    ] = None
-    believed_course_deg: Annotated[
-        FloatArray | None,
-        Column("direction of the ground velocity that it believed to have", in_digest=False, believed=True),
-    ] = None
-    believed_cross_track_m: Annotated[
-        FloatArray | None,
-        Column("distance from the plan being flown that guidance saw", in_digest=False, believed=True),
-    ] = None
+    time_s: FloatArray = _column("simulated time")
+    east_m: FloatArray = _column("position in the local plane")
+    north_m: FloatArray = _column("position in the local plane")
+    up_m: FloatArray = _column("altitude above mean sea level")
+    course_deg: FloatArray = _column("direction of the ground velocity, in [0, 360)")
+    heading_deg: FloatArray = _column("direction of the nose, in [0, 360)")
+    roll_deg: FloatArray = _column("positive right wing down")
+    pitch_deg: FloatArray = _column("positive nose up")
+    airspeed_mps: FloatArray = _column("true airspeed")
+    groundspeed_mps: FloatArray = _column("horizontal speed over the ground")
+    load_factor: FloatArray = _column("normal load factor, 1 in level flight")
+    roll_command_deg: FloatArray = _column("what guidance asked of the inner loops")
+    cross_track_m: FloatArray = _column(
+        "distance from the plan being flown, positive right of it; NaN before the first plan"
+    )
+    clearance_m: FloatArray = _column(
+        "true distance to the nearest active obstacle edge, negative inside, inf with none"
+    )
+    plan_index: IntArray = _column("row of plans.parquet being flown, -1 before the first", dtype="<i8")
+    arc_length_m: FloatArray = _column(
+        "distance along the plan being flown; NaN before the first plan", digested=False
+    )
+    throttle: FloatArray = _column(
+        "throttle command, 0 to 1; NaN for a flight model without an engine", digested=False
+    )
+    altitude_above_ground_m: Floats = _optional(
+        "height above the true ground; NaN where that is not known, the default"
+    )
+    actuator_limited_s: Floats = _optional(
+        "time since the start in which a servo was at its rate limit, each counted; 0 without such servos",
+        0.0,
+    )
+    vertical_actuator_limited_s: Floats = _optional("that of the servos of elevator and throttle alone", 0.0)
+    elevator: Floats = _optional(
+        "commanded deflection of the elevator with its trim, -1 to 1, where it is at its stop; NaN where not known"
+    )
+    aileron: Floats = _optional("that of the ailerons, -1 to 1, where it is at its stop; NaN where not known")
+    rudder: Floats = _optional("that of the rudder, -1 to 1, where it is at its stop; NaN where not known")
+    angle_of_attack_deg: Floats = _optional("angle of attack; NaN where not known")
+    believed_east_m: Floats = _optional("where the aircraft believed to be", believed=True)
+    believed_north_m: Floats = _optional("where the aircraft believed to be", believed=True)
+    believed_up_m: Floats = _optional("altitude that it believed to have", believed=True)
+    believed_course_deg: Floats = _optional(
+        "direction of the ground velocity that it believed to have", believed=True
+    )
+    believed_cross_track_m: Floats = _optional(
+        "distance from the plan being flown that guidance saw", believed=True
+    )
 
     def __post_init__(self) -> None:
-        for name in SERVO_FIELDS:
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, np.zeros(len(self.time_s)))
-        for name in UNKNOWN:
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, np.full(len(self.time_s), math.nan))
         for name, column in TRACK_COLUMNS.items():
-            values = np.array(getattr(self, name), dtype=column.dtype)
+            given = getattr(self, name)
+            given = np.full(len(self.time_s), column.left_out) if given is None else given
+            values = np.array(given, dtype=column.dtype)
             if values.shape != (len(self.time_s),):
                 raise ValueError(
                     f"track column {name} has shape {values.shape}, time_s has {len(self.time_s)} rows"
@@ -188,9 +170,7 @@ class Track:
         )
 
 
-TRACK_COLUMNS: Mapping[str, Column] = MappingProxyType(
-    {name: hint.__metadata__[0] for name, hint in get_type_hints(Track, include_extras=True).items()}
-)
+TRACK_COLUMNS: Mapping[str, Column] = {each.name: each.metadata["column"] for each in fields(Track)}
 """All columns of `track.parquet`, in its order: the fields of `Track`."""
 
 TRACK_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if not column.believed)
@@ -201,15 +181,6 @@ BELIEVED_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if column
 
 SURFACES = ("elevator", "aileron", "rudder")
 """Names of the columns of control surfaces."""
-
-UNKNOWN = ("altitude_above_ground_m", *SURFACES, "angle_of_attack_deg", *BELIEVED_FIELDS)
-"""Names of those that are all NaN where they are left out."""
-
-SERVO_FIELDS = ("actuator_limited_s", "vertical_actuator_limited_s")
-"""Names of those that are all 0 where they are left out."""
-
-TRACK_OPTIONAL = (*SERVO_FIELDS, *UNKNOWN)
-"""Names of those that may be left out."""
 
 COLUMNS = tuple(name for name, column in TRACK_COLUMNS.items() if column.in_digest)
 """Columns of `track.parquet` that the digest covers, in its order."""

@@ -18,7 +18,6 @@ from harness.flight.record import (
     BELIEVED_FIELDS,
     TRACK_COLUMNS,
     TRACK_FIELDS,
-    TRACK_OPTIONAL,
     AcceptedPlan,
     FloatArray,
     Track,
@@ -72,8 +71,9 @@ def track_table(track: Track) -> pa.Table:
 
 def track_of(table: pa.Table) -> Track:
     """The track that such a table holds."""
-    names = [name for name in TRACK_COLUMNS if name not in TRACK_OPTIONAL or name in table.column_names]
-    return Track(**{name: table[name].to_numpy() for name in names})
+    names = set(table.column_names)
+    needed = [name for name, column in TRACK_COLUMNS.items() if column.left_out is None or name in names]
+    return Track(**{name: table[name].to_numpy() for name in needed})
 
 
 def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
