@@ -148,12 +148,12 @@ def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_
     from harness.cli.flight_rows import flight_rows
     from harness.cli.terminal import plain, print_table
     from harness.scenario.conditions import told
-    from harness.world.motion_assumptions import scenario_outside_assumptions
+    from harness.world.motion_assumptions import outside_assumptions
 
     law = scenario.guidance.kind
     under = "" if law == type(scenario.guidance)().kind else f", {law}"
     rows = {"conditions": plain(told(scenario))} | flight_rows(metrics)
-    outside = scenario_outside_assumptions(scenario)
+    outside = outside_assumptions(scenario)
     if outside:
         more = f" (and {len(outside) - 1} more: `wayproof validate` names them)" if len(outside) > 1 else ""
         rows["not covered"] = plain(outside[0] + more)

@@ -45,10 +45,10 @@ def _found(file: str) -> tuple[str, tuple[str, ...]]:
         runs = checked(campaign_path(file))
         return f"{runs.campaign.name}, {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}", ()
     loaded = load(file)
-    from harness.world.motion_assumptions import scenario_outside_assumptions
+    from harness.world.motion_assumptions import outside_assumptions
 
     held = f"{loaded.name}, {counted(len(loaded.obstacles), 'obstacle')}"
-    return held, scenario_outside_assumptions(loaded)
+    return held, outside_assumptions(loaded)
 
 
 def schema(
