@@ -24,8 +24,7 @@ from aircraft.guidance.registry import DEFAULT_KIND, guidance_kinds
 from aircraft.interface import Route
 from aircraft.route import arc_point
 from aircraft.start import Atmosphere, StartConditions
-from harness.flight.navigation import Navigator
-from harness.flight.state_estimator import PerfectEstimator, StateEstimator
+from harness.flight.navigation import Navigator, StateEstimator
 from harness.scenario.navigation import Navigation
 from planner.kernel_cache import seal
 
@@ -94,7 +93,7 @@ class Case:
     def navigator(self, seed: int) -> StateEstimator:
         """What the aircraft believes of its state, for a seed."""
         if self.navigation == "perfect":
-            return PerfectEstimator()
+            return StateEstimator()
         return Navigator(Navigation(kind=self.navigation), np.random.SeedSequence((seed, 3)))
 
 
@@ -164,8 +163,8 @@ def fly_course(
         air,
     )
     law = guidance_kinds()[guidance].law(frame.guidance_limits(airspeed_mps))
-    navigator = navigator or PerfectEstimator()
-    if not isinstance(navigator, PerfectEstimator):
+    navigator = navigator or StateEstimator()
+    if isinstance(navigator, Navigator):
         start = navigator.believed(model.state())
         route = _moved(route, start.east_m, start.north_m)
     law.follow(route, 0.0)

@@ -13,16 +13,16 @@ from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput
 from aircraft.guidance.progress import measures_itself
 from aircraft.interface import FlightModel
 from harness.files.crash import sentence, trace
-from harness.flight.observer import PROGRESS_EVERY_S, Caution, Observer, Progress
+from harness.flight.navigation import StateEstimator
+from harness.flight.observer import PROGRESS_EVERY_S, Caution, Observer, Progress, RowObserver
 from harness.flight.plans import Plans
 from harness.flight.position_errors import CrossTrack, FixEvents
 from harness.flight.record import Flight, Outcome
 from harness.flight.sensing import Sensing
 from harness.flight.signals import held_back
-from harness.flight.state_estimator import PerfectEstimator, StateEstimator
 from harness.flight.termination import Ending, Termination
 from harness.flight.timetable import intervals
-from harness.flight.track_log import flight_log
+from harness.flight.track_log import TrackLog
 from harness.mapping.sensed_map import SensedMap
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
@@ -60,7 +60,7 @@ class Loop:
     mission: Mission
     vertical: LevelFlight | AltitudeGuidance
     scan_rate_hz: float
-    navigator: StateEstimator = field(default_factory=PerfectEstimator)
+    navigator: StateEstimator = field(default_factory=StateEstimator)
 
 
 def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None) -> Flight:
@@ -126,7 +126,12 @@ class ClosedLoop:
         self._fixes = FixEvents(loop.navigator, observers)
         self._true_error, self._believed_error = CrossTrack(self.plans), CrossTrack(self.plans)
         self._law_measures = measures_itself(loop.guidance)
-        self._log = flight_log(loop.world, observers)
+        self._log = TrackLog(
+            loop.world.clearance,
+            [each.on_block for each in observers],
+            ground=loop.world.ground_heights,
+            row_sinks=[each.on_row for each in observers if isinstance(each, RowObserver)],
+        )
         self._roll_override_rad: float | None = None
         self._law_error: str | None = None
         timetable = intervals(loop.model.step_rate_hz, loop.scan_rate_hz if loop.sensor else 0.0)

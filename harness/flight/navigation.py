@@ -1,4 +1,8 @@
-"""What the aircraft believes of its state: truth and error, seeded."""
+"""What the aircraft believes of its state: truth and error, seeded.
+
+Guidance, the altitude and airspeed that are held, the pose with which a scan enters the map, and the position that the
+planner is told are believed ones. World, sensor, contact, `reached` and metrics are of the true state.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ import numpy as np
 from aircraft.guidance.latency import as_it_was
 from aircraft.interface import AircraftState, FloatArray
 from harness.scenario.navigation import Navigation
+from harness.world.range_sensor import child_stream
 
 VELOCITY_CORRELATION_S: Final = 1.0
 """Correlation time of the velocity errors. Chosen: a filter between the fixes of a receiver of some hertz."""
@@ -32,11 +37,7 @@ def pose_error_m(navigation: Navigation, range_m: float) -> float:
     """Standard deviation of how far a return at some range is shifted from one look at it to a later one, in m.
 
     That is what position and heading err differently at two times that are `LOOKS_APART_S` apart: of a first-order
-    Gauss-Markov process with size sigma sqrt(2 (1 - exp(-dt / tau))) sigma.
-
-    Args:
-        navigation: sizes of the errors.
-        range_m: distance of the return; the sensing range is the worst case.
+    Gauss-Markov process with size sigma sqrt(2 (1 - exp(-dt / tau))) sigma. The sensing range is the worst case.
     """
 
     def change(sigma: float, correlation_s: float) -> float:
@@ -48,8 +49,26 @@ def pose_error_m(navigation: Navigation, range_m: float) -> float:
     )
 
 
-class Navigator:
-    """Believed states of one flight. Implements `StateEstimator`.
+class StateEstimator:
+    """Tells what the aircraft believes of its state, for one flight; this one knows it exactly."""
+
+    has_fix = True
+    """Whether the position is that of a fix, as of the last call of `believed`; without one it drifts."""
+    jumps = 0
+    """How often a fix has come back after an outage, and the believed position has jumped."""
+    held_errors = 0.0, 0.0
+    """Error of altitude (m) and airspeed (m/s) that the autopilot holds, without the age of the state."""
+
+    def believed(self, state: AircraftState) -> AircraftState:
+        """What the aircraft believes where this is its true state; the very object given where it knows it exactly.
+
+        Time never goes back from one call to the next.
+        """
+        return state
+
+
+class Navigator(StateEstimator):
+    """Believed states of one flight.
 
     Position (east, north), velocity (three components), heading, airspeed and altitude have errors that are
     independent first-order Gauss-Markov processes, stationary from the first call on. Over an interval dt a process
@@ -71,7 +90,7 @@ class Navigator:
 
     def __init__(self, navigation: Navigation, seed_sequence: np.random.SeedSequence) -> None:
         self._navigation = navigation
-        self._rng, directions = (_stream(seed_sequence, number) for number in range(2))
+        self._rng, directions = (child_stream(seed_sequence, number) for number in range(2))
         turns = directions.uniform(0.0, math.tau, len(navigation.outages_s))
         self._directions = np.column_stack([np.sin(turns), np.cos(turns)])
         position_s, position_m = navigation.position_correlation_s, navigation.position_sigma_m
@@ -91,39 +110,16 @@ class Navigator:
         )
         self._perfect = navigation.kind == "perfect"
         self._past: deque[AircraftState] = deque()
-        self.jumps = 0
-        """How often a fix has come back after an outage, and the believed position has jumped."""
-        self.held_errors = 0.0, 0.0
-        """Error of altitude (m) and airspeed (m/s), without the age of the state."""
         self._unit = np.zeros(8)  # the processes, over their sigmas
         self._time_s, self._place = math.nan, np.zeros(2)
         self._outage = -1
         self._fix_error, self._drift = np.zeros(2), np.zeros(2)
 
-    @property
-    def has_fix(self) -> bool:
-        """Whether there is a fix, as of the last call of `believed`."""
-        return self._outage < 0
-
     def believed(self, state: AircraftState) -> AircraftState:
-        """What the aircraft believes where this is its true state.
-
-        Args:
-            state: the truth; its time is no earlier than that of the call before. At the same time the errors are
-                the same.
-
-        Returns:
-            The believed state; the very object given where navigation is perfect.
-
-        Raises:
-            ValueError: time goes back.
-        """
+        """What the aircraft believes where this is its true state; `ValueError` if time goes back."""
         if self._perfect:
             return state
-        return self._erroneous(as_it_was(self._past, state, self._navigation.latency_s))
-
-    def _erroneous(self, state: AircraftState) -> AircraftState:
-        """A state with the errors of its time."""
+        state = as_it_was(self._past, state, self._navigation.latency_s)
         if state.time_s < self._time_s:
             raise ValueError(f"time goes back from {self._time_s:g} s to {state.time_s:g} s")
         place = np.array([state.east_m, state.north_m])
@@ -170,6 +166,7 @@ class Navigator:
             flown_m = math.dist(place, self._place) * (time_s - max(begin_s, before_s)) / (time_s - before_s)
             self._drift = self._drift + self._navigation.drift_share * flown_m * self._directions[outage]
         self._outage, self._time_s, self._place = outage, time_s, place
+        self.has_fix = outage < 0
 
     def _outage_at(self, time_s: float) -> int:
         """Index of the outage at a time, -1 if there is a fix."""
@@ -177,11 +174,3 @@ class Navigator:
             if begin_s <= time_s < end_s:
                 return index
         return -1
-
-
-def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:
-    """The numbered child stream of a root, whatever was spawned from the root before."""
-    child = np.random.SeedSequence(
-        root.entropy, spawn_key=(*root.spawn_key, number), pool_size=root.pool_size
-    )
-    return np.random.default_rng(child)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from aircraft.guidance.progress import PathPoint, RouteProgress
 from aircraft.interface import AircraftState, Route
+from harness.flight.navigation import StateEstimator
 from harness.flight.observer import Caution, Observer
 from harness.flight.plans import Plans
-from harness.flight.state_estimator import StateEstimator
 
 
 class FixEvents:

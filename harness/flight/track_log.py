@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
-from harness.flight.observer import Observer, RowObserver
-from harness.flight.record import SURFACES, FloatArray, Track
-from harness.world.world import World
+from harness.flight.record import TRACK_COLUMNS, FloatArray, Track
 
 Clearance = Callable[[FloatArray, FloatArray], FloatArray]
 """(k, 2) points and (k,) times -> (k,) true distance to the nearest active obstacle edge, m."""
@@ -84,14 +82,11 @@ class TrackLog:
         believed: AircraftState | None = None,
         true_cross_track_m: float = math.nan,
     ) -> None:
-        """Adds one row. A state that is not finite, with which control is lost, is no row of the track.
+        """Adds one row: true state, what guidance decided last, and the plan in effect, -1 before the first.
 
-        Args:
-            state: the true state.
-            steering: what guidance decided last; before the first plan its cross-track error and arc length are NaN.
-            plan_index: row of `plans.parquet` being flown, -1 before the first.
-            believed: what the aircraft believes; None where it knows its state exactly.
-            true_cross_track_m: of the true position, where `believed` is given; `steering` has the believed one's.
+        Where the aircraft does not know its state exactly, `believed` is what it takes it to be, and the true position
+        lies `true_cross_track_m` beside the plan; `steering` has that of the believed one. A state that is not finite,
+        with which control is lost, is no row of the track.
         """
         if believed is not None:
             self._believes = True
@@ -134,54 +129,27 @@ class TrackLog:
         if not len(rows):
             return
         of = {name: np.ascontiguousarray(rows[name]) for name in NAMES}
-        east_mps, north_mps = of["velocity_east_mps"], of["velocity_north_mps"]
-        block = Track(
-            time_s=of["time_s"],
-            east_m=of["east_m"],
-            north_m=of["north_m"],
-            up_m=of["up_m"],
-            course_deg=np.degrees(np.arctan2(east_mps, north_mps)) % 360.0,
-            heading_deg=np.degrees(of["heading_rad"]) % 360.0,
-            roll_deg=np.degrees(of["roll_rad"]),
-            pitch_deg=np.degrees(of["pitch_rad"]),
-            airspeed_mps=of["airspeed_mps"],
-            groundspeed_mps=np.hypot(east_mps, north_mps),
-            load_factor=of["load_factor"],
-            roll_command_deg=np.degrees(of["roll_command_rad"]),
-            cross_track_m=of["cross_track_m"],
-            clearance_m=self._clearance(np.column_stack((of["east_m"], of["north_m"])), of["time_s"]),
-            plan_index=of["plan_index"],
-            arc_length_m=of["arc_length_m"],
-            throttle=of["throttle"],
-            actuator_limited_s=of["actuator_limited_s"],
-            vertical_actuator_limited_s=of["vertical_actuator_limited_s"],
-            **{name: of[name] for name in SURFACES},
-            angle_of_attack_deg=np.degrees(of["angle_of_attack_rad"]),
-            altitude_above_ground_m=(
-                None if self._ground is None else of["up_m"] - self._ground(of["east_m"], of["north_m"])
-            ),
-            **(_believed(beliefs) if self._believes else {}),
-        )
+        of |= {name.replace("_rad", "_deg"): np.degrees(of[name]) for name in NAMES if name.endswith("_rad")}
+        east_m, north_m = of["east_m"], of["north_m"]
+        of |= {
+            "course_deg": _course_deg(rows),
+            "heading_deg": of["heading_deg"] % 360.0,
+            "groundspeed_mps": np.hypot(of["velocity_east_mps"], of["velocity_north_mps"]),
+            "clearance_m": self._clearance(np.column_stack((east_m, north_m)), of["time_s"]),
+        }
+        if self._ground is not None:
+            of["altitude_above_ground_m"] = of["up_m"] - self._ground(east_m, north_m)
+        if self._believes:
+            of["believed_course_deg"] = _course_deg(beliefs)
+            for name in ("east_m", "north_m", "up_m", "cross_track_m"):
+                of[f"believed_{name}"] = beliefs[name].copy()
+        block = Track(**{name: column for name, column in of.items() if name in TRACK_COLUMNS})
         self._blocks.append(block)
         for sink in self._sinks:
             sink(block)
 
 
-def flight_log(world: World, observers: Sequence[Observer]) -> TrackLog:
-    """The track of one flight in a world; the observers get every finished block, a `RowObserver` every row."""
-    rows = [each.on_row for each in observers if isinstance(each, RowObserver)]
-    return TrackLog(
-        world.clearance, [each.on_block for each in observers], ground=world.ground_heights, row_sinks=rows
-    )
-
-
-def _believed(rows: np.ndarray[Any, Any]) -> dict[str, FloatArray]:
-    """The columns of what the aircraft believed."""
-    course = np.degrees(np.arctan2(rows["velocity_east_mps"], rows["velocity_north_mps"])) % 360.0
-    return {
-        "believed_east_m": rows["east_m"].copy(),
-        "believed_north_m": rows["north_m"].copy(),
-        "believed_up_m": rows["up_m"].copy(),
-        "believed_course_deg": course,
-        "believed_cross_track_m": rows["cross_track_m"].copy(),
-    }
+def _course_deg(rows: np.ndarray[Any, Any]) -> FloatArray:
+    """(k,) direction of the ground velocity, in [0, 360)."""
+    course: FloatArray = np.degrees(np.arctan2(rows["velocity_east_mps"], rows["velocity_north_mps"])) % 360.0
+    return course

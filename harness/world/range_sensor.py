@@ -79,7 +79,7 @@ class RangeSensor:
             "lossy": config.dropout > 0.0,
         }
         self._noise, self._dropout, self._false_return = (
-            _stream(seed_sequence, number) for number in range(3)
+            child_stream(seed_sequence, number) for number in range(3)
         )
         self._flawed = config.range_noise_m > 0 or config.dropout > 0 or config.false_return > 0
         self._lost: list[tuple[int, int]] = []
@@ -146,7 +146,7 @@ class RangeSensor:
         return ranges
 
 
-def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:
+def child_stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:
     """The numbered child stream of a root, whatever was spawned from the root before."""
     key = (*root.spawn_key, number)
     return np.random.default_rng(

@@ -10,6 +10,7 @@ import pytest
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import AircraftState, Route
 from harness.flight.closed_loop import fly
+from harness.flight.navigation import StateEstimator
 from harness.flight.record import Flight, Outcome
 from harness.run.scenario_flight import make_loop
 from planner.interface import Plan, PlanRequest
@@ -20,10 +21,10 @@ EAST_M, NORTH_M, UP_M, AIRSPEED_MPS = 30.0, -40.0, 7.0, 2.0
 TREE = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}
 
 
-class Shifted:
+class Shifted(StateEstimator):
     """Believes to be elsewhere, always by as much."""
 
-    has_fix, jumps, held_errors = True, 0, (UP_M, AIRSPEED_MPS)
+    held_errors = UP_M, AIRSPEED_MPS
 
     def believed(self, state: AircraftState) -> AircraftState:
         return state._replace(

@@ -15,9 +15,9 @@ from aircraft.interface import AircraftState, Route
 from harness.analysis.metrics import metrics
 from harness.cli.flight_rows import flight_rows
 from harness.flight.closed_loop import Loop, fly
+from harness.flight.navigation import StateEstimator
 from harness.flight.observer import Caution, Observer
 from harness.flight.record import BELIEVED_FIELDS, TRACK_FIELDS, Flight, Outcome, digest
-from harness.flight.state_estimator import PerfectEstimator
 from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run, tables
 from harness.scenario.scenario import Scenario, parse_scenario
@@ -46,7 +46,7 @@ def flight(scenario: Scenario) -> Flight:
 def test_perfect_navigation_changes_no_bit() -> None:
     scenario = small_world(TREE)
     loop = make_loop(scenario, PointMass)
-    without = replace(make_loop(scenario, PointMass), navigator=PerfectEstimator())
+    without = replace(make_loop(scenario, PointMass), navigator=StateEstimator())
     flight = fly(loop)
     assert digest(flight.track) == digest(fly(without).track)
     assert not flight.track.has_beliefs
@@ -97,10 +97,8 @@ def test_metrics_have_the_error_and_its_cause(scenario: Scenario, flight: Flight
     assert "navigation error" not in told  # guidance was off as well
 
 
-class Jumping:
+class Jumping(StateEstimator):
     """Believes to be 80 m to the east, until a fix comes at 30 s."""
-
-    has_fix, jumps, held_errors = True, 0, (0.0, 0.0)
 
     def believed(self, state: AircraftState) -> AircraftState:
         if state.time_s >= 30.0:
