@@ -47,10 +47,6 @@ class SteppedFlight(SteppedLoop):
         """
         return FlightResult.of(self.scenario, self.flight())
 
-    def __repr__(self) -> str:
-        """A line for people."""
-        return f"SteppedFlight({self.scenario.name}: {self.standing})"
-
 
 def make(
     scenario: Scenario | str | Path,

@@ -55,9 +55,8 @@ class SteppedLoop:
     def step(self, roll_command_rad: float | None = None) -> Status:
         """Flies one guidance interval, or up to the end of the flight if that comes first.
 
-        Args:
-            roll_command_rad: held for this interval in place of what the guidance law decides, positive right wing
-                down; nothing limits it but what the aircraft can do. None: the law steers.
+        A roll command is held for this interval in place of what the guidance law decides, positive right wing down;
+        nothing limits it but what the aircraft can do.
 
         Raises:
             RuntimeError: no flight has begun, or it is over.
@@ -76,23 +75,20 @@ class SteppedLoop:
 
     @property
     def status(self) -> Status:
-        """How the flight stands.
-
-        Raises:
-            RuntimeError: no flight has begun.
-        """
+        """How the flight stands; `RuntimeError` where none has begun."""
         flying = self._flight_begun()
         outcome, reason = (None, "") if flying.ending is None else flying.ending
+        steering = flying.steering
         return Status(
-            time_s=flying.true.time_s,
-            state=flying.true,
-            believed=flying.believed,
-            to_go_m=flying.to_go_m,
-            plan_index=flying.plans.index,
-            arc_length_m=flying.steering.arc_length_m,
-            cross_track_m=flying.steering.cross_track_m,
-            outcome=outcome,
-            reason=reason,
+            flying.true.time_s,
+            flying.true,
+            flying.believed,
+            flying.to_go_m,
+            flying.plans.index,
+            steering.arc_length_m,
+            steering.cross_track_m,
+            outcome,
+            reason,
         )
 
     @property
@@ -100,22 +96,8 @@ class SteppedLoop:
         """Whether the flight that was begun last is over."""
         return self._flight_begun().ending is not None
 
-    @property
-    def standing(self) -> str:
-        """How the flight stands, in some words for people."""
-        flying = self._flying
-        if flying is None:
-            return "not begun"
-        if flying.ending is None:
-            return f"at {flying.true.time_s:g} s, {flying.status_label}"
-        return f"over after {flying.true.time_s:g} s, {flying.status_label}"
-
     def flight(self) -> Flight:
-        """The flight, once it is over.
-
-        Raises:
-            RuntimeError: no flight has begun, or it is not over.
-        """
+        """The flight, once it is over; before that, `RuntimeError`."""
         return self._flight_begun().flight()
 
     def _flight_begun(self) -> ClosedLoop:

@@ -10,31 +10,20 @@ from aircraft.guidance.interface import UPDATE_RATE_HZ
 
 
 class Instant(NamedTuple):
-    """A step at which something is due."""
+    """A step at which something is due: guidance with a row of the track, or a scan; and the steps to the next one."""
 
     guidance: bool
-    """Guidance is, and a row of the track."""
     scan: bool
-    """A scan is."""
     steps: int
-    """Steps of the flight model from here to the next instant."""
 
 
 def intervals(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[Instant, ...]]:
-    """The instants of consecutive guidance intervals, until all of it begins again.
+    """The instants of consecutive guidance intervals, until all of it begins again; guidance is due at the first.
 
-    Args:
-        step_rate_hz: steps of the flight model a second.
-        scan_rate_hz: scans a second; 0: there are none.
-
-    Returns:
-        For each interval its instants; guidance is due at the first of them, and only there.
-
-    Raises:
-        ValueError: one of the rates does not divide that of the flight model.
+    Without scans `scan_rate_hz` is 0. Raises `ValueError` where a rate does not divide that of the flight model.
     """
-    update = steps_between(step_rate_hz, UPDATE_RATE_HZ, "guidance")
-    scan = steps_between(step_rate_hz, scan_rate_hz, "scan") if scan_rate_hz else update
+    update = _steps_between(step_rate_hz, UPDATE_RATE_HZ, "guidance")
+    scan = _steps_between(step_rate_hz, scan_rate_hz, "scan") if scan_rate_hz else update
     found = []
     for begin in range(0, math.lcm(scan, update), update):
         end = begin + update
@@ -48,12 +37,7 @@ def intervals(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[Instant, ...
     return found
 
 
-def steps_between(step_rate_hz: int, rate_hz: float, name: str) -> int:
-    """Steps of the flight model from one event of a rate to the next.
-
-    Raises:
-        ValueError: the rate does not divide that of the flight model.
-    """
+def _steps_between(step_rate_hz: int, rate_hz: float, name: str) -> int:
     steps = round(step_rate_hz / rate_hz)
     if steps < 1 or abs(steps * rate_hz - step_rate_hz) > 1e-9 * step_rate_hz:
         raise ValueError(

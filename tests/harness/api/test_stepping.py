@@ -25,18 +25,13 @@ def flown(flight: wayproof.SteppedFlight) -> wayproof.FlightResult:
 
 def test_a_stepped_flight_is_the_flight_that_fly_flies() -> None:
     flight = wayproof.make(small())
-    assert repr(flight) == "SteppedFlight(short: not begun)"
     stepped, run = flown(flight), wayproof.fly(small())
     assert stepped.digest == run.digest
     assert (stepped.outcome, stepped.reason, stepped.scenario) == (run.outcome, run.reason, run.scenario)
     for name in run.track.column_names:
         np.testing.assert_array_equal(stepped.track[name].to_numpy(), run.track[name].to_numpy())
     assert stepped.plans["path"].equals(run.plans["path"])
-    assert repr(flight).endswith(" s, reached)")
     assert flown(flight).digest == run.digest
-    flight.reset()
-    flight.step()
-    assert repr(flight) == "SteppedFlight(short: at 0.1 s, following)"
 
 
 def test_it_takes_what_fly_takes() -> None:
