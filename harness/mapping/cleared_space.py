@@ -1,7 +1,7 @@
 """What a scan looked through: places, and cells of a grid. Compiled: see `planner.compiled`.
 
-Most places that are asked were seen to be edges, or are hidden by them: what meets the beam towards one, or a
-neighbour of that, is told by a bearing that need not be exact.
+`beams` are those of the scan, as `harness.mapping.scan.RangeScan.beams` has them; bearings are clockwise from the axis
+of the first one, in [0, 2 pi).
 """
 
 from __future__ import annotations
@@ -11,40 +11,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.compiled import BOOL, BOOLS_OUT, COUNT, FLOAT, FLOATS, PLACES, compiled
+from harness.mapping.scan import Beams
+from planner.compiled import BOOLS_OUT, COUNT, FLOAT, FLOATS, PLACES, compiled
 from planner.interface import BoolArray, ComplexArray, FloatArray
 
 CELLS, CELLS_OUT, LOOKS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]", "uint8[:, :]"
 """Parts of grids."""
-NEARLY_RAD = 1e-5
-"""Bearings by which `nearly_towards` finds a ray err by no more."""
-TINY = 1e-300
-
-
-@compiled(FLOAT, FLOAT, FLOAT, FLOAT)
-def nearly_towards(east: float, north: float, start_rad: float, spacing_rad: float) -> int:
-    """The ray towards a place, or the next one to either side; it may be one too many.
-
-    The arc tangent is Hastings' polynomial (Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.4.49).
-
-    East and north are from the sensor; the first ray is at `start_rad`, in [0, 2 pi), and the spacing is more than
-    twice `NEARLY_RAD`.
-    """
-    beside, ahead = abs(east), abs(north)
-    ratio = min(beside, ahead) / max(beside, ahead, TINY)
-    square = ratio * ratio
-    bearing = 0.180141 + square * (-0.085133 + square * 0.0208351)
-    bearing = ratio * (0.999866 + square * (-0.3302995 + square * bearing))
-    if beside > ahead:
-        bearing = 0.5 * math.pi - bearing
-    if north < 0.0:
-        bearing = math.pi - bearing
-    if east < 0.0:
-        bearing = math.tau - bearing
-    clockwise = bearing - start_rad
-    if clockwise < 0.0:
-        clockwise += math.tau
-    return int(clockwise / spacing_rad + 0.5)
+BEAMS = "UniTuple(float64, 5)"
 
 
 @compiled(FLOAT, FLOAT, FLOAT, COUNT)
@@ -65,17 +38,6 @@ def clockwise_of(east: float, north: float, start_rad: float) -> float:
     return turned
 
 
-@compiled(FLOAT, FLOAT, FLOAT, FLOAT, FLOATS, FLOAT)
-def is_hidden(
-    east: float, north: float, start_rad: float, spacing_rad: float, ranges: FloatArray, beyond: float
-) -> bool:
-    """Whether the beam towards an offset, or a neighbour, surely goes no further than `beyond`."""
-    if spacing_rad <= 2.0 * NEARLY_RAD:
-        return False
-    ray = nearly_towards(east, north, start_rad, spacing_rad)
-    return 0 <= ray < len(ranges) and ranges[ray] <= beyond
-
-
 @compiled(FLOATS, COUNT, COUNT, FLOAT)
 def first_short(ranges: FloatArray, first: int, many: int, beyond: float) -> int:
     """The first of so many neighbouring beams that does not go beyond a distance; -1 where all do."""
@@ -88,19 +50,16 @@ def first_short(ranges: FloatArray, first: int, many: int, beyond: float) -> int
     return -1
 
 
-@compiled(CELLS_OUT, LOOKS_OUT, CELLS, FLOATS, *[FLOAT] * 6, BOOL, FLOAT, FLOAT, COUNT, COUNT)
+@compiled(CELLS_OUT, LOOKS_OUT, CELLS, FLOATS, BEAMS, *[FLOAT] * 5, COUNT, COUNT)
 def through_cells(
     seen: BoolArray,
     looks: NDArray[np.uint8],
     disc: BoolArray,
     ranges: FloatArray,
-    x_first: float,
-    y_first: float,
+    beams: Beams,
+    x_low: float,
+    y_low: float,
     cell: float,
-    start_rad: float,
-    spacing_rad: float,
-    beam_rad: float,
-    closed: bool,
     reach: float,
     noise: float,
     aside: int,
@@ -112,10 +71,12 @@ def through_cells(
     too narrow to be missed between them is up to who chooses `reach`.
 
     Of the cells of a `disc` those not `seen` to be free are asked; `looks` tells how often each was looked through, and
-    is not read where once is enough (`needed`). The first cell's corner lies at `x_first`, `y_first` from the sensor.
-    Ranges count up to `reach`; beams have to go beyond a cell by `noise`, and so have `aside` more to either side.
+    is not read where once is enough (`needed`). The first cell's corner lies at `x_low`, `y_low`. Ranges count up to
+    `reach`; beams have to go beyond a cell by `noise`, and so have `aside` more to either side.
     """
-    rays, half = len(ranges), 0.75 * cell
+    east, north, start_rad, spacing_rad, beam_rad = beams
+    rays, half, x_first, y_first = len(ranges), 0.75 * cell, x_low - east, y_low - north
+    closed = rays * spacing_rad > math.tau - 1e-9
     for column in range(seen.shape[0]):
         x = (column + 0.5) * cell + x_first
         for row in range(seen.shape[1]):
@@ -126,8 +87,6 @@ def through_cells(
             distance = math.sqrt(x * x + y * y)
             beyond = distance + half + noise
             if beyond >= reach:
-                continue
-            if needed == 1 and is_hidden(x, y, start_rad, spacing_rad, ranges, beyond):
                 continue
             clockwise = clockwise_of(x, y, start_rad)
             wide = math.asin(half / distance) if distance > half else math.pi
@@ -147,17 +106,12 @@ def through_cells(
                 looks[column, row] = 0
 
 
-@compiled(BOOLS_OUT, PLACES, FLOATS, *[FLOAT] * 5, BOOL, FLOAT, FLOAT, COUNT, FLOAT, COUNT)
+@compiled(BOOLS_OUT, PLACES, FLOATS, BEAMS, FLOAT, FLOAT, COUNT, FLOAT, COUNT)
 def through_places(
     through: BoolArray,
     places: ComplexArray,
     ranges: FloatArray,
-    east: float,
-    north: float,
-    start_rad: float,
-    spacing_rad: float,
-    beam_rad: float,
-    closed: bool,
+    beams: Beams,
     within_m: float,
     sure_m: float,
     abreast: int,
@@ -170,13 +124,13 @@ def through_places(
     these one in `every`. The beams, the one towards a place and `abreast` to either side, have to go further by
     `sure_m`, and the middle of that one to pass by no further than `aimed_m`.
     """
+    east, north, start_rad, spacing_rad, beam_rad = beams
     many, rays = 0, len(ranges)
+    closed = rays * spacing_rad > math.tau - 1e-9
     for i in range(0, len(places), every):
         dx, dy = places[i].real - east, places[i].imag - north
         distance = math.hypot(dx, dy)
         if distance >= within_m:
-            continue
-        if is_hidden(dx, dy, start_rad, spacing_rad, ranges, distance + sure_m):
             continue
         towards = clockwise_of(dx, dy, start_rad) / spacing_rad
         ray = round(towards)

@@ -14,7 +14,7 @@ import numpy as np
 
 from harness.mapping.cleared_space import through_cells
 from harness.mapping.edge_grid import MOST_CELLS
-from harness.mapping.scan import RangeScan, all_round
+from harness.mapping.scan import RangeScan
 from planner.compiled import BOOLS_OUT, FLOAT, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
@@ -90,13 +90,10 @@ class FreeSpace:
             self._looks[cells] if self._needed > 1 else self._looks,
             self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first],
             scan.ranges_m,
-            self._x0 + x_low * self._cell - scan.east_m,
-            self._y0 + y_low * self._cell - scan.north_m,
+            scan.beams,
+            self._x0 + x_low * self._cell,
+            self._y0 + y_low * self._cell,
             self._cell,
-            scan.start_rad,
-            scan.spacing_rad,
-            scan.beam_rad,
-            all_round(scan),
             reach,
             self._noise,
             self._aside,

@@ -30,6 +30,9 @@ from planner.compiled import (
 )
 from planner.interface import ComplexArray, FloatArray, IntArray
 
+Beams = tuple[float, float, float, float, float]
+"""As `RangeScan.beams` has them."""
+
 GRAZING, NEARER = 30.0, 0.5
 """Neighbouring beams show one face where the range of one is less by no more than this times the width of a beam there,
 as where it is seen at 2 degrees, nor by more than this share."""
@@ -126,6 +129,11 @@ class RangeScan:
         """The same, its rays followed by now: nothing leads from it to the world any more."""
         _ = self.ranges_m
         return self
+
+    @property
+    def beams(self) -> Beams:
+        """Where they come from, east and north; bearing of the first axis, from axis to axis, and width, rad."""
+        return self.east_m, self.north_m, self.start_rad, self.spacing_rad, self.beam_rad
 
     @property
     def followed(self) -> bool:
