@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.mapping.scan import RangeScan
 from harness.mapping.scan_comparison import near_any
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
@@ -71,6 +72,14 @@ class EdgePoints(ABC):
     def spacing_m(self) -> float:
         """Edge points of one wall are about this far apart."""
         return self._cell
+
+    @abstractmethod
+    def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
+        """Takes in one scan, but for some of its rays."""
+
+    @abstractmethod
+    def forget(self, points_m: FloatArray, within_m: float) -> None:
+        """Forgets all that is no further from some points, (k, 2)."""
 
     @abstractmethod
     def _are_edges(self, slots: IntArray) -> BoolArray:

@@ -43,7 +43,7 @@ other time only where none was the last time."""
 
 
 class ObstacleMap(EdgePoints):
-    """What stands still, as a sensor with exact ranges shows it (`harness.mapping.sensed_map.Edges`).
+    """What stands still, as a sensor with exact ranges shows it.
 
     Args:
         bounds_m: xmin, ymin, xmax, ymax of the area.

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.mapping.edge_grid import EdgeGrid, EdgePoints
-from harness.mapping.reflection_counting import count_rays, find_long
 from harness.mapping.scan import RangeScan, all_round, clockwise_from
+from planner.compiled import BOOL, FLOAT, FLOATS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
 LEAST_STOPPED = 5.0
@@ -36,9 +36,12 @@ STOOD_S = 20.0
 """What has been an edge for so long stands: what moves is elsewhere by then."""
 NO_RAYS = np.zeros(0, dtype=np.bool_)
 
+SLOTS, FLAGS = "Array(int32, 1, 'C', readonly=True)", "Array(boolean, 1, 'C', readonly=True)"
+COUNTED_OUT = "float32[:, ::1]"
+
 
 class ReflectionMap(EdgePoints):
-    """What stands still, as a sensor with noisy ranges shows it (`harness.mapping.sensed_map.Edges`).
+    """What stands still, as a sensor with noisy ranges shows it.
 
     Args:
         bounds_m: xmin, ymin, xmax, ymax of the area.
@@ -72,10 +75,13 @@ class ReflectionMap(EdgePoints):
     def stands(self, points_m: FloatArray, since_s: float = STOOD_S) -> BoolArray:
         """(k,) which of (k, 2) places lie no further than ranges err from a cell that has been an edge so long."""
         reach = math.ceil(self._noise / self._cell)
+        around = np.arange(-reach, reach + 1)
         at = np.floor((points_m - (self._origin.real, self._origin.imag)) / self._cell).astype(np.int64)
-        found = np.zeros(len(points_m), dtype=np.bool_)
-        find_long(found, at, self._slot, self._edge, self._since_s, self._nx, reach, self._time_s - since_s)
-        return found
+        column, row = np.clip(at.T[:, :, None] + around, 0, [[[self._nx - 1]], [[self._ny - 1]]])
+        long = self._edge[: self._count] & (self._since_s[: self._count] <= self._time_s - since_s)
+        slots = self._slot[column[:, :, None] * self._ny + row[:, None, :]]
+        stands: BoolArray = np.append(long, False)[slots].any(axis=(1, 2))  # the last where there is no slot
+        return stands
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
         """Takes in one scan, but for some of its rays."""
@@ -112,24 +118,23 @@ class ReflectionMap(EdgePoints):
         slots = self._in_reach(complex(scan.east_m, scan.north_m), self._range / 16.0)
         offsets = self._points.take(slots) - complex(scan.east_m, scan.north_m)
         bearings = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
-        counted = np.empty(len(slots), dtype=np.int32)
-        many = count_rays(
-            counted,
-            slots,
-            np.abs(offsets),
-            bearings / scan.spacing_rad,
-            scan.ranges_m,
-            NO_RAYS if ignored is None else ignored,
-            self._counts,
-            0.5 * self._cell,
-            scan.spacing_rad,
-            # Beyond, a return is lost where noise takes it out of range.
-            scan.max_range_m - 2.0 * self._noise,
-            self._noise,
-            FORGET_AT,
-            all_round(scan),
+        self._decide(
+            _count_rays(
+                slots,
+                np.abs(offsets),
+                bearings / scan.spacing_rad,
+                scan.ranges_m,
+                NO_RAYS if ignored is None else ignored,
+                self._counts,
+                0.5 * self._cell,
+                scan.spacing_rad,
+                # Beyond, a return is lost where noise takes it out of range.
+                scan.max_range_m - 2.0 * self._noise,
+                self._noise,
+                FORGET_AT,
+                all_round(scan),
+            )
         )
-        self._decide(counted[:many])
 
     def _decide(self, slots: NDArray[np.int32]) -> None:
         """Tells which cells are edges now."""
@@ -144,3 +149,64 @@ class ReflectionMap(EdgePoints):
             self._since[slots[changed]], self._since_s[slots[changed]] = self.revision, self._time_s
             if was[changed].any():
                 self.last_removal_revision = self.revision
+
+
+@compiled(COUNTED_OUT, "int32", FLOAT, FLOAT, FLOAT, rare=True)
+def _count(counts: NDArray[np.float32], slot: int, beyond: float, half: float, noise: float) -> None:
+    """Counts a ray that went so much further than a cell: it was stopped, passed, or ended before it."""
+    if abs(beyond) <= half:
+        counts[slot, 0] += np.float32(1.0)
+    elif beyond > half:
+        counts[slot, 1] += np.float32(1.0)
+    elif beyond > -half - 2.0 * noise:
+        counts[slot, 2] += np.float32(1.0)
+
+
+@compiled(SLOTS, FLOATS, FLOATS, FLOATS, FLAGS, COUNTED_OUT, *[FLOAT] * 5, BOOL, rare=True)
+def _count_rays(
+    slots: NDArray[np.int32],
+    distances: FloatArray,
+    positions: FloatArray,
+    ranges: FloatArray,
+    ignored: BoolArray,
+    counts: NDArray[np.float32],
+    half: float,
+    spacing_rad: float,
+    within: float,
+    noise: float,
+    forget_at: float,
+    closed: bool,
+) -> NDArray[np.int32]:
+    """Counts what the rays towards cells did. Near by, where several rays meet a cell, two more of them are asked.
+
+    `slots` are the cells that are asked; by cell are told `distances` (m) and `positions`, bearings in rays from the
+    first on, and by slot `counts` (n, 3), which are written: rays that the cell stopped, that it let through, that
+    ended before it. `ignored` rays are not counted; it may be empty. `half` is half the width of a cell; cells beyond
+    `within` are not asked; counts are halved from `forget_at` on.
+
+    Returns:
+        (k,) the slots that a ray was aimed at.
+    """
+    counted, rays, many = np.empty(len(slots), dtype=np.int32), len(ranges), 0
+    for i in range(len(slots)):
+        distance, ray = distances[i], int(np.rint(positions[i]))
+        if not (abs(positions[i] - ray) * spacing_rad * distance < half and distance < within):
+            continue
+        if not closed and ray >= rays:
+            continue
+        ray %= rays
+        if len(ignored) and ignored[ray]:
+            continue
+        slot = slots[i]
+        counted[many] = slot
+        many += 1
+        aside = int(0.7 * half / spacing_rad / max(distance, half))
+        for side in range(-1, 2 if aside >= 1 else 0):
+            # The ray itself comes first.
+            other = ray + (0 if side == -1 else (2 * side - 1) * aside)
+            other = other % rays if closed else min(max(other, 0), rays - 1)
+            _count(counts, slot, ranges[other] - distance, half, noise)
+        if counts[slot, 0] + counts[slot, 1] + counts[slot, 2] > forget_at:
+            for column in range(3):
+                counts[slot, column] *= np.float32(0.5)
+    return counted[:many]

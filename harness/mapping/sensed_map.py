@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import numpy as np
 
+from harness.mapping.edge_grid import EdgePoints
 from harness.mapping.free_space import FreeSpace
 from harness.mapping.moving_obstacles import MovingObstacles
 from harness.mapping.obstacle_map import ObstacleMap
@@ -18,29 +18,6 @@ from planner.nearest_edge import NearestEdge
 
 NOISY = 0.1
 """Ranges that err by more than this share of the clearance are weighed. What moves is then told by medians."""
-
-
-class Edges(Protocol):
-    """A map of the edges of what stands still; the members of `planner.interface.MapView` that concern it."""
-
-    @property
-    def spacing_m(self) -> float: ...  # noqa: D102
-
-    @property
-    def revision(self) -> int: ...  # noqa: D102
-
-    @property
-    def last_removal_revision(self) -> int: ...  # noqa: D102
-
-    def edges_since(self, revision: int) -> FloatArray: ...  # noqa: D102
-
-    def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
-        """Takes in one scan, but for some of its rays."""
-        ...
-
-    def forget(self, points_m: FloatArray, within_m: float) -> None:
-        """Forgets all that is no further from some points, (k, 2)."""
-        ...
 
 
 class SensedMap:
@@ -88,7 +65,7 @@ class SensedMap:
     def _begin(self, revision: int) -> None:
         """Makes everything empty."""
         self._free = FreeSpace(*self._area, self._noise, self._lost, self._least_width)
-        self._edges: Edges
+        self._edges: EdgePoints
         if self._noisy:
             self._edges = edges = ReflectionMap(*self._area, self._noise, revision)
             self._moving = MovingObstacles(

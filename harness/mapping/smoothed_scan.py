@@ -13,7 +13,6 @@ from itertools import pairwise
 import numpy as np
 
 from harness.mapping.scan import RangeScan, all_round
-from planner.compiled import COUNT, COUNTS, FLOATS, FLOATS_OUT, compiled
 from planner.interface import FloatArray, IntArray
 
 HALVES = (2, 4, 8, 16)
@@ -45,29 +44,12 @@ def smoothed(scan: RangeScan, width_m: float) -> RangeScan:
 
 
 def _medians(ring: FloatArray, rays: IntArray, half: int) -> FloatArray:
-    """(k,) medians of what so many rays to either side of each of (k,) returned; infinite where most did not."""
-    medians = np.empty(len(rays))
-    find_medians(medians, ring, rays, HALVES[-1] - half, 2 * half + 1)
-    return medians
+    """(k,) medians of what so many rays to either side of each of (k,) returned; infinite where most did not.
 
-
-@compiled(FLOATS_OUT, FLOATS, COUNTS, COUNT, COUNT, rare=True)
-def find_medians(medians: FloatArray, ring: FloatArray, rays: IntArray, offset: int, width: int) -> None:
-    """Medians of stretches of a list of ranges; of an even number the lower of the two in the middle.
-
-    (k,) `medians` are written, infinite where no more than half of a stretch returned anything. Each stretch of `width`
-    begins `offset` behind one of the `rays` in `ring`.
+    Of an even number of returns it is the lower of the two in the middle.
     """
-    ordered = np.empty(width)
-    for i in range(len(rays)):
-        returned = 0
-        for j in range(width):
-            value = ring[rays[i] + offset + j]
-            if value < math.inf:
-                k = returned
-                while k > 0 and ordered[k - 1] > value:
-                    ordered[k] = ordered[k - 1]
-                    k -= 1
-                ordered[k] = value
-                returned += 1
-        medians[i] = ordered[(returned - 1) // 2] if 2 * returned > width else math.inf
+    width = 2 * half + 1
+    ordered = np.sort(np.lib.stride_tricks.sliding_window_view(ring, width)[rays + HALVES[-1] - half])
+    returned = np.count_nonzero(ordered < math.inf, axis=1)
+    medians = ordered[np.arange(len(rays)), np.maximum(returned - 1, 0) // 2]
+    return np.where(2 * returned > width, medians, math.inf)
