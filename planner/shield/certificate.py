@@ -48,6 +48,12 @@ ARC_LENGTHS_AT_ONCE = 4
 AHEAD_STEP, ASIDE = 0.25, (0.0, 0.5)
 """Turns about places ahead are looked for at every such share of the turn radius along a path, this share aside."""
 
+STRAIGHT_ON = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
+"""A path is left straight on for so many turn radii: where it bends behind something the view goes straight on."""
+
+SPARSE = 16
+"""One in so many places of a disc is looked at first."""
+
 SIDES = (1.0, -1.0)
 """Left, right: the sign of the curvature."""
 
@@ -75,13 +81,13 @@ class Certified:
     loiter_entry_m: float
 
 
-class _Swerve(NamedTuple):
-    """An arc to one side that leads into a full turn to the other, about a place ahead.
+class _Exit(NamedTuple):
+    """How a path is left for a full turn: by an arc to the other side, about a place ahead, or straight on.
 
     Attributes:
         side: of the full turn, 1: left.
-        angle_rad: of the arc.
-        ahead_m, aside_m: where the centre lies, seen from where the arc begins.
+        angle_rad: of the arc, 0: straight on.
+        ahead_m, aside_m: where the centre of the turn lies, seen from where the path is left.
     """
 
     side: float
@@ -90,7 +96,7 @@ class _Swerve(NamedTuple):
     aside_m: float
 
     @classmethod
-    def to(cls, side: float, share: float, limits: Limits) -> _Swerve:
+    def about_place_ahead(cls, side: float, share: float, limits: Limits) -> _Exit:
         """The one whose centre lies aside by a share of the radius: 2 R cos(a) - roll sin(a) = (1 + share) R."""
         radius, roll = limits.radius_m, 2.0 * limits.roll_m
         angle = math.acos((1.0 + share) * radius / math.hypot(2.0 * radius, roll)) - math.atan2(
@@ -101,7 +107,9 @@ class _Swerve(NamedTuple):
         )
 
     def lead(self, pose: Pose, limits: Limits) -> list[Segment]:
-        """The arc, and the straight to roll after it."""
+        """The arc and the straight to roll after it, or the straight."""
+        if not self.angle_rad:
+            return [(*pose, 0.0, self.ahead_m)]
         arc: Segment = (*pose, -self.side / limits.radius_m, self.angle_rad * limits.radius_m)
         return [arc, (*along(arc, arc[5]), 0.0, 2.0 * limits.roll_m)] if limits.roll_m else [arc]
 
@@ -112,8 +120,12 @@ class Certifier:
     def __init__(self, limits: Limits, clearance_m: float, horizon_m: float, spacing_m: float) -> None:
         self._limits, self._horizon, self._spacing = limits, horizon_m, spacing_m
         self._beside = BEYOND * clearance_m
-        self._swerves = [_Swerve.to(side, share, limits) for share in ASIDE for side in SIDES]
-        self._disc = _disc(disc_radius_m(limits.radius_m, clearance_m), spacing_m)
+        radius_m = limits.radius_m
+        self._exits = [_Exit.about_place_ahead(side, share, limits) for share in ASIDE for side in SIDES]
+        self._exits += [
+            _Exit(side, 0.0, n * radius_m, side * radius_m) for n in STRAIGHT_ON for side in SIDES
+        ]
+        self._disc = _disc(disc_radius_m(radius_m, clearance_m), spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: MapView) -> float:
         """Arc length up to which a path lies in space seen to be free: that of the first place that does not."""
@@ -148,31 +160,36 @@ class Certifier:
         return None
 
     def certify_ahead(self, path: Path, seen: MapView, terrain: Terrain, to_m: float) -> Certified | None:
-        """The longest part of a path that ends in a turn about a place ahead on it, seen to be free.
+        """The longest part of a path that can be left, ahead or straight on, for a turn that is seen to be free.
 
-        Through a gap narrower than a turn beside the path, this is the first turn that is seen. An arc to one side
-        leads into a full turn to the other, about a place ahead. Arguments are those of `certify`.
+        Through a gap narrower than a turn beside the path, this is the first turn that is seen: by an arc to one side
+        into a full turn to the other, about a place ahead, or beyond the gap, where the path bends behind something.
+        Arguments are those of `certify`.
         """
+        radius_m = self._limits.radius_m
         free_to = min(self.seen_free_to_m(path, seen), to_m)
-        step = AHEAD_STEP * self._limits.radius_m
+        step = AHEAD_STEP * radius_m
         arc_lengths_m: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
         poses = poses_at(path, arc_lengths_m)
         ahead = poses[:, None, 2:]
         aside = np.stack((-ahead[..., 1], ahead[..., 0]), axis=-1)
-        offsets = np.array([(each.ahead_m, each.aside_m) for each in self._swerves])[:, :, None]
+        offsets = np.array([(each.ahead_m, each.aside_m) for each in self._exits])[:, :, None]
         centres = poses[:, None, :2] + offsets[:, 0] * ahead + offsets[:, 1] * aside
-        places = (centres[:, :, None] + self._disc).reshape(-1, 2)
-        free = seen.seen_free(places).reshape(*centres.shape[:2], -1).all(axis=2)
+        places = centres[:, :, None] + self._disc[::SPARSE]
+        free = seen.seen_free(places.reshape(-1, 2)).reshape(*centres.shape[:2], -1).all(axis=2)
         for i, which in np.argwhere(free).tolist():
-            arc_length_m = float(arc_lengths_m[i])
+            arc_length_m, leaving = float(arc_lengths_m[i]), self._exits[which]
             pose, curvature = place_on(path, arc_length_m)
-            swerve = self._swerves[which]
-            if swerve.side * curvature > 0.0:
+            if leaving.angle_rad and leaving.side * curvature > 0.0:
                 continue  # that would take a straight to roll
-            lead = Path(np.array(swerve.lead(pose, self._limits)))
-            turn = full_turn(end_of(lead), self._limits.radius_m, swerve.side)
+            lead = Path(np.array(leaving.lead(pose, self._limits)))
+            turn = full_turn(end_of(lead), radius_m, leaving.side)
             whole = Path(np.array([*lead.segments.tolist(), turn]), loiter=True)
-            if self.seen_free_to_m(lead, seen) >= lead.length_m and terrain.admits(whole):
+            if (
+                seen.seen_free(centres[i, which] + self._disc).all()
+                and self.seen_free_to_m(lead, seen) >= lead.length_m
+                and terrain.admits(whole)
+            ):
                 way = between(path, 0.0, arc_length_m)
                 return Certified(Path(np.array([*way, *whole.segments.tolist()]), loiter=True), arc_length_m)
         return None

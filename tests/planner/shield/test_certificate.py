@@ -118,6 +118,9 @@ def test_what_is_certified_is_free_everywhere(
     points = rng.uniform(-1500.0, 1500.0, (40, 2))
     line = shapely.LineString(sample(path, 10.0, 0.1))
     points = points[shapely.distance(line, shapely.points(points)) > KEEP + 1.0]
+    ahead = CERTIFIER.certify_ahead(path, seen, terrain(points), math.inf)
+    if ahead is not None:
+        assert_certified(ahead, path, seen, points, assert_flyable)
     found = CERTIFIER.certify(path, seen, terrain(points))
     if found is not None:
         assert_certified(found, path, seen, points, assert_flyable)
@@ -157,6 +160,22 @@ def test_it_turns_to_the_side_that_is_free() -> None:
         found = CERTIFIER.certify(STRAIGHT, FreeDiscs(np.array(corridor)), terrain())
         assert found is not None
         assert found.path.segments[-1, 4] * side > 0.0
+
+
+def test_a_path_that_bends_behind_something_in_a_gap_is_left_straight_on(
+    assert_flyable: AssertFlyable,
+) -> None:
+    # Beyond the gap the path turns left, to where nothing was seen; the view goes straight on, to room on the right.
+    path = bent([(0.0, 650.0), (1.0 / RADIUS, 0.5 * math.pi * RADIUS), (0.0, 900.0)])
+    lane = [(x, 0.0, 70.0) for x in np.arange(0.0, 900.0, 20.0)]
+    seen = FreeDiscs(np.array([*lane, (950.0, -100.0, 180.0)]))
+    points = np.array([(600.0, -60.0), (600.0, 60.0)])
+    assert CERTIFIER.certify(path, seen, terrain(points)) is None
+    found = CERTIFIER.certify_ahead(path, seen, terrain(points), math.inf)
+    assert found is not None
+    assert_certified(found, path, seen, points, assert_flyable)
+    assert 500.0 < found.loiter_entry_m <= 700.0
+    assert found.path.segments[-1, 4] < 0.0
 
 
 def test_an_edge_point_in_the_turn_forbids_it_though_it_was_seen_free() -> None:
