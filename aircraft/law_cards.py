@@ -20,7 +20,7 @@ from aircraft.card_cache import cached
 from aircraft.envelope import LawCard, WindPoint, performance
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.guidance.preview import PreviewConfig
-from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind, installed_kinds
+from aircraft.guidance.registry import BUILT_IN, DEFAULT_KIND, GuidanceKind
 from aircraft.guidance.waypoints import waypoint_law
 from aircraft.model_files import AircraftError, ModelFiles
 from aircraft.route import weave
@@ -78,7 +78,7 @@ def law_card(
     legs = f"waypoints {acceptance_radius_m!r}" if waypoints else ""
     flies = repr(replace(frame, files=None))  # type: ignore[arg-type]  # the files count by their content
     known = (flies, frame.files, kind, keys, legs, limits.airspeed_mps)
-    if known not in _kept and installed_kinds().get(kind.kind) != kind:
+    if known not in _kept and kind not in BUILT_IN:
         _kept[known] = _card(flown())  # nothing tells what it depends on
     if known not in _kept:
         file = getsourcefile(kind.make)  # one of another distribution is not in the digest of this package

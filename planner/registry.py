@@ -1,17 +1,13 @@
-"""Planner kinds by name: the built-in ones and those of other distributions.
+"""The planners that come with wayproof, as scenarios name them.
 
-Another distribution adds a planner by an entry point in the group `wayproof.planners` that names a
-`PlannerKind`.
+Another distribution adds one by an entry point in the group `wayproof.planners` that names a `PlannerKind`.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
-from contextlib import redirect_stdout
 from dataclasses import dataclass
-from functools import cache, partial
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from functools import partial
 from typing import Any
 
 from planner.baselines import bendy_ruler, bug, dubins_tree, mppi, tangent_bug, vfh_plus
@@ -20,9 +16,6 @@ from planner.paper import config as paper_config
 from planner.paper import rolling as paper
 from planner.rolling_window import config as rolling_window_config
 from planner.rolling_window import planner as rolling_window
-
-GROUP = "wayproof.planners"
-_registered: dict[str, PlannerKind] = {}
 
 
 @dataclass(frozen=True)
@@ -112,75 +105,3 @@ BUILT_IN = (
         needs="ompl",
     ),
 )
-
-
-class PluginError(ImportError):
-    """A planner of another distribution cannot be loaded; the message says which, why, and what to do."""
-
-
-def installed_kinds() -> dict[str, PlannerKind]:
-    """The planner kinds that every process finds, by name, built-in ones first.
-
-    Raises:
-        PluginError: one of another distribution cannot be loaded.
-    """
-    kinds = {kind.kind: kind for kind in BUILT_IN}
-    for point in _outside(entry_points, tuple(sys.path)):
-        outside = _loaded(point)
-        kinds.setdefault(outside.kind, outside)
-    return kinds
-
-
-def planner_kinds() -> dict[str, PlannerKind]:
-    """All planner kinds by name: the installed ones, and those that this process has registered."""
-    return {**installed_kinds(), **_registered}
-
-
-def register(kind: PlannerKind) -> None:
-    """Lets this process, and no other, know a planner by its name, as an entry point does for every process.
-
-    One that was registered under the same name before is replaced.
-
-    Raises:
-        ValueError: a built-in planner, or one of another distribution, has the name.
-    """
-    if kind.kind in installed_kinds():
-        raise ValueError(f"there is a planner called {kind.kind} already; give this one another name")
-    _registered[kind.kind] = kind
-
-
-def distribution_of(kind: str) -> str | None:
-    """Name and version of the other distribution that a planner kind comes from; None for a built-in one."""
-    if kind in (built_in.kind for built_in in BUILT_IN):
-        return None
-    for point in _outside(entry_points, tuple(sys.path)):
-        if _loaded(point).kind == kind and point.dist is not None:
-            return f"{point.dist.name} {point.dist.version}"
-    return None
-
-
-@cache
-def _outside(find: Callable[..., EntryPoints], path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """Entry points of other distributions; to look for them takes as long as all else of reading a scenario."""
-    return tuple(find(group=GROUP))
-
-
-def _loaded(point: EntryPoint) -> PlannerKind:
-    """What an entry point of another distribution names.
-
-    Raises:
-        PluginError: it names something else, or cannot be loaded.
-    """
-    owner = f"{point.dist.name} {point.dist.version}" if point.dist is not None else "another distribution"
-    told = f"the planner of entry point {point.name!r} ({point.value}) of {owner}"
-    try:
-        with redirect_stdout(sys.stderr):
-            outside = point.load()
-    except Exception as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise PluginError(
-            f"{told} cannot be loaded: {reason}; mend or uninstall that distribution"
-        ) from error
-    if not isinstance(outside, PlannerKind):
-        raise PluginError(f"{told} is no PlannerKind; mend or uninstall that distribution")
-    return outside

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from harness.campaign.flight import Answer
     from harness.certification.certificate import Certificate
     from harness.certification.certification import Tally
-    from harness.scenario.given import LoopPart
+    from harness.scenario.kinds import LoopPart
 
 
 def compare(
@@ -43,7 +43,8 @@ def compare(
     import pyarrow as pa
 
     from harness.comparison.comparison import fly_and_compare
-    from harness.scenario.given import GUIDANCE, PLANNER, is_source
+    from harness.scenario.given import is_source
+    from harness.scenario.kinds import GUIDANCE, PLANNER
 
     given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [each if isinstance(each, Scenario) else load_scenario(each) for each in given]

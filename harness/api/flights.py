@@ -11,7 +11,8 @@ from harness.api.errors import as_input_errors
 from harness.api.metrics import Metrics
 from harness.api.results import FlightResult
 from harness.files.input_file import InputError
-from harness.scenario.given import GUIDANCE, PLANNER, LoopPart, registered
+from harness.scenario.given import registered
+from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart
 from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def _name_of(given: object, part: LoopPart) -> str:
     try:
         return registered(given, part)
     except ValueError as error:
-        raise InputError(f"wayproof: {part.noun.partition(' ')[2]}: {error}") from error
+        raise InputError(f"wayproof: {part.noun}: {error}") from error
 
 
 def _flown(scenario: Scenario, out: Path | None, recording: bool, progress: Progress | None) -> FlightResult:

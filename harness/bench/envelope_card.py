@@ -18,10 +18,10 @@ from aircraft.climb import climb_rates
 from aircraft.envelope import performance
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.guidance.margins import law_margins
-from aircraft.guidance.registry import installed_kinds
 from aircraft.interface import GRAVITY_MPS2
 from aircraft.start import Atmosphere
 from harness.bench.tracking import ALTITUDE_M, course, fly_course
+from harness.scenario.kinds import GUIDANCE
 from planner.kernel_cache import seal
 
 BANKS_DEG: Final = (10.0, 20.0, 30.0, 40.0, 45.0)
@@ -78,7 +78,7 @@ def envelope_card(
         "verified": frame.verified,
         "laws": {
             name: law_margins(kind, frame.guidance_limits())._asdict()
-            for name, kind in installed_kinds().items()
+            for name, kind in GUIDANCE.installed().items()
         },
         "at": pages,
     }

@@ -20,11 +20,12 @@ from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.guidance.progress import RouteProgress
-from aircraft.guidance.registry import DEFAULT_KIND, guidance_kinds
+from aircraft.guidance.registry import DEFAULT_KIND
 from aircraft.interface import Route
 from aircraft.route import arc_point
 from aircraft.start import Atmosphere, StartConditions
 from harness.flight.navigation import Navigator, StateEstimator
+from harness.scenario.kinds import guidance_kinds
 from harness.scenario.navigation import Navigation
 from planner.kernel_cache import seal
 

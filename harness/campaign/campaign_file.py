@@ -16,11 +16,11 @@ from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node, fault
 from harness.scenario.files_resolved import file_beside
 from harness.scenario.generators import WorldSpec
 from harness.scenario.given import is_source
+from harness.scenario.kinds import planner_kinds
 from harness.scenario.resolving import model_or_folder
 from harness.scenario.sections import AircraftSpec, PlannerSpec, Section
 from harness.scenario.shipped import shipped_scenarios
 from harness.scenario.validation import NAME_PATTERN, KeyFault, input_error, shown
-from planner.registry import planner_kinds
 
 SCHEMA: Final = "wayproof/campaign/1"
 MAX_RUNS: Final = 1_000_000

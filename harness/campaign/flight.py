@@ -14,7 +14,8 @@ from harness.analysis.claims import Claim, holds
 from harness.campaign.results import ERROR, metric_cells, time_cells
 from harness.files.crash import PlannerError, sentence, trace
 from harness.files.errors import RunFolderError, WriteError
-from harness.scenario.given import GUIDANCE, PLANNER, registered_source
+from harness.scenario.given import registered_source
+from harness.scenario.kinds import GUIDANCE, PLANNER
 from harness.scenario.scenario import Scenario, unpacked
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from harness.files.input_file import MAX_JSON_BYTES, read_index
 from harness.files.versions import versions
 from harness.files.whole_file import PARTIAL, append_to, replace_text, replacing
 from harness.files.wording import counted
-from planner.registry import distribution_of
+from harness.scenario.kinds import PLANNER
 
 LOCK: Final = "lock"
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/1"
@@ -130,7 +130,7 @@ class CampaignFolder:
         about = {
             "schema": FOLDER_SCHEMA,
             "versions": versions(),
-            "planners": {kind: distribution_of(kind) for kind in self._runs.planners},
+            "planners": {kind: PLANNER.distribution_of(kind) for kind in self._runs.planners},
             "aircraft": {model: airframe(model).files.digest() for model in self._runs.aircraft},
             **self._runs.plain(),
         }

@@ -140,13 +140,12 @@ def _flush() -> None:
 
 def _report(error: Exception) -> int:
     """Says on standard error what went wrong and returns the exit status."""
-    from aircraft.guidance.registry import PluginError as GuidancePluginError
     from harness.files.crash import PlannerError, sentence
     from harness.files.errors import WriteError
     from harness.files.input_file import InputError
-    from planner.registry import PluginError as PlannerPluginError
+    from harness.scenario.kinds import PluginError
 
-    if isinstance(error, (PlannerError, PlannerPluginError, GuidancePluginError)):
+    if isinstance(error, (PlannerError, PluginError)):
         say(f"wayproof: {error}", err=True)
         return BAD_INPUT
     if isinstance(error, InputError):

@@ -68,9 +68,9 @@ def bench(
 def _bench_tracking(name: str, seeds: int, as_json: bool, guidance: str) -> int:
     """The table of tracking errors of an aircraft."""
     from aircraft.airframes import AircraftError
-    from aircraft.guidance.registry import guidance_kinds
     from harness.bench.tracking import bench_tracking
     from harness.cli.terminal import print_table, step_bar
+    from harness.scenario.kinds import guidance_kinds
 
     guidance = law_kind(guidance)
     if guidance not in guidance_kinds():

@@ -39,11 +39,11 @@ def list_names(
     if what == "aircraft":
         _print_aircraft()
     elif what == "guidance":
-        from aircraft.guidance.registry import guidance_kinds
+        from harness.scenario.kinds import guidance_kinds
 
         _print_kinds(guidance_kinds())
     elif what == "planners":
-        from planner.registry import planner_kinds
+        from harness.scenario.kinds import planner_kinds
 
         _print_kinds(planner_kinds())
     elif what == "metrics":

@@ -14,7 +14,7 @@ import typer
 from harness.cli.options import AircraftOption, completing, option
 
 if TYPE_CHECKING:
-    from harness.scenario.given import LoopPart
+    from harness.scenario.kinds import LoopPart
 
 Run = TypeVar("Run", bound=Callable[..., int])
 
@@ -26,7 +26,7 @@ REPLACING: Final[dict[str, Any]] = {
         option(
             "KIND",
             f"Replaces planner.kind; {_KIND}",
-            autocompletion=completing("planner.registry:planner_kinds"),
+            autocompletion=completing("harness.scenario.kinds:planner_kinds"),
         ),
     ],
     "aircraft": AircraftOption,
@@ -35,7 +35,7 @@ REPLACING: Final[dict[str, Any]] = {
         option(
             "KIND",
             f"Replaces guidance.kind; {_KIND}",
-            autocompletion=completing("aircraft.guidance.registry:guidance_kinds"),
+            autocompletion=completing("harness.scenario.kinds:guidance_kinds"),
         ),
     ],
     "conditions": Annotated[
@@ -183,7 +183,7 @@ def _setting(text: str) -> tuple[str, str]:
 
 def planner_kind(text: str) -> str:
     """The kind that --planner means: FILE.py:NAME and MODULE:NAME are imported, and known by their name then."""
-    from harness.scenario.given import PLANNER
+    from harness.scenario.kinds import PLANNER
     from harness.scenario.sections import SHIELDED
 
     shielded = SHIELDED if text.endswith(SHIELDED) else ""
@@ -192,7 +192,7 @@ def planner_kind(text: str) -> str:
 
 def law_kind(text: str) -> str:
     """The kind that --guidance means, likewise."""
-    from harness.scenario.given import GUIDANCE
+    from harness.scenario.kinds import GUIDANCE
 
     return _kind(text, GUIDANCE, "--guidance")
 
@@ -200,8 +200,8 @@ def law_kind(text: str) -> str:
 def _kind(text: str, part: LoopPart, option: str) -> str:
     from harness.scenario.given import registered
 
-    if text.endswith(".py") and text not in part.kinds():
-        told = f"is {text}; must be one of {', '.join(part.kinds())}, or FILE.py:NAME as {text}:NAME"
+    if text.endswith(".py") and text not in part.known():
+        told = f"is {text}; must be one of {', '.join(part.known())}, or FILE.py:NAME as {text}:NAME"
         raise typer.BadParameter(told, param_hint=option)
     try:
         return registered(text, part)

@@ -6,10 +6,10 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Final
 
+from harness.scenario.kinds import planner_kinds
 from harness.scenario.sections import AircraftSpec
 from planner.compiled import begin_compiling
 from planner.kernel_cache import seal
-from planner.registry import planner_kinds
 
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe

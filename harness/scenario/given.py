@@ -12,50 +12,17 @@ import importlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import aircraft.guidance.registry
-import planner.registry
 from aircraft.guidance.registry import GuidanceKind
+from harness.scenario.kinds import PLANNER, LoopPart
 from planner.registry import PlannerKind
 
 Kind = PlannerKind | GuidanceKind
-
-
-class LoopPart(NamedTuple):
-    """A part of the loop that may be given: its noun, the methods that it has to have, what a factory may be told.
-
-    And the type of its kinds, those that this process knows by name, and what makes one more known.
-    """
-
-    noun: str
-    methods: tuple[str, ...]
-    told: str
-    kind: Callable[..., Any]
-    kinds: Callable[[], Mapping[str, Any]]
-    register: Callable[[Any], None]
-
-
-PLANNER = LoopPart(
-    "a planner",
-    ("plan(request)",),
-    "mission",
-    PlannerKind,
-    planner.registry.planner_kinds,
-    planner.registry.register,
-)
-GUIDANCE = LoopPart(
-    "a guidance law",
-    ("update(state)", "follow(route, arc_length_m)"),
-    "limits",
-    GuidanceKind,
-    aircraft.guidance.registry.guidance_kinds,
-    aircraft.guidance.registry.register,
-)
 
 
 @dataclass(frozen=True)
@@ -92,7 +59,7 @@ def registered(given: object, part: LoopPart = PLANNER) -> str:
         kind = _same_kind_of(given, part)
     except TypeError:  # it cannot be hashed
         kind = kind_of(given, part)
-    if part.kinds().get(kind.kind) != kind:
+    if part.known().get(kind.kind) != kind:
         part.register(kind)
     return kind.kind
 
@@ -134,10 +101,10 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
         made = _maker(given, part)
     elif not _is_part(given, part):
         raise ValueError(
-            f"{part.noun} must be a kind, a class, a function or an object with the method "
+            f"a {part.noun} must be a kind, a class, a function or an object with the method "
             f"{' and '.join(part.methods)}; this is a {type(given).__name__}"
         )
-    summary = (inspect.getdoc(given) or f"{part.noun} given in Python").splitlines()[0]
+    summary = (inspect.getdoc(given) or f"a {part.noun} given in Python").splitlines()[0]
     kind: Kind = part.kind(_name(given), summary, NoKeys, made)
     return kind
 

@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
 
 from pydantic import Field, ValidationError, create_model
 
-import aircraft.guidance.registry
-import planner.registry
-from aircraft.guidance.registry import GuidanceKind, guidance_kinds
+from aircraft.guidance.registry import GuidanceKind
 from harness.files.crash import PlannerError, sentence
 from harness.files.printing import PrintingAside
 from harness.scenario.craft import airframe_of, limits_of
 from harness.scenario.given import Kind, is_source
+from harness.scenario.kinds import GUIDANCE, PLANNER, guidance_kinds, planner_kinds
 from harness.scenario.sections import AircraftSpec, GuidanceSpec, PartSpec, PlannerSpec, Section
 from harness.scenario.validation import KeyFault, first_fault, unknown_key
 from planner.compiled import compile_all
 from planner.kernel_cache import seal
-from planner.registry import PlannerKind, planner_kinds
+from planner.registry import PlannerKind
 from planner.shield.shield import Shield
 
 if TYPE_CHECKING:
@@ -196,8 +195,8 @@ def _keys_section(kind: Kind) -> type[Section]:
 def with_own_keys(schema: dict[str, Any]) -> dict[str, Any]:
     """The JSON Schema of a scenario with a choice for each kind of planner and of guidance law, its own keys in it."""
     for name, spec, kinds in (
-        ("planner", "PlannerSpec", planner.registry.installed_kinds()),
-        ("guidance", "GuidanceSpec", aircraft.guidance.registry.installed_kinds()),
+        ("planner", "PlannerSpec", PLANNER.installed()),
+        ("guidance", "GuidanceSpec", GUIDANCE.installed()),
     ):
         shared = schema["$defs"].pop(spec)
         choices = [_choice(shared, kind) for kind in kinds.values()]

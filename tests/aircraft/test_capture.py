@@ -7,10 +7,10 @@ import pytest
 
 from aircraft.airframes import aircraft_names, airframe
 from aircraft.guidance.npfg import NpfgConfig
-from aircraft.guidance.registry import guidance_kinds
 from aircraft.interface import Route
 from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.trials import in_flight
+from harness.scenario.kinds import guidance_kinds
 
 BESIDE_S, RETURNED_S = 2.0, 0.02
 """Flying times: so far beside the line it begins, and so near it comes."""

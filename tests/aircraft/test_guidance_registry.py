@@ -1,11 +1,10 @@
-"""Guidance laws by name, ours and those of other distributions."""
+"""Guidance laws by name."""
 
 from __future__ import annotations
 
 import re
 import sys
 from dataclasses import fields
-from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,23 +13,14 @@ import numpy as np
 import pytest
 
 from aircraft.airframes import airframe
-from aircraft.guidance import registry
 from aircraft.guidance.interface import UPDATE_RATE_HZ
-from aircraft.guidance.preview import PreviewConfig, PreviewLaw
-from aircraft.guidance.registry import BUILT_IN, GROUP, GuidanceKind, PluginError, guidance_kinds
+from aircraft.guidance.registry import BUILT_IN, GuidanceKind
 from aircraft.interface import Route
 from aircraft.start import StartConditions
+from harness.scenario.kinds import guidance_kinds
 from tests.point_mass import PointMass
 
 LIMITS = airframe("aerosonde").guidance_limits()
-OUTSIDE = GuidanceKind("mine", "a law of another distribution", PreviewConfig, PreviewLaw)
-
-
-def found_outside(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
-    point = EntryPoint("mine", value, GROUP)
-    monkeypatch.setattr(
-        registry, "entry_points", lambda group: EntryPoints([point] if group == GROUP else [])
-    )
 
 
 @pytest.mark.parametrize("kind", BUILT_IN, ids=lambda kind: kind.kind)
@@ -47,18 +37,6 @@ def test_keys_reach_the_law() -> None:
     assert law._gains["damping"] == 0.7
     law = guidance_kinds()["preview"].law(LIMITS)
     assert law._gains["bandwidth_radps"] == LIMITS.bandwidth_radps
-
-
-def test_a_law_of_another_distribution_is_found_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    found_outside(monkeypatch, f"{__name__}:OUTSIDE")
-    assert guidance_kinds()["mine"] is OUTSIDE
-    assert list(guidance_kinds())[: len(BUILT_IN)] == [kind.kind for kind in BUILT_IN]
-
-
-def test_an_entry_point_that_is_no_law_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    found_outside(monkeypatch, "math:tau")
-    with pytest.raises(PluginError, match=r"'mine' \(math:tau\) of .* is no GuidanceKind; mend or uninstall"):
-        guidance_kinds()
 
 
 def test_the_law_of_the_readme_flies_to_its_route(monkeypatch: pytest.MonkeyPatch) -> None:

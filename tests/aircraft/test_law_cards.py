@@ -13,9 +13,10 @@ from aircraft.airframes import airframe
 from aircraft.envelope import LawCard, WindPoint, performance
 from aircraft.guidance.interface import GuidanceLimits, GuidanceOutput
 from aircraft.guidance.progress import RouteProgress
-from aircraft.guidance.registry import GuidanceKind, guidance_kinds
+from aircraft.guidance.registry import GuidanceKind
 from aircraft.interface import AircraftState, Route
 from aircraft.model_files import AircraftError
+from harness.scenario.kinds import guidance_kinds
 from tests.longer import longer
 
 AEROSONDE = airframe("aerosonde")

@@ -11,9 +11,9 @@ from aircraft.airframes import airframe
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.latency import as_it_was
 from aircraft.guidance.margins import law_margins
-from aircraft.guidance.registry import guidance_kinds
 from aircraft.interface import AircraftState, Route
 from aircraft.start import StartConditions
+from harness.scenario.kinds import guidance_kinds
 from tests.point_mass import PointMass
 
 LIMITS: GuidanceLimits = airframe("aerosonde").guidance_limits(25.0)

@@ -9,11 +9,11 @@ import pytest
 
 from aircraft.airframes import airframe
 from aircraft.guidance.interface import GuidanceOutput
-from aircraft.guidance.registry import guidance_kinds
 from aircraft.guidance.waypoints import WaypointLaw, acceptance, mission_waypoints
 from aircraft.interface import AircraftState, Route
 from aircraft.route import arc_point
 from aircraft.start import StartConditions
+from harness.scenario.kinds import guidance_kinds
 from tests.point_mass import PointMass
 
 

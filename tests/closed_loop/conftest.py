@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from planner import registry
+from harness.scenario.kinds import PLANNER
 from planner.interface import Mission, Plan, PlanRequest
 from planner.registry import PlannerKind
 from planner.rolling_window.config import RollingWindowConfig
@@ -25,6 +25,6 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[[Answer], None]:
                 return answer(self.mission, request)
 
         kind = PlannerKind("stand_in", "answers as a test tells it to", RollingWindowConfig, StandIn)
-        monkeypatch.setattr(registry, "BUILT_IN", (*registry.BUILT_IN, kind))
+        monkeypatch.setattr(PLANNER, "built_in", (*PLANNER.built_in, kind))
 
     return install

@@ -20,7 +20,6 @@ import numpy as np
 from aircraft.airframe import Airframe
 from aircraft.airframes import AircraftError, airframe
 from aircraft.envelope import performance
-from aircraft.guidance.registry import guidance_kinds
 from aircraft.law_cards import law_card
 from harness.analysis.metrics import metrics
 from harness.bench.tracking import CASES
@@ -28,6 +27,7 @@ from harness.certification.bounds import clopper_pearson
 from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
 from harness.run.scenario_flight import flight_limits, make_loop
+from harness.scenario.kinds import guidance_kinds
 from harness.scenario.scenario import Scenario, scenario_of
 
 LAWS: Final = ("preview", "npfg", "l1", "vector_field", "pure_pursuit", "bearing")

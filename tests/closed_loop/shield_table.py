@@ -23,8 +23,8 @@ from scipy.stats import beta
 from shapely import LineString, Point, Polygon, box
 
 import wayproof
+from harness.scenario.kinds import planner_kinds
 from planner.interface import Mission, Plan, Planner, PlanRequest
-from planner.registry import planner_kinds
 from planner.shield.shield import Shield
 from tests.closed_loop.hostile import HOSTILE
 

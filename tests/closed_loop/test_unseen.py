@@ -12,10 +12,10 @@ import pytest
 
 from harness.flight.record import COLUMNS, Flight, FloatArray, Outcome
 from harness.run.scenario_flight import make_loop
+from harness.scenario.kinds import planner_kinds
 from harness.world.obstacle import Obstacle
 from harness.world.world import World
 from planner.interface import Mission, Plan, PlanRequest
-from planner.registry import planner_kinds
 from tests.closed_loop.small import flown_by_point_mass, small_world
 
 RANGE_M = 1500.0

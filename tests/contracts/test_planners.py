@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from harness.mapping.sensed_map import SensedMap
+from harness.scenario.kinds import planner_kinds
 from harness.scenario.sections import Sensor
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.range_sensor import RangeSensor
@@ -17,7 +18,7 @@ from harness.world.world import World
 from planner.contract import AHEAD, MISSION, START, PlannerContract, bits, make
 from planner.geometry.curves import on_loiter, pose_at
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
-from planner.registry import PlannerKind, planner_kinds
+from planner.registry import PlannerKind
 from tests.longer import longer
 
 SHIPPED = planner_kinds()

@@ -51,7 +51,7 @@ def test_a_signal_in_flight_is_said_in_a_line(
 
 SLEEPER = """
 import time
-from planner.registry import planner_kinds
+from harness.scenario.kinds import planner_kinds
 
 
 class Sleeper:

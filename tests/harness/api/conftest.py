@@ -2,11 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-import aircraft.guidance.registry
-import planner.registry
+from harness.scenario.kinds import GUIDANCE, PLANNER
 
 
 @pytest.fixture(autouse=True)
 def nothing_stays_registered(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planner.registry, "_registered", {})
-    monkeypatch.setattr(aircraft.guidance.registry, "_registered", {})
+    monkeypatch.setattr(PLANNER, "registered", {})
+    monkeypatch.setattr(GUIDANCE, "registered", {})

@@ -14,14 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import aircraft.guidance.registry
 import harness
-import planner.registry
 import wayproof
 from aircraft.airframes import airframe
-from aircraft.guidance.registry import guidance_kinds
 from harness.cli.app import main
 from harness.flight.record import TRACK_FIELDS
+from harness.scenario.kinds import GUIDANCE, PLANNER, guidance_kinds
 from harness.scenario.performance import mission_of
 from tests.harness.api.worlds import SCENARIO, Beeline, small, source_file
 
@@ -152,7 +150,7 @@ def test_a_guidance_law_is_given_as_a_class(
             wayproof.fly(small(), guidance=given)
     radius_m = mission_of(gentle.scenario).turn_radius_m
     # In another process, which has not been given the law.
-    monkeypatch.setattr(aircraft.guidance.registry, "_registered", {})
+    monkeypatch.setattr(GUIDANCE, "registered", {})
     back = wayproof.load_run(tmp_path / "run")
     assert (back.digest, back.scenario.guidance) == (gentle.digest, gentle.scenario.guidance)
     assert main(["report", str(tmp_path / "run")]) == 0
@@ -216,7 +214,7 @@ def test_a_run_of_a_planner_that_is_not_here_is_read_and_shown_all_the_same(
     source, folder = source_file(tmp_path), tmp_path / "run"
     (tmp_path / "short.yaml").write_text(SCENARIO)
     flown = wayproof.fly(tmp_path / "short.yaml", planner=f"{source}:Beeline", out=folder)
-    monkeypatch.setattr(planner.registry, "_registered", {})
+    monkeypatch.setattr(PLANNER, "registered", {})
     back = wayproof.load_run(folder)
     assert (back.digest, back.scenario.planner.kind) == (flown.digest, "planner.py:Beeline")
     assert main(["report", str(folder)]) == 0

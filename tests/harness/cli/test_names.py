@@ -11,12 +11,11 @@ from typing import Any
 import pytest
 
 from aircraft import airframes
-from aircraft.guidance.registry import guidance_kinds
 from aircraft.model_files import AircraftError
 from harness.cli.app import main
+from harness.scenario import kinds as registry
 from harness.scenario import shipped
-from planner import registry
-from planner.registry import planner_kinds
+from harness.scenario.kinds import guidance_kinds, planner_kinds
 
 
 def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,7 +102,7 @@ def test_whether_an_aircraft_is_surveyed_is_not_asked_of_nobody() -> None:
 def test_what_of_another_distribution_cannot_be_loaded_is_told_in_a_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    point = EntryPoint("absent", "math:no_planner", registry.GROUP)
+    point = EntryPoint("absent", "math:no_planner", registry.PLANNER.group)
     monkeypatch.setattr(registry, "entry_points", lambda group: EntryPoints([point]))
     assert main(["list", "planners"]) == 2
     said = capsys.readouterr().err

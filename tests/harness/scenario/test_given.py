@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from harness.scenario.given import NoKeys, registered
-from planner import registry
+from harness.scenario.kinds import PLANNER, planner_kinds
 from planner.interface import Mission, Plan, PlanRequest, PlanStatus
-from planner.registry import BUILT_IN, PlannerKind, planner_kinds, register
+from planner.registry import BUILT_IN, PlannerKind
 
 MISSION = Mission((900.0, 0.0), 50.0, (-1e3, -1e3, 1e3, 1e3), 40.0, 100.0, 25.0, 1.0, 0.1, 500.0)
 
@@ -27,7 +27,7 @@ class Waits:
 
 @pytest.fixture(autouse=True)
 def fresh(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_registered", {})
+    monkeypatch.setattr(PLANNER, "registered", {})
     monkeypatch.setattr(sys, "path", [*sys.path])
 
 
@@ -54,7 +54,7 @@ def test_a_built_in_name_is_not_taken() -> None:
     assert registered(BUILT_IN[0]) == "rolling_window"
     assert registered("bug2") == "bug2"
     with pytest.raises(ValueError, match="there is a planner called bug2 already"):
-        register(PlannerKind("bug2", "another", NoKeys, lambda keys, mission: Waits()))
+        PLANNER.register(PlannerKind("bug2", "another", NoKeys, lambda keys, mission: Waits()))
 
 
 def test_a_kind_in_a_file_keeps_its_keys(tmp_path: Path) -> None:

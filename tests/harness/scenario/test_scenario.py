@@ -21,6 +21,7 @@ from aircraft.envelope import performance
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError
 from harness.run.scenario_flight import make_loop
+from harness.scenario.kinds import planner_kinds
 from harness.scenario.performance import mission_of, performance_of
 from harness.scenario.scenario import (
     Scenario,
@@ -31,7 +32,6 @@ from harness.scenario.scenario import (
     scenario_schema,
 )
 from harness.scenario.shipped import scenario_path
-from planner.registry import planner_kinds
 
 LEAST = """\
 schema: wayproof/scenario/1
