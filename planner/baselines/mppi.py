@@ -21,14 +21,13 @@ from functools import partial
 
 import numpy as np
 
+from planner.baselines.steering import Replanner, Start
 from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.curves import Pose, Segment, along
-from planner.geometry.joining import branch_off, stuck
 from planner.geometry.margin import margin_of
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.kernels.segments import to_nearest
 from planner.keys import key, margin_key
-from planner.memory import ObstacleMemory
 
 STEP_RADII = 0.5
 """Length of a step in turn radii."""
@@ -48,9 +47,6 @@ LAMBDA_STEPS = 0.3
 ROUNDS = 3
 """The weighted mean is taken so many times."""
 
-UPDATE_S = 1.0
-"""The controls are optimised anew after so much time."""
-
 DRAWN = 24
 """So many of the rollouts are drawn in a recording."""
 
@@ -69,43 +65,31 @@ class MppiConfig:
         return replace(self, margin_m=margin_of(mission) if self.margin_m is None else self.margin_m)
 
 
-class Mppi:
+class Mppi(Replanner):
     """The planner for one flight."""
 
     def __init__(self, config: MppiConfig, mission: Mission) -> None:
-        self._config, self._mission = config.resolved(mission), mission
+        super().__init__(mission)
+        self._config = config.resolved(mission)
         self._step_m = STEP_RADII * mission.turn_radius_m
         self._most_1pm = 1.0 / mission.turn_radius_m
-        self._memory = ObstacleMemory(mission.clearance_m)
         self._random = np.random.default_rng(self._config.seed)
         self._nominal = np.zeros(self._config.steps)
-        self._optimised_s, self._begins_m = -math.inf, 0.0
+        self._begins_m = 0.0
 
-    def plan(self, request: PlanRequest) -> Plan:
-        """The controls optimised anew once a second, and where the path in effect is cut."""
-        self._memory.take_in(request.seen)
-        mission, path, points = (
-            self._mission,
-            request.flown.path if request.flown else None,
-            self._memory.points_m,
-        )
-        cut = path is not None and math.isfinite(
-            first_breach(path, points, mission.clearance_m, request.arc_length_m)
-        )
-        if path is not None and not cut and request.time_s < self._optimised_s + UPDATE_S:
-            return Plan(PlanStatus.KEPT, "the controls are less than a second old")
-        self._optimised_s = request.time_s
-        pose, prefix = branch_off(request, mission)
-        lead_m = sum(row[5] for row in prefix)
-        self._move_on(request.arc_length_m + lead_m - self._begins_m if prefix else math.inf)
+    def replanned(self, request: PlanRequest, start: Start) -> Plan:
+        """The rollout of the controls, optimised anew."""
+        mission, pose = self.mission, start.pose
+        lead_m = sum(row[5] for row in start.before)
+        self._move_on(request.arc_length_m + lead_m - self._begins_m if start.before else math.inf)
         self._begins_m = lead_m
         rollouts = self._optimise(pose, self._nearby(pose))
         rows = self._path(pose)
-        found = Path(np.array([*prefix, *rows]))
-        free = math.isinf(first_breach(Path(np.array(rows)), points, 0.5 * mission.clearance_m))
-        if not free or not inside_bounds(found, mission.bounds_m):
+        found = Path(np.array([*start.before, *rows]))
+        breach_m = first_breach(Path(np.array(rows)), self.memory.points_m, 0.5 * mission.clearance_m)
+        if math.isfinite(breach_m) or not inside_bounds(found, mission.bounds_m):
             self._nominal[:] = 0.0
-            return stuck("the best rollout is blocked", request, mission, points)
+            return self.stuck("the best rollout is blocked", request)
         return Plan(
             PlanStatus.FOUND,
             f"mean of {self._config.samples} rollouts",
@@ -122,10 +106,10 @@ class Mppi:
 
     def _nearby(self, pose: Pose) -> FloatArray:
         """(m, 2) edge points that a rollout may meet, one for each square of half the clearance."""
-        points = self._memory.points_m
-        reach = self._step_m * self._config.steps + 2.0 * self._mission.clearance_m
+        points = self.memory.points_m
+        reach = self._step_m * self._config.steps + 2.0 * self.mission.clearance_m
         near = points[np.hypot(*(points - pose[:2]).T) < reach]
-        squares = np.floor(near / (0.5 * max(self._mission.clearance_m, 1.0)))
+        squares = np.floor(near / (0.5 * max(self.mission.clearance_m, 1.0)))
         _, first = np.unique(squares, axis=0, return_index=True)
         return np.ascontiguousarray(near[np.sort(first)])
 
@@ -158,7 +142,7 @@ class Mppi:
 
     def costs(self, places: FloatArray, points_m: FloatArray) -> FloatArray:
         """(K,) costs in steps: the least sum of way and distance left, and what is too near or outside before that."""
-        mission, config = self._mission, self._config
+        mission, config = self.mission, self._config
         assert config.margin_m is not None
         left = np.hypot(*np.moveaxis(places - mission.goal_m, 2, 0)) / self._step_m
         way = left + np.arange(1, places.shape[1] + 1)

@@ -1,49 +1,140 @@
-"""A direction steered to: the turn onto it at the turn radius and straight on, as far as the area goes."""
+"""The frame of planners that plan anew from what they have seen, and of those whose plan is a direction."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.geometry.clearance import inside_bounds
+from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.curves import SHORTEST_M, Point, Pose, Segment, turn_onto
-from planner.geometry.joining import stuck
+from planner.geometry.joining import branch_off, stuck
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.memory import ObstacleMemory
 
 
-def steer(
-    request: PlanRequest,
-    mission: Mission,
-    start: tuple[Pose, list[Segment]],
-    target: Point,
-    points_m: FloatArray,
-    picture: Callable[[], PlanPicture],
-) -> Plan:
-    """The path of a planner that answers with a direction: BendyRuler and VFH+ have none of their own.
+class Start(NamedTuple):
+    """Where a new path leaves the one in effect.
 
-    `start` is where the path leaves the one in effect, and the stretch up to there; the direction leads to `target`.
-    The (m, 2) edge points are for a turn to hold in.
+    Attributes:
+        pose: there.
+        before: the stretch of the path in effect up to there.
+        left_m: what is left of the path in effect; 0 of none, and of a turn to hold in.
+        cut: something seen has come too near to it.
     """
-    pose, prefix = start
-    turn = turn_onto(pose, target, mission.turn_radius_m)
-    if turn is None:
-        return Plan(PlanStatus.NO_PATH, "the goal is nearer than a turn")
-    arcs, last = [row for row in turn if row[4]], turn[-1]
-    room_m = last[5] if last[4] else _to_border_m(last, mission.bounds_m)
-    if room_m < SHORTEST_M or (arcs and not inside_bounds(Path(np.array(arcs)), mission.bounds_m)):
-        return stuck("no turn stays inside the area", request, mission, points_m)
-    turn[-1] = (*last[:5], min(last[5], room_m))
-    bearing = math.atan2(target[1] - pose.north_m, target[0] - pose.east_m)
-    return Plan(
-        PlanStatus.FOUND,
-        f"steering {math.degrees(math.pi / 2 - bearing) % 360:.0f} degrees",
-        np.array([request.position_m, *(row[:2] for row in turn[1:]), target]),
-        Path(np.array([*prefix, *turn])),
-        picture,
-    )
+
+    pose: Pose
+    before: list[Segment]
+    left_m: float
+    cut: bool
+
+
+class Replanner(ABC):
+    """Keeps its path until something seen comes nearer to it than the clearance, or it is due.
+
+    Args:
+        mission: what stays the same for the flight.
+    """
+
+    every_s = 1.0
+    """A path this old is due."""
+
+    def __init__(self, mission: Mission) -> None:
+        self.mission = mission
+        self.memory = ObstacleMemory(mission.clearance_m)
+        self._planned_s = -math.inf
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """The path in effect, or a new one."""
+        self.memory.take_in(request.seen)
+        path, at_m = request.flown.path if request.flown else None, request.arc_length_m
+        left_m, cut = 0.0, False
+        if path is not None:
+            left_m = 0.0 if path.loiter else path.length_m - at_m
+            cut = math.isfinite(first_breach(path, self.memory.points_m, self.mission.clearance_m, at_m))
+            if not cut and not self.due(path, left_m, request.time_s - self._planned_s):
+                return Plan(PlanStatus.KEPT, "nothing cuts the path in effect, and it is not due")
+        self._planned_s = request.time_s
+        return self.replanned(request, Start(*branch_off(request, self.mission), left_m, cut))
+
+    def due(self, path: Path, left_m: float, age_s: float) -> bool:
+        """Whether to plan anew although nothing cuts the path in effect."""
+        return age_s >= self.every_s
+
+    @abstractmethod
+    def replanned(self, request: PlanRequest, start: Start) -> Plan:
+        """The answer where a new path is wanted."""
+
+    def stuck(self, why: str, request: PlanRequest) -> Plan:
+        """The answer where there is none: a turn to hold in."""
+        return stuck(why, request, self.mission, self.memory.points_m)
+
+
+class Steerer(Replanner):
+    """A planner that chooses a direction, and has no path of its own: a turn onto it and straight on.
+
+    Args:
+        mission: what stays the same for the flight.
+        look_m: how far the path leads.
+        near_m: edge points so near to the aircraft are looked at.
+        step_rad: directions are so far apart.
+    """
+
+    def __init__(self, mission: Mission, look_m: float, near_m: float, step_rad: float) -> None:
+        super().__init__(mission)
+        self.look_m, self._near_m, self._step_rad = look_m, near_m, step_rad
+        self.chosen: float | None = None
+        """The direction chosen last, rad counter-clockwise from east."""
+
+    @abstractmethod
+    def direction(self, pose: Pose, points_m: FloatArray) -> float | None:
+        """The best direction among (m, 2) edge points; None where none is free."""
+
+    def picture(self, request: PlanRequest) -> PlanPicture:
+        """The guide vector and how far is looked."""
+        return PlanPicture(np.array([request.position_m, self.mission.goal_m]), self.look_m)
+
+    def replanned(self, request: PlanRequest, start: Start) -> Plan:
+        """A new path where the direction is another one, or the path in effect is cut or short."""
+        points = self.memory.points_m
+        near = points[np.hypot(*(points - start.pose[:2]).T) < self._near_m]
+        last, self.chosen = self.chosen, self.direction(start.pose, near)
+        if self.chosen is None:
+            return self.stuck("no direction is free", request)
+        look_m = min(self.look_m, math.dist(start.pose[:2], self.mission.goal_m))
+        same = last is not None and abs(off(self.chosen, last)) < 0.5 * self._step_rad
+        if same and not start.cut and start.left_m > 0.5 * look_m:
+            self.chosen = last
+            return Plan(PlanStatus.KEPT, "the direction is still the best one")
+        return self._steered(request, start, ahead(start.pose[:2], self.chosen, look_m))
+
+    def _steered(self, request: PlanRequest, start: Start, target: Point) -> Plan:
+        """The turn towards a place at the turn radius and straight on, as far as the area goes."""
+        turn = turn_onto(start.pose, target, self.mission.turn_radius_m)
+        if turn is None:
+            return Plan(PlanStatus.NO_PATH, "the goal is nearer than a turn")
+        arcs, last = [row for row in turn if row[4]], turn[-1]
+        room_m = last[5] if last[4] else _to_border_m(last, self.mission.bounds_m)
+        if room_m < SHORTEST_M or (arcs and not inside_bounds(Path(np.array(arcs)), self.mission.bounds_m)):
+            return self.stuck("no turn stays inside the area", request)
+        turn[-1] = (*last[:5], min(last[5], room_m))
+        bearing = math.atan2(target[1] - start.pose.north_m, target[0] - start.pose.east_m)
+        picture = self.picture(request)
+        return Plan(
+            PlanStatus.FOUND,
+            f"steering {math.degrees(math.pi / 2 - bearing) % 360:.0f} degrees",
+            np.array([request.position_m, *(row[:2] for row in turn[1:]), target]),
+            Path(np.array([*start.before, *turn])),
+            lambda: picture,
+        )
+
+
+def ahead(place: Point, bearing: float, distance_m: float) -> Point:
+    """The place in a direction, rad counter-clockwise from east."""
+    return place[0] + distance_m * math.cos(bearing), place[1] + distance_m * math.sin(bearing)
 
 
 def off(a: ArrayLike, b: ArrayLike) -> FloatArray:

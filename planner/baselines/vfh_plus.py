@@ -18,18 +18,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
-from planner.baselines.steering import off, steer
-from planner.geometry.clearance import first_breach
-from planner.geometry.curves import Limits, Point, Pose, Segment
-from planner.geometry.joining import branch_off, stuck
+from planner.baselines.steering import Steerer, off
+from planner.geometry.curves import Pose
 from planner.geometry.margin import margin_of
-from planner.interface import BoolArray, FloatArray, Mission, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import BoolArray, FloatArray, Mission, PlanPicture, PlanRequest
 from planner.keys import key, margin_key
-from planner.memory import ObstacleMemory
 
 WIDE_RAD = math.radians(80.0)
 """An opening as wide as this has two sides to choose from; of a narrower one the middle is taken."""
@@ -76,51 +72,32 @@ class VfhPlusConfig:
         return replace(self, window_m=window, margin_m=margin)
 
 
-class VfhPlus:
+class VfhPlus(Steerer):
     """The planner for one flight."""
 
+    every_s = 0.0
+
     def __init__(self, config: VfhPlusConfig, mission: Mission) -> None:
-        config = config.resolved(mission)
+        self._config = config = config.resolved(mission)
         assert config.window_m is not None
         assert config.margin_m is not None
-        self._config, self._mission, self._window_m = config, mission, config.window_m
-        self._keep_m = mission.clearance_m + config.margin_m
-        self._limits = Limits.of(mission)
-        self._memory = ObstacleMemory(mission.clearance_m)
         self._width_rad = math.tau / config.sectors
+        super().__init__(mission, config.window_m, config.window_m, self._width_rad)
+        self._keep_m = mission.clearance_m + config.margin_m
         self._bearings = self._width_rad * np.arange(config.sectors)
         self._blocked: BoolArray = np.zeros(config.sectors, dtype=np.bool_)
-        self._choice: float | None = None
+        self._masked = self._blocked
 
-    def plan(self, request: PlanRequest) -> Plan:
-        """One histogram, one direction; a path only where the direction is a new one."""
-        self._memory.take_in(request.seen)
-        mission, path = self._mission, request.flown.path if request.flown else None
-        pose, prefix = branch_off(request, mission)
-        near = self._near(pose)
-        masked = self._masked(pose, near, self._binary(pose, near))
-        choice = self._direction(pose, masked)
-        if choice is None:
-            self._choice = None
-            return stuck("no direction is free", request, mission, self._memory.points_m)
-        last, self._choice = self._choice, choice
-        left = 0.0 if path is None or path.loiter else path.length_m - request.arc_length_m
-        if (
-            last is not None
-            and path is not None
-            and abs(off(choice, last)) < 0.5 * self._width_rad
-            and left > 0.5 * self._look_m(pose[:2])
-            and math.isinf(first_breach(path, near, mission.clearance_m, request.arc_length_m))
-        ):
-            self._choice = last
-            return Plan(PlanStatus.KEPT, "the direction is still the best one")
-        return self._found(request, pose, prefix, choice, masked)
+    def direction(self, pose: Pose, points_m: FloatArray) -> float | None:
+        """Steps 1 to 4."""
+        self._masked = self._mask(pose, points_m, self._binary(pose, points_m))
+        return self._best(pose, self._masked)
 
-    def _near(self, pose: Pose) -> FloatArray:
-        """(m, 2) edge points of the active window."""
-        points = self._memory.points_m
-        distance = np.hypot(points[:, 0] - pose.east_m, points[:, 1] - pose.north_m)
-        return points[distance < self._window_m]
+    def picture(self, request: PlanRequest) -> PlanPicture:
+        """The free sectors as well."""
+        edges = self._bearings[~self._masked, None] + 0.5 * self._width_rad * np.array((-1.0, 1.0))
+        sectors = np.stack((np.cos(edges), np.sin(edges)), axis=2).reshape(-1, 4)
+        return replace(super().picture(request), sectors=sectors)
 
     def _binary(self, pose: Pose, near: FloatArray) -> BoolArray:
         """Which sectors are blocked: the primary histogram between two thresholds."""
@@ -128,7 +105,7 @@ class VfhPlus:
         distance = np.hypot(dx, dy)
         half = np.arcsin(np.minimum(self._keep_m / np.maximum(distance, 1e-9), 1.0))
         # The paper's a - b d^2 with unit certainty, 1 here and 0 at the rim.
-        magnitude = 1.0 - np.square(distance / self._window_m)
+        magnitude = 1.0 - np.square(distance / self.look_m)
         aside = np.abs(off(self._bearings[:, None], np.arctan2(dy, dx)))
         primary = (magnitude * (aside <= half)).sum(axis=1)
         low, high = self._config.free_below, self._config.blocked_above
@@ -137,19 +114,19 @@ class VfhPlus:
 
     def _outside(self, pose: Pose) -> BoolArray:
         """Which directions leave the area within two turn radii."""
-        xmin, ymin, xmax, ymax = self._mission.bounds_m
-        reach = 2.0 * self._mission.turn_radius_m
+        xmin, ymin, xmax, ymax = self.mission.bounds_m
+        reach = 2.0 * self.mission.turn_radius_m
         x = pose.east_m + reach * np.cos(self._bearings)
         y = pose.north_m + reach * np.sin(self._bearings)
         return np.asarray((x < xmin) | (x > xmax) | (y < ymin) | (y > ymax))
 
-    def _masked(self, pose: Pose, near: FloatArray, blocked: BoolArray) -> BoolArray:
+    def _mask(self, pose: Pose, near: FloatArray, blocked: BoolArray) -> BoolArray:
         """Which sectors are blocked or lie behind an obstacle that a turn there would touch."""
         course = math.atan2(pose.tangent_north, pose.tangent_east)
         relative = off(self._bearings, course)
         masked = blocked.copy()
         for side in (1.0, -1.0):  # left, right
-            radius = self._limits.radius_m
+            radius = self.mission.turn_radius_m
             x, y = (
                 pose.east_m - side * radius * pose.tangent_north,
                 pose.north_m + side * radius * pose.tangent_east,
@@ -161,11 +138,11 @@ class VfhPlus:
             masked |= side * relative > limit
         return masked
 
-    def _direction(self, pose: Pose, masked: BoolArray) -> float | None:
+    def _best(self, pose: Pose, masked: BoolArray) -> float | None:
         """The candidate direction with the least cost; None where all is blocked."""
-        dx, dy = self._mission.goal_m[0] - pose.east_m, self._mission.goal_m[1] - pose.north_m
+        dx, dy = self.mission.goal_m[0] - pose.east_m, self.mission.goal_m[1] - pose.north_m
         goal, course = math.atan2(dy, dx), math.atan2(pose.tangent_north, pose.tangent_east)
-        last = course if self._choice is None else self._choice
+        last = course if self.chosen is None else self.chosen
 
         def cost(bearing: float) -> float:
             terms = ((GOAL_WEIGHT, goal), (COURSE_WEIGHT, course), (CHOICE_WEIGHT, last))
@@ -189,25 +166,3 @@ class VfhPlus:
             if not masked[round(goal / width) % count] and (goal - right) % math.tau <= left - right:
                 candidates.append(goal)
         return candidates
-
-    def _look_m(self, place: Point) -> float:
-        """How far a path reaches."""
-        return min(self._window_m, math.dist(place, self._mission.goal_m))
-
-    def _found(
-        self, request: PlanRequest, pose: Pose, prefix: list[Segment], choice: float, masked: BoolArray
-    ) -> Plan:
-        """The turn to a direction, and straight on along it."""
-        look = self._look_m(pose[:2])
-        target = pose.east_m + look * math.cos(choice), pose.north_m + look * math.sin(choice)
-        free = self._bearings[~masked]
-        half = 0.5 * self._width_rad
-        picture = partial(
-            PlanPicture,
-            np.array([request.position_m, self._mission.goal_m]),
-            self._window_m,
-            np.column_stack(
-                (np.cos(free - half), np.sin(free - half), np.cos(free + half), np.sin(free + half))
-            ),
-        )
-        return steer(request, self._mission, (pose, prefix), target, self._memory.points_m, picture)

@@ -10,6 +10,7 @@ import pytest
 
 from planner.baselines.bendy_ruler import BendyRuler, BendyRulerConfig
 from planner.contract import MISSION
+from planner.geometry.curves import Pose
 
 HERE = (1000.0, 7000.0)
 EAST = replace(MISSION, goal_m=(19_000.0, 7000.0))
@@ -22,7 +23,7 @@ def ruler(**keys: float) -> BendyRuler:
 
 def bearing(planner: BendyRuler, *points: tuple[float, float]) -> float:
     seen = np.array(points).reshape(-1, 2) + HERE
-    return math.degrees(planner.bearing(HERE, seen))
+    return math.degrees(planner.direction(Pose(*HERE, 1.0, 0.0), seen))
 
 
 def test_with_nothing_in_the_way_it_flies_at_the_goal() -> None:
@@ -54,7 +55,7 @@ def test_where_no_bearing_is_clear_the_one_of_the_largest_margin_is_taken() -> N
 
 def test_a_bearing_far_off_the_last_one_is_resisted() -> None:
     planner = ruler()
-    planner._bearing = math.radians(80.0)
+    planner.chosen = math.radians(80.0)
     # Straight at the goal the margin is 260 m, along the last bearing 221 m: no better by half.
     points = ((600.0, 260.0), (600.0, -260.0), (300.0, 408.0))
     assert bearing(planner, *points) == pytest.approx(80.0)
