@@ -24,7 +24,7 @@ MAX_LINES = 400
 
 # Which top-level packages a room may import besides the standard library and itself.
 ALLOWED = {
-    "planner": {"numba", "numpy", "shapely", "ompl"},
+    "planner": {"numba", "numpy", "shapely"},
     "aircraft": {"numpy", "numba", "jsbsim", "yaml"},
     "harness": {
         "numpy",
@@ -83,7 +83,6 @@ ONLY_IN = {
         "planner/kernel_cache.py",
         "aircraft/kernels.py",
     ),
-    "ompl": ("planner/baselines/dubins_tree.py",),
     "harness.cli.app": ("harness/__main__.py", "harness/front_door/wayproof/__main__.py"),
     "wayproof": ("harness/front_door/wayproof/*.py",),
 }
@@ -100,7 +99,6 @@ LATE = {
     "typer": ("harness/cli/*.py"),
     "matplotlib": ("harness/*figure*.py",),
     "jinja2": ("harness/report/page.py",),
-    "ompl": (),
     "distributed": (),
     "gymnasium": ("harness/learning/environments.py",),
     "aerofiles": (),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -177,14 +178,13 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
 
 
 def turning_optimum_m(points_m: FloatArray, course_deg: float | None, radius_m: float) -> float | None:
-    """Length of the optimum (k, 2) with the shortest Dubins curve from the start's course onto one of its lines.
+    """Length of the optimum (k, 2) with the shortest turn and straight from the start's course onto one of its lines.
 
-    An estimate: its bends are taken to be as wide as the turn radius. None where there is no optimum or course.
+    An estimate: what the bends of the optimum cost is left out. None where there is no optimum or course.
     """
     if len(points_m) < 2 or course_deg is None:
         return None
-    from planner.baselines.dubins_tree import dubins
-    from planner.geometry.curves import Pose
+    from planner.geometry.curves import Pose, turn_onto
 
     steps = np.diff(points_m, axis=0)
     lengths = np.hypot(*steps.T)
@@ -192,15 +192,14 @@ def turning_optimum_m(points_m: FloatArray, course_deg: float | None, radius_m: 
     east_m, north_m = points_m[0].tolist()
     start = Pose(east_m, north_m, math.sin(course), math.cos(course))
     left = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
-    places = [(line, share) for line in np.flatnonzero(lengths > 0.0).tolist() for share in JOINING_SHARES]
     ways = []
-    for line, share in places:
-        tangent_east, tangent_north = (steps[line] / lengths[line]).tolist()
+    for line, share in product(range(len(steps)), JOINING_SHARES):
         east_m, north_m = (points_m[line] + share * steps[line]).tolist()
-        curve = dubins(start, Pose(east_m, north_m, tangent_east, tangent_north), radius_m)
+        curve_m = sum(row[5] for row in turn_onto(start, (east_m, north_m), radius_m) or ())
         to_go_m = float(left[line] - share * lengths[line])
         # A curve shorter than the optimum up to there leads through an obstacle.
-        ways.append(to_go_m + max(sum(row[5] for row in curve), float(left[0]) - to_go_m))
+        if curve_m:
+            ways.append(to_go_m + max(curve_m, float(left[0]) - to_go_m))
     return min(ways, default=None)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -19,14 +18,9 @@ from planner.contract import AHEAD, MISSION, START, PlannerContract, bits, make
 from planner.geometry.curves import on_loiter, pose_at
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.registry import PlannerKind
-from tests.longer import longer
 
-SHIPPED = planner_kinds()
+KINDS = planner_kinds()
 """As they are before any test registers a kind of its own."""
-KINDS = {
-    name: kind for name, kind in SHIPPED.items() if kind.needs is None or find_spec(kind.needs) is not None
-}
-"""Those whose optional package, where they need one, is installed."""
 
 OBSTACLES = (
     Obstacle(Circle((7000.0, 5000.0), 1500.0)),
@@ -34,21 +28,9 @@ OBSTACLES = (
     Obstacle(Circle((15_500.0, 9000.0), 800.0)),
 )
 
-SLOW = {"dubins_tree"}
-"""Those whose searches take longer than the quick tests may."""
-
-SLOW_APART = [longer([name])[0] if name in SLOW else name for name in KINDS]
-
 # One class of tests for each kind: Test_rolling_window and so on.
 globals().update(
-    {
-        f"Test_{name}": type(
-            f"Test_{name}",
-            (PlannerContract,),
-            {"kind": kind, "pytestmark": [pytest.mark.flights] if name in SLOW else []},
-        )
-        for name, kind in KINDS.items()
-    }
+    {f"Test_{name}": type(f"Test_{name}", (PlannerContract,), {"kind": kind}) for name, kind in KINDS.items()}
 )
 
 
@@ -83,15 +65,6 @@ class Flight:
             if answer.status is PlanStatus.FOUND:
                 flown, arc_length_m = answer, 0.0
             arc_length_m += 12.5
-
-
-def test_a_kind_that_is_left_out_needs_a_package_that_is_not_there() -> None:
-    left_out = [kind for name, kind in SHIPPED.items() if name not in KINDS]
-    assert all(kind.needs is not None for kind in left_out)
-    for kind in left_out:
-        with pytest.raises(ValueError, match=f"(?i){kind.needs}"):
-            kind.config().resolved(MISSION)
-    assert len(KINDS) >= 5
 
 
 @dataclass(frozen=True)
@@ -147,7 +120,7 @@ def test_the_contract_sees_a_fault(fault: str, test: str) -> None:
         getattr(tests, test)()
 
 
-@pytest.mark.parametrize("kind", SLOW_APART)
+@pytest.mark.parametrize("kind", KINDS)
 def test_what_has_not_come_into_range_changes_nothing(kind: str) -> None:
     far = (
         *OBSTACLES,
