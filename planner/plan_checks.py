@@ -21,28 +21,18 @@ from planner.interface import NOT_UNIT, FloatArray, Mission, Path, Plan, PlanPic
 
 MOST_REASON_LETTERS = 2000
 """A reason is one sentence, no longer than this."""
-
 MOST_SEGMENTS = 100_000
 """A path has no more segments, and a plan no more waypoints. A sampled curve of 100 km at 1 m has as many."""
-
-LONGEST_M = 1e7
-"""Greatest length of a path: five times across the largest area."""
-
-MOST_TURNING_RAD = 1e5
-"""Greatest sum of the angles that the segments of a path turn by: 16,000 full turns."""
-
+LONGEST_M, MOST_TURNING_RAD = 1e7, 1e5
+"""A path is no longer: five times across the largest area; and turns no more: 16,000 full turns."""
 FURTHEST_M = 1e8
 """No waypoint lies further east, west, north or south of the origin."""
-
 START_S = 1.0
 """A path may begin so much flying time ahead of the aircraft or behind it; see `start_tolerance_m`."""
-
 JOIN_M = 0.1
 """A segment begins no further than this from where the one before ends; a loiter ends so near to its beginning."""
-
 FULL_TURN_RAD = 1e-3
 """A loiter turns by a full turn, give or take this."""
-
 MOST_PICTURE_POINTS = 1_000_000
 """A picture of a plan has no more points."""
 
@@ -100,14 +90,22 @@ def _type(value: object) -> str:
     return "None" if value is None else f"an object of type {type(value).__name__[:100]}"
 
 
+def _shape(value: Any) -> str:
+    return str(value.shape) if isinstance(value, np.ndarray) else _type(value)
+
+
+def _is_table(value: Any, columns: int) -> bool:
+    return issubclass(type(value), np.ndarray) and value.ndim == 2 and value.shape[1] == columns
+
+
 def _refused(what: str) -> WrongAnswerError:
     return WrongAnswerError(f"the planner gave a path that cannot be flown: {what}")
 
 
 def _waypoints(waypoints_m: Any) -> FloatArray:
     """The waypoints, if they are (n, 2) finite numbers."""
-    if not issubclass(type(waypoints_m), np.ndarray) or waypoints_m.ndim != 2 or waypoints_m.shape[1] != 2:
-        shape = f"shape {waypoints_m.shape}" if isinstance(waypoints_m, np.ndarray) else _type(waypoints_m)
+    if not _is_table(waypoints_m, 2):
+        shape = "shape " * isinstance(waypoints_m, np.ndarray) + _shape(waypoints_m)
         raise WrongAnswerError(
             f"the planner gave waypoints with {shape}; they must be an array of shape (n, 2)"
         )
@@ -132,72 +130,47 @@ def _path(path: Any, position_m: tuple[float, float], start_m: float) -> Path:
     if not issubclass(type(path), Path):
         raise _refused(f"it is {_type(path)}; it must be a Path")
     rows, loiter = path.segments, path.loiter
-    if not issubclass(type(rows), np.ndarray) or rows.ndim != 2 or rows.shape[1] != 6 or not len(rows):
-        shape = rows.shape if isinstance(rows, np.ndarray) else _type(rows)
-        raise _refused(f"its segments must have shape (n, 6), n > 0; got {shape}")
+    if not _is_table(rows, 6) or not len(rows):
+        raise _refused(f"its segments must have shape (n, 6), n > 0; got {_shape(rows)}")
     if not isinstance(loiter, bool | np.bool_):
         raise _refused(f"it has {_type(loiter)} as its loiter; it must be True or False")
     if len(rows) > MOST_SEGMENTS:
         raise _refused(f"it has {len(rows):,} segments; it must have at most {MOST_SEGMENTS:,}")
     rows = np.asarray(rows, dtype=np.float64)
-    _check_each(rows)
-    _check_size(rows)
-    _check_joints(rows, position_m, start_m)
+    _check_segments(rows, position_m, start_m)
     if loiter:
         _check_loiter(rows)
     return Path(rows, bool(loiter))
 
 
-def _check_each(rows: FloatArray) -> None:
-    """Every segment is finite, longer than zero, and begins with a unit tangent."""
-    tangent = np.hypot(rows[:, 2], rows[:, 3])
-    checks: tuple[tuple[Any, Callable[[int], str]], ...] = (
-        (
-            np.isfinite(rows).all(axis=1),
-            lambda i: "is not finite: " + ", ".join(f"{x:g}" for x in rows[i].tolist()),
-        ),
-        (rows[:, 5] > 0.0, lambda i: f"is {rows[i, 5]:g} m long; it must be longer than 0 m"),
-        (
-            np.abs(tangent - 1.0) < NOT_UNIT,
-            lambda i: f"begins with a tangent of length {tangent[i]:.9g}; it must be a unit vector",
-        ),
-    )
-    for fits, told in checks:
-        bad = np.flatnonzero(~fits)
-        if len(bad):
-            raise _refused(f"segment {bad[0]} {told(int(bad[0]))}")
-
-
-def _check_size(rows: FloatArray) -> None:
-    """The path is no longer and turns no more than a path that is meant to be flown."""
-    with np.errstate(over="ignore"):
-        length, turning = np.cumsum(rows[:, 5]), np.cumsum(np.abs(rows[:, 4] * rows[:, 5]))
-    for sums, most, is_, must in (
-        (length, LONGEST_M, "is {:.6g} m long", "be at most {:g} m long"),
-        (turning, MOST_TURNING_RAD, "turns by {:.6g} rad", "turn by at most {:g} rad"),
-    ):
-        over = np.flatnonzero(~(sums <= most))
-        if len(over):
-            told = is_.format(sums[over[0]])
-            raise _refused(f"it {told} up to the end of segment {over[0]}; it must {must.format(most)}")
-
-
-def _check_joints(rows: FloatArray, position_m: tuple[float, float], start_m: float) -> None:
-    """The path begins at the aircraft, and each segment where the one before ends."""
-    off_m = math.dist(rows[0, :2].tolist(), position_m)
-    if not off_m <= start_m:
-        raise _refused(
-            f"segment 0 begins {off_m:.6g} m from the aircraft; it must begin at most {start_m:.3g} m from it"
-        )
-    ends = _ends(rows)
-    gaps = np.hypot(*(rows[1:, :2] - ends[:-1]).T)
-    bad = np.flatnonzero(~(gaps <= JOIN_M))
+def _require(fits: Any, told: str, *values: FloatArray) -> None:
+    """Refuses the path where something does not fit: told of the first segment `i` for which it does not."""
+    bad = np.flatnonzero(~fits)
     if len(bad):
-        first = int(bad[0])
-        raise _refused(
-            f"segment {first + 1} begins {gaps[first]:.6g} m from where segment {first} ends; "
-            f"they must meet within {JOIN_M:g} m"
-        )
+        i = int(bad[0])
+        raise _refused(told.format(*(value[i] for value in values), i=i, following=i + 1))
+
+
+def _check_segments(rows: FloatArray, position_m: tuple[float, float], start_m: float) -> None:
+    """Each segment can be flown, all are not too much, and they are joined from the aircraft on."""
+    tangent, length = np.hypot(rows[:, 2], rows[:, 3]), rows[:, 5]
+    each = "segment {i} is not finite: {:g}, {:g}, {:g}, {:g}, {:g}, {:g}"
+    _require(np.isfinite(rows).all(axis=1), each, *rows.T)
+    _require(length > 0.0, "segment {i} is {:g} m long; it must be longer than 0 m", length)
+    each = "segment {i} begins with a tangent of length {:.9g}; it must be a unit vector"
+    _require(np.abs(tangent - 1.0) < NOT_UNIT, each, tangent)
+    with np.errstate(over="ignore"):
+        way, turning = np.cumsum(length), np.cumsum(np.abs(rows[:, 4] * length))
+    most = f"m long up to the end of segment {{i}}; it must be at most {LONGEST_M:g} m long"
+    _require(way <= LONGEST_M, "it is {:.6g} " + most, way)
+    most = f"rad up to the end of segment {{i}}; it must turn by at most {MOST_TURNING_RAD:g} rad"
+    _require(turning <= MOST_TURNING_RAD, "it turns by {:.6g} " + most, turning)
+    off_m = np.hypot(*(rows[:1, :2] - position_m).T)
+    most = f"m from the aircraft; it must begin at most {start_m:.3g} m from it"
+    _require(off_m <= start_m, "segment {i} begins {:.6g} " + most, off_m)
+    gaps = np.hypot(*(rows[1:, :2] - _ends(rows)[:-1]).T)
+    most = f"m from where segment {{i}} ends; they must meet within {JOIN_M:g} m"
+    _require(gaps <= JOIN_M, "segment {following} begins {:.6g} " + most, gaps)
 
 
 def _check_loiter(rows: FloatArray) -> None:
@@ -248,12 +221,14 @@ def _picture(make: Callable[[], PlanPicture] | None) -> Callable[[], PlanPicture
 
 def _check_drawn(name: str, width: int, points: Any) -> None:
     """What a picture draws has the shape that it must have, and is finite."""
-    fits = issubclass(type(points), np.ndarray) and points.ndim == 2 and points.shape[1] == width
-    if not fits or (name == "guide_m" and len(points) != 2) or len(points) > MOST_PICTURE_POINTS:
-        shape = points.shape if isinstance(points, np.ndarray) else _type(points)
-        rows = "2" if name == "guide_m" else "n"
+    rows = "2" if name == "guide_m" else "n"
+    if (
+        not _is_table(points, width)
+        or len(points) > MOST_PICTURE_POINTS
+        or (rows == "2" and len(points) != 2)
+    ):
         raise WrongAnswerError(
-            f"the planner's picture of its plan has {shape} as {name}; it must be an array of shape "
+            f"the planner's picture of its plan has {_shape(points)} as {name}; it must be an array of shape "
             f"({rows}, {width}), n at most {MOST_PICTURE_POINTS:,}"
         )
     if not np.isfinite(points).all():
