@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from planner.baselines import bendy_ruler, bug, dubins_tree, mppi, tangent_bug, vfh_plus
-from planner.baselines.walk import Walker
+from planner.baselines.walk import PointConfig, Walker
 from planner.interface import Mission, Planner
 from planner.paper import config as paper_config
 from planner.paper import rolling as paper
@@ -56,11 +56,11 @@ BUILT_IN = (
         for kind, config, make, summary in (
             ("improved_bug", paper_config.ImprovedBugConfig, paper.ImprovedBug,
              "the paper's improved BUG, literally: it sees its window only, and can be caught"),
-            ("bug1", bug.BugConfig, bug.Bug1,
+            ("bug1", PointConfig, bug.Bug1,
              "Bug1 (Lumelsky, Stepanov): round every obstacle, and on from its point nearest to the goal"),
-            ("bug2", bug.BugConfig, bug.Bug2,
+            ("bug2", PointConfig, bug.Bug2,
              "Bug2 (Lumelsky, Stepanov): along the M-line, round obstacles until the line is met again"),
-            ("tangent_bug", tangent_bug.TangentBugConfig, tangent_bug.TangentBug,
+            ("tangent_bug", PointConfig, tangent_bug.TangentBug,
              "TangentBug (Kamon, Rimon, Rivlin): by the edges in sight, along boundaries where caught"),
             ("vfh_plus", vfh_plus.VfhPlusConfig, vfh_plus.VfhPlus,
              "VFH+ (Ulrich, Borenstein): polar histogram masked by the turn radius; local, can be caught"),

@@ -4,7 +4,7 @@ V. J. Lumelsky and A. A. Stepanov, "Dynamic path planning for a mobile automaton
 environment", IEEE Transactions on Automatic Control 31(11), 1986; and "Path-planning strategies for a point
 mobile automaton moving amidst unknown obstacles of arbitrary shape", Algorithmica 2, 1987.
 
-Both move straight to the goal, or to a hit point on an obstacle, turn to the given side and follow its boundary.
+Both move straight to the goal, or to a hit point on an obstacle, turn left and follow its boundary.
 
 Bug1 follows it back to the hit point, remembering the point Q nearest to the goal, and returns to Q by the shorter way.
 If the line from Q to the goal begins inside the obstacle, the goal is enclosed and cannot be reached. Its path is no
@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.baselines.polyline import Mark, beside, length_of, mark_at, piece, stations
-from planner.baselines.walk import Enclosed, PointConfig, Straight, Walker, WalkLeg, place_at_end
+from planner.baselines.walk import LEFT, Enclosed, PointConfig, Straight, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
 
@@ -36,14 +36,9 @@ LOST_SHARE = 1.5
 
 @dataclass(frozen=True)
 class Circling:
-    """On the boundary of an obstacle.
+    """On the boundary of an obstacle: where it was met, and how far it has been followed.
 
-    Attributes:
-        hit: where it was met.
-        q: Bug1: the point of it nearest to the goal.
-        q_m: its distance from the goal.
-        q_at_m: how far along the boundary it lies.
-        walked_m: how far the boundary has been followed.
+    `q` is the point of it nearest to the goal, `q_m` from that, and `q_at_m` along the boundary.
     """
 
     hit: Mark
@@ -55,14 +50,7 @@ class Circling:
 
 @dataclass(frozen=True)
 class Returning:
-    """Bug1, on the way back to Q.
-
-    Attributes:
-        q: the point, passed in the sense of the way back.
-        side: of the obstacle on this way.
-        round_m: length of the whole boundary.
-        walked_m: how far the way back has been followed.
-    """
+    """Bug1, on the way back to Q, passed in that sense: side of the obstacle, length of all of it, how far followed."""
 
     q: Mark
     side: float
@@ -71,10 +59,6 @@ class Returning:
 
 
 BugState = Straight | Circling | Returning | Enclosed
-
-
-class BugConfig(PointConfig):
-    """Keys of `planner.kind: bug1` and `bug2`."""
 
 
 class Bug1(Walker[BugState]):
@@ -121,8 +105,7 @@ class Bug1(Walker[BugState]):
                 place = place_at_end(line, place)
                 state = self._met(place)
                 continue
-            side = state.side if isinstance(state, Returning) else self.side
-            way = self.known.boundary(place, side, left)
+            way = self.known.boundary(place, state.side if isinstance(state, Returning) else LEFT, left)
             stop, leaves = self._stops(state, way)
             flown = piece(way, 0.0, stop)
             yield WalkLeg(state, flown)
@@ -133,7 +116,7 @@ class Bug1(Walker[BugState]):
             state = Straight() if leaves else self._onward(place, state, flown)
 
     def _met(self, place: Point) -> Circling:
-        hit = mark_at(self.known.boundary(place, self.side, self.keep_m), 0.0)
+        hit = mark_at(self.known.boundary(place, LEFT, self.keep_m), 0.0)
         return Circling(hit, hit, math.dist(place, self.goal))
 
     def _stops(self, state: Circling | Returning, way: FloatArray) -> tuple[float, bool]:
@@ -167,14 +150,14 @@ class Bug1(Walker[BugState]):
     def _returning(self, state: Circling) -> Returning:
         """The shorter way back to Q."""
         onward = state.q_at_m <= 0.5 * state.walked_m
-        q, side = (state.q, self.side) if onward else (state.q.reversed(), -self.side)
+        q, side = (state.q, LEFT) if onward else (state.q.reversed(), -LEFT)
         return Returning(q, side, state.walked_m)
 
 
 class Bug2(Bug1):
     """Bug2 for one flight."""
 
-    def __init__(self, config: BugConfig, mission: Mission) -> None:
+    def __init__(self, config: PointConfig, mission: Mission) -> None:
         super().__init__(config, mission)
         self._start = mission.goal_m
 

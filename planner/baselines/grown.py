@@ -1,14 +1,12 @@
 """The known obstacles grown by the distance to be kept: what a BUG follows.
 
 Every edge point is the centre of a disc that must not be entered, and so is all that lies outside of the area. shapely
-unites them. Their outline is simplified by less than the margin: neighbouring discs leave no dents between them. An
-obstacle is united anew only when something has come to it, or has been taken back.
+unites them. Their outline is simplified by less than the margin: neighbouring discs leave no dents between them.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,23 +35,6 @@ CELL_SHARE = 0.35
 """Points in one square of this share of the kept distance are grown as one, with what lies between them."""
 
 
-@dataclass(frozen=True, eq=False)
-class Obstacle:
-    """One obstacle, or the border of the area and what touches it.
-
-    Attributes:
-        discs: a polygon, the union of the discs as it came.
-        core: what must not be entered, prepared.
-        rings: its boundaries, the obstacle on the left.
-        border: it is the border.
-    """
-
-    discs: Any
-    core: Any
-    rings: tuple[Any, ...]
-    border: bool
-
-
 class Tangent(NamedTuple):
     """Where a line from a place touches an obstacle.
 
@@ -71,15 +52,20 @@ class Tangent(NamedTuple):
 
 
 class GrownObstacles:
-    """The obstacles of one flight: discs of the radius `keep_m`, clearance and margin; the border keeps the margin."""
+    """The obstacles of one flight: discs of the radius `keep_m`, clearance and margin; the border keeps the margin.
+
+    Each obstacle has a shape, a core that must not be entered, and rings: its boundaries, the obstacle on the left.
+    """
 
     def __init__(self, mission: Mission, margin_m: float) -> None:
         self.keep_m, self._margin_m, self._mission = mission.clearance_m + margin_m, margin_m, mission
         self._memory = ObstacleMemory(mission.clearance_m)
-        self._points_m = self._united_m = NOWHERE
-        self._stale = True
-        self._obstacles: list[Obstacle] = []
-        self._cores: Any = None  # (n,) of the obstacles
+        self._points_m = NOWHERE
+        self._united = -1  # how many of the points the discs are those of
+        self._discs: Any = None
+        self._shapes: Any = None
+        self._cores: Any = None
+        self._border = 0  # the obstacle that is the border of the area and what touches it
         self._rings: list[Any] = []
         self._owners: IntArray = np.zeros(0, dtype=np.intp)  # which obstacle each ring belongs to
 
@@ -92,7 +78,8 @@ class GrownObstacles:
         # What moves comes last there: where it has moved, or new edges have come before it, it is taken back.
         points, known = self._memory.points_m, len(self._points_m)
         taken_back = not np.array_equal(points[:known], self._points_m)
-        self._stale |= taken_back or len(points) > known
+        if taken_back:
+            self._united = -1
         self._points_m = points
         return points[0 if taken_back else known :], taken_back
 
@@ -102,58 +89,30 @@ class GrownObstacles:
         return self._memory.ever_cleared
 
     def _unite(self) -> None:
-        """Brings the obstacles up to date to which something has come: only where a walk is asked for."""
+        """Brings the obstacles up to date: only where a walk is asked for."""
         import shapely
 
-        if not self._stale:
+        if self._united == len(self._points_m):
             return
-        self._stale = False
-        fresh, gone = self._changes()
-        known = self._obstacles or [self._obstacle(self._frame() - self._hole())]
-        if len(gone):
-            known, fresh = self._without(known, gone, fresh)
-        added = self._discs(fresh)
-        joined = [each for each in known if shapely.intersects(each.discs, added)]
-        united = shapely.union_all([added, *(each.discs for each in joined)])
-        self._obstacles = [each for each in known if each not in joined]
-        self._obstacles += [self._obstacle(each) for each in shapely.get_parts(united)]
-        self._united_m = self._points_m
-        self._number()
-
-    def _number(self) -> None:
-        """Numbers the obstacles, and their boundaries after them."""
-        self._cores = np.array([each.core for each in self._obstacles], dtype=object)
-        owned = [(i, ring) for i, each in enumerate(self._obstacles) for ring in each.rings]
+        if self._united < 0:
+            reach = 10.0 * self.keep_m * np.array((-1.0, -1.0, 1.0, 1.0))
+            self._united, self._discs = 0, shapely.box(*(self._mission.bounds_m + reach)) - self._hole()
+        self._discs = shapely.union(self._discs, self._grown(self._points_m[self._united :]))
+        self._united = len(self._points_m)
+        parts = shapely.simplify(shapely.get_parts(self._discs), SIMPLER * self._margin_m)
+        self._shapes = shapely.orient_polygons(parts)
+        self._cores = shapely.buffer(self._shapes, -GRAZED_M, join_style="mitre")
+        shapely.prepare(self._cores)
+        self._border = int(np.argmin(shapely.bounds(self._shapes)[:, 0]))
+        owned = []
+        for i, shape in enumerate(self._shapes):
+            owned += [(i, shape.exterior)] if i != self._border else []
+            # No hole that is too small to be in.
+            owned += [
+                (i, hole) for hole in shape.interiors if shapely.Polygon(hole).area > self.keep_m**2 / 4.0
+            ]
         self._rings = [ring for _, ring in owned]
         self._owners = np.array([i for i, _ in owned], dtype=np.intp)
-
-    def _without(
-        self, known: list[Obstacle], gone: FloatArray, fresh: FloatArray
-    ) -> tuple[list[Obstacle], FloatArray]:
-        """The obstacles but those that lost a point, and (k, 2) the points to be grown: also what is left of these."""
-        import shapely
-
-        kept = []
-        for each in known:
-            if not shapely.intersects_xy(each.discs, gone).any():
-                kept.append(each)
-                continue
-            fresh = np.concatenate((fresh, self._points_m[shapely.intersects_xy(each.discs, self._points_m)]))
-            kept += [self._obstacle(self._frame() - self._hole())] if each.border else []
-        return kept, fresh
-
-    def _changes(self) -> tuple[FloatArray, FloatArray]:
-        """(k, 2) points that have come and (j, 2) that have gone since the obstacles were brought up to date."""
-        known = len(self._united_m)
-        if np.array_equal(self._points_m[:known], self._united_m):
-            return self._points_m[known:], NOWHERE
-        now, before = (points @ (1.0, 1.0j) for points in (self._points_m, self._united_m))
-        return self._points_m[~np.isin(now, before)], self._united_m[~np.isin(before, now)]
-
-    def _frame(self) -> Any:
-        import shapely
-
-        return shapely.box(*(self._mission.bounds_m + 10.0 * self.keep_m * np.array((-1.0, -1.0, 1.0, 1.0))))
 
     def _hole(self) -> Any:
         """The area but for its border."""
@@ -163,7 +122,7 @@ class GrownObstacles:
         inset = max(0.0, min(self._margin_m, float(np.abs(goal - bounds.reshape(2, 2)).min()) - 1e-3))
         return shapely.box(*(bounds + inset * np.array((1.0, 1.0, -1.0, -1.0))))
 
-    def _discs(self, fresh: FloatArray) -> Any:
+    def _grown(self, fresh: FloatArray) -> Any:
         """The union of the discs about (k, 2) points."""
         import shapely
 
@@ -177,17 +136,6 @@ class GrownObstacles:
         np.minimum.at(least, cells.ravel(), radii)
         discs = shapely.buffer(hulls, least, quad_segs=QUARTER_CORNERS)
         return shapely.simplify(shapely.union_all(discs), SIMPLER * self._margin_m)
-
-    def _obstacle(self, discs: Any) -> Obstacle:
-        """What belongs to a polygon; no hole that is too small to be in."""
-        import shapely
-
-        shape = shapely.orient_polygons(shapely.simplify(discs, SIMPLER * self._margin_m))
-        border = shape.bounds[0] < self._mission.bounds_m[0] - 5.0 * self.keep_m
-        core = shapely.buffer(shape, -GRAZED_M, join_style="mitre")
-        shapely.prepare(core)
-        holes = [hole for hole in shape.interiors if shapely.Polygon(hole).area > self.keep_m**2 / 4.0]
-        return Obstacle(discs, core, (*(() if border else (shape.exterior,)), *holes), border)
 
     def first_hit(self, a: Point, b: Point) -> tuple[float, int]:
         """Where the line from a to b first enters an obstacle: distance (m) and obstacle; infinite and -1 for never.
@@ -253,12 +201,9 @@ class GrownObstacles:
 
         self._unite()
         beside_m, here = TOUCH_SHARE * self.keep_m + self._margin_m, shapely.Point(place)
-        mine = [each for each in self._obstacles if shapely.distance(each.discs, here) < beside_m]
         # What the border joins are obstacles of their own.
-        shapes = [
-            shapely.get_parts(each.discs & self._hole() if each.border else each.discs) for each in mine
-        ]
-        parts = np.concatenate([np.array([]), *shapes])
+        joined = shapely.get_parts(self._shapes[self._border] & self._hole())
+        parts = np.concatenate((np.delete(self._shapes, self._border), joined))
         beside = parts[shapely.distance(parts, here) < beside_m]
         return float(shapely.distance(beside, shapely.Point(self._mission.goal_m)).min(initial=math.inf))
 
@@ -268,9 +213,9 @@ class GrownObstacles:
 
         self._unite()
         found: list[Tangent] = []
-        for own, ring in (
-            (self._obstacles[i], ring) for i in sorted(parts) for ring in self._obstacles[i].rings
-        ):
+        for own, ring in zip(self._owners.tolist(), self._rings, strict=True):
+            if own not in parts:
+                continue
             corners = shapely.get_coordinates(ring)[:-1]
             before, after = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
             to = corners - place
@@ -282,7 +227,7 @@ class GrownObstacles:
             hidden = shapely.intersects(self._cores[:, None], lines).any(axis=0)
             beyond = corners[chosen] + DENT_SHARE * self.keep_m * to[chosen] / away[chosen, None]
             rays = shapely.linestrings(np.stack((corners[chosen], beyond), axis=1))
-            dents = shapely.intersects(own.core, rays) & (not own.border)
+            dents = shapely.intersects(self._cores[own], rays) & (own != self._border)
             for i, out, dent in zip(chosen.tolist(), hidden.tolist(), dents.tolist(), strict=True):
                 side = math.copysign(1.0, float(sides[:, i].sum()))
                 found.append(Tangent((float(corners[i, 0]), float(corners[i, 1])), side, not out, dent))

@@ -24,8 +24,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.baselines.grown import Tangent
 from planner.baselines.polyline import NOWHERE, Mark, length_of, mark_at, piece
-from planner.baselines.walk import Enclosed, PointConfig, Walker, WalkLeg, place_at_end
+from planner.baselines.walk import LEFT, Enclosed, PointConfig, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
 
@@ -44,11 +45,7 @@ SHORTCUTS = 16
 
 @dataclass(frozen=True)
 class Toward:
-    """Motion to the goal.
-
-    Attributes:
-        limit_m: only places nearer to the goal than this are aimed at.
-    """
+    """Motion to the goal: only places nearer to it than this are aimed at."""
 
     limit_m: float
 
@@ -85,22 +82,18 @@ class TangentNode:
     to_goal_m: float
     way_m: float
     side: float
-    dent: bool = False
-
-
-class TangentBugConfig(PointConfig):
-    """Keys of `planner.kind: tangent_bug`."""
+    dent: bool
 
 
 class TangentBug(Walker[TangentBugState]):
     """The planner for one flight."""
 
-    def __init__(self, config: TangentBugConfig, mission: Mission) -> None:
+    def __init__(self, config: PointConfig, mission: Mission) -> None:
         super().__init__(config, mission)
         self._progress_m = PROGRESS_SHARE * self.keep_m
 
     def begin(self, place: Point) -> TangentBugState:
-        """Motion to the goal."""
+        """Motion to the goal, wherever that leads."""
         return Toward(math.inf)
 
     def after(self, state: TangentBugState, flown: FloatArray) -> TangentBugState:
@@ -160,16 +153,11 @@ class TangentBug(Walker[TangentBugState]):
             yield from self._follow(place, state)
 
     def _nodes(self, place: Point, also: Point | None = None) -> list[TangentNode]:
-        """The local tangent graph: what lies about the obstacle that blocks the goal, and about another one.
-
-        Args:
-            place: where the aircraft is.
-            also: a place on the boundary of the other one.
-        """
+        """The local tangent graph about the obstacle that blocks the goal, and the one at another place (`also`)."""
         reach = self.mission.sensor_range_m
         clear, blocking = self.known.first_hit(place, self.goal)
         ahead = min(clear, reach, math.dist(place, self.goal))
-        nodes = [self._node(place, mark_at(np.array([place, self.goal]), ahead).place, 0.0)]
+        free = Tangent(mark_at(np.array([place, self.goal]), ahead).place, 0.0, seen=True, dent=False)
         parts = {blocking} if clear < reach else set()
         if also is not None:
             parts.add(self.known.part_at(also))
@@ -177,21 +165,21 @@ class TangentBug(Walker[TangentBugState]):
         # Where something hides an edge, the edges of that are taken as well.
         hiding = {self.known.first_hit(place, each.place)[1] for each in touched if not each.seen} - parts
         touched += self.known.tangents(place, hiding, reach)
-        return nodes + [self._node(place, each.place, each.side, each.dent) for each in touched if each.seen]
-
-    def _node(self, place: Point, touch: Point, side: float, dent: bool = False) -> TangentNode:
-        to_goal = math.dist(touch, self.goal)
-        return TangentNode(touch, to_goal, math.dist(place, touch) + to_goal, side, dent)
+        nodes = []
+        for each in [free, *(touch for touch in touched if touch.seen)]:
+            to_goal_m = math.dist(each.place, self.goal)
+            way_m = math.dist(place, each.place) + to_goal_m
+            nodes.append(TangentNode(each.place, to_goal_m, way_m, each.side, each.dent))
+        return nodes
 
     def _best(self, place: Point, nodes: list[TangentNode], limit_m: float) -> TangentNode | None:
         """The node to move to, past an obstacle rather than into a dent of it; None at a local minimum."""
         here = math.dist(place, self.goal)
         nearer = []
         for node in nodes:
-            dx, dy = node.place[0] - place[0], node.place[1] - place[1]
-            onward = dx * (self.goal[0] - place[0]) + dy * (self.goal[1] - place[1]) > 0.0
-            touching = math.hypot(dx, dy) < self.keep_m
-            if node.side and onward and node.to_goal_m < limit_m and (touching or node.to_goal_m < here):
+            to, goal = np.subtract(node.place, place), np.subtract(self.goal, place)
+            nearer_m = math.inf if math.dist(place, node.place) < self.keep_m else here
+            if node.side and to @ goal > 0.0 and node.to_goal_m < min(limit_m, nearer_m):
                 nearer.append(node)
         return min(nearer, key=lambda node: (node.dent, node.way_m), default=None)
 
@@ -204,10 +192,8 @@ class TangentBug(Walker[TangentBugState]):
         to_goal = np.hypot(*(along - self.goal).T).tolist()
         last = 0
         while last < len(along) - 1 and to_goal[last + 1] <= to_goal[last]:
-            if (
-                not self.known.first_hit((float(along[last, 0]), float(along[last, 1])), self.goal)[0]
-                < self.keep_m
-            ):
+            here = float(along[last, 0]), float(along[last, 1])
+            if self.known.first_hit(here, self.goal)[0] >= self.keep_m:
                 break
             last += 1
         return np.concatenate((way, along[: last + 1]))
@@ -218,7 +204,7 @@ class TangentBug(Walker[TangentBugState]):
         d_followed is of this boundary alone: else a round of it would prove nothing.
         """
         nodes = [node for node in self._nodes(place) if node.side]
-        side = min(nodes, key=lambda node: node.way_m).side if nodes else self.side
+        side = min(nodes, key=lambda node: node.way_m).side if nodes else LEFT
         first = mark_at(self.known.boundary(hit, side, self.keep_m), 0.0)
         on_boundary = math.dist(place, hit) < self._progress_m
         return BoundaryFollowing(first, side, hit, 0.0, on_boundary, self._nearest_m(hit))

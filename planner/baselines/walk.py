@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Generic, Literal, Self, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -25,8 +25,11 @@ from planner.geometry.clearance import first_breach
 from planner.geometry.curves import SHORTEST_M, Point, end_of, pose_at
 from planner.geometry.margin import margin_of
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
-from planner.keys import key, margin_key
+from planner.keys import margin_key
 from planner.world_stability import WorldStability
+
+LEFT = -1.0
+"""A point that meets an obstacle turns left, so that the obstacle comes to be on its right: that side."""
 
 BREACH_SHARE = 0.25
 """A new edge point counts when it comes nearer than the kept distance by this share of the margin."""
@@ -40,21 +43,13 @@ WalkState = TypeVar("WalkState")
 
 @dataclass(frozen=True)
 class PointConfig:
-    """Keys that all planners of the BUG family have."""
+    """Keys of `planner.kind: bug1`, `bug2` and `tangent_bug`."""
 
-    turn: Literal["left", "right"] = key("left", "the way a point turns when it meets an obstacle")
     margin_m: float | None = margin_key()
-    horizon_m: float | None = key(
-        None, "how far along a boundary a plan reaches; default: the sensor range", "m", above=0.0
-    )
 
-    def resolved(self, mission: Mission) -> Self:
+    def resolved(self, mission: Mission) -> PointConfig:
         """This config with every None replaced by its default for the mission."""
-        return replace(
-            self,
-            margin_m=margin_of(mission) if self.margin_m is None else self.margin_m,
-            horizon_m=mission.sensor_range_m if self.horizon_m is None else self.horizon_m,
-        )
+        return replace(self, margin_m=margin_of(mission) if self.margin_m is None else self.margin_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +72,7 @@ class Straight:
 
 @dataclass(frozen=True)
 class Enclosed:
-    """At the end: the goal cannot be reached.
-
-    Attributes:
-        sentence: why.
-    """
+    """At the end: the goal cannot be reached, and a sentence why."""
 
     sentence: str
 
@@ -95,17 +86,13 @@ class Walker(ABC, Generic[WalkState]):
     """
 
     def __init__(self, config: PointConfig, mission: Mission) -> None:
-        config = config.resolved(mission)
-        assert config.margin_m is not None
-        assert config.horizon_m is not None
-        self.mission, self.goal, self.horizon_m = mission, mission.goal_m, config.horizon_m
-        self.side = (
-            -1.0 if config.turn == "left" else 1.0
-        )  # turning left, the obstacle comes to be on the right
-        self.known = GrownObstacles(mission, config.margin_m)
+        margin_m = config.resolved(mission).margin_m
+        assert margin_m is not None
+        self.mission, self.goal, self.horizon_m = mission, mission.goal_m, mission.sensor_range_m
+        self.known = GrownObstacles(mission, margin_m)
         self.keep_m = self.known.keep_m
         self._near_m = 2.0 * self.keep_m + mission.ground_speed_mps * (2.0 + mission.compute_latency_s)
-        self._breach_keep_m = self.keep_m - BREACH_SHARE * config.margin_m
+        self._breach_keep_m = self.keep_m - BREACH_SHARE * margin_m
         self._unrest = WorldStability()
         self._tried_again = False
         self._plan: Plan | None = None
@@ -117,13 +104,13 @@ class Walker(ABC, Generic[WalkState]):
     def begin(self, place: Point) -> WalkState:
         """The state at the start of the flight."""
 
-    @abstractmethod
     def after(self, state: WalkState, flown: FloatArray) -> WalkState:
         """The state after a part of a leg, (n, 2)."""
+        return state
 
     @abstractmethod
-    def walk(self, place: Point, state: WalkState) -> Iterable[WalkLeg[WalkState]]:
-        """What the algorithm does from a place on, in what is known, leg by leg to the goal or the horizon."""
+    def walk(self, place: Point, state: WalkState) -> Iterator[WalkLeg[WalkState]]:
+        """What the algorithm does from a place on, in what is known, leg by leg to the goal or the sensing range."""
 
     @abstractmethod
     def follows(self, place: Point, state: WalkState) -> tuple[Point, ...]:
@@ -145,27 +132,30 @@ class Walker(ABC, Generic[WalkState]):
         """Keeps the walk while it serves; takes it up anew where it does not."""
         fresh, taken_back = self.known.take_in(request.seen)
         self._unrest.note(request.time_s, request.seen)
-        path = request.flown.path if request.flown and request.flown is self._plan else None
-        if path is None and request.refused is not None and self.legs:
-            # Not begun anew: the shield only held.
-            state, place = self._state_at(self._flown_m), request.position_m
-            return self._found(self._taken_up(place, state, taken_back), request, place)
-        if path is None:
-            return self._begun(request)
-        self._flown_m = request.arc_length_m
-        arc_length_m, end = request.arc_length_m, self.legs[-1].state
-        left = path.length_m - arc_length_m
-        if isinstance(end, Enclosed) and left < SAME_PLACE * self.keep_m:
+        if request.flown is not None and request.flown is self._plan:
+            assert request.flown.path is not None
+            return self._went_on(request, request.flown.path, fresh, taken_back)
+        place = request.position_m
+        if request.refused is None or not self.legs:
+            return self._found(self.walk(place, self.begin(place)), request, place)
+        # Not begun anew: the shield only held.
+        return self._found(self._taken_up(place, self._state_at(self._flown_m), taken_back), request, place)
+
+    def _went_on(self, request: PlanRequest, path: Path, fresh: FloatArray, taken_back: bool) -> Plan:
+        """The answer while the walk is flown."""
+        at_m, end = request.arc_length_m, self.legs[-1].state
+        self._flown_m, left_m = at_m, path.length_m - at_m
+        if isinstance(end, Enclosed) and left_m < SAME_PLACE * self.keep_m:
             return self._ended(request, end, taken_back)
-        must = taken_back or self._ends_soon(path, arc_length_m, fresh)
-        if not must and arc_length_m < self._look_at_m:
+        must = taken_back or self._ends_soon(path, at_m, fresh)
+        if not must and at_m < self._look_at_m:
             return Plan(PlanStatus.KEPT, "the walk goes on")
-        place = pose_at(path, arc_length_m)[:2]
+        place = pose_at(path, at_m)[:2]
         if math.dist(place, request.position_m) > self.mission.off_path_m:
             place = request.position_m
-        legs = self._taken_up(place, self._state_at(arc_length_m), taken_back)
-        if not must and not self.prefers(legs, left):
-            self._look_at_m = arc_length_m + self.look_again_m()
+        legs = self._taken_up(place, self._state_at(at_m), taken_back)
+        if not must and not self.prefers(legs, left_m):
+            self._look_at_m = at_m + self.look_again_m()
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
         return self._found(legs, request, place)
 
@@ -179,17 +169,13 @@ class Walker(ABC, Generic[WalkState]):
         ends = ends_early and path.length_m - arc_length_m < max(self._near_m, 0.5 * self.horizon_m)
         return ends or self.breach_m - arc_length_m < self._near_m
 
-    def _begun(self, request: PlanRequest) -> Plan:
-        """A walk from the beginning of the algorithm."""
-        place = request.position_m
-        return self._found(tuple(self.walk(place, self.begin(place))), request, place)
-
     def _ended(self, request: PlanRequest, end: Enclosed, taken_back: bool) -> Plan:
         """At the end of the algorithm: it is begun anew where the world may not be what it was."""
         doubtful = taken_back or (self.known.taken_back and not self._tried_again)
         if doubtful or not self._unrest.settled(request.time_s):
             self._tried_again |= doubtful
-            return self._begun(request)
+            place = request.position_m
+            return self._found(self.walk(place, self.begin(place)), request, place)
         return Plan(PlanStatus.UNREACHABLE, end.sentence)
 
     def _taken_up(self, place: Point, state: WalkState, taken_back: bool) -> tuple[WalkLeg[WalkState], ...]:
@@ -207,8 +193,8 @@ class Walker(ABC, Generic[WalkState]):
             begin = end
         return self.after(leg.state, piece(leg.way, 0.0, arc_length_m - begin))
 
-    def _found(self, legs: tuple[WalkLeg[WalkState], ...], request: PlanRequest, place: Point) -> Plan:
-        legs = tuple(connected(legs, place))
+    def _found(self, walk: Iterable[WalkLeg[WalkState]], request: PlanRequest, place: Point) -> Plan:
+        legs = tuple(connected(walk, place))
         corners = np.concatenate([leg.way for leg in legs])
         apart = np.hypot(*np.diff(corners, axis=0).T) > SHORTEST_M
         corners = corners[np.concatenate(([True], apart))] if len(corners) else corners
@@ -253,7 +239,7 @@ def place_at_end(way: FloatArray, otherwise: Point) -> Point:
     return (float(way[-1, 0]), float(way[-1, 1])) if len(way) else otherwise
 
 
-def connected(legs: Sequence[WalkLeg[WalkState]], begin: Point) -> Iterator[WalkLeg[WalkState]]:
+def connected(legs: Iterable[WalkLeg[WalkState]], begin: Point) -> Iterator[WalkLeg[WalkState]]:
     """Legs that begin where the one before ends, the first one where the vehicle is: by a straight line."""
     at = np.array([begin])
     for leg in legs:

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import length_of
-from planner.interface import BoolArray, FloatArray, Mission, MovingEdges
-from planner.nearest_edge import distance_to_edges
+from planner.contract import GivenMap
+from planner.interface import FloatArray, Mission
 
 MISSION = Mission(
     (9000.0, 9000.0), 50.0, (0.0, 0.0, 10_000.0, 10_000.0), 200.0, 100.0, 25.0, 1.0, 3.0, 3000.0
@@ -23,25 +23,9 @@ KEEP, SIMPLER_M = 220.0, 4.0
 MakePoints = Callable[..., FloatArray]
 
 
-class Seen:
-    spacing_m = 50.0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-    distance_m = distance_to_edges
-
-    def __init__(self, points: FloatArray) -> None:
-        self.points, self.revision, self.last_removal_revision = points, 1, 0
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return self.points if revision < self.revision else np.zeros((0, 2))
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return np.zeros(len(points_m), dtype=np.bool_)
-
-
 def grown(points: FloatArray) -> GrownObstacles:
     known = GrownObstacles(MISSION, KEEP - MISSION.clearance_m)
-    known.take_in(Seen(points))
+    known.take_in(GivenMap(points))
     return known
 
 
@@ -89,11 +73,12 @@ def test_the_bounds_are_a_wall_with_all_of_the_area_but_the_margin_inside() -> N
 
 def test_what_is_taken_back_is_forgotten() -> None:
     known = GrownObstacles(MISSION, 20.0)
-    seen = Seen(np.array([(5000.0, 5000.0), (3000.0, 3000.0)]))
-    assert known.take_in(seen)[1] is False
+    points = np.array([(5000.0, 5000.0), (3000.0, 3000.0)])
+    assert known.take_in(GivenMap(points))[1] is False
     assert covers(known, (3000.0, 3100.0))
-    seen.points, seen.revision, seen.last_removal_revision = seen.points[:1], 2, 2
-    fresh, taken_back = known.take_in(seen)
+    gone = GivenMap(points[:1])
+    gone.revision = gone.last_removal_revision = 2
+    fresh, taken_back = known.take_in(gone)
     assert taken_back
     assert len(fresh) == 1
     assert covers(known, (5000.0, 5100.0))
@@ -146,35 +131,3 @@ def test_two_walls_that_the_border_joins_are_as_near_to_the_goal_as_each_is(wall
     told = known.nearest_to_goal_m((1500.0, 3000.0 + KEEP))
     assert told == pytest.approx(math.dist((3000.0, 3000.0), MISSION.goal_m) - KEEP, abs=SIMPLER_M)
     assert known.nearest_to_goal_m((9500.0, 8000.0 + KEEP)) == pytest.approx(1000.0 - KEEP, abs=SIMPLER_M)
-
-
-@pytest.mark.parametrize("what", ["comes", "goes"])
-def test_only_the_obstacle_that_something_comes_to_or_goes_from_is_united_anew(
-    what: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of 64 lone points one gets a neighbour, or is taken back: corners of a few discs are united, not of all."""
-    lone = np.array([(1000.0 * i, 1000.0 * j) for i in range(1, 9) for j in range(1, 9)])
-    more = np.array([(4100.0, 4100.0)])
-    before, after = (lone, np.concatenate((lone, more))) if what == "comes" else (lone, lone[1:])
-    known, seen = GrownObstacles(MISSION, KEEP - MISSION.clearance_m), Seen(before)
-    known.take_in(seen)
-    place = (4100.0, 3000.0)
-    assert known.part_at(place) == known.part_at((4000.0, 3100.0))
-    united, plain = [], shapely.union_all
-
-    def counted(shapes: object, *args: object) -> object:
-        united.append(int(shapely.get_num_coordinates(shapes).sum()))
-        return plain(shapes, *args)
-
-    monkeypatch.setattr(shapely, "union_all", counted)
-    known.part_at(place)
-    assert not united  # nothing has changed
-    gone = what == "goes"
-    seen.points, seen.revision, seen.last_removal_revision = after if gone else more, 2, 2 * gone
-    known.take_in(seen)
-    known.part_at(place)
-    assert united
-    assert sum(united) < 200  # a disc has 49 corners: all 64 have 3,136
-    fresh = grown(after)
-    for east, north in ((4100.0, 4330.0), (1000.0, 1230.0), (8000.0, 8230.0)):
-        assert covers(known, (east, north)) == covers(fresh, (east, north))

@@ -9,9 +9,9 @@ import pytest
 import shapely
 
 from planner.baselines.vfh_plus import VfhPlus, VfhPlusConfig
+from planner.contract import GivenMap
 from planner.geometry.curves import pose_at
-from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanRequest, PlanStatus
-from planner.nearest_edge import distance_to_edges
+from planner.interface import FloatArray, Mission, Plan, PlanRequest, PlanStatus
 
 MakePoints = Callable[..., FloatArray]
 
@@ -29,25 +29,9 @@ MISSION = Mission(
 START = (2000.0, 5000.0)
 
 
-class Seen:
-    spacing_m = 50.0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-    distance_m = distance_to_edges
-
-    def __init__(self, points: FloatArray) -> None:
-        self._points, self.revision, self.last_removal_revision = points, 1, 0
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return self._points if revision < self.revision else np.zeros((0, 2))
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return np.zeros(len(points_m), dtype=np.bool_)
-
-
 def flown(points: FloatArray, most_m: float = 20_000.0) -> tuple[FloatArray, list[Plan], bool]:
     """The track of an exact flight, all plans, and whether the goal was reached."""
-    planner, seen = VfhPlus(VfhPlusConfig(), MISSION), Seen(points)
+    planner, seen = VfhPlus(VfhPlusConfig(), MISSION), GivenMap(points)
     place, direction, arc_length_m = START, (1.0, 0.0), 0.0
     current: Plan | None = None
     track, plans = [START], list[Plan]()
@@ -70,7 +54,7 @@ def flown(points: FloatArray, most_m: float = 20_000.0) -> tuple[FloatArray, lis
 def first(
     points: FloatArray, direction: tuple[float, float] = (1.0, 0.0), place: tuple[float, float] = START
 ) -> Plan:
-    return VfhPlus(VfhPlusConfig(), MISSION).plan(PlanRequest(0.0, place, direction, Seen(points)))
+    return VfhPlus(VfhPlusConfig(), MISSION).plan(PlanRequest(0.0, place, direction, GivenMap(points)))
 
 
 def steered(plan: Plan) -> float:
@@ -118,7 +102,7 @@ def test_the_mask_forbids_a_turn_through_an_obstacle() -> None:
     beside = np.array([(10_000.0 + 250.0 * math.cos(1.0), 5000.0 + 250.0 * math.sin(1.0))])
     turns = []
     for points in (np.zeros((0, 2)), beside):
-        request = PlanRequest(0.0, (10_000.0, 5000.0), (1.0, 0.0), Seen(points))
+        request = PlanRequest(0.0, (10_000.0, 5000.0), (1.0, 0.0), GivenMap(points))
         path = VfhPlus(VfhPlusConfig(), behind).plan(request).path
         assert path is not None
         turns.append(float(np.sign(path.segments[0, 4])))
@@ -133,7 +117,7 @@ def test_a_sector_between_the_thresholds_stays_as_it_was() -> None:
     def swerves(distances: list[float]) -> bool:
         planner, plan = VfhPlus(config, MISSION), Plan(PlanStatus.KEPT, "")
         for i, distance in enumerate(distances, 1):
-            seen = Seen(np.array([(START[0] + distance, START[1])]))
+            seen = GivenMap(np.array([(START[0] + distance, START[1])]))
             seen.revision = seen.last_removal_revision = i
             plan = planner.plan(PlanRequest(0.0, START, (1.0, 0.0), seen))
         return abs(steered(plan)) > 0.05
@@ -171,7 +155,7 @@ def test_near_the_border_a_path_ends_inside_and_none_is_held_back_far_from_it(
         discs = rng.uniform((13_000.0, 3500.0, 300.0), (19_800.0, 11_000.0, 900.0), (6, 3)).tolist()
         if min(math.dist(place, (x, y)) - radius for x, y, radius in discs) < 400.0:
             continue
-        seen = Seen(np.concatenate([ring(*disc, 50.0) for disc in discs]))
+        seen = GivenMap(np.concatenate([ring(*disc, 50.0) for disc in discs]))
         heading = float(rng.uniform(0.0, math.tau))
         direction = (math.cos(heading), math.sin(heading))
         far = min(place[0] - xmin, xmax - place[0], place[1] - ymin, ymax - place[1]) > 2000.0
