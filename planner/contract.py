@@ -63,7 +63,7 @@ SPACING_M = 50.0
 
 
 class GivenMap:
-    """A seen world of points given beforehand; everything else is free."""
+    """A seen world of (m, 2) edge points given beforehand; everything else is free."""
 
     spacing_m = SPACING_M
     revision = 1
@@ -72,12 +72,12 @@ class GivenMap:
     last_contradiction_s = -math.inf
     distance_m = distance_to_edges
 
-    def __init__(self, points_m: FloatArray) -> None:
-        self._points = points_m
+    def __init__(self, points: FloatArray) -> None:
+        self._points = points
 
     def edges_since(self, revision: int) -> FloatArray:
         """All points at first, then none."""
-        return self._points if revision < self.revision else np.zeros((0, 2))
+        return self._points[: len(self._points) if revision < self.revision else 0]
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         """(k,) true."""
@@ -88,14 +88,15 @@ class InRange(GivenMap):
     """A seen world in which everything within range of a place of the flight has been seen."""
 
     def __init__(self, circles: Sequence[Disc], range_m: float) -> None:
+        super().__init__(np.zeros((0, 2)))
         self.revision = 0
         self._circles, self._range = np.array(circles).reshape(-1, 3), range_m
-        self._hidden = np.concatenate([np.zeros((0, 2)), *(circle_outline(*each) for each in circles)])
+        self._hidden = np.concatenate([self._points, *(circle_outline(*each) for each in circles)])
         self._shown: list[FloatArray] = []
-        self._places = np.zeros((0, 2))
+        self._places = self._points
 
     def look(self, place: Point) -> None:
-        """Takes a scan."""
+        """Takes a scan, unless one was taken nearby."""
         if len(self._places) and math.dist(self._places[-1], place) < 0.01 * self._range:
             return
         self._places = np.concatenate((self._places, [place]))
@@ -107,7 +108,7 @@ class InRange(GivenMap):
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after a revision."""
-        return np.concatenate([np.zeros((0, 2)), *self._shown[max(revision, 0) :]])
+        return np.concatenate([self._points, *self._shown[max(revision, 0) :]])
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether points were within range once and lie in no obstacle."""
@@ -192,15 +193,11 @@ class PlannerContract:
     kind: ClassVar[PlannerKind]
     mission: ClassVar[Mission] = MISSION
 
-    def test_conforms_to_the_protocol(self) -> None:
-        """A plan is asked for with one request; the kind has a summary."""
-        planner = make(self.kind, self.mission)
+    def test_it_is_a_planner_with_a_summary_and_described_keys(self) -> None:
+        """A plan is asked for with one request; keys are documented and frozen, and none is left to be derived."""
+        planner, config = make(self.kind, self.mission), self.kind.config()
         assert list(inspect.signature(planner.plan).parameters) == ["request"]
         assert len(self.kind.summary) > 20, "say in the summary what it is"
-
-    def test_its_config_is_frozen_described_and_resolves_to_itself(self) -> None:
-        """Keys are documented, cannot be changed, and none is left to be derived."""
-        config = self.kind.config()
         for field in fields(config):
             assert field.metadata["doc"], field.name
             np.testing.assert_raises(FrozenInstanceError, setattr, config, field.name, None)
@@ -240,46 +237,35 @@ class PlannerContract:
         assert [bits(answer) for _, answer in again.answers] == [bits(answer) for _, answer in first.answers]
         assert len({answer.status for _, answer in first.answers}) > 1, "it never changes its answer"
 
-    def test_plans_are_complete(self) -> None:
-        """FOUND comes with a path and waypoints that begin at the aircraft; every other status with neither."""
-        found = 0
-        for request, plan in _among_circles(self.kind, self.mission).answers:
-            assert plan.reason
-            if plan.status is not PlanStatus.FOUND:
-                assert plan.path is None
-                assert len(plan.waypoints_m) == 0
-                continue
-            found += 1
-            assert plan.path is not None
-            assert len(plan.waypoints_m)
-            np.testing.assert_allclose(plan.path.segments[0, :2], request.position_m, atol=1e-3)
-            if not self.kind.point:
-                np.testing.assert_allclose(plan.path.segments[0, 2:4], request.direction, atol=1e-5)
-        assert found, "no plan was found among a few circles"
+    def test_its_answers_can_be_flown(self) -> None:
+        """FOUND has waypoints and a path from the aircraft on, no tighter than it can turn, inside; no other has one.
 
-    def test_its_answers_are_taken_by_the_closed_loop(self) -> None:
-        """Each passes what the loop asks of an answer (`planner.plan_checks`), or the flight would end there."""
-        for request, plan in _among_circles(self.kind, self.mission).answers:
-            checked_plan(plan, request.position_m, self.mission)
-
-    def test_paths_are_joined_no_tighter_than_the_turn_radius_and_inside(self) -> None:
-        """Segments meet; those of an aircraft without a jump of direction, and none bends too tightly."""
+        What the closed loop asks of an answer (`planner.plan_checks`) holds: else the flight would end there.
+        """
         xmin, ymin, xmax, ymax = self.mission.bounds_m
-        meet = 2 if self.kind.point else 4
-        for _, plan in _among_circles(self.kind, self.mission).answers:
+        found = 0
+        for request, answer in _among_circles(self.kind, self.mission).answers:
+            plan = checked_plan(answer, request.position_m, self.mission)
+            assert plan.reason
+            assert (plan.path is not None) == (len(plan.waypoints_m) > 0) == (plan.status is PlanStatus.FOUND)
             if plan.path is None:
                 continue
+            found += 1
             rows = plan.path.segments
+            np.testing.assert_allclose(rows[0, :2], request.position_m, atol=1e-3)
             if not self.kind.point:
+                np.testing.assert_allclose(rows[0, 2:4], request.direction, atol=1e-5)
                 assert plan.path.max_curvature_1pm <= 1.0 / self.mission.turn_radius_m + 1e-9
+            meet = 2 if self.kind.point else 4  # that of a point may jump in direction
             for row, following in pairwise(rows):
                 np.testing.assert_allclose(along(row, float(row[5]))[:meet], following[:meet], atol=1e-4)
             points = sample(plan.path, 100.0, 0.1)
             assert (points >= (xmin - 1e-6, ymin - 1e-6)).all()
             assert (points <= (xmax + 1e-6, ymax + 1e-6)).all()
+        assert found, "no plan was found among a few circles"
 
-    def test_what_it_is_given_stays_as_it_is(self) -> None:
-        """Neither the points given nor a plan handed out changes afterwards, and they share no memory."""
+    def test_plans_and_what_they_are_made_from_stay_as_they_are(self) -> None:
+        """What it is given is not changed, a plan handed out neither, and they share no memory."""
         points = circle_outline(5000.0, 4000.0, 900.0)
         given = points.copy()
         given.setflags(write=False)
@@ -287,7 +273,10 @@ class PlannerContract:
         plan = planner.plan(PlanRequest(0.0, START, AHEAD, seen))
         assert plan.path is not None
         before = bits(plan)
-        assert not any(np.shares_memory(array, given) for array in arrays_in(plan))
+        np.testing.assert_raises(FrozenInstanceError, setattr, plan, "status", PlanStatus.KEPT)
+        for array in arrays_in(plan):
+            assert not array.flags.writeable
+            assert not np.shares_memory(array, given)
         pose = pose_at(plan.path, 100.0)
         planner.plan(PlanRequest(4.0, pose[:2], pose[2:], seen, plan, 100.0))
         np.testing.assert_array_equal(given, points)
@@ -303,16 +292,7 @@ class PlannerContract:
             plan = planner.plan(PlanRequest(0.0, START, AHEAD, seen))
             assert plan.path is not None
             spoilt[:] = 0.0
-            arc_length_m = 0.4 * plan.path.length_m
-            pose = pose_at(plan.path, arc_length_m)
-            answers.append(
-                bits(planner.plan(PlanRequest(400.0, pose[:2], pose[2:], seen, plan, arc_length_m)))
-            )
+            at_m = 0.4 * plan.path.length_m
+            pose = pose_at(plan.path, at_m)
+            answers.append(bits(planner.plan(PlanRequest(400.0, pose[:2], pose[2:], seen, plan, at_m))))
         assert answers[0] == answers[1]
-
-    def test_plans_cannot_be_changed(self) -> None:
-        """Plans are values."""
-        answers = (answer for _, answer in _among_circles(self.kind, self.mission).answers)
-        plan = next(answer for answer in answers if answer.path is not None)
-        np.testing.assert_raises(FrozenInstanceError, setattr, plan, "status", PlanStatus.KEPT)
-        assert not any(array.flags.writeable for array in arrays_in(plan))

@@ -6,9 +6,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from planner.contract import GivenMap
 from planner.geometry.curves import Segment
-from planner.interface import BoolArray, FloatArray, MapView, MovingEdges, Path
-from planner.nearest_edge import distance_to_edges
+from planner.interface import FloatArray, MapView, Path
 
 MakePoints = Callable[..., FloatArray]
 
@@ -32,24 +32,6 @@ def wall(start_m: tuple[float, float], end_m: tuple[float, float], spacing_m: fl
     count = math.ceil(2.0 * math.dist(start_m, end_m) / spacing_m) + 1
     points = np.column_stack([np.linspace(a, b, count) for a, b in zip(start_m, end_m, strict=True)])
     return one_a_cell(np.concatenate((points[-1:], points)), spacing_m)
-
-
-class Known:
-    """Edge points that are all known from the beginning, in space that is seen to be free."""
-
-    spacing_m, revision, last_removal_revision = 50.0, 1, 0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-    distance_m = distance_to_edges
-
-    def __init__(self, points: FloatArray) -> None:
-        self._points = points
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return self._points if revision < 1 else self._points[:0]
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return np.ones(len(points_m), dtype=np.bool_)
 
 
 def integrated(
@@ -107,4 +89,4 @@ def assert_flyable_fixture() -> Callable[[Path, float], None]:
 
 @pytest.fixture(name="known")
 def known_fixture() -> Callable[[FloatArray], MapView]:
-    return Known
+    return GivenMap
