@@ -20,10 +20,8 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 ComplexArray = NDArray[np.complex128]
 
-
 OFF_PATH = 4.0
 """The aircraft has left a path when it is this many times the tracking error away from it."""
-
 NOT_UNIT = 1e-6
 """A tangent is a unit vector if its length differs from 1 by less than this."""
 
@@ -140,7 +138,7 @@ class Mission:
     @property
     def hold_radius_m(self) -> float:
         """Radius of the full turns that plans end in."""
-        return self.turn_radius_m if self.least_hold_radius_m is None else self.least_hold_radius_m
+        return self.least_hold_radius_m or self.turn_radius_m
 
     @property
     def spaced(self) -> Mission:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from planner.geometry.margin import margin_of
 from planner.interface import Mission
 from planner.keys import key, margin_key
-from planner.paper.step_model import most_units
+from planner.paper.model import most_units
 
 
 @dataclass(frozen=True)

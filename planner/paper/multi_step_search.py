@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
 from planner.paper.config import ImprovedBugConfig
-from planner.paper.definitions import crosses, guide_vector, within
+from planner.paper.model import crosses, guide_vector, most_units, step, within
 from planner.paper.sectors import (
     Sector,
     clip,
@@ -20,7 +20,6 @@ from planner.paper.sectors import (
     signed,
     whole_units,
 )
-from planner.paper.step_model import most_units, step
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from planner.geometry.curves import Pose, Segment, along, between, place_on
 from planner.geometry.joining import LEAD_S, branch_off, stuck
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.paper.config import ImprovedBugConfig
-from planner.paper.definitions import within
+from planner.paper.model import within
 from planner.paper.multi_step_search import Window, multi_step_search
 from planner.paper.route_optimisation import Route, optimise, shortest
 from planner.paper.sectors import ALL, fan_shaped_sectors
@@ -37,30 +37,23 @@ class ImprovedBug:
 
     def plan(self, request: PlanRequest) -> Plan:
         """Section 3.3: one step of the rolling window, where one is due."""
-        window, path = self.planning_window(request), request.flown.path if request.flown else None
-        cut = path is not None and math.isfinite(
-            first_breach(path, window.points_m, self._mission.clearance_m, request.arc_length_m)
-        )
-        why = self._serves(request, path, cut)
-        if why:
-            return Plan(PlanStatus.KEPT, why)
+        window, at_m = self.planning_window(request), request.arc_length_m
+        path = request.flown.path if request.flown else None
+        cut = False
+        if path is not None:
+            cut = math.isfinite(first_breach(path, window.points_m, self._mission.clearance_m, at_m))
+            if not request.scanned:
+                return Plan(PlanStatus.KEPT, "nothing new is sensed")
+            if not path.loiter and not cut and at_m < self._config.resolved_step_m:
+                return Plan(PlanStatus.KEPT, "the first step of the plan is being flown")
         start, before = self._start(request, cut)
         routes = self.local_planning(window, start)
         if routes:
             return self._found(request, window, routes, before)
-        left_m = 0.0 if path is None or path.loiter or cut else path.length_m - request.arc_length_m
+        left_m = 0.0 if path is None or path.loiter or cut else path.length_m - at_m
         if left_m > self._config.resolved_step_m:
             return Plan(PlanStatus.NO_PATH, "no candidate in the window; the plan in effect is flown on")
         return stuck("no candidate in the window", request, self._mission, window.points_m)
-
-    def _serves(self, request: PlanRequest, path: Path | None, cut: bool) -> str:
-        """Section 3.3: why the window does not roll yet; empty where it does."""
-        if path is None:
-            return ""
-        if not request.scanned:
-            return "nothing new is sensed"
-        first = not path.loiter and not cut and request.arc_length_m < self._config.resolved_step_m
-        return "the first step of the plan is being flown" if first else ""
 
     def planning_window(self, request: PlanRequest) -> Window:
         """Section 3.3: U_1 about the aircraft, with the sensed edge points that are not too far to matter in it."""
@@ -93,21 +86,16 @@ class ImprovedBug:
         return shortest((route for route in routes if route is not None), self._mission.goal_m)
 
     def _start(self, request: PlanRequest, cut: bool) -> tuple[Pose, list[Segment]]:
-        """Where the new plan leaves the one in effect, and the stretch up to there."""
+        """Where the new plan leaves the one in effect, at the end of an arc, and the stretch up to there."""
         start, before = branch_off(request, self._mission)
-        if not before or cut:
+        path, at_m = request.flown.path if request.flown else None, request.arc_length_m
+        if path is None or not before or cut:
             return start, before
-        assert request.flown is not None
-        assert request.flown.path is not None
-        leave = request.arc_length_m + self._mission.ground_speed_mps * (
-            LEAD_S + self._mission.compute_latency_s
-        )
-        path = request.flown.path
-        for end_m in np.cumsum(path.segments[:, 5]).tolist():
-            if end_m > leave and place_on(path, leave)[1]:
-                return place_on(path, end_m)[0], between(path, request.arc_length_m, end_m)
-            if end_m > leave:
-                break
+        leave_m = at_m + self._mission.ground_speed_mps * (LEAD_S + self._mission.compute_latency_s)
+        ends = (end_m for end_m in np.cumsum(path.segments[:, 5]).tolist() if end_m > leave_m)
+        end_m = next(ends, None)
+        if end_m is not None and place_on(path, leave_m)[1]:
+            return place_on(path, end_m)[0], between(path, at_m, end_m)
         return start, before
 
     def _found(

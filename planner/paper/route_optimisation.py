@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from planner.geometry.clearance import admits
 from planner.geometry.curves import Limits, Point, Pose, fillet
 from planner.interface import Path
-from planner.paper.definitions import guide_vector, track_cost_m
+from planner.paper.model import guide_vector, track_cost_m
 from planner.paper.multi_step_search import Track, Window
 from planner.paper.sectors import signed
 

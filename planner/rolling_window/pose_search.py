@@ -16,7 +16,7 @@ import numpy as np
 from planner.geometry.curves import Limits, Point, Pose, Segment, turns_onto
 from planner.geometry.terrain import Terrain
 from planner.interface import Path
-from planner.paper.step_model import step
+from planner.paper.model import step
 from planner.rolling_window.route_optimisation import FlyableRoute
 
 EXPANSIONS = 1000

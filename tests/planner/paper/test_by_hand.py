@@ -16,7 +16,7 @@ from planner.contract import MISSION
 from planner.geometry.curves import Pose, sample
 from planner.interface import FloatArray, Mission, Path
 from planner.paper.config import ImprovedBugConfig
-from planner.paper.definitions import crosses, guide_vector, within
+from planner.paper.model import crosses, guide_vector, most_units, step, within
 from planner.paper.multi_step_search import Window, multi_step_search
 from planner.paper.route_optimisation import Route, cancel_nodes, flyable, shortest, turn_fits
 from planner.paper.sectors import (
@@ -30,7 +30,6 @@ from planner.paper.sectors import (
     select,
     whole_units,
 )
-from planner.paper.step_model import most_units, step
 
 NOTHING = np.zeros((0, 2))
 UNIT = math.radians(1.0)
