@@ -101,7 +101,7 @@ def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) 
         (where, [], str(tmp_path / "site")),
         (front_door, [], str(tmp_path / "site" / "wayproof" / "__init__.pyfly")),
         (command, ["fly", "aerosonde_forest", "--no-recording"], "reached: inside the goal circle"),
-        (command, ["sweep", "forest_planners", "--dry-run"], "forest_planners"),
+        (command, ["validate", "forest_planners"], "forest_planners"),
         (command, ["sweep", "one.yaml"], "results: runs/one/results.parquet"),
     ):
         run = subprocess.run(

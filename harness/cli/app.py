@@ -18,17 +18,20 @@ import typer
 from harness.cli.bench import bench, envelope
 from harness.cli.certify import certify
 from harness.cli.check import check
+from harness.cli.command_line import BAD_INPUT, FAILED, with_remedy
 from harness.cli.compare import compare
 from harness.cli.export import export
 from harness.cli.falsify import falsify
 from harness.cli.fly import fly
 from harness.cli.formats import schema, validate
 from harness.cli.names import list_names
-from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag, with_remedy
+from harness.cli.options import Command, Group, flag
 from harness.cli.review import replay, report, view
 from harness.cli.standard_output import kept_up, results_alone, results_over, say, to_nowhere
 from harness.cli.sweep import sweep
 from harness.cli.world import world
+from harness.files.errors import RunFolderError, WriteError
+from harness.files.input_file import InputError
 from harness.files.spawning import open_standard_files
 from harness.flight.signals import taken_as_interrupt
 from planner.compiled import own_this_process
@@ -140,14 +143,6 @@ def _flush() -> None:
 
 def _report(error: Exception) -> int:
     """Says on standard error what went wrong and returns the exit status."""
-    from harness.files.crash import PlannerError, sentence
-    from harness.files.errors import WriteError
-    from harness.files.input_file import InputError
-    from harness.scenario.kinds import PluginError
-
-    if isinstance(error, (PlannerError, PluginError)):
-        say(f"wayproof: {error}", err=True)
-        return BAD_INPUT
     if isinstance(error, InputError):
         say(str(error), err=True)
         return BAD_INPUT
@@ -157,11 +152,23 @@ def _report(error: Exception) -> int:
         whose = getattr(getattr(error, "ctx", None), "command_path", "wayproof")
         say(f"wayproof: {text} (see {whose} --help)", err=True)
         return BAD_INPUT
-    if isinstance(error, WriteError):
-        say(f"wayproof: {error}", err=True)
-        return FAILED
     if isinstance(error, OSError):
-        say(f"wayproof: {with_remedy(error)}", err=True)
-        return FAILED if error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
+        written = isinstance(error, WriteError)
+        say(f"wayproof: {error if written else with_remedy(error)}", err=True)
+        return FAILED if written or error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
+    if isinstance(error, (RunFolderError, *_others())):
+        say(f"wayproof: {error}", err=True)
+        return BAD_INPUT
+    from harness.files.crash import sentence
+
     say(f"wayproof: internal error, {sentence(error)}; --debug shows where", err=True)
     return FAILED
+
+
+def _others() -> tuple[type[Exception], ...]:
+    """Faults of planners, laws and aircraft, whose rooms take long to import."""
+    from aircraft.model_files import AircraftError
+    from harness.files.crash import PlannerError
+    from harness.scenario.kinds import PluginError
+
+    return AircraftError, PlannerError, PluginError

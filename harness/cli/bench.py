@@ -8,31 +8,20 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from harness.cli.options import (
-    FAILED,
-    AircraftOption,
-    JsonOption,
-    argument,
-    bad_input,
-    load,
-    option,
-    print_json,
-)
+from harness.cli.command_line import FAILED, load, print_json
+from harness.cli.options import AircraftArgument, AircraftOption, Count, Json, Text, argument, option
 from harness.cli.replacing import law_kind
+from harness.cli.terminal import legible, print_table, progress_bar, step_bar
+
+SCENARIO: Final = "A file or shipped name; or the word tracking."
 
 
 def bench(
-    scenario: Annotated[
-        str, argument("SCENARIO", "A file or shipped name; or the word tracking.", show_default=True)
-    ] = "paper_circles",
+    scenario: Annotated[str, argument("SCENARIO", SCENARIO, show_default=True)] = "paper_circles",
     aircraft: AircraftOption = None,
-    seeds: Annotated[
-        int | None, option("N", "With tracking: courses in each air. Default: 20.", min=1)
-    ] = None,
-    guidance: Annotated[
-        str | None, option("KIND", "With tracking: the guidance law. Default: preview.")
-    ] = None,
-    as_json: JsonOption = False,
+    seeds: Annotated[Count, option("N", "With tracking: courses in each air. Default: 20.", min=1)] = None,
+    guidance: Annotated[Text, option("KIND", "With tracking: the guidance law. Default: preview.")] = None,
+    as_json: Json = False,
 ) -> int:
     """Measures the time of the closed loop on this machine over that of bare JSBSim, block by block.
 
@@ -48,16 +37,10 @@ def bench(
     if guidance or aircraft or seeds:
         raise typer.BadParameter("--aircraft, --seeds and --guidance go with `bench tracking`")
     loaded = load(scenario)
-
-    from aircraft.airframes import AircraftError
     from harness.bench.costs import bench as measure
-    from harness.cli.terminal import print_table, progress_bar
 
-    try:
-        with progress_bar(math.dist(loaded.mission.start_m, loaded.mission.goal_m)) as report:
-            result = measure(loaded, report)
-    except AircraftError as error:
-        raise bad_input(error) from error
+    with progress_bar(math.dist(loaded.mission.start_m, loaded.mission.goal_m)) as report:
+        result = measure(loaded, report)
     if as_json:
         print_json(result)
     else:
@@ -67,20 +50,15 @@ def bench(
 
 def _bench_tracking(name: str, seeds: int, as_json: bool, guidance: str) -> int:
     """The table of tracking errors of an aircraft."""
-    from aircraft.airframes import AircraftError
     from harness.bench.tracking import bench_tracking
-    from harness.cli.terminal import print_table, step_bar
     from harness.scenario.kinds import guidance_kinds
 
     guidance = law_kind(guidance)
     if guidance not in guidance_kinds():
         known = ", ".join(sorted(guidance_kinds()))
         raise typer.BadParameter(f"there is no guidance law {guidance!r}; known are: {known}")
-    try:
-        with step_bar() as report:
-            result = bench_tracking(name, seeds, report, guidance)
-    except AircraftError as error:
-        raise bad_input(error) from error
+    with step_bar() as report:
+        result = bench_tracking(name, seeds, report, guidance)
     if as_json:
         print_json(result)
     else:
@@ -119,17 +97,15 @@ def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequen
     return ("air", "cross-track p95", "max m", "altitude p95", "saturated", "limits"), rows
 
 
+AIRSPEEDS: Final = "True airspeed; can be repeated. Default: cruise."
+WINDS: Final = "Wind to track in; can be repeated. Default: 30 % of V."
+
+
 def envelope(
-    aircraft: Annotated[
-        str, argument("AIRCRAFT", "A name that `wayproof list aircraft` prints, or a folder.")
-    ],
-    airspeeds: Annotated[
-        list[float] | None, option("V", "True airspeed; can be repeated. Default: cruise.", "--airspeed-mps")
-    ] = None,
-    winds: Annotated[
-        list[float] | None, option("M/S", "Wind to track in; can be repeated. Default: 30 % of V.", "--wind")
-    ] = None,
-    as_json: JsonOption = False,
+    aircraft: AircraftArgument,
+    airspeeds: Annotated[list[float] | None, option("V", AIRSPEEDS, "--airspeed-mps")] = None,
+    winds: Annotated[list[float] | None, option("M/S", WINDS, "--wind")] = None,
+    as_json: Json = False,
 ) -> int:
     """Flies an aircraft and prints what it can do: speeds, turns, roll-in, the tightest path that it tracks.
 
@@ -138,19 +114,14 @@ def envelope(
 
     For example: wayproof envelope c172p --wind 8
     """
-    from aircraft.airframes import AircraftError
     from harness.bench.envelope_card import envelope_card
-    from harness.cli.terminal import step_bar
 
     for name, values in (("--airspeed-mps", airspeeds or ()), ("--wind", winds or ())):
         for value in values:
             if not 0.0 <= value < 1000.0:
                 raise typer.BadParameter(f"{value:g} is not a speed from 0 to 1000 m/s", param_hint=name)
-    try:
-        with step_bar() as report:
-            card = envelope_card(aircraft, airspeeds or (), winds or (), report)
-    except AircraftError as error:
-        raise bad_input(error) from error
+    with step_bar() as report:
+        card = envelope_card(aircraft, airspeeds or (), winds or (), report)
     if as_json:
         print_json(card)
     else:
@@ -174,8 +145,6 @@ _PATH_COLUMNS: Final = {
 
 def _print_card(card: Mapping[str, Any]) -> None:
     """The tables of `envelope`."""
-    from harness.cli.terminal import legible, print_table
-
     low, high = card["airspeed_range_mps"]
     facts = {
         "mass": f"{card['mass_kg']:g} kg",

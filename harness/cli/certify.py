@@ -11,21 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from harness.analysis.claims import Claim
-from harness.cli.options import (
-    FAILED,
-    JsonOption,
-    OutOption,
-    QuietOption,
-    ResumeOption,
-    WorkersOption,
-    argument,
-    option,
-    print_json,
-    resumable,
-    told_apart,
-)
+from harness.cli.command_line import FAILED, print_json, resumable, told_apart
+from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
+from harness.cli.terminal import plain, print_table, step_bar
 
 if TYPE_CHECKING:
     from harness.certification.certificate import Certificate
@@ -40,31 +30,26 @@ LEAST_SHARE: Final = 0.01
 
 STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
 
+CLAIM: Final = "reached (default), no-contact, trackable; as-given (default of a path)."
+PROBABILITY: Final = "Claim that it holds on this share of the days; stops once that is decided."
+VARY: Final = "LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."
+
 
 @replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def certify(
     subject: Annotated[str, argument("SCENARIO|PATH", "A scenario, or a path that `wayproof check` takes.")],
     given: Given = NOTHING,
-    claim: Annotated[
-        Claim | None,
-        option("CLAIM", "reached (default), no-contact, trackable; as-given (default of a path)."),
-    ] = None,
-    probability: Annotated[
-        float | None,
-        option("P", "Claim that it holds on this share of the days; stops once that is decided."),
-    ] = None,
+    claim: Annotated[Claim | None, option("CLAIM", CLAIM)] = None,
+    probability: Annotated[Number, option("P", PROBABILITY)] = None,
     confidence: Annotated[float, option("C", "Of each bound.")] = 0.95,
-    runs: Annotated[int | None, option("N", "Days to fly, at most. Default: 1000.", min=1)] = None,
-    vary: Annotated[
-        list[str] | None,
-        option("KEY=DRAW", "LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."),
-    ] = None,
-    world: Annotated[str | None, option("WORLD", "Of a path: obstacles, bounds, air.", "--scenario")] = None,
-    workers: WorkersOption = None,
-    out: OutOption = None,
-    resume: ResumeOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    runs: Annotated[Count, option("N", "Days to fly, at most. Default: 1000.", min=1)] = None,
+    vary: Annotated[list[str] | None, option("KEY=DRAW", VARY)] = None,
+    world: Annotated[Text, option("WORLD", "Of a path: obstacles, bounds, air.", "--scenario")] = None,
+    workers: Workers = None,
+    out: Out = None,
+    resume: Resume = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
 ) -> int:
     """Flies a scenario or a path on many days, and says how often a claim holds, with confidence bounds.
 
@@ -75,11 +60,8 @@ def certify(
     For example: wayproof certify aerosonde_forest --vary environment.wind.speed_mps=0:8 --probability 0.9
 
     Exit status:
-
     0 shown
-
     1 refuted or undecided
-
     2 bad input or usage, nothing flown
     """
     from harness.certification.certification import MOST_RUNS, Terms
@@ -125,7 +107,6 @@ def _fly(
     from harness.campaign.results import INDEX
     from harness.campaign.workers import local_workers
     from harness.certification.certification import certify as fly_days
-    from harness.cli.terminal import step_bar
 
     with (
         resumable(folder, INDEX),
@@ -140,16 +121,12 @@ def _fly(
 
 
 def _print(found: Certificate, title: str, folder: Path) -> None:
-    from harness.cli.terminal import print_table
-
     print_table(title, certificate_rows(found))
     say(f"certificate: {folder / 'certificate.json'}")
 
 
 def certificate_rows(certificate: Certificate) -> dict[str, str]:
     """Name and value of each row."""
-    from harness.cli.terminal import plain
-
     sure = f"{certificate.confidence:.4g}"
     rows: dict[str, str] = {"claim": certificate.claim}
     if certificate.conditions:

@@ -6,75 +6,61 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from harness.cli.command_line import FAILED, interruptible, marked_incomplete, print_json, told_apart
+from harness.cli.flight_rows import verdict_rows
 from harness.cli.options import (
-    FAILED,
     AircraftName,
-    JsonOption,
-    NoRecordingOption,
-    OutOption,
-    QuietOption,
+    Count,
+    Json,
+    NoRecording,
+    Number,
+    Out,
+    Quiet,
+    Text,
     argument,
-    faults_told,
-    marked_incomplete,
     option,
-    print_json,
-    told_apart,
 )
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
+from harness.cli.terminal import plain, print_table, progress_bar
 
 if TYPE_CHECKING:
     from harness.run.path_check import CheckedPath, PathCheck
 
 
+PATH: Final = "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints)."
+WORLD: Final = "A scenario that gives obstacles, bounds, environment, seed, altitude."
+TOLERANCE: Final = "Largest distance from the path. Default: a tenth of C, or 10 m without C."
+ACCEPTED: Final = "at waypoints of a mission the acceptance radius in the file, else 90 m."
+CORNER: Final = f"Largest distance from corners. Default: T; {ACCEPTED}"
+DAYS: Final = "Fly it on N days of its conditions too: DIR/days, as `certify` does."
+
+
 @replacing("guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def check(
-    path: Annotated[
-        Path,
-        argument(
-            "PATH",
-            "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints).",
-        ),
-    ],
+    path: Annotated[Path, argument("PATH", PATH)],
     aircraft: AircraftName,
     given: Given = NOTHING,
-    airspeed_mps: Annotated[
-        float | None, option("V", "True airspeed. Default: the aircraft's cruise.")
-    ] = None,
+    airspeed_mps: Annotated[Number, option("V", "True airspeed. Default: the aircraft's cruise.")] = None,
     altitude_m: Annotated[
-        float | None, option("H", "Altitude above sea level. Default: the file's, else 300.")
+        Number, option("H", "Altitude above sea level. Default: the file's, else 300.")
     ] = None,
-    scenario: Annotated[
-        str | None, option("WORLD", "A scenario that gives obstacles, bounds, environment, seed, altitude.")
-    ] = None,
-    clearance_m: Annotated[
-        float | None, option("C", "Wanted clearance. Default: WORLD's, if written.")
-    ] = None,
-    tolerance_m: Annotated[
-        float | None, option("T", "Largest distance from the path. Default: a tenth of C, or 10 m without C.")
-    ] = None,
+    scenario: Annotated[Text, option("WORLD", WORLD)] = None,
+    clearance_m: Annotated[Number, option("C", "Wanted clearance. Default: WORLD's, if written.")] = None,
+    tolerance_m: Annotated[Number, option("T", TOLERANCE)] = None,
     altitude_tolerance_m: Annotated[
-        float | None, option("A", "Largest distance from the altitude. Default: 10 m.")
+        Number, option("A", "Largest distance from the altitude. Default: 10 m.")
     ] = None,
-    corner_m: Annotated[
-        float | None,
-        option(
-            "R",
-            "Largest distance from corners. Default: T; at waypoints of a mission the acceptance radius in the "
-            "file, else 90 m.",
-        ),
-    ] = None,
-    days: Annotated[
-        int | None, option("N", "Fly it on N days of its conditions too: DIR/days, as `certify` does.", min=1)
-    ] = None,
-    out: OutOption = None,
-    no_recording: NoRecordingOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    corner_m: Annotated[Number, option("R", CORNER)] = None,
+    days: Annotated[Count, option("N", DAYS, min=1)] = None,
+    out: Out = None,
+    no_recording: NoRecording = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
 ) -> int:
     """Flies a given path and says whether it can be flown as given, and where and why not.
 
@@ -84,11 +70,8 @@ def check(
     For example: wayproof check survey.plan --aircraft aerosonde --wind 8,270
 
     Exit status:
-
     0 trackable, no contact, no fence or bound crossed
-
     1 flown, but not as given
-
     2 bad input or usage, nothing flown
     """
     from harness.run.path_check import asked, origin_of
@@ -158,20 +141,17 @@ def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> Ch
     """Flies into a folder, with progress on standard error."""
     import numpy as np
 
-    from harness.cli.terminal import progress_bar
     from harness.run.path_check import fly_check
     from harness.run_files.run_folder import MANIFEST, SCHEMA
 
     length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
     progress = progress_bar(length_m, silent)
-    with faults_told(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
+    with interruptible(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
         return fly_check(check, folder, recording, report)
 
 
 def _print_verdict(title: str, flown: CheckedPath, folder: Path) -> None:
     """The table of a path, its verdict and its conditions first."""
-    from harness.cli.flight_rows import verdict_rows
-    from harness.cli.terminal import plain, print_table
     from harness.scenario.conditions import told
 
     scenario = flown.check.scenario

@@ -9,21 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from harness.cli.options import (
-    FAILED,
-    JsonOption,
-    NoRecordingOption,
-    OutOption,
-    WorkersOption,
-    argument,
-    faults_told,
-    load,
-    marked_incomplete,
-    option,
-    print_json,
-)
+from harness.cli.command_line import FAILED, interruptible, load, marked_incomplete, print_json
+from harness.cli.options import Json, NoRecording, Out, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, given_by, replacing, sources
 from harness.cli.standard_output import say
+from harness.cli.terminal import coloured, plain, print_line, print_table, step_bar
+from harness.files.errors import WriteError
 
 if TYPE_CHECKING:
     from harness.analysis.metric import Metric
@@ -39,30 +30,24 @@ LEGEND: Final = (
 def compare(
     scenarios: Annotated[list[str], argument("SCENARIO...", "Files or shipped names.")],
     planners: Annotated[str, option("A,B,...", "Kinds, in order; KIND+shield: under the shield.")],
-    guidance: Annotated[
-        str | None, option("X,Y,...", "Kinds of guidance laws. Default: the scenario's.")
-    ] = None,
+    guidance: Annotated[Text, option("X,Y,...", "Kinds of guidance laws. Default: the scenario's.")] = None,
     given: Given = NOTHING,
-    out: OutOption = None,
-    workers: WorkersOption = None,
-    no_recording: NoRecordingOption = False,
-    as_json: JsonOption = False,
+    out: Out = None,
+    workers: Workers = None,
+    no_recording: NoRecording = False,
+    as_json: Json = False,
 ) -> int:
     """Flies every planner (under every guidance law) through every scenario: table, figures, report, overlays.
 
     For example: wayproof compare paper_circles --planners rolling_window,bug2
 
     Exit status:
-
     0 every planner reached every goal
-
     1 one did not, or the software failed in a flight
-
     2 bad input or usage, nothing flown
     """
-    from harness.cli.terminal import step_bar
     from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
-    from harness.files.errors import WriteError
+    from harness.run_files.run_folder import OVERLAY
 
     kinds = [kind.strip() for kind in planners.split(",")]
     laws = [law.strip() for law in guidance.split(",")] if guidance is not None else [None]
@@ -70,7 +55,7 @@ def compare(
     loaded = [load(scenario, each) for scenario in scenarios for each in variants]
     folder, over = out or Path("runs/comparison"), itertools.count(1)
     try:
-        with faults_told(marked_incomplete("comparison", folder, INDEX, SCHEMA)), step_bar() as bar:
+        with interruptible(marked_incomplete("comparison", folder, INDEX, SCHEMA)), step_bar() as bar:
             comparison = fly_and_compare(
                 loaded,
                 folder,
@@ -86,34 +71,14 @@ def compare(
     else:
         print_comparison(comparison.rows)
         say(f"report: {folder / 'report.html'}")
-        _print_view([folder / each.name for each in loaded])
+        _print_view([folder / each.name / OVERLAY for each in loaded])
     return 0 if comparison.all_reached else FAILED
 
 
-def _print_view(folders: Sequence[Path]) -> None:
+def _print_view(overlays: Sequence[Path]) -> None:
     """How to see the first overlay, if there is one."""
-    from harness.run_files.run_folder import OVERLAY
-
-    for overlay in [each / OVERLAY for each in folders if (each / OVERLAY).is_file()][:1]:
+    for overlay in [each for each in overlays if each.is_file()][:1]:
         say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
-
-
-def _shown() -> list[Metric]:
-    """The figures that fit 80 columns."""
-    from harness.analysis.registry import METRICS
-    from harness.analysis.rows import ON_TERMINAL
-
-    return [next(figure for figure in METRICS if figure.short == short) for short in ON_TERMINAL]
-
-
-def _cells(row: Row, by_law: bool) -> list[str]:
-    """The name of a row, its outcome and its figures."""
-    from harness.analysis.rows import DASH
-    from harness.cli.terminal import coloured, plain
-
-    name = row.guidance if by_law else "\n ".join(filter(None, (row.planner, row.guidance)))
-    figures = [plain(row.text(figure)) or DASH for figure in _shown()[1:]]
-    return [plain(name), coloured(row.outcome), *figures]
 
 
 def print_comparison(rows: Sequence[Row]) -> None:
@@ -123,16 +88,31 @@ def print_comparison(rows: Sequence[Row]) -> None:
     title.
     """
     from harness.analysis.metric import ERROR
-    from harness.cli.terminal import print_line, print_table
 
     for name in dict.fromkeys(row.scenario for row in rows):
         own = [row for row in rows if row.scenario == name]
         by_law = all(row.guidance for row in own) and len({row.planner for row in own}) == 1
         lines = [_cells(row, by_law) for row in own]
-        title = f"{name}, {own[0].planner}" if by_law else name
         heads = ("guidance" if by_law else "planner", *(figure.short for figure in _shown()))
-        print_table(title, lines, heads)
+        print_table(f"{name}, {own[0].planner}" if by_law else name, lines, heads)
     print_line(LEGEND, style="dim")
     for row in rows:
         if row.outcome == ERROR:
             say(f"{row.label}, error: {row.reason}")
+
+
+def _shown() -> list[Metric]:
+    """The figures that fit 80 columns, the outcome first."""
+    from harness.analysis.registry import METRICS
+    from harness.analysis.rows import ON_TERMINAL
+
+    return [next(figure for figure in METRICS if figure.short == short) for short in ON_TERMINAL]
+
+
+def _cells(row: Row, by_law: bool) -> list[str]:
+    """The name of a row, its outcome and its figures."""
+    from harness.analysis.rows import DASH
+
+    name = row.guidance if by_law else "\n ".join(filter(None, (row.planner, row.guidance)))
+    figures = [plain(row.text(figure)) or DASH for figure in _shown()[1:]]
+    return [plain(name), coloured(row.outcome), *figures]

@@ -6,48 +6,41 @@ import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
-from harness.cli.options import argument, bad_input, option
+from harness.cli.command_line import written
+from harness.cli.options import argument, option
 from harness.cli.standard_output import say, to_nowhere
+from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
+
+Form = Literal["plan", "waypoints", "geojson", "kml"]
+What = Literal["flown", "planned"]
 
 
 def export(
     run_dir: Annotated[Path, argument("RUN_DIR", "A run folder.")],
-    form: Annotated[
-        Literal["plan", "waypoints", "geojson", "kml"],
-        option("FORMAT", "plan, waypoints, geojson or kml.", "--format"),
-    ],
-    what: Annotated[
-        Literal["flown", "planned"], option("WHAT", "flown: the track; planned: the plans in effect.")
-    ] = "flown",
+    form: Annotated[Form, option("FORMAT", "plan, waypoints, geojson or kml.", "--format")],
+    what: Annotated[What, option("WHAT", "flown: the track; planned: the plans in effect.")] = "flown",
     out: Annotated[Path | None, option("FILE", "Default: standard output.")] = None,
 ) -> int:
     """Writes a run for QGroundControl (plan), MAVLink (waypoints) or maps (geojson, kml).
 
     For example: wayproof export runs/my_run --format plan --out way.plan
     """
-    from harness.files.errors import RunFolderError
-    from harness.files.input_file import InputError
     from harness.files.whole_file import replace_bytes
     from harness.run_files.exports import exported
     from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
 
     try:
         content, notes = exported(load_run(run_dir), form, what)
-    except InputError:
+    except (InputError, RunFolderError):
         raise
-    except RunFolderError as error:
-        raise bad_input(error) from error
     except WRONG_CONTENT as error:
-        raise bad_input(damaged(run_dir, error)) from error
+        raise damaged(run_dir, error) from error
     if out is None:
         _write(content)
     else:
-        try:
+        with written(out):
             replace_bytes(out, content)
-        except OSError as error:
-            raise InputError(
-                f"{out}: cannot be written ({error.strerror}); give the path of a file"
-            ) from error
     for note in notes:
         say(note, err=True)
     return 0

@@ -10,19 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from harness.cli.options import (
-    JsonOption,
-    OutOption,
-    QuietOption,
-    ScenarioArgument,
-    faults_told,
-    load,
-    option,
-    print_json,
-    told_apart,
-)
+from harness.cli.command_line import interruptible, load, print_json, told_apart
+from harness.cli.options import Count, Json, Out, Quiet, ScenarioArgument, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
+from harness.cli.terminal import plain, print_table, step_bar
 from harness.files.wording import counted
 
 if TYPE_CHECKING:
@@ -30,6 +22,7 @@ if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
 
 RUNS_A_KEY: Final = 40
+Claim = Literal["reached", "no-contact", "trackable"]
 
 
 @replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
@@ -38,16 +31,13 @@ def falsify(
     vary: Annotated[list[str], option("KEY.PATH=LO:HI", "From the mild end LO to HI; can be repeated.")],
     given: Given = NOTHING,
     claim: Annotated[
-        Literal["reached", "no-contact", "trackable"],
-        option("CLAIM", "What fails to hold: reached, no-contact or trackable."),
+        Claim, option("CLAIM", "What fails to hold: reached, no-contact or trackable.")
     ] = "reached",
-    runs: Annotated[
-        int | None, option("N", f"Number of flights. Default: {RUNS_A_KEY} a key.", min=2)
-    ] = None,
+    runs: Annotated[Count, option("N", f"Number of flights. Default: {RUNS_A_KEY} a key.", min=2)] = None,
     tolerance: Annotated[float, option("SHARE", "Precision, as a share of each range.")] = 0.01,
-    out: OutOption = None,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    out: Out = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
 ) -> int:
     """Searches for the mildest condition that makes a flight fail, and writes it as a scenario.
 
@@ -59,14 +49,11 @@ def falsify(
     For example: wayproof falsify aerosonde_forest --vary environment.wind.speed_mps=0:20
 
     Exit status:
-
     0 searched, with or without a failure; the last line says which
-
     2 bad input or usage, nothing written
     """
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
-    from harness.cli.terminal import print_table, step_bar
     from harness.falsify.breaking_point import FALSIFIED, INDEX, vary_of
     from harness.falsify.breaking_point import falsify as search
     from harness.scenario.given import own_words
@@ -80,27 +67,22 @@ def falsify(
     # Indices as `--set` takes them, which no shell takes for a pattern.
     keys = "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in varied)])
     folder = out or Path("runs") / loaded(()).name / f"{keys}{told_apart(given.keys, named=())}"
-    flights = 0
 
     def left() -> str:
-        return f"the flights so far are in {folder / INDEX}" if flights else "no flight had ended yet"
+        begun = (folder / INDEX).is_file()
+        return f"the flights so far are in {folder / INDEX}" if begun else "no flight had ended yet"
 
-    with faults_told(left), step_bar(quiet) as bar:
-
-        def ended(done: int, of: int, told: str) -> None:
-            nonlocal flights
-            flights = done
-            bar(done, of, told)
-
+    with interruptible(left), step_bar(quiet) as bar:
+        most = runs or RUNS_A_KEY * len(ranges)
         found = search(
             loaded,
             varied,
             folder,
             flown=_flown,
             claim=claim,
-            conditions=runs or RUNS_A_KEY * len(ranges),
+            conditions=most,
             tolerance=tolerance,
-            progress=ended,
+            progress=bar,
         )
     if as_json:
         print_json(found.plain())
@@ -140,7 +122,6 @@ def range_of(text: str) -> tuple[str, float, float]:
 
 def breaking_rows(breaking: Breaking) -> dict[str, str]:
     """Name and value of each row. Values are printed as they were flown, never rounded."""
-    from harness.cli.terminal import plain
     from harness.falsify.breaking_point import number_text
 
     def told(values: Sequence[float]) -> str:

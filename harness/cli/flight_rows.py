@@ -14,6 +14,9 @@ SHOWN: Final = 6
 MOST_ITEMS: Final = 12
 """Most items of a mission that are listed one by one."""
 
+OF_NOTE: Final = ("not flown", "flown", "not reached")
+"""What becomes of items that are listed where there is a reason; those not flown always."""
+
 OF_HEIGHT_OR_SPEED: Final = (
     "climb too steep",
     "descent too steep",
@@ -90,34 +93,42 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     lengths = [f"{metrics['planned_length_m']:,.0f} m"]
     if "given_length_m" in check:  # in runs made since it is kept
         lengths = [f"{check['given_length_m']:,.0f} m", f"rounded {lengths[0]}"]
-    rows = {
+    corners = sorted(check["corners"], key=lambda each: each["kept"])
+    bad = [{"number": number, **leg} for number, leg in enumerate(legs, start=1) if not leg["trackable"]]
+    return {
         "flown as given": f"[{style}]{word}[/]:{plain(why)}",
         "outcome": plain(f"{metrics['outcome']}: {metrics['reason']}"),
         "path": f"{check['points']} points, {', '.join(lengths)}, {counted(len(legs), 'leg')}",
+        **_contacts(metrics),
+        **_deviations(metrics),
+        **_counted("legs not trackable", bad),
+        **dict(_leg(leg, point if check["items"] else "") for leg in bad[:SHOWN]),
+        **_counted("corners cut", corners),
+        **{f"  {point} {each['waypoint']}": _corner(each) for each in corners[:SHOWN]},
+        **_items(check["items"]),
+        **{" " * (at + 1) if at else "notes": plain(note) for at, note in enumerate(check["notes"])},
+        "smoothness as given": _smoothness(check["given"]),
+        "smoothness as flown": _smoothness(metrics["smoothness"]["flown"]),
     }
-    _add_contacts(metrics, rows)
-    _add_deviations(metrics, rows)
-    bad = [{"number": number, **leg} for number, leg in enumerate(legs, start=1) if not leg["trackable"]]
-    for leg in _listed(bad, "legs not trackable", rows):
-        to = f" to {point} {leg['waypoint']}" if check["items"] and leg["waypoint"] is not None else ""
-        rows[f"  leg {leg['number']}{to}"] = (
-            f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {_metres(leg['max_deviation_m'])} off"
-        )
-        if leg["cause"] in OF_HEIGHT_OR_SPEED:
-            rows[f"  leg {leg['number']}{to}"] += f", {_metres(leg['max_altitude_error_m'])} in altitude"
-            if (slow_mps := leg["max_airspeed_error_mps"]) is not None:
-                rows[f"  leg {leg['number']}{to}"] += f", {slow_mps:.2g} m/s in airspeed"
-    for corner in _listed(sorted(check["corners"], key=lambda each: each["kept"]), "corners cut", rows):
-        side = "left" if corner["turn_deg"] > 0 else "right"
-        rows[f"  {point} {corner['waypoint']}"] = (
-            f"{abs(corner['turn_deg']):.0f} deg {side}, {_rounded(corner)}"
-        )
-    _add_items(check["items"], rows)
-    for number, note in enumerate(check["notes"]):
-        rows["notes" if not number else " " * (number + 1)] = plain(note)
-    rows["smoothness as given"] = _smoothness(check["given"])
-    rows["smoothness as flown"] = _smoothness(metrics["smoothness"]["flown"])
-    return rows
+
+
+def _counted(title: str, entries: Sequence[Any]) -> dict[str, str]:
+    """A row that counts entries, of which the first few follow."""
+    more = f", the first {SHOWN}:" if len(entries) > SHOWN else ""
+    return {title: f"{len(entries)}{more}"} if entries else {}
+
+
+def _leg(leg: Mapping[str, Any], point: str) -> tuple[str, str]:
+    """Name and value of the row of a leg that was not tracked."""
+    told = (
+        f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {_metres(leg['max_deviation_m'])} off"
+    )
+    if leg["cause"] in OF_HEIGHT_OR_SPEED:
+        told += f", {_metres(leg['max_altitude_error_m'])} in altitude"
+        if (slow_mps := leg["max_airspeed_error_mps"]) is not None:
+            told += f", {slow_mps:.2g} m/s in airspeed"
+    to = f" to {point} {leg['waypoint']}" if point and leg["waypoint"] is not None else ""
+    return f"  leg {leg['number']}{to}", told
 
 
 def _smoothness(figures: Mapping[str, float]) -> str:
@@ -127,80 +138,77 @@ def _smoothness(figures: Mapping[str, float]) -> str:
     return f"turns {figures['heading_change_deg']:,.0f} deg, {energy}, {tightest}"
 
 
-def _add_deviations(metrics: Mapping[str, Any], rows: dict[str, str]) -> None:
+def _deviations(metrics: Mapping[str, Any]) -> dict[str, str]:
     """How far the flight was off the path, where most, and off the altitude."""
     legs, check, worst = metrics["trackability"], metrics["check"], metrics["check"]["worst"]
     tolerance = f"{legs[0]['threshold_m']:.3g} m" if legs else "none"
+    other = legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"])
     off = spread(metrics["deviation_from_given_m"], ("p95", "max"))
-    rows["off the path given"] = f"{off} m, allowed {tolerance}"
-    if legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"]):
-        rows["off the path given"] += ", at corners as below"
-    rows["  worst place"] = (
-        f"{_metres(worst['off_m'])} off at {_where(worst)}; allowed {_metres(worst['allowed_m'])}"
-    )
-    rows |= error_rows(metrics)
-    rows["altitude error"] = f"{spread(metrics['altitude_error_m'])} m"
+    allowed = f"{_metres(worst['off_m'])} off at {_where(worst)}; allowed {_metres(worst['allowed_m'])}"
+    rows = {
+        "off the path given": f"{off} m, allowed {tolerance}{', at corners as below' if other else ''}",
+        "  worst place": allowed,
+        **error_rows(metrics),
+        "altitude error": f"{spread(metrics['altitude_error_m'])} m",
+    }
     if "height_above_ground_m" in metrics:
         height = metrics["height_above_ground_m"]
-        rows["above ground"] = (
-            f"least {_metres(height['min'])} at {_where(height)}; mean {_metres(height['mean'])}"
-        )
+        told = f"least {_metres(height['min'])} at {_where(height)}; mean {_metres(height['mean'])}"
+        rows["above ground"] = told
+    return rows
 
 
 def _where(place: Mapping[str, float]) -> str:
     return f"{place['time_s']:.0f} s, ({place['east_m']:.0f}, {place['north_m']:.0f}) m"
 
 
-def _add_contacts(metrics: Mapping[str, Any], rows: dict[str, str]) -> None:
+def _contacts(metrics: Mapping[str, Any]) -> dict[str, str]:
     """What was touched and crossed, and the least distance, where there was anything."""
-    if metrics["min_clearance_m"] is not None:
-        rows["least clearance"] = f"{metrics['min_clearance_m']:,.4g} m"
+    least_m, rows = metrics["min_clearance_m"], {}
+    if least_m is not None:
+        rows["least clearance"] = f"{least_m:,.4g} m"
     for one, many in (("contact", "contacts"), ("breach", "breaches")):
-        for number, each in enumerate(_listed(metrics[many], many, rows), start=1):
+        rows |= _counted(many, metrics[many])
+        for number, each in enumerate(metrics[many][:SHOWN], start=1):
+            time = f"{each['start_s']:.0f} to {each['end_s']:.0f} s"
+            place = f"({each['east_m']:.0f}, {each['north_m']:.0f}) m"
             rows[f"  {one} {number}"] = plain(
-                f"{each['name']}, {each['start_s']:.0f} to {each['end_s']:.0f} s, by {each['depth_m']:.3g} m at "
-                f"({each['east_m']:.0f}, {each['north_m']:.0f}) m"
+                f"{each['name']}, {time}, by {each['depth_m']:.3g} m at {place}"
             )
+    return rows
 
 
-def _add_items(items: Sequence[Mapping[str, str]], rows: dict[str, str]) -> None:
+def _items(items: Sequence[Mapping[str, str]]) -> dict[str, str]:
     """What became of the items of a mission: all are counted, those of note are named."""
     if not items:
-        return
+        return {}
     kinds = [item["what"] for item in items]
     tally = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-    rows["items"] = f"{len(items)}: {tally}"
     told = [
-        each
-        for each in items
-        if each["what"] == "not flown" or (each["what"] in ("flown", "not reached") and each["why"])
+        item for item in items if item["what"] in OF_NOTE and (item["why"] or item["what"] == "not flown")
     ]
+    rows = {"items": f"{len(items)}: {tally}"}
     for item in told[:MOST_ITEMS]:
         why = f": {item['why']}" if item["why"] else ""
         rows[f"  item {item['item']} "] = plain(f"{item['name']}, {item['what']}{why}")
     if len(told) > MOST_ITEMS:
         rows["  more"] = f"{len(told) - MOST_ITEMS}, in metrics.json"
+    return rows
 
 
-def _listed(entries: Sequence[Any], title: str, rows: dict[str, str]) -> Sequence[Any]:
-    """The first few entries, and a row that counts them all."""
-    if entries:
-        more = f", the first {SHOWN}:" if len(entries) > SHOWN else ""
-        rows[title] = f"{len(entries)}{more}"
-    return entries[:SHOWN]
-
-
-def _rounded(corner: Mapping[str, Any]) -> str:
-    """How a corner was rounded."""
+def _corner(corner: Mapping[str, Any]) -> str:
+    """How a corner turns and was rounded."""
+    side = "left" if corner["turn_deg"] > 0 else "right"
     allowed, cut_m = f"{corner['allowed_cut_m']:.3g} m allowed", corner["flown_cut_m"]
     if cut_m is None:
-        return f"not reached; {allowed}"
-    if not corner["radius_m"]:
-        return f"passed at {cut_m:.0f} m; {allowed}"
-    told = f"radius {corner['radius_m']:.0f} m, cut by {cut_m:.0f} m"
-    if corner["most_off_m"] > max(1.1 * cut_m, corner["allowed_cut_m"]):
-        told += f", {corner['most_off_m']:.0f} m off after it"
-    return f"{told}; {allowed}"
+        told = "not reached"
+    elif not corner["radius_m"]:
+        told = f"passed at {cut_m:.0f} m"
+    else:
+        told = f"radius {corner['radius_m']:.0f} m, cut by {cut_m:.0f} m"
+        if corner["most_off_m"] > max(1.1 * cut_m, corner["allowed_cut_m"]):
+            told += f", {corner['most_off_m']:.0f} m off after it"
+    return f"{abs(corner['turn_deg']):.0f} deg {side}, {told}; {allowed}"
 
 
 def _metres(value: float | None) -> str:

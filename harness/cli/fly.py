@@ -5,30 +5,20 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from harness.cli.options import (
-    FAILED,
-    JsonOption,
-    NoRecordingOption,
-    OptionalScenario,
-    OutOption,
-    QuietOption,
-    faults_told,
-    flag,
-    load,
-    marked_incomplete,
-    option,
-    print_json,
-    told_apart,
-)
+from harness.cli.command_line import FAILED, interruptible, load, marked_incomplete, print_json, told_apart
+from harness.cli.flight_rows import flight_rows
+from harness.cli.options import Count, Json, NoRecording, Number, OptionalScenario, Out, Quiet, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.review import open_viewer
 from harness.cli.standard_output import say
+from harness.cli.terminal import plain, print_table, progress_bar
+from harness.files.input_file import InputError
 
 if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
@@ -36,39 +26,33 @@ if TYPE_CHECKING:
 
 FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
 """Exit status of `fly` by outcome; FAILED for the others."""
+FROM: Final = "A campaign's results.parquet, instead of SCENARIO."
+SPEED: Final = "With --live: simulated seconds a second. Default: as fast as it goes."
 
 
 @replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def fly(
     scenario: OptionalScenario = None,
     given: Given = NOTHING,
-    results: Annotated[
-        Path | None, option("FILE", "A campaign's results.parquet, instead of SCENARIO.", "--from")
-    ] = None,
-    run: Annotated[int | None, option("K", "With --from: which run.")] = None,
-    out: OutOption = None,
-    no_recording: NoRecordingOption = False,
+    results: Annotated[Path | None, option("FILE", FROM, "--from")] = None,
+    run: Annotated[Count, option("K", "With --from: which run.")] = None,
+    out: Out = None,
+    no_recording: NoRecording = False,
     view: Annotated[bool, flag("--view", "Open the recording after the flight.")] = False,
     live: Annotated[bool, flag("--live", "Show the flight in the viewer while it is flown.")] = False,
-    speed: Annotated[
-        float | None, option("X", "With --live: simulated seconds a second. Default: as fast as it goes.")
-    ] = None,
+    speed: Annotated[Number, option("X", SPEED)] = None,
     web: Annotated[bool, flag("--web", "With --live: show it in a browser, served on 127.0.0.1.")] = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
 ) -> int:
     """Flies a scenario with a planner, and writes a run folder.
 
     For example: wayproof fly paper_circles --seed 3 --set planner.clearance_m=400
 
     Exit status:
-
     0 goal reached with no collision and inside the area
-
     1 flown, but goal not reached; or with --from not as the campaign flew it
-
     2 bad input or usage, nothing flown
-
     3 the planner proved the goal unreachable and the aircraft is safe
     """
     _check_usage(view and no_recording, live, speed, web)
@@ -129,13 +113,12 @@ def _fly(
     scenario: Scenario, folder: Path, onlookers: Onlookers | None, *, recording: bool, silent: bool
 ) -> dict[str, Any]:
     """Flies into a folder, with progress on standard error."""
-    from harness.cli.terminal import progress_bar
     from harness.run.scenario_flight import fly_to_folder
     from harness.run_files.run_folder import MANIFEST, SCHEMA
 
     straight_m = math.dist(scenario.mission.start_m, scenario.mission.goal_m)
     progress = progress_bar(straight_m, silent)
-    with faults_told(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
+    with interruptible(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
         if onlookers is None:
             return fly_to_folder(scenario, folder, recording, report)
         from harness.watching.watched_flight import fly_watched
@@ -145,8 +128,6 @@ def _fly(
 
 def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
     """The table of a flight, and where its files are."""
-    from harness.cli.flight_rows import flight_rows
-    from harness.cli.terminal import plain, print_table
     from harness.scenario.conditions import told
     from harness.world.motion_assumptions import outside_assumptions
 
@@ -170,25 +151,19 @@ def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Onlookers, Callabl
     Raises:
         InputError: there is no screen for the viewer.
     """
-    from contextlib import ExitStack
-
-    from harness.files.input_file import InputError
     from harness.recording.viewer import ViewerError, empty_viewer
     from harness.watching.watched_flight import Onlookers
 
-    with ExitStack() as stack:
-        try:
-            process, url = stack.enter_context(empty_viewer(web, lambda address: say(address, err=True)))
-        except ViewerError as error:
-            raise InputError(f"wayproof: {error}") from error
+    gone = "wayproof: the viewer has gone; the flight goes on"
+    try:
+        with empty_viewer(web, lambda address: say(address, err=True)) as (process, url):
 
-        def wait() -> None:
-            if sys.stdout is not None:
-                sys.stdout.flush()
-            try:
-                process.wait()
-            except KeyboardInterrupt:
-                return
+            def wait() -> None:
+                if sys.stdout is not None:
+                    sys.stdout.flush()
+                with suppress(KeyboardInterrupt):
+                    process.wait()
 
-        gone = "wayproof: the viewer has gone; the flight goes on"
-        yield Onlookers(url, speed, lambda: say(gone, err=True)), wait
+            yield Onlookers(url, speed, lambda: say(gone, err=True)), wait
+    except ViewerError as error:
+        raise InputError(f"wayproof: {error}") from error

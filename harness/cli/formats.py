@@ -6,8 +6,10 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-from harness.cli.options import BAD_INPUT, argument, load, print_json
+from harness.cli.command_line import BAD_INPUT, load, print_json
+from harness.cli.options import argument
 from harness.cli.standard_output import say
+from harness.files.input_file import InputError
 
 
 def validate(
@@ -17,8 +19,6 @@ def validate(
 
     For example: wayproof validate my_world.yaml paper_circles
     """
-    from harness.files.strict_yaml import InputError
-
     status = 0
     for file in files:
         try:

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
 
-from harness.cli.options import argument
+from harness.cli.options import argument, called
 from harness.cli.standard_output import folded, say
+from harness.cli.terminal import step_bar
 
-LISTED: Final = ("planners", "aircraft", "guidance", "scenarios", "worlds", "campaigns", "metrics")
 _AIRCRAFT_ROW: Final = "{:13} {:>7} {:>10} {:>6} {:>6} {:6} "
 _WIDTH: Final = 80
+WHAT: Final = "planners, aircraft, guidance, scenarios, worlds, campaigns or metrics."
 
 
 def list_names(
-    what: Annotated[
-        str,
-        argument(
-            "WHAT",
-            f"{', '.join(LISTED[:-1])} or {LISTED[-1]}.",
-            autocompletion=lambda incomplete: [each for each in LISTED if each.startswith(incomplete)],
-        ),
-    ],
+    what: Annotated[str, argument("WHAT", WHAT, "harness.cli.names:listed")],
 ) -> int:
     """Prints the names that a scenario or a command can use; for planners and guidance laws also their keys.
 
@@ -34,38 +29,36 @@ def list_names(
 
     For example: wayproof list planners
     """
-    if what not in LISTED:
-        raise typer.BadParameter(f"{what[:60]!r} is not one of {', '.join(LISTED)}", param_hint="WHAT")
-    if what == "aircraft":
-        _print_aircraft()
-    elif what == "guidance":
-        from harness.scenario.kinds import guidance_kinds
-
-        _print_kinds(guidance_kinds())
-    elif what == "planners":
-        from harness.scenario.kinds import planner_kinds
-
-        _print_kinds(planner_kinds())
-    elif what == "metrics":
-        _print_metrics()
-    elif what == "worlds":
-        _print_worlds()
-    else:
-        _print_shipped(what)
+    lists = listed()
+    if what not in lists:
+        raise typer.BadParameter(f"{what[:60]!r} is not one of {', '.join(lists)}", param_hint="WHAT")
+    for line in lists[what]():
+        say(line)
     return 0
 
 
-def _print_shipped(what: str) -> None:
+def listed() -> dict[str, Callable[[], Iterator[str]]]:
+    """What makes the lines of each list."""
+    return {
+        "planners": lambda: _kinds(called("harness.scenario.kinds:planner_kinds")),
+        "aircraft": _aircraft,
+        "guidance": lambda: _kinds(called("harness.scenario.kinds:guidance_kinds")),
+        "scenarios": lambda: _files(called("harness.scenario.shipped:shipped_scenarios")),
+        "worlds": _worlds,
+        "campaigns": lambda: _files(called("harness.scenario.shipped:shipped_campaigns")),
+        "metrics": _metrics,
+    }
+
+
+def _files(files: Mapping[str, Path]) -> Iterator[str]:
     """Shipped files, a row each."""
-    from harness.scenario.shipped import shipped_campaigns, shipped_scenarios, summary
+    from harness.scenario.shipped import summary
 
-    files = shipped_campaigns() if what == "campaigns" else shipped_scenarios()
     width = max(map(len, files), default=0)
-    for name, path in files.items():
-        say(folded(f"{name:{width}}  ", summary(path)))
+    return (folded(f"{name:{width}}  ", summary(path)) for name, path in files.items())
 
 
-def _print_metrics() -> None:
+def _metrics() -> Iterator[str]:
     """Every figure of a flight that people are shown: its name, place in `metrics.json`, unit, and what it means."""
     from harness.analysis.registry import METRICS
 
@@ -74,14 +67,14 @@ def _print_metrics() -> None:
             unit = f" [{metric.unit}]" if metric.unit else ""
             hint = f": {metric.hint}" if metric.hint else ""
             place = f" ({metric.path})" if metric.path != metric.name and not metric.derived else ""
-            say(
-                textwrap.fill(
-                    f"{metric.name}{place}: {metric.title}{unit}{hint}", _WIDTH, subsequent_indent="  "
-                )
-            )
+            yield _filled(f"{metric.name}{place}: {metric.title}{unit}{hint}")
 
 
-def _print_worlds() -> None:
+def _filled(text: str, begin: str = "") -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent=begin, subsequent_indent=f"{2 * begin}  ")
+
+
+def _worlds() -> Iterator[str]:
     """A row for each family of benchmark worlds: how many there are, the first one's name, its source and licence."""
     from harness.scenario.shipped import shipped_worlds, summary
 
@@ -91,17 +84,17 @@ def _print_worlds() -> None:
         families.setdefault(name.partition("/")[0], []).append(name)
     for family, names in families.items():
         source = summary(worlds[names[0]]).replace(", see ../LICENCES.md", "")
-        say(folded(f"{family:15} {len(names):3}  ", f"{names[0]}: {source}"))
+        yield folded(f"{family:15} {len(names):3}  ", f"{names[0]}: {source}")
 
 
-def _print_kinds(kinds: Mapping[str, Any]) -> None:
+def _kinds(kinds: Mapping[str, Any]) -> Iterator[str]:
     """Every planner, or law, with its own keys: default, unit, what it is."""
     for name, kind in kinds.items():
-        say(textwrap.fill(f"{name}: {kind.summary}", _WIDTH, subsequent_indent="  "))
+        yield _filled(f"{name}: {kind.summary}")
         for own in fields(kind.config):
             unit = own.metadata.get("unit") or "1"
-            text = f"{own.name} = {_default(own.default)}{'' if unit == '1' else f' {unit}'}: {own.metadata['doc']}"
-            say(textwrap.fill(text, _WIDTH, initial_indent="  ", subsequent_indent="      "))
+            told = "" if unit == "1" else f" {unit}"
+            yield _filled(f"{own.name} = {_default(own.default)}{told}: {own.metadata['doc']}", "  ")
 
 
 def _default(value: object) -> str:
@@ -111,40 +104,37 @@ def _default(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value).lower()
 
 
-def _print_aircraft() -> None:
+def _aircraft() -> Iterator[str]:
     """A row for each of the fleet; columns are those of `_AIRCRAFT_ROW`."""
     from aircraft.airframes import AircraftError, aircraft_names, airframe, is_surveyed
-    from harness.cli.terminal import step_bar
+    from aircraft.envelope import performance
     from planner.kernel_cache import seal
 
     names = aircraft_names()
-    new, faults = [name for name in names if not is_surveyed(name)], {}
+    new = [name for name in names if not is_surveyed(name)]
     if new:
         seal()
         many = f"{len(new)} aircraft are" if len(new) > 1 else f"{new[0]} is"
         say(f"{many} flown for the figures, once; some seconds each", err=True)
-        with step_bar() as report:
-            for done, name in enumerate(new):
-                report(done, len(new), name)
-                try:
-                    airframe(name)
-                except AircraftError as error:
-                    faults[name] = str(error)
-    say(folded(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "tested"), "what"))
-    for name in names:
-        fault = faults.get(name)
-        say(f"{name:13} cannot be flown: {fault}" if fault else _aircraft_row(name))
-
-
-def _aircraft_row(name: str) -> str:
-    from aircraft.airframes import AircraftError, airframe
-    from aircraft.envelope import performance
-
-    try:
-        frame = airframe(name)
-        radius_m = performance(frame, frame.cruise_mps).turn_radius_m
-    except AircraftError as error:
-        return f"{name:13} cannot be flown: {error}"
-    low, high = frame.airspeed_range_mps
-    figures = (f"{frame.mass_kg:.0f}", f"{low:g}-{high:g}", f"{frame.cruise_mps:g}", f"{radius_m:.0f}")
-    return folded(_AIRCRAFT_ROW.format(name, *figures, "yes" if frame.verified else "no"), frame.summary)
+    rows = [
+        folded(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "tested"), "what")
+    ]
+    with step_bar(silent=not new) as report:
+        for done, name in enumerate(names):
+            report(done, len(names), name)
+            try:
+                frame = airframe(name)
+                radius_m = performance(frame, frame.cruise_mps).turn_radius_m
+            except AircraftError as error:
+                rows.append(f"{name:13} cannot be flown: {error}")
+                continue
+            low, high = frame.airspeed_range_mps
+            figures = (
+                f"{frame.mass_kg:.0f}",
+                f"{low:g}-{high:g}",
+                f"{frame.cruise_mps:g}",
+                f"{radius_m:.0f}",
+            )
+            tested = "yes" if frame.verified else "no"
+            rows.append(folded(_AIRCRAFT_ROW.format(name, *figures, tested), frame.summary))
+    return iter(rows)

@@ -11,46 +11,29 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
-from harness.cli.options import AircraftOption, completing, option
+from harness.cli.options import AircraftOption, Count, Text, option
 
 if TYPE_CHECKING:
     from harness.scenario.kinds import LoopPart
 
 Run = TypeVar("Run", bound=Callable[..., int])
 
-_KIND: Final = "or FILE.py:NAME, MODULE:NAME."
+_KIND: Final = "Replaces {}.kind; or FILE.py:NAME, MODULE:NAME."
+_LAWS: Final = "harness.scenario.kinds:guidance_kinds"
+_DAY: Final = "Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."
+_ANY: Final = "Replaces any key of a scenario; can be repeated."
 
 REPLACING: Final[dict[str, Any]] = {
     "planner": Annotated[
-        str | None,
-        option(
-            "KIND",
-            f"Replaces planner.kind; {_KIND}",
-            autocompletion=completing("harness.scenario.kinds:planner_kinds"),
-        ),
+        Text, option("KIND", _KIND.format("planner"), completes="harness.scenario.kinds:planner_kinds")
     ],
     "aircraft": AircraftOption,
-    "guidance": Annotated[
-        str | None,
-        option(
-            "KIND",
-            f"Replaces guidance.kind; {_KIND}",
-            autocompletion=completing("harness.scenario.kinds:guidance_kinds"),
-        ),
-    ],
-    "conditions": Annotated[
-        str | None,
-        option("DAY", "Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."),
-    ],
-    "wind": Annotated[str | None, option("SPEED,FROM", "Steady wind: m/s, degrees it blows from.")],
-    "turbulence": Annotated[
-        str | None, option("INTENSITY", "light, moderate or severe; or milspec:light, ...")
-    ],
-    "seed": Annotated[int | None, option("N", "Replaces seed.")],
-    "settings": Annotated[
-        list[str] | None,
-        option("KEY.PATH=VALUE", "Replaces any key of a scenario; can be repeated.", "--set"),
-    ],
+    "guidance": Annotated[Text, option("KIND", _KIND.format("guidance"), completes=_LAWS)],
+    "conditions": Annotated[Text, option("DAY", _DAY)],
+    "wind": Annotated[Text, option("SPEED,FROM", "Steady wind: m/s, degrees it blows from.")],
+    "turbulence": Annotated[Text, option("INTENSITY", "light, moderate or severe; or milspec:light, ...")],
+    "seed": Annotated[Count, option("N", "Replaces seed.")],
+    "settings": Annotated[list[str] | None, option("KEY.PATH=VALUE", _ANY, "--set")],
 }
 """The options that replace keys of a scenario, by the name of the parameter."""
 
@@ -109,11 +92,8 @@ def replacing(*names: str) -> Callable[[Run], Callable[..., int]]:
         signature = inspect.signature(command, eval_str=True)
         kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
         own = [inspect.Parameter(name, kind, default=None, annotation=REPLACING[name]) for name in names]
-        parameters = [
-            option
-            for each in signature.parameters.values()
-            for option in (own if each.name == "given" else [each])
-        ]
+        listed = signature.parameters.values()
+        parameters = [p for each in listed for p in (own if each.name == "given" else [each])]
 
         @wraps(command)
         def run(**arguments: Any) -> int:

@@ -1,4 +1,4 @@
-"""What a person sees of a campaign on a terminal: what would be flown, and the answers in 80 columns."""
+"""What a person sees of a campaign on a terminal: the answers, in 80 columns."""
 
 from __future__ import annotations
 
@@ -8,44 +8,16 @@ from typing import Final
 from harness.analysis.metric import number
 from harness.campaign.cell import QUESTIONS, Cell
 from harness.campaign.paired import Duel
-from harness.campaign.runs import CampaignRuns
 from harness.campaign.summary import Summary, Table
-from harness.cli.standard_output import folded, say
+from harness.cli.standard_output import say
 from harness.cli.terminal import coloured, plain, print_line, print_table
-from harness.files.strict_yaml import Scalar
 from harness.files.wording import counted
 
-FIRST, LAST = 15, 5
-"""Numbers of the first and last runs that are shown where there are more runs than both together."""
-CELL: Final = 28
-"""A longer value is cut short."""
 SHOWN_WORST: Final = 5
 LEGEND: Final = (
     "reached, below the wanted clearance, tracks: 95 % interval; "
     "length over the optimum: median/p95; plan: p99/max"
 )
-
-
-def print_runs(runs: CampaignRuns) -> None:
-    """What would be flown, a line a run, those in the middle left out where there are many."""
-    campaign, count = runs.campaign, len(runs)
-    say(
-        f"{campaign.name}: {counted(count, 'run')} of {counted(runs.cases, 'case')}, root seed {campaign.seed}, "
-        f"recordings: {campaign.recordings}"
-    )
-    last = max(count - LAST, FIRST)
-    for index in (*range(min(FIRST, count)), *range(last, count)):
-        if index == last > FIRST:
-            say("...")
-        run = runs.run(index)
-        varied = [f"{name}={_shown(value)}" for name, value in run.varied.items()]
-        names = run.scenario, run.world, run.planner, run.aircraft, f"seed {run.seed}"
-        say(folded(f"run {run.run}, case {run.case}: ", ", ".join([*names, *varied])))
-
-
-def _shown(value: Scalar) -> str:
-    text = f"{value:.6g}" if isinstance(value, float) else "none" if value is None else str(value)
-    return text if len(text) <= CELL else f"{text[: CELL - 3]}..."
 
 
 def print_summary(summary: Summary, all_tables: bool = False) -> None:

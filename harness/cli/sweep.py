@@ -8,79 +8,50 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from harness.cli.options import (
-    FAILED,
-    JsonOption,
-    OutOption,
-    QuietOption,
-    ResumeOption,
-    WorkersOption,
-    argument,
-    completing,
-    flag,
-    option,
-    print_json,
-    resumable,
-)
+from harness.cli.command_line import FAILED, print_json, resumable
+from harness.cli.options import Json, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, planner_kind, replacing, sources
 from harness.cli.standard_output import say
+from harness.cli.terminal import step_bar
+from harness.files.input_file import InputError
 
 if TYPE_CHECKING:
     from harness.campaign.runs import CampaignRuns
-    from harness.campaign.workers import Workers
+    from harness.campaign.workers import Workers as Flyers
+
+
+CAMPAIGNS: Final = "harness.scenario.shipped:shipped_campaigns"
+PLANNERS: Final = "Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME."
+SCHEDULER: Final = "A Dask cluster that flies instead: tls://HOST:8786. It can run code on this machine."
+UNENCRYPTED: Final = "Allow a --scheduler beyond this machine without TLS, in a trusted network."
 
 
 @replacing("guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def sweep(
-    campaign: Annotated[
-        str,
-        argument(
-            "CAMPAIGN",
-            "A campaign file, or a shipped one's name.",
-            autocompletion=completing("harness.scenario.shipped:shipped_campaigns"),
-        ),
-    ],
-    planners: Annotated[
-        str | None,
-        option(
-            "A,B,...", "Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME.", "--planners", "--planner"
-        ),
-    ] = None,
+    campaign: Annotated[str, argument("CAMPAIGN", "A campaign file, or a shipped one's name.", CAMPAIGNS)],
+    planners: Annotated[Text, option("A,B,...", PLANNERS, "--planners", "--planner")] = None,
     given: Given = NOTHING,
-    workers: WorkersOption = None,
-    scheduler: Annotated[
-        str | None,
-        option(
-            "ADDRESS", "A Dask cluster that flies instead: tls://HOST:8786. It can run code on this machine."
-        ),
-    ] = None,
-    unencrypted: Annotated[
-        bool,
-        flag("--unencrypted", "Allow a --scheduler beyond this machine without TLS, in a trusted network."),
-    ] = False,
-    out: OutOption = None,
-    resume: ResumeOption = False,
-    dry_run: Annotated[bool, flag("--dry-run", "Print the runs; fly and write nothing.")] = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    workers: Workers = None,
+    scheduler: Annotated[Text, option("ADDRESS", SCHEDULER)] = None,
+    unencrypted: Annotated[bool, flag("--unencrypted", UNENCRYPTED)] = False,
+    out: Out = None,
+    resume: Resume = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
 ) -> int:
     """Flies a campaign: many flights on all processors or a cluster, one row each in results.parquet.
 
     For example: wayproof sweep forest_planners --workers 4
 
     Exit status:
-
     0 every run was flown to its end, whatever its outcome
-
     1 the software failed in a run (its row has the traceback), or the disk was full or the cluster gone (--resume
     goes on)
-
     2 bad input or usage, nothing flown
-
     130 interrupted; --resume goes on
     """
     _check_usage(scheduler, workers, unencrypted)
@@ -92,9 +63,6 @@ def sweep(
 
     named = [each.strip() for each in planners.split(",")] if planners else []
     runs = checked(campaign_path(campaign), named, given.keys, given.sources[1])
-    if dry_run:
-        _print_runs(runs, as_json)
-        return 0
     folder = out or Path("runs") / runs.campaign.name
     local = partial(local_workers, workers or os.cpu_count() or 1)
     flyers = dask_workers(scheduler, unencrypted, _warn) if scheduler else local()
@@ -117,17 +85,6 @@ def _check_usage(scheduler: str | None, workers: int | None, unencrypted: bool) 
         raise typer.BadParameter("--unencrypted goes with --scheduler")
 
 
-def _print_runs(runs: CampaignRuns, as_json: bool) -> None:
-    from dataclasses import asdict
-
-    from harness.cli.summary_table import print_runs
-
-    if as_json:
-        print_json([asdict(runs.run(number)) for number in range(len(runs))])
-    else:
-        print_runs(runs)
-
-
 def _warn(text: str) -> None:
     say(f"wayproof: {text}", err=True)
 
@@ -141,8 +98,6 @@ def checked(
     """The runs of a campaign file, every scenario of them made once."""
     from harness.campaign.campaign_file import is_scenario, load_campaign
     from harness.campaign.runs import CampaignRuns
-    from harness.cli.terminal import step_bar
-    from harness.files.strict_yaml import InputError
 
     try:
         kinds = [planner_kind(each) for each in planners]
@@ -158,14 +113,13 @@ def checked(
 
 
 def _fly(
-    runs: CampaignRuns, path: Path, workers: AbstractContextManager[Workers], *, resume: bool, silent: bool
+    runs: CampaignRuns, path: Path, workers: AbstractContextManager[Flyers], *, resume: bool, silent: bool
 ) -> tuple[dict[str, int], bool]:
     """Flies what is missing; returns how many runs ended how, and whether all are over."""
     from harness.campaign.flight import Answer
     from harness.campaign.folder import CampaignFolder
     from harness.campaign.results import INDEX
     from harness.campaign.sweep import fly_missing, told_left
-    from harness.cli.terminal import step_bar
 
     with (
         resumable(path, INDEX),

@@ -6,47 +6,43 @@ import math
 import os
 import re
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from harness.cli.options import AircraftName, argument, option
+from harness.cli.command_line import written
+from harness.cli.options import AircraftName, Number, Text, argument, option
 from harness.cli.standard_output import say
+from harness.cli.terminal import plain, print_table
+from harness.files.input_file import InputError
+from harness.files.wording import counted
 
 if TYPE_CHECKING:
     from harness.world_files.siting import Craft, Site
 
 Pair = tuple[float, float]
 
+PLACE: Final = "Latitude,longitude; or x,y in metres for a file without a place on earth."
+NEAR: Final = "Whatever comes this near to the altitude is an obstacle."
+CRS: Final = "Coordinate system of files that name none, such as EPSG:28992."
+
 
 def world(
     files: Annotated[
         list[Path], argument("FILE...", "Terrain, buildings, airspace, fences or an occupancy map.")
     ],
-    altitude_m: Annotated[float, option("H", "Flight altitude above mean sea level.", "--altitude-m")],
+    altitude_m: Annotated[float, option("H", "Flight altitude above mean sea level.")],
     out: Annotated[Path, option("SCENARIO.yaml", "The scenario to write.")],
     aircraft: AircraftName = "aerosonde",
-    start: Annotated[
-        str | None, option("A,B", "Latitude,longitude; or x,y in metres for a file without a place on earth.")
-    ] = None,
-    goal: Annotated[str | None, option("A,B", "Likewise.")] = None,
-    clearance_m: Annotated[
-        float | None, option("C", "Wanted clearance: planner.clearance_m.", "--clearance-m")
-    ] = None,
-    vertical_clearance_m: Annotated[
-        float,
-        option("V", "Whatever comes this near to the altitude is an obstacle.", "--vertical-clearance-m"),
-    ] = 10.0,
-    metres_per_cell: Annotated[
-        float | None, option("M", "Side of a cell of an occupancy map.", "--metres-per-cell")
-    ] = None,
-    ground_m: Annotated[
-        float | None, option("G", "Flat ground, for heights above ground without terrain.", "--ground-m")
-    ] = None,
-    crs: Annotated[
-        str | None, option("EPSG:N", "Coordinate system of files that name none, such as EPSG:28992.")
-    ] = None,
+    start: Annotated[Text, option("A,B", PLACE)] = None,
+    goal: Annotated[Text, option("A,B", "Likewise.")] = None,
+    clearance_m: Annotated[Number, option("C", "Wanted clearance: planner.clearance_m.")] = None,
+    vertical_clearance_m: Annotated[float, option("V", NEAR)] = 10.0,
+    metres_per_cell: Annotated[Number, option("M", "Side of a cell of an occupancy map.")] = None,
+    ground_m: Annotated[Number, option("G", "Flat ground, for heights above ground without terrain.")] = None,
+    crs: Annotated[Text, option("EPSG:N", CRS)] = None,
 ) -> int:
     """Makes a scenario from files of terrain, buildings, airspace, fences or an occupancy map.
 
@@ -54,42 +50,40 @@ def world(
 
     For example: wayproof world davos.tif --altitude-m 2000 --out davos.yaml
     """
-    from harness.files.input_file import InputError
     from harness.files.strict_yaml import dump
     from harness.files.whole_file import replace_text
     from harness.world_files.expansion import FileFault, FileSpec
     from harness.world_files.parts import WorldFileError
     from harness.world_files.siting import site
 
-    given = _ends(start, goal)
+    ends = _ends(start, goal)
     if not out.absolute().parent.is_dir():
         raise InputError(f"{out}: cannot be written (its folder is not there); make the folder first")
     craft = _craft(aircraft, clearance_m)
     specs = [
-        FileSpec(
-            path,
-            vertical_clearance_m=vertical_clearance_m,
-            metres_per_cell=metres_per_cell,
-            ground_m=ground_m,
-            crs=crs,
-        )
+        FileSpec(path, None, vertical_clearance_m, metres_per_cell, crs=crs, ground_m=ground_m)
         for path in files
     ]
     try:
-        found = site(specs, altitude_m, craft, given, lambda what: say(f"wayproof: {what}", err=True))
+        found = site(specs, altitude_m, craft, ends, lambda what: say(f"wayproof: {what}", err=True))
     except FileFault as fault:
         raise InputError(f"{files[fault.index]}: {fault}") from fault
     except WorldFileError as error:
         raise InputError(f"{' '.join(map(str, files))}: {error}") from error
-    keys = _scenario(found, out, aircraft, altitude_m, clearance_m)
+    name = re.sub(r"[^a-z0-9._-]+", "_", out.stem.lower())[:100].strip(".") or "world"
+    area: dict[str, Any] = {"bounds_m": list(found.bounds_m)}
+    if (place := found.place) is not None:
+        area["origin"] = {"latitude_deg": place.latitude_deg, "longitude_deg": place.longitude_deg}
+    obstacles = [{"file": _file_keys(spec, out)} for spec in found.specs]
+    start_m, goal_m = found.ends_m.tolist()
+    mission = {"start_m": start_m, "goal_m": goal_m, "altitude_m": float(altitude_m)}
+    keys = _keys(name, area, obstacles, mission, aircraft, clearance_m)
     names = ", ".join(each.name for each in files)
     comment = [f"What {names} has at {altitude_m:g} m: made by `wayproof world`.", *_notes(found)]
     text = "".join(f"# {line}\n" for line in comment) + dump(keys)
     _checked(text, out)
-    try:
+    with written(out):
         replace_text(out, text)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror}); give the path of a file") from error
     _print(found, out)
     return 0
 
@@ -118,36 +112,25 @@ def _craft(name: str, clearance_m: float | None) -> Craft:
     from harness.scenario.scenario import scenario_of
     from harness.world_files.siting import Craft
 
-    empty = scenario_of(
-        {
-            "schema": "wayproof/scenario/1",
-            "name": "room",
-            "area": {"bounds_m": [-1.5e5, -1.5e5, 1.5e5, 1.5e5]},
-            "mission": {"start_m": [-1e5, 0.0], "goal_m": [1e5, 0.0]},
-            "aircraft": {"model": name},
-            "planner": {} if clearance_m is None else {"clearance_m": clearance_m},
-        }
-    )
+    area = {"bounds_m": [-1.5e5, -1.5e5, 1.5e5, 1.5e5]}
+    mission = {"start_m": [-1e5, 0.0], "goal_m": [1e5, 0.0]}
+    empty = scenario_of(_keys("room", area, [], mission, name, clearance_m))
     return Craft(name, performance_of(empty).turn_radius_m, empty.planner.clearance_m)
 
 
-def _scenario(
-    found: Site, out: Path, aircraft: str, altitude_m: float, clearance_m: float | None
+def _keys(
+    name: str, area: Any, obstacles: Sequence[Any], mission: Any, aircraft: str, clearance_m: float | None
 ) -> dict[str, Any]:
-    """The keys of the scenario file."""
-    area: dict[str, Any] = {"bounds_m": list(found.bounds_m)}
-    if found.place is not None:
-        place = found.place
-        area["origin"] = {"latitude_deg": place.latitude_deg, "longitude_deg": place.longitude_deg}
-    start_m, goal_m = found.ends_m.tolist()
+    """The keys of a scenario file."""
+    planner = {} if clearance_m is None else {"planner": {"clearance_m": float(clearance_m)}}
     return {
         "schema": "wayproof/scenario/1",
-        "name": re.sub(r"[^a-z0-9._-]+", "_", out.stem.lower())[:100].strip(".") or "world",
+        "name": name,
         "area": area,
-        "obstacles": [{"file": _file_keys(spec, out)} for spec in found.specs],
-        "mission": {"start_m": start_m, "goal_m": goal_m, "altitude_m": float(altitude_m)},
+        "obstacles": list(obstacles),
+        "mission": mission,
         "aircraft": {"model": aircraft},
-        **({} if clearance_m is None else {"planner": {"clearance_m": float(clearance_m)}}),
+        **planner,
     }
 
 
@@ -158,9 +141,8 @@ def _file_keys(spec: Any, out: Path) -> dict[str, Any]:
     keys: dict[str, Any] = {"path": os.path.relpath(spec.path.absolute(), out.absolute().parent)}
     for field in fields(spec):
         value = getattr(spec, field.name)
-        if field.name == "path" or (value == field.default and field.name != "vertical_clearance_m"):
-            continue
-        keys[field.name] = [round(each, 3) for each in value] if isinstance(value, tuple) else value
+        if field.name == "vertical_clearance_m" or (field.name != "path" and value != field.default):
+            keys[field.name] = [round(each, 3) for each in value] if isinstance(value, tuple) else value
     return keys
 
 
@@ -172,7 +154,6 @@ def _notes(found: Site) -> list[str]:
 
 def _checked(text: str, out: Path) -> None:
     """Raises InputError if the scenario could not be flown: for its altitude, perhaps, or for start and goal."""
-    from harness.files.input_file import InputError
     from harness.scenario.scenario import parse_scenario
 
     try:
@@ -183,9 +164,6 @@ def _checked(text: str, out: Path) -> None:
 
 
 def _print(found: Site, out: Path) -> None:
-    from harness.cli.terminal import plain, print_table
-    from harness.files.wording import counted
-
     xmin, ymin, xmax, ymax = found.bounds_m
     solid = [each for source in found.expanded.sources for each in source.polygons]
     inside = min(sum(each.area for each in solid) / ((xmax - xmin) * (ymax - ymin)), 1.0)

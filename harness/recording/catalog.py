@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.analysis.registry import METRICS
-from harness.files.errors import RunFolderError
 from harness.recording.blueprint import FRAME, Frame
 from harness.recording.layout import layout_of
 from harness.recording.local_page import LOCALHOST
-from harness.recording.properties import NO_RECORDINGS, RUN, VARIED
+from harness.recording.properties import RUN, VARIED
 from harness.recording.viewer import ViewerError, empty_viewer, wait_for
 
 if TYPE_CHECKING:
@@ -70,11 +69,8 @@ def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
     """Serves recordings as one dataset on 127.0.0.1, as long as the block lasts. To read a thousand takes seconds.
 
     Raises:
-        RunFolderError: there are none.
         ViewerError: rerun's server is not installed or does not start.
     """
-    if not recordings:
-        raise RunFolderError(NO_RECORDINGS.format(name))
     try:
         import datafusion  # noqa: F401
     except ImportError as error:
@@ -161,7 +157,6 @@ def open_table(
     """Opens the table of a campaign in the viewer and waits until it is closed.
 
     Raises:
-        RunFolderError: the campaign has no recordings.
         ViewerError: there is no screen, or the viewer or the server does not start.
     """
     with catalog(name, recordings) as served, empty_viewer(web, tell, served.url) as (viewer, source):

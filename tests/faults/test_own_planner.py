@@ -209,7 +209,7 @@ def test_a_campaign_and_a_command_say_how_an_own_planner_is_named(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (place / "campaign.yaml").write_text(CAMPAIGN.replace("gone", "'other.py:Bug'"))
-    assert main(["sweep", str(place / "campaign.yaml"), "--dry-run"]) == 2
+    assert main(["sweep", str(place / "campaign.yaml")]) == 2
     assert "planners[0]: is 'other.py:Bug', which no file may name: give" in (told := capsys.readouterr().err)
     assert "--planners other.py:Bug,..., which replaces all of `planners`" in told
     assert main(["fly", str(place / "short.yaml"), "--planner", "other.py"]) == 2

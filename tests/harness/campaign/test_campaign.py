@@ -444,35 +444,6 @@ def test_validate_and_schema_know_campaigns(place: Path, capsys: pytest.CaptureF
     assert json.loads(capsys.readouterr().out) == campaign_schema()
 
 
-def test_a_dry_run_shows_the_runs_and_writes_nothing(
-    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(place)
-    (place / "campaign.yaml").write_text(CAMPAIGN)
-    before = sorted(place.rglob("*"))
-    assert main(["sweep", "campaign.yaml", "--dry-run"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "small: 48 runs of 12 cases, root seed 5, recordings: none"
-    numbers = [int(line.split()[1].rstrip(",")) for line in lines if line.startswith("run ")]
-    assert numbers == [*range(15), *range(43, 48)]
-    last = runs_of(place, CAMPAIGN).run(47)
-    begin = (
-        f"run 47, case 11: {last.scenario}, {last.world}, {last.planner}, {last.aircraft}, seed {last.seed}, "
-    )
-    assert lines[-1].startswith(begin)
-    assert all(f"{name}=" in lines[-1] for name in last.varied)
-    monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    assert main(["sweep", "campaign.yaml", "--dry-run"]) == 0
-    narrow = capsys.readouterr().out
-    assert max(map(len, narrow.splitlines())) <= 80
-    assert narrow.split() == "\n".join(lines).split()
-    assert main(["sweep", "campaign.yaml", "--dry-run", "--json"]) == 0
-    plain = json.loads(capsys.readouterr().out)
-    assert [each["run"] for each in plain] == list(range(48))
-    assert sorted(place.rglob("*")) == before
-
-
 @pytest.mark.parametrize("name", shipped_campaigns())
 def test_shipped_campaigns_are_valid_and_named_after_their_files(name: str) -> None:
     path = shipped_campaigns()[name]

@@ -12,8 +12,8 @@ import pytest
 
 from harness.cli.app import main
 from harness.cli.bench import bench_rows
+from harness.cli.command_line import print_json
 from harness.cli.flight_rows import flight_rows
-from harness.cli.options import print_json
 from harness.cli.standard_output import say
 from harness.cli.terminal import print_table, progress_bar, step_bar
 from harness.files.wording import printable

@@ -1,0 +1,120 @@
+"""What the commands do alike: load a scenario, name a folder, tell of faults and interrupts, print JSON."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shlex
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import typer
+
+from harness.cli.standard_output import say
+from harness.files.input_file import InputError, read_index
+from harness.files.wording import printable
+
+if TYPE_CHECKING:
+    from harness.scenario.scenario import Scenario
+
+FAILED: Final = 1
+BAD_INPUT: Final = 2
+"""Exit statuses."""
+IN_THE_NAME: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")
+"""Keys that the default folder of a run is called after; of a model that is a folder, by the folder's last name."""
+
+
+def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+    """A scenario by file or shipped name, with keys replaced."""
+    from harness.campaign.campaign_file import is_campaign
+    from harness.scenario.scenario import load_scenario
+    from harness.scenario.shipped import shipped_campaigns
+
+    try:
+        return load_scenario(scenario, overrides)
+    except InputError as error:
+        if scenario in shipped_campaigns() or (os.path.isfile(scenario) and is_campaign(Path(scenario))):
+            use = shlex.join(["wayproof", "sweep", scenario])
+            raise InputError(f"{scenario}: this is a campaign: use `{use}`") from error
+        raise
+
+
+def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_THE_NAME) -> str:
+    """What a default folder's name has at its end, so that runs which differ in settings do not replace one another."""
+    from hashlib import sha256
+
+    from harness.files.strict_yaml import as_spelt
+
+    spelt = [(as_spelt(key), value.strip()) for key, value in settings]
+    others = [(key, value) for key, value in spelt if key not in named or "/" in value]
+    return f"-{sha256(json.dumps(others).encode()).hexdigest()[:8]}" if others else ""
+
+
+def with_remedy(error: OSError) -> str:
+    """What an error of the system says, and what would help where that is known."""
+    if error.errno in (errno.EMFILE, errno.ENFILE):
+        return f"{error}: raise the limit with `ulimit -n 1024`"
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return "the working directory has been deleted: change to another"
+    return str(error)
+
+
+@contextmanager
+def interruptible(left: Callable[[], str]) -> Iterator[None]:
+    """Says after Ctrl-C what is left."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        say(f"wayproof: interrupted; {left()}", err=True)
+        raise
+
+
+def marked_incomplete(what: str, folder: Path, index: str, schema: str) -> Callable[[], str]:
+    """What became of a folder that was being written, for `interruptible`."""
+
+    def left() -> str:
+        begun = read_index(folder / index, schema)
+        if begun is not None and begun.get("complete") is False:
+            return f"the {what} in {folder} is marked incomplete"
+        return "nothing was written"
+
+    return left
+
+
+@contextmanager
+def resumable(folder: Path, index: str) -> Iterator[None]:
+    """The same for many flights, which --resume goes on with; a full disk, or a cluster gone, ends with FAILED."""
+    done = f"what is done is in {folder}, --resume goes on"
+    try:
+        with interruptible(lambda: done if (folder / index).exists() else "nothing was written"):
+            yield
+    except OSError as error:
+        say(f"wayproof: {with_remedy(error)}; {done}", err=True)
+        raise typer.Exit(FAILED) from error
+
+
+@contextmanager
+def written(out: Path) -> Iterator[None]:
+    """Around writing a file that somebody named.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror}); give the path of a file") from error
+
+
+def print_json(content: Any) -> None:
+    """Prints a result for scripts."""
+    text = json.dumps(content, indent=2, ensure_ascii=False)
+    if printable(text) != text:
+        # JSON has spelt out what ASCII has of them; what say() would make of the others is no JSON.
+        text = "".join(c if c == printable(c) else f"\\u{ord(c):04x}" for c in text)
+    say(text)
