@@ -67,12 +67,17 @@ def falsify(
     # Indices as `--set` takes them, which no shell takes for a pattern.
     keys = "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in varied)])
     folder = out or Path("runs") / loaded(()).name / f"{keys}{told_apart(given.keys, named=())}"
+    ended: list[int] = []
 
     def left() -> str:
-        begun = (folder / INDEX).is_file()
-        return f"the flights so far are in {folder / INDEX}" if begun else "no flight had ended yet"
+        return f"the flights so far are in {folder / INDEX}" if ended else "no flight had ended yet"
 
     with interruptible(left), step_bar(quiet) as bar:
+
+        def report(done: int, of: int, told: str) -> None:
+            ended.append(done)
+            bar(done, of, told)
+
         most = runs or RUNS_A_KEY * len(ranges)
         found = search(
             loaded,
@@ -82,7 +87,7 @@ def falsify(
             claim=claim,
             conditions=most,
             tolerance=tolerance,
-            progress=bar,
+            progress=report,
         )
     if as_json:
         print_json(found.plain())
