@@ -20,7 +20,8 @@ from harness.world.world import Faces
 from planner.compiled import BOOL, COUNT, FLOAT, FLOATS_OUT, PLACES, compiled
 from planner.interface import ComplexArray, FloatArray
 
-FACES, PLACE = "Array(float64, 2, 'A', readonly=True)", "complex128"
+FACES, PLACE, FOUR = "Array(float64, 2, 'A', readonly=True)", "complex128", "UniTuple(float64, 4)"
+Four = tuple[float, float, float, float]
 
 SAME = 1e-9
 """Beams touch where their width is their spacing but for this share: both may come from degrees."""
@@ -72,13 +73,12 @@ class Fan:
 
     def ranges_m(self, faces: Faces, east: float, north: float, heading_rad: float) -> FloatArray:
         """(n,) ranges to the nearest face within each beam, +inf beyond the range."""
-        sin, cos = math.sin(heading_rad), math.cos(heading_rad)
         ranges = self.nothing.copy()
-        pose = (east, north, cos, sin, self._range_m, self.first_rad, self.spacing_rad, self.beam_rad)
-        if faces.circles_m.shape[1]:
-            _lower_to_circles(ranges, self._left, self._right, faces.circles_m, self._touching, *pose)
-        if faces.edges_m.shape[1]:
-            _lower_to_edges(ranges, self._left, self._right, faces.edges_m, self._touching, *pose)
+        pose = east, north, math.cos(heading_rad), math.sin(heading_rad)
+        fan = self._range_m, self.first_rad, self.spacing_rad, self.beam_rad
+        for each in (faces.circles_m, faces.edges_m):
+            if each.shape[1]:
+                _lower(ranges, self._left, self._right, each, self._touching, pose, fan)
         return ranges
 
 
@@ -116,74 +116,6 @@ def _between(left: complex, right: complex, to_right: float, ahead: float) -> bo
     )
 
 
-@compiled(PLACE, FLOAT, FLOAT, FLOAT, BOOL)
-def _along_to_circle(ray: complex, right: float, ahead: float, radius: float, outside: bool) -> float:
-    """Distance along a ray to a circle, from inside to the way out; +inf where it does not meet it.
-
-    Its centre lies to the right and ahead of the sensor, which may be `outside`.
-    """
-    beside = abs(_side(ray, right, ahead))
-    if beside > radius:
-        return math.inf
-    along, half_chord = ray.real * right + ray.imag * ahead, math.sqrt((radius - beside) * (radius + beside))
-    distance = along - half_chord if outside else along + half_chord
-    return distance if distance >= 0.0 else math.inf
-
-
-@compiled(FLOATS_OUT, PLACES, PLACES, FACES, BOOL, *[FLOAT] * 8)
-def _lower_to_circles(
-    ranges: FloatArray,
-    left: ComplexArray,
-    right: ComplexArray,
-    circles: FloatArray,
-    touching: bool,
-    east: float,
-    north: float,
-    cos: float,
-    sin: float,
-    range_m: float,
-    first_rad: float,
-    spacing_rad: float,
-    beam_rad: float,
-) -> None:
-    """Lowers ranges to circles.
-
-    `left` and `right` are unit vectors of the sides of the beams as the nose sees them, to its right + i ahead; of
-    beams that are `touching` the right side of each is the left side of the next. (3, c) `circles` are those of
-    `Faces`. The sensor is at east and north, its heading has `cos` and `sin`; `first_rad` is the bearing of the axis of
-    beam 0.
-    """
-    rays = len(ranges)
-    for circle in range(circles.shape[1]):
-        away_east, away_north = circles[0, circle] - east, circles[1, circle] - north
-        radius = circles[2, circle]
-        to_right, ahead = away_east * cos - away_north * sin, away_east * sin + away_north * cos
-        away = math.hypot(to_right, ahead)
-        if not away - radius <= range_m:  # or what tells where it is is not a number
-            continue
-        half_rad = math.asin(radius / away) if away > radius else math.pi
-        outside = away > radius
-        # Its nearest place is that towards its centre; seen from inside, away from that.
-        way = 1.0 if outside else -1.0
-        begins_rad = math.atan2(to_right, ahead) - half_rad - 0.5 * beam_rad
-        low, high, again = _tried(begins_rad, 2.0 * half_rad + beam_rad, first_rad, spacing_rad, rays)
-        for begin, end in ((low, high), (0, again)):
-            at_right = math.inf
-            for beam in range(begin, end):
-                if touching and beam > begin:
-                    at_left = at_right
-                else:
-                    at_left = _along_to_circle(left[beam], to_right, ahead, radius, outside)
-                at_right = at_left
-                if beam_rad > 0.0:
-                    at_right = _along_to_circle(right[beam], to_right, ahead, radius, outside)
-                distance = min(at_left, at_right)
-                if beam_rad > 0.0 and _between(left[beam], right[beam], way * to_right, way * ahead):
-                    distance = min(distance, abs(away - radius))
-                if distance <= range_m:
-                    ranges[beam] = min(ranges[beam], distance)
-
-
 @compiled(FLOAT, FLOAT, FLOAT, FLOAT)
 def _nearest_of(
     start_right: float, start_ahead: float, end_right: float, end_ahead: float
@@ -196,53 +128,91 @@ def _nearest_of(
     return right, ahead, math.hypot(right, ahead)
 
 
-@compiled(PLACE, FLOAT, FLOAT, FLOAT, FLOAT, rare=True)
-def _along_to_edge(
-    ray: complex, start_right: float, start_ahead: float, end_right: float, end_ahead: float
-) -> float:
-    """Distance along a ray to an edge; +inf where it does not meet it.
+@compiled(FACES, COUNT, FOUR)
+def _seen(faces: FloatArray, face: int, pose: Four) -> tuple[Four, tuple[float, float, float], float, float]:
+    """A face as the nose sees it: what `_along` takes, its nearest place and how far away it is, its bearings.
 
-    It does where the ends lie on different sides of it. Two edges that share a vertex agree about its side, so that no
-    ray slips through between them.
+    The nearest place is to the right and ahead; bearings are that of its left end and how far it reaches clockwise.
     """
-    start_side, end_side = _side(ray, start_right, start_ahead), _side(ray, end_right, end_ahead)
-    if (start_side >= 0.0) == (end_side >= 0.0):
-        return math.inf
-    lever = start_right * (end_ahead - start_ahead) - start_ahead * (end_right - start_right)
-    distance = lever / (start_side - end_side)
+    east, north, cos, sin = pose
+    away_east, away_north = faces[0, face] - east, faces[1, face] - north
+    right, ahead = away_east * cos - away_north * sin, away_east * sin + away_north * cos
+    if len(faces) == 3:
+        radius, away = faces[2, face], math.hypot(right, ahead)
+        half_rad = math.asin(radius / away) if away > radius else math.pi
+        # Its nearest place is that towards its centre; seen from inside, away from that.
+        way = 1.0 if away > radius else -1.0
+        foot = way * right, way * ahead, abs(away - radius)
+        return (right, ahead, radius, way), foot, math.atan2(right, ahead) - half_rad, 2.0 * half_rad
+    away_east, away_north = faces[2, face] - east, faces[3, face] - north
+    end_right, end_ahead = away_east * cos - away_north * sin, away_east * sin + away_north * cos
+    width_rad = math.atan2(ahead * end_right - right * end_ahead, right * end_right + ahead * end_ahead)
+    begins_rad = math.atan2(right, ahead) if width_rad >= 0.0 else math.atan2(end_right, end_ahead)
+    foot = _nearest_of(right, ahead, end_right, end_ahead)
+    return (right, ahead, end_right, end_ahead), foot, begins_rad, abs(width_rad)
+
+
+@compiled(PLACE, FOUR, BOOL)
+def _along(ray: complex, face: Four, circular: bool) -> float:
+    """Distance along a ray to a face; +inf where it does not meet it.
+
+    A circle is its centre, its radius, and 1, or -1 where the ray begins inside of it and leads to the way out. An edge
+    is its two ends; it is met where they lie on different sides of the ray. Two edges that share a vertex agree about
+    its side, so that no ray slips through between them.
+    """
+    right, ahead, end_right, end_ahead = face
+    start_side = _side(ray, right, ahead)
+    if circular:
+        beside, radius = abs(start_side), end_right
+        if beside > radius:
+            return math.inf
+        half_chord = math.sqrt((radius - beside) * (radius + beside))
+        distance = ray.real * right + ray.imag * ahead - end_ahead * half_chord
+    else:
+        end_side = _side(ray, end_right, end_ahead)
+        if (start_side >= 0.0) == (end_side >= 0.0):
+            return math.inf
+        lever = right * (end_ahead - ahead) - ahead * (end_right - right)
+        distance = lever / (start_side - end_side)
     return distance if distance >= 0.0 else math.inf
 
 
-@compiled(FLOATS_OUT, PLACES, PLACES, FACES, BOOL, *[FLOAT] * 8, rare=True)
-def _lower_to_edges(
+@compiled(PLACE, PLACE, FOUR, "UniTuple(float64, 3)", BOOL)
+def _inside(
+    left: complex, right: complex, face: Four, foot: tuple[float, float, float], circular: bool
+) -> float:
+    """Distance to the nearest of those places of a face that may be nearest between the sides of a beam; +inf: none."""
+    distance = foot[2] if _between(left, right, foot[0], foot[1]) else math.inf
+    if not circular:
+        # Both vertices: where the nearest place of the edge is out of the beam, one may be nearest in it.
+        if _between(left, right, face[0], face[1]):
+            distance = min(distance, math.hypot(face[0], face[1]))
+        if _between(left, right, face[2], face[3]):
+            distance = min(distance, math.hypot(face[2], face[3]))
+    return distance
+
+
+@compiled(FLOATS_OUT, PLACES, PLACES, FACES, BOOL, FOUR, FOUR)
+def _lower(
     ranges: FloatArray,
     left: ComplexArray,
     right: ComplexArray,
-    edges: FloatArray,
+    faces: FloatArray,
     touching: bool,
-    east: float,
-    north: float,
-    cos: float,
-    sin: float,
-    range_m: float,
-    first_rad: float,
-    spacing_rad: float,
-    beam_rad: float,
+    pose: Four,
+    fan: Four,
 ) -> None:
-    """Lowers ranges to edges of polygons; arguments as `_lower_to_circles` has them, (4, e) edges as `Faces`."""
-    rays = len(ranges)
-    for edge in range(edges.shape[1]):
-        away_east, away_north = edges[0, edge] - east, edges[1, edge] - north
-        start_right, start_ahead = away_east * cos - away_north * sin, away_east * sin + away_north * cos
-        away_east, away_north = edges[2, edge] - east, edges[3, edge] - north
-        end_right, end_ahead = away_east * cos - away_north * sin, away_east * sin + away_north * cos
-        turn = start_ahead * end_right - start_right * end_ahead
-        width_rad = math.atan2(turn, start_right * end_right + start_ahead * end_ahead)
-        begins_rad = math.atan2(start_right, start_ahead)
-        if width_rad < 0.0:
-            begins_rad, width_rad = math.atan2(end_right, end_ahead), -width_rad
-        foot_right, foot_ahead, foot_m = _nearest_of(start_right, start_ahead, end_right, end_ahead)
-        if not foot_m <= range_m:
+    """Lowers ranges to faces: (3, c) circles or (4, e) edges, as `Faces` has them.
+
+    `left` and `right` are unit vectors of the sides of the beams as the nose sees them, to its right + i ahead; of
+    beams that are `touching` the right side of each is the left side of the next. `pose` is the place of the sensor and
+    cosine and sine of its heading; `fan` the range, the bearing of the axis of beam 0, from axis to axis, and the width
+    of a beam.
+    """
+    (range_m, first_rad, spacing_rad, beam_rad), circular, rays = fan, len(faces) == 3, len(ranges)
+    for number in range(faces.shape[1]):
+        face, foot, begins_rad, width_rad = _seen(faces, number, pose)
+        if not foot[2] <= range_m:  # or what tells where it is is not a number
             continue
         low, high, again = _tried(
             begins_rad - 0.5 * beam_rad, width_rad + beam_rad, first_rad, spacing_rad, rays
@@ -250,22 +220,14 @@ def _lower_to_edges(
         for begin, end in ((low, high), (0, again)):
             at_right = math.inf
             for beam in range(begin, end):
-                if touching and beam > begin:
-                    at_left = at_right
-                else:
-                    at_left = _along_to_edge(left[beam], start_right, start_ahead, end_right, end_ahead)
-                at_right = at_left
+                at_left = at_right
+                if beam == begin or not touching:
+                    at_left = _along(left[beam], face, circular)
+                distance = at_right = at_left
                 if beam_rad > 0.0:
-                    at_right = _along_to_edge(right[beam], start_right, start_ahead, end_right, end_ahead)
-                distance = min(at_left, at_right)
-                if beam_rad > 0.0:
-                    if _between(left[beam], right[beam], foot_right, foot_ahead):
-                        distance = min(distance, foot_m)
-                    # Both vertices: where the nearest place of the edge is out of the beam, one may be nearest in it.
-                    if _between(left[beam], right[beam], start_right, start_ahead):
-                        distance = min(distance, math.hypot(start_right, start_ahead))
-                    if _between(left[beam], right[beam], end_right, end_ahead):
-                        distance = min(distance, math.hypot(end_right, end_ahead))
+                    at_right = _along(right[beam], face, circular)
+                    inside = _inside(left[beam], right[beam], face, foot, circular)
+                    distance = min(at_left, at_right, inside)
                 if distance <= range_m:
                     ranges[beam] = min(ranges[beam], distance)
 
