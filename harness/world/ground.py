@@ -24,6 +24,9 @@ Position = tuple[float, float, float]
 SAMPLE_M: Final = 0.5
 """A way is held against the ground at least this often; what is thinner along it is no contact."""
 
+SQUARES: Final = (64, 16, 4, 1)
+"""Half widths, in cells of the grid, of the squares whose highest ground is looked for."""
+
 
 @dataclass(frozen=True, eq=False)
 class Ground:
@@ -52,37 +55,23 @@ class Ground:
     def reach_m(self, position: Position) -> float:
         """So far can one fly from a position, in whatever direction, without touching the ground; at least.
 
-        Around the position tiles of the grid are taken, as large as their highest ground allows. Nothing else is
-        known of the ground, so that the answer may be much too small, but never too large.
+        Only the highest ground in squares about the position is known, so that the answer may be much too small, but
+        never too large.
         """
         east, north, up = position
-        column = (east - self.field.corner_m[0]) / self.field.spacing_m[0]
-        row = (north - self.field.corner_m[1]) / self.field.spacing_m[1]
+        row = math.floor((north - self.field.corner_m[1]) / self.field.spacing_m[1])
+        column = math.floor((east - self.field.corner_m[0]) / self.field.spacing_m[0])
         best = 0.0
-        for level, tiles in enumerate(self._highest):
-            side = 2**level
-            reach = side * min(self.field.spacing_m)
-            i, j = math.floor(row / side), math.floor(column / side)
-            near = tiles[max(i - 1, 0) : max(i + 2, 0), max(j - 1, 0) : max(j + 2, 0)]
+        for cells in SQUARES:
+            near = self._solid_m[
+                max(row - cells, 0) : max(row + cells + 2, 0),
+                max(column - cells, 0) : max(column + cells + 2, 0),
+            ]
             free = up - float(near.max(initial=-math.inf))
-            if free <= 0.0:
-                break
-            best = min(reach, free)
-            if free < reach:
-                break
+            best = max(best, min(cells * min(self.field.spacing_m), free))
         return best
 
     @cached_property
-    def _highest(self) -> list[FloatArray]:
-        """Highest ground in tiles of 1, 2, 4 ... cells a side; the last is one tile. -inf where it is not known."""
-        heights = np.where(np.isfinite(self.field.heights_m), self.field.heights_m, -math.inf)
-        # A cell reaches from its node to the next ones in the east and north.
-        wide = np.pad(heights, ((0, 1), (0, 1)), constant_values=-math.inf)
-        pairs = np.maximum(wide[:, :-1], wide[:, 1:])
-        tiles: FloatArray = np.maximum(pairs[:-1], pairs[1:])
-        levels = [tiles]
-        while max(levels[-1].shape) > 1:
-            rows, columns = levels[-1].shape
-            even = np.pad(levels[-1], ((0, rows % 2), (0, columns % 2)), constant_values=-math.inf)
-            levels.append(np.maximum.reduce([even[i::2, j::2] for i in (0, 1) for j in (0, 1)]))
-        return levels
+    def _solid_m(self) -> FloatArray:
+        """Heights of the nodes, -inf where they are not known."""
+        return np.where(np.isfinite(self.field.heights_m), self.field.heights_m, -math.inf)
