@@ -38,16 +38,11 @@ class Loop:
 
     Attributes:
         world: the truth; only sensor, termination and record see it.
-        sensor: range sensor; None: nothing is sensed, and the planner is asked at the start alone.
+        sensor: None: nothing is sensed, and the planner is asked at the start alone.
         seen: obstacle map, all that the planner sees.
-        planner: planner under test.
         model: aircraft with its inner loops.
-        guidance: law that steers the aircraft along the route.
-        termination: says when the flight is over.
-        mission: goal and limits.
         vertical: says at which altitude and airspeed the aircraft flies.
         scan_rate_hz: scans a second; divides the model's step rate.
-        navigator: tells what the aircraft believes of its state.
     """
 
     world: World
@@ -70,8 +65,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
 
     Raises:
         KeyboardInterrupt: after Ctrl-C; the observers have all rows up to it.
-        ValueError: the scan rate does not divide the simulation rate.
-        RuntimeError: the loop has been flown before.
+        ValueError, RuntimeError: as `ClosedLoop` has them.
     """
     next_report_s = 0.0
     with held_back() as interrupt:
@@ -286,11 +280,7 @@ class ClosedLoop:
         return self.plans.status_label if self.ending is None else self.ending.outcome.value
 
     def flight(self) -> Flight:
-        """The flight, once it is over.
-
-        Raises:
-            RuntimeError: it is not over.
-        """
+        """The flight, once it is over; before that, `RuntimeError`."""
         if self.ending is None:
             raise RuntimeError(f"the flight is not over; it has come to {self.true.time_s:g} s")
         return Flight(

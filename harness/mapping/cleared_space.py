@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.mapping.scan import Beams
-from planner.compiled import BOOLS_OUT, COUNT, FLOAT, FLOATS, PLACES, compiled
+from planner.compiled import COUNT, FLOAT, FLOATS, PLACES, compiled
 from planner.interface import BoolArray, ComplexArray, FloatArray
 
 CELLS, CELLS_OUT, LOOKS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]", "uint8[:, :]"
@@ -71,7 +71,7 @@ def through_cells(
     too narrow to be missed between them is up to who chooses `reach`.
 
     Of the cells of a `disc` those not `seen` to be free are asked; `looks` tells how often each was looked through, and
-    is not read where once is enough (`needed`). The first cell's corner lies at `x_low`, `y_low`. Ranges count up to
+    it is free where that was as often as `needed`. The first cell's corner lies at `x_low`, `y_low`. Ranges count up to
     `reach`; beams have to go beyond a cell by `noise`, and so have `aside` more to either side.
     """
     east, north, start_rad, spacing_rad, beam_rad = beams
@@ -96,19 +96,16 @@ def through_cells(
             many = min(last - first + 1, rays)
             if not closed and (many == rays or not 0 <= first <= last < rays):
                 continue
-            short = first_short(ranges, 0 if many == rays else first, many, beyond)
-            if needed == 1:
-                seen[column, row] = short < 0
-            elif short < 0:
+            short = first_short(ranges, first, many, beyond)
+            if short < 0:
                 looks[column, row] += 1
                 seen[column, row] = looks[column, row] >= needed
             elif ranges[short] > distance - half - noise:
                 looks[column, row] = 0
 
 
-@compiled(BOOLS_OUT, PLACES, FLOATS, BEAMS, FLOAT, FLOAT, COUNT, FLOAT, COUNT)
+@compiled(PLACES, FLOATS, BEAMS, FLOAT, FLOAT, COUNT, FLOAT, COUNT)
 def through_places(
-    through: BoolArray,
     places: ComplexArray,
     ranges: FloatArray,
     beams: Beams,
@@ -117,15 +114,15 @@ def through_places(
     abreast: int,
     aimed_m: float,
     every: int,
-) -> int:
-    """How many places all beams to either side went beyond; `through` becomes true for these.
+) -> BoolArray:
+    """(k,) which of (k,) places, east + i north, all beams to either side went beyond.
 
-    `through` (k,) is all false, `places` (k,) are east + i north. Only places nearer than `within_m` are asked, and of
-    these one in `every`. The beams, the one towards a place and `abreast` to either side, have to go further by
-    `sure_m`, and the middle of that one to pass by no further than `aimed_m`.
+    Only places nearer than `within_m` are asked, and of these one in `every`. The beams, the one towards a place and
+    `abreast` to either side, have to go further by `sure_m`, and the middle of that one to pass by no further than
+    `aimed_m`.
     """
     east, north, start_rad, spacing_rad, beam_rad = beams
-    many, rays = 0, len(ranges)
+    through, rays = np.zeros(len(places), dtype=np.bool_), len(ranges)
     closed = rays * spacing_rad > math.tau - 1e-9
     for i in range(0, len(places), every):
         dx, dy = places[i].real - east, places[i].imag - north
@@ -138,7 +135,5 @@ def through_places(
             continue
         if not closed and not abreast <= ray < rays - abreast:
             continue
-        if first_short(ranges, ray - abreast, 2 * abreast + 1, distance + sure_m) < 0:
-            through[i] = True
-            many += 1
-    return many
+        through[i] = first_short(ranges, ray - abreast, 2 * abreast + 1, distance + sure_m) < 0
+    return through

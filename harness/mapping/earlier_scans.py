@@ -17,10 +17,10 @@ from harness.mapping.followed_outline import MOST_MPS, FollowedOutline
 from harness.mapping.scan import RangeScan
 from harness.mapping.scan_comparison import (
     any_come,
-    cleared_space,
     come,
     drawn_back,
     in_all,
+    looked_through,
     near_any,
     near_line,
 )
@@ -116,7 +116,7 @@ class EarlierScans:
         """
         first, near_m = self._looks[0], NO_STEP * self._clearance
         own = near_any(first.places, track.shown_at(first.scan.time_s), self.own_m)
-        stood = first.places[~own & ~cleared_space(now, first.places, self._sure)]
+        stood = first.places[~own & ~looked_through(now, first.places, self._sure)]
         may = ~near_any(places, stood, near_m) | come(first.scan, places, self._sure)
         if not track.outline.is_definite:
             return may.nonzero()[0]
@@ -124,7 +124,7 @@ class EarlierScans:
         for before in self._looks:
             past_s = now.time_s - before.scan.time_s
             off_m = max(self._sure, near_m) + OFF * track.error_mps * past_s
-            was &= ~cleared_space(before.scan, places - track.velocity * past_s, off_m)
+            was &= ~looked_through(before.scan, places - track.velocity * past_s, off_m)
         near = may & near_any(places, track.at(now.time_s).points, near_m)
         some = was if 2 * np.count_nonzero(was & near) >= np.count_nonzero(near) else may
         return some.nonzero()[0]

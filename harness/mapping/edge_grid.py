@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,46 +16,21 @@ MOST_CELLS = 16_000_000
 """Cells are wider than a quarter of the clearance where more of them would be needed."""
 
 
-@dataclass(frozen=True)
-class EdgeGrid:
-    """A grid over the area of operations and a border.
-
-    Attributes:
-        cell_m: width of a cell.
-        corner: its lower left corner, east + i north, m.
-        columns: cells from west to east.
-        rows: cells from south to north.
-    """
-
-    cell_m: float
-    corner: complex
-    columns: int
-    rows: int
-
-    @staticmethod
-    def over(bounds_m: tuple[float, float, float, float], clearance_m: float) -> EdgeGrid:
-        """The grid for an area: cells a quarter of the clearance wide, or wider where they would be too many."""
-        xmin, ymin, xmax, ymax = bounds_m
-        span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
-        cell = max(clearance_m / 4.0, span / math.sqrt(MOST_CELLS))
-        border = 2.0 * clearance_m + cell
-        columns, rows = (
-            math.ceil((high - low + 2.0 * border) / cell) for low, high in ((xmin, xmax), (ymin, ymax))
-        )
-        return EdgeGrid(cell, complex(xmin - border, ymin - border), columns, rows)
-
-
 class EdgePoints(ABC):
     """Points by slot, in the order in which they came, and the revision of the set of those that are edges.
 
-    Args:
-        grid: that they lie on.
-        range_m: sensing range.
-        revision: to count from, where the map follows another one.
+    Their grid covers the area of operations (xmin, ymin, xmax, ymax) and a border; revisions count from one on.
     """
 
-    def __init__(self, grid: EdgeGrid, range_m: float, revision: int) -> None:
-        self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
+    def __init__(
+        self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float, revision: int
+    ) -> None:
+        xmin, ymin, xmax, ymax = bounds_m
+        span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
+        self._cell = cell = max(clearance_m / 4.0, span / math.sqrt(MOST_CELLS))
+        border = 2.0 * clearance_m + cell
+        self._origin = complex(xmin - border, ymin - border)  # the lower left corner
+        self._nx, self._ny = (math.ceil((far + 2.0 * border) / cell) for far in (xmax - xmin, ymax - ymin))
         self._range = range_m
         self._count = 0
         self._points = np.zeros(1024, dtype=np.complex128)

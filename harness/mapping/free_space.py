@@ -15,7 +15,7 @@ import numpy as np
 from harness.mapping.cleared_space import through_cells
 from harness.mapping.edge_grid import MOST_CELLS
 from harness.mapping.scan import RangeScan
-from planner.compiled import BOOLS_OUT, FLOAT, GRID, ROWS, compiled
+from planner.compiled import FLOAT, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
 NARROWEST_RAD = 1e-3
@@ -36,9 +36,6 @@ class FreeSpace:
     """Cells of space that a scan has looked through: half a clearance wide, or wider where they would be too many.
 
     Args:
-        bounds_m: xmin, ymin, xmax, ymax of the area.
-        clearance_m: wanted distance from obstacles.
-        range_m: sensing range.
         noise_m: standard deviation of ranges, as the sensor's maker states it.
         lost: share of the returns that get lost or are false, likewise.
         least_width_m: the narrowest obstacle that there is; it counts where beams do not touch. Default: the clearance.
@@ -62,7 +59,7 @@ class FreeSpace:
         self._every, self._noise = range_m / 32.0, noise_m
         self._least_width = clearance_m if least_width_m is None else least_width_m
         self._needed = looks_needed(lost)
-        self._looks = np.zeros(self._seen.shape if self._needed > 1 else (1, 1), dtype=np.uint8)
+        self._looks = np.zeros(self._seen.shape, dtype=np.uint8)
         self._aside = BESIDE if lost > 0.0 or noise_m > 0.0 else 0
         self._last = (math.inf, math.inf)
         self._reach = 0.0
@@ -87,7 +84,7 @@ class FreeSpace:
         cells = slice(x_low, x_high), slice(y_low, y_high)
         through_cells(
             self._seen[cells],
-            self._looks[cells] if self._needed > 1 else self._looks,
+            self._looks[cells],
             self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first],
             scan.ranges_m,
             scan.beams,
@@ -113,10 +110,7 @@ class FreeSpace:
         Returns:
             Whether any of it stands in space that was seen to be free: an edge point with free cells all about it.
         """
-        free = np.zeros(len(edges_m), dtype=np.bool_)
-        if not self._count_free(free, edges_m):
-            return False
-        edges_m = edges_m[free]
+        edges_m = edges_m[self.contains(edges_m)]
         if not self.surrounds(edges_m).any():
             return False
         _, _, x_low, x_high, y_low, y_high = self._window(scan, math.ceil(scan.max_range_m / self._cell) + 1)
@@ -130,8 +124,7 @@ class FreeSpace:
         mine = np.floor(np.arctan2(x, y) / width).astype(np.int64) % len(hidden_from)
         hidden = np.hypot(x, y) > hidden_from[mine] - self._cell
         seen[column[hidden], row[hidden]] = False
-        if self._needed > 1:
-            self._looks[x_low:x_high, y_low:y_high][column[hidden], row[hidden]] = 0
+        self._looks[x_low:x_high, y_low:y_high][column[hidden], row[hidden]] = 0
         self._last = (math.inf, math.inf)  # what the next scan looks through is free at once
         return True
 
@@ -166,13 +159,7 @@ class FreeSpace:
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""
-        free = np.zeros(len(points_m), dtype=np.bool_)
-        self._count_free(free, points_m)
-        return free
-
-    def _count_free(self, free: BoolArray, points_m: FloatArray) -> int:
-        """How many of (k, 2) points lie in free cells; (k,) `free` becomes true for these."""
-        return _count_free(free, self._seen, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
+        return _are_free(self._seen, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
 
 
 def looks_needed(missed: float) -> int:
@@ -182,17 +169,14 @@ def looks_needed(missed: float) -> int:
     return MOST_LOOKS + 1 if missed >= 1.0 else max(math.ceil(math.log(MISSED) / math.log(missed)), 1)
 
 
-@compiled(BOOLS_OUT, GRID, ROWS, FLOAT, FLOAT, FLOAT)
-def _count_free(
-    free: BoolArray, seen: BoolArray, points: FloatArray, x0: float, y0: float, cell: float
-) -> int:
-    many = 0
+@compiled(GRID, ROWS, FLOAT, FLOAT, FLOAT)
+def _are_free(seen: BoolArray, points: FloatArray, x0: float, y0: float, cell: float) -> BoolArray:
+    free = np.zeros(len(points), dtype=np.bool_)
     for i in range(len(points)):
         column, row = math.floor((points[i, 0] - x0) / cell), math.floor((points[i, 1] - y0) / cell)
         if 0 <= column < seen.shape[0] and 0 <= row < seen.shape[1]:
             free[i] = seen[column, row]
-            many += free[i]
-    return many
+    return free
 
 
 def _disc(cells: int) -> BoolArray:

@@ -2,10 +2,9 @@
 
 A return from a place that scans of some seconds before looked through tells of something that moves there, or that
 has just appeared; one from behind a place where something was, of something that draws back, or of what has gone
-(`harness.mapping.scan_comparison`). Scans of shortly before tell of what has just come out from behind something,
-those of long
-before of what is slow. The run of returns about it, up to the next step in range and without what stood there before
-beside it, is followed from scan to scan: the translation that lays the outline seen first upon the one seen now
+(`harness.mapping.scan_comparison`). Scans of shortly before tell of what has just come out from behind something, those
+of long before of what is slow. The run of returns about it, up to the next step in range and without what stood there
+before beside it, is followed from scan to scan: the translation that lays the outline seen first upon the one seen now
 (`harness.mapping.scan_matching`) grows in proportion to time where it moves, and not at all where it only appeared.
 Assumed: obstacles that move do so without turning, no faster than `MOST_MPS`.
 
@@ -33,7 +32,7 @@ from harness.mapping.followed_outline import (
     extent_m,
 )
 from harness.mapping.scan import RangeScan, all_round, supported
-from harness.mapping.scan_comparison import cleared_space, grown, in_a_row, joined, near_any, runs_of
+from harness.mapping.scan_comparison import grown, in_a_row, joined, looked_through, near_any, runs_of
 from harness.mapping.scan_matching import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, means, register
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
@@ -58,8 +57,7 @@ NEAR = 1.5
 """In standard deviations of ranges: returns so near to an outline may be its."""
 BENT = 14.0
 """This times noise over spacing, to the power of two thirds, is how many points of a straight face a mean has to
-be of
-for the face not to look bent (`registration.FLAT`)."""
+be of for the face not to look bent (`registration.FLAT`)."""
 NARROW = 4.0
 """In standard deviations of ranges: what is narrower tells nothing of an outline; all about it is taken as well."""
 MEDIANS = 0.5
@@ -75,7 +73,6 @@ class MovingObstacles:
 
     Args:
         clearance_m: wanted distance from obstacles; runs of returns break where they are further apart.
-        noise_m: standard deviation of ranges.
         false_returns: the sensor is known to return ranges where nothing is.
         is_free: tells which of (k, 2) places were surely seen to be free. With it, what comes there is told from all
             that was ever seen, in every scan, and is found at once, standing until it is known to move.
@@ -291,7 +288,7 @@ class MovingObstacles:
         if self._is_free:
             return True
         first = track.at(scan.time_s).points - track.moved
-        gone = np.count_nonzero(cleared_space(scan, first, self._sure)) >= FEWEST
+        gone = np.count_nonzero(looked_through(scan, first, self._sure)) >= FEWEST
         return bool(gone) or self._earlier.have_come(places, FEWEST)
 
     def _found_again(

@@ -15,10 +15,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.mapping.edge_grid import EdgeGrid, EdgePoints
+from harness.mapping.edge_grid import EdgePoints
 from harness.mapping.hit_counting import CONFIRMED, count_hits, ends, new_edges
 from harness.mapping.scan import RangeScan, all_round, supported
-from harness.mapping.scan_comparison import count_looked_through
+from harness.mapping.scan_comparison import looked_through
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 SUPPORT = 0.5
@@ -45,13 +45,11 @@ other time only where none was the last time."""
 class ObstacleMap(EdgePoints):
     """What stands still, as a sensor with exact ranges shows it.
 
+    Hits nearer to each other than twice the clearance leave no way between them and are joined. Edge points lie about a
+    quarter of it apart.
+
     Args:
-        bounds_m: xmin, ymin, xmax, ymax of the area.
-        clearance_m: wanted distance from obstacles; hits nearer to each other than twice this leave no way
-            between them and are joined. Edge points lie about a quarter of it apart.
-        range_m: sensing range.
         doubtful: the sensor may return what is not there: a single hit is not believed.
-        revision: to count from, where it follows another map.
         shifted: the poses of scans err. An edge is the more misplaced the further away it was seen from, so one that
             is seen from nearer by is moved to where it is seen now.
     """
@@ -65,7 +63,7 @@ class ObstacleMap(EdgePoints):
         revision: int = 0,
         shifted: bool = False,
     ) -> None:
-        super().__init__(EdgeGrid.over(bounds_m, clearance_m), range_m, revision)
+        super().__init__(bounds_m, clearance_m, range_m, revision)
         self._coarse = self._nx * self._ny
         # Fine cells that were hit, numbered after the coarse ones.
         self._fine: dict[tuple[int, int, int], int] = {}
@@ -121,15 +119,12 @@ class ObstacleMap(EdgePoints):
         """
         self._unconfirmed = False
         hits, places = self._hits(scan, ignored)
-        if not len(hits):
-            return
         if self._shifted:
             self._place_anew(scan, scan.ranges_m[hits], places)
-        if not self._holds(scan):
-            _, _, on_grid = self._column_and_row(places)
-            hits, places = hits[on_grid], places[on_grid]
-            if not len(hits):
-                return
+        _, _, on_grid = self._column_and_row(places)
+        hits, places = hits[on_grid], places[on_grid]
+        if not len(hits):
+            return
         rays, cell, join, first = len(scan.ranges_m), self._cell, self._join, self._first_score
         closed = all_round(scan) and bool(hits[0] + rays - hits[-1] <= 2)
         cells, found = new_edges(
@@ -188,12 +183,6 @@ class ObstacleMap(EdgePoints):
         hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
         return hits, scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
 
-    def _holds(self, scan: RangeScan) -> bool:
-        """Whether all that a scan can reach lies on the grid."""
-        reach, x, y = scan.max_range_m, scan.east_m - self._origin.real, scan.north_m - self._origin.imag
-        width, height = self._nx * self._cell, self._ny * self._cell
-        return reach < x < width - reach and reach < y < height - reach
-
     def _count_hits(self, cells: IntArray, places: ComplexArray) -> None:
         if not len(cells):
             return
@@ -219,18 +208,15 @@ class ObstacleMap(EdgePoints):
         """Takes a point off every known point that three neighbouring rays looked past; whether any was."""
         sensor = complex(scan.east_m, scan.north_m)
         slots = self._in_reach(sensor, self._range / 8.0)
-        through = np.zeros(len(slots), dtype=np.bool_)
         # Only a ray that passes close by says anything about a point.
-        if not count_looked_through(
-            through,
+        through = looked_through(
             scan,
             self._points.take(slots),
             1.5 * self._cell,
             abreast=1,
             aimed_m=0.25 * self._cell,
             within_m=scan.max_range_m - 2.0 * self._cell,
-        ):
-            return False
+        )
         weaker = self._key[slots[through]]
         weaker = weaker[self._score[weaker] > 0]
         if len(weaker):

@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.mapping.edge_grid import EdgeGrid, EdgePoints
+from harness.mapping.edge_grid import EdgePoints
 from harness.mapping.scan import RangeScan, all_round, clockwise_from
 from planner.compiled import BOOL, FLOAT, FLOATS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
@@ -34,22 +34,13 @@ FORGET_AT = 48.0
 """Counts are halved from so many on: what has gone fades, what is new counts."""
 STOOD_S = 20.0
 """What has been an edge for so long stands: what moves is elsewhere by then."""
-NO_RAYS = np.zeros(0, dtype=np.bool_)
 
 SLOTS, FLAGS = "Array(int32, 1, 'C', readonly=True)", "Array(boolean, 1, 'C', readonly=True)"
 COUNTED_OUT = "float32[:, ::1]"
 
 
 class ReflectionMap(EdgePoints):
-    """What stands still, as a sensor with noisy ranges shows it.
-
-    Args:
-        bounds_m: xmin, ymin, xmax, ymax of the area.
-        clearance_m: wanted distance from obstacles; cells are a quarter of it wide.
-        range_m: sensing range.
-        noise_m: standard deviation of ranges, as the sensor's maker states it; positive.
-        revision: to count from, where it follows another map.
-    """
+    """What stands still, as a sensor with noisy ranges shows it; `noise_m` is their stated standard deviation."""
 
     def __init__(
         self,
@@ -59,7 +50,7 @@ class ReflectionMap(EdgePoints):
         noise_m: float,
         revision: int = 0,
     ) -> None:
-        super().__init__(EdgeGrid.over(bounds_m, clearance_m), range_m, revision)
+        super().__init__(bounds_m, clearance_m, range_m, revision)
         self._noise = noise_m
         self._least_share = min(REFLECTIVITY, HAZARD * self._cell / noise_m)
         self._slot = np.full(self._nx * self._ny, -1, dtype=np.int32)  # by cell; points are middles of cells
@@ -124,7 +115,7 @@ class ReflectionMap(EdgePoints):
                 np.abs(offsets),
                 bearings / scan.spacing_rad,
                 scan.ranges_m,
-                NO_RAYS if ignored is None else ignored,
+                np.zeros(len(scan.ranges_m), np.bool_) if ignored is None else ignored,
                 self._counts,
                 0.5 * self._cell,
                 scan.spacing_rad,
@@ -181,7 +172,7 @@ def _count_rays(
 
     `slots` are the cells that are asked; by cell are told `distances` (m) and `positions`, bearings in rays from the
     first on, and by slot `counts` (n, 3), which are written: rays that the cell stopped, that it let through, that
-    ended before it. `ignored` rays are not counted; it may be empty. `half` is half the width of a cell; cells beyond
+    ended before it. `ignored` rays are not counted. `half` is half the width of a cell; cells beyond
     `within` are not asked; counts are halved from `forget_at` on.
 
     Returns:
@@ -195,7 +186,7 @@ def _count_rays(
         if not closed and ray >= rays:
             continue
         ray %= rays
-        if len(ignored) and ignored[ray]:
+        if ignored[ray]:
             continue
         slot = slots[i]
         counted[many] = slot
@@ -207,6 +198,7 @@ def _count_rays(
             other = other % rays if closed else min(max(other, 0), rays - 1)
             _count(counts, slot, ranges[other] - distance, half, noise)
         if counts[slot, 0] + counts[slot, 1] + counts[slot, 2] > forget_at:
-            for column in range(3):
-                counts[slot, column] *= np.float32(0.5)
+            counts[slot, 0] *= np.float32(0.5)
+            counts[slot, 1] *= np.float32(0.5)
+            counts[slot, 2] *= np.float32(0.5)
     return counted[:many]

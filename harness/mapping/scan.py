@@ -169,9 +169,7 @@ def _side(ranges: FloatArray, ray: int, beam_rad: float, noise_m: float, closed:
     before, after = _beside(ranges, ray, -1, closed, lossy), _beside(ranges, ray, 1, closed, lossy)
     least, most = own - min(GRAZING * beam_rad, NEARER) * own, own - SURELY * noise_m
     from_left, from_right = least <= before <= most, least <= after <= most
-    if (
-        from_left == from_right
-    ):  # a corner that points away, or all as far: neither side is nearer than the axis
+    if from_left == from_right:  # a corner that points away, or all as far: no side is nearer than the axis
         return 0.0
     return 1.0 if from_right else -1.0
 

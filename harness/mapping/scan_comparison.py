@@ -24,22 +24,19 @@ ABREAST = 2
 
 def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
     """(k,) which places were looked through by a scan before: what is there now has come."""
-    return cleared_space(before, places, sure_m) if any_come(before, places, sure_m) else _none_of(places)
+    any_ = any_come(before, places, sure_m)
+    return looked_through(before, places, sure_m) if any_ else np.zeros(len(places), dtype=np.bool_)
 
 
 def any_come(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
     """Whether `come` may hold for any of (k,) places: in a still world it mostly does not."""
-    return count_looked_through(_none_of(places), before, places, sure_m, every=FEWEST) > 0
+    return bool(looked_through(before, places, sure_m, every=FEWEST).any())
 
 
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
-    """(n,) which rays of a scan look through where something was before: what they meet may have drawn back.
+    """(n,) which rays of a scan look through (k,) places where something was: what they meet may have drawn back.
 
-    Args:
-        were: (k,) places where a scan before met something.
-        scan: as it is now.
-        sure_m: what lies further behind is surely another place.
-        most_m: nothing has drawn back by more.
+    What lies further behind than `sure_m` is surely another place; nothing has drawn back by more than `most_m`.
     """
     gone = np.zeros(len(scan.ranges_m), dtype=np.bool_)
     left = were[come(scan, were, sure_m)]
@@ -60,22 +57,7 @@ def rays_towards(scan: RangeScan, places: ComplexArray) -> IntArray:
     return ray % len(scan.ranges_m) if all_round(scan) else ray
 
 
-def cleared_space(
-    scan: RangeScan,
-    places: ComplexArray,
-    sure_m: float,
-    abreast: int = ABREAST,
-    aimed_m: float = math.inf,
-    within_m: float = math.inf,
-) -> BoolArray:
-    """(k,) which places `count_looked_through` counts."""
-    through = _none_of(places)
-    count_looked_through(through, scan, places, sure_m, abreast, aimed_m, within_m)
-    return through
-
-
-def count_looked_through(
-    through: BoolArray,
+def looked_through(
     scan: RangeScan,
     places: ComplexArray,
     sure_m: float,
@@ -83,26 +65,13 @@ def count_looked_through(
     aimed_m: float = math.inf,
     within_m: float = math.inf,
     every: int = 1,
-) -> int:
-    """How many places a scan looked through, surely: with the ray towards each and some to either side.
+) -> BoolArray:
+    """(k,) which places a scan looked through, surely: with the ray towards each and some to either side.
 
-    Arguments are those of `through_places`: those of (k,) places that were looked through become true in `through`.
+    Arguments are those of `through_places`.
     """
-    return through_places(
-        through,
-        places,
-        scan.ranges_m,
-        scan.beams,
-        min(within_m, scan.max_range_m - sure_m),
-        sure_m,
-        abreast,
-        aimed_m,
-        every,
-    )
-
-
-def _none_of(places: ComplexArray) -> BoolArray:
-    return np.zeros(len(places), dtype=np.bool_)
+    within_m = min(within_m, scan.max_range_m - sure_m)
+    return through_places(places, scan.ranges_m, scan.beams, within_m, sure_m, abreast, aimed_m, every)
 
 
 def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, closed: bool) -> list[IntArray]:
@@ -115,14 +84,9 @@ def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, closed: b
 
 
 def grown(mine: IntArray, hits: IntArray, places: ComplexArray, step_m: float, scan: RangeScan) -> IntArray:
-    """Some returns in clockwise order, and those that go on from their ends without a step.
+    """Some returns in clockwise order, and those that go on from their ends, each nearer than a step to the one before.
 
-    Args:
-        mine: (k,) indices of the returns.
-        hits: (n,) rays of the scan that returned something.
-        places: (n,) where they did.
-        step_m: each is nearer to the one before.
-        scan: the scan.
+    (k,) `mine` are their indices among (n,) `hits`, the rays of the scan that returned something, and `places`.
     """
     next_hits, next_places = np.roll(hits, -1), np.roll(places, -1)
     near = ((next_hits - hits) % len(scan.ranges_m) <= MISSING + 1) & (np.abs(next_places - places) < step_m)

@@ -119,20 +119,14 @@ def register(
     stiff: float = STIFF,
     near_m: float = 0.0,
 ) -> Registration | None:
-    """Lays an outline upon the returns of a scan.
+    """Lays an outline, where it is expected, upon the returns of a scan: (n,) rays `hits`, at (n,) places.
 
-    Args:
-        outline: where it is expected.
-        hits: (n,) rays of the scan that returned something.
-        places: (n,) where they did.
-        scan: the scan.
-        gate_m: returns further from the outline are not its.
-        apart_m: beyond an end, rays go on, and end so far away or further.
-        stiff: share of the weight of all returns that holds the outline where it is expected.
-        near_m: returns no further off may be its in every round: they err so much.
+    Returns further from the outline than `gate_m` are not its; those no further off than `near_m` may be in every
+    round: they err so much. Beyond an end, rays go on, and end `apart_m` away or further. `stiff` is the share of the
+    weight of all returns that holds the outline where it is expected.
 
     Returns:
-        How; None where too few of the returns are near, or it would be laid further away than the gate.
+        None where too few of the returns are near, or it would be laid further away than the gate.
     """
     near = _about(outline.points, places, gate_m)
     if min(len(near), len(outline.points)) < FEWEST:

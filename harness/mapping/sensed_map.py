@@ -26,7 +26,6 @@ class SensedMap:
     Args:
         bounds_m: xmin, ymin, xmax, ymax of the area.
         clearance_m: wanted distance from obstacles.
-        range_m: sensing range.
         noise_m: standard deviation of ranges, as the sensor's maker states it.
         false_returns: the sensor is known to return ranges where nothing is.
         lost: share of the returns that get lost or are false, likewise.

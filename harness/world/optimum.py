@@ -56,26 +56,18 @@ def shortest_path(
     is shorter by its radius. Obstacles that reach into the circle are left out for the length, which makes it a lower
     bound; the points are those of a path round all obstacles.
 
-    Args:
-        obstacles: the whole world.
-        bounds_m: xmin, ymin, xmax, ymax; a path may touch them.
-        start_m: (east, north).
-        goal_m: (east, north).
-        clearance_m: distance kept from every obstacle edge, at least 0.
-        goal_radius_m: of the circle in which the goal is reached; the points stop at its rim.
+    Bounds are xmin, ymin, xmax, ymax; a path may touch them. The points stop at the rim of the goal circle.
     """
-    if any(each.velocity_mps != (0.0, 0.0) or each.active_s is not None for each in obstacles):
+    if not all(each.stands_for_ever for each in obstacles):
         return _none("an obstacle moves, appears or disappears: the optimum is defined for standing ones")
     scene = TangentScene([each.shape for each in obstacles], bounds_m, start_m, goal_m, clearance_m)
     free = scene.free_points(np.array([start_m, goal_m]))
     if not free.all():
-        end = "goal" if free[0] else "start"
+        end = ("start", "goal")[int(free.argmin())]
         return _none(f"the {end} is outside the area or nearer than the clearance to an obstacle")
     found = _search(scene)
     if found.length_m is None or goal_radius_m <= 0.0:
         return found
-    import shapely
-
     east, north = np.array([goal_m]).T
     outside = [
         each for each in obstacles if each.shape.distance(east, north)[0] >= goal_radius_m + clearance_m
@@ -84,9 +76,16 @@ def shortest_path(
     if len(outside) < len(obstacles):
         relaxed = TangentScene([each.shape for each in outside], bounds_m, start_m, goal_m, clearance_m)
         length = _search(relaxed).length_m or 0.0
-    line = shapely.LineString(found.points_m).difference(shapely.Point(goal_m).buffer(goal_radius_m))
-    points = shapely.get_coordinates(shapely.get_parts(line)[:1])
-    return Optimum(max(length - goal_radius_m, 0.0), points)
+    return Optimum(max(length - goal_radius_m, 0.0), _to_circle(found.points_m, goal_m, goal_radius_m))
+
+
+def _to_circle(points_m: FloatArray, goal_m: tuple[float, float], radius_m: float) -> FloatArray:
+    """(k, 2) the part of a way that leads to the rim of the goal circle."""
+    import shapely
+
+    line = shapely.LineString(points_m).difference(shapely.Point(goal_m).buffer(radius_m))
+    points: FloatArray = shapely.get_coordinates(shapely.get_parts(line)[:1])
+    return points
 
 
 def _none(reason: str) -> Optimum:

@@ -181,13 +181,8 @@ class World:
         """Clearance at a contact on the straight way between two fixes; +inf if there surely is none.
 
         While nothing appears or goes, clearance changes no faster than the way is long: parts of it that are too
-        short for a contact are left out, down to `TOUCH_M` (Piyavskii 1972, doi:10.1016/0041-5553(72)90115-2).
-
-        Args:
-            begin: where and when the way begins.
-            before_m: clearance there, or less.
-            end: where it ends.
-            after_m: clearance there, or less.
+        short for a contact are left out, down to `TOUCH_M` (Piyavskii 1972, doi:10.1016/0041-5553(72)90115-2). The
+        clearances given are those at both ends, or less.
         """
         known = [(begin, before_m)]
         for time_s in self._motions.changes(begin[2], end[2]) if len(self._changing) else ():
@@ -210,16 +205,10 @@ class World:
         return math.inf
 
     def clearance(self, points_m: FloatArray, times_s: FloatArray) -> FloatArray:
-        """True distance from points to the nearest obstacle edge, each at its own time.
+        """(k,) true distance from (k, 2) points to the nearest obstacle edge, each at its own time.
 
-        Quick where neighbouring rows are near one another in place and time, as they are on a track.
-
-        Args:
-            points_m: (k, 2).
-            times_s: (k,).
-
-        Returns:
-            (k,) metres: negative inside an obstacle, +inf without obstacles, NaN where a row is not finite.
+        Negative inside an obstacle, +inf without obstacles, NaN where a row is not finite. Quick where neighbouring
+        rows are near one another in place and time, as they are on a track.
         """
         result = np.full(len(points_m), math.nan)
         rows = np.flatnonzero(np.isfinite(points_m).all(axis=1) & np.isfinite(times_s))

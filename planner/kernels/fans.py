@@ -19,6 +19,23 @@ EDGE_OFF_RAD = 1e-7
 """Edges are turned this much into the free sector, clear of rounding errors."""
 
 
+@compiled(ROWS, COUNT, COUNT, FLOAT, FLOAT, FLOAT, FLOAT)
+def _first_of(
+    places: FloatArray, begin: int, end: int, east: float, north: float, ux: float, uy: float
+) -> tuple[float, int]:
+    """`first_met` of the points from one on to another."""
+    nearest, met = math.inf, 0
+    for k in range(begin, end):
+        dx, dy = places[0, k] - east, places[1, k] - north
+        ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
+        room = places[2, k] * places[2, k] - beside * beside
+        if room > 0.0 and ahead > 0.0:
+            entry = ahead - math.sqrt(room)
+            if entry < nearest:
+                nearest, met = entry, k
+    return nearest, met
+
+
 @compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
 def first_met(
     places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float, ux: float, uy: float
@@ -42,14 +59,9 @@ def first_met(
             break
         begins[least] = math.inf
         block = squares[least]
-        for k in range(first[block], first[block + 1]):
-            dx, dy = places[0, k] - east, places[1, k] - north
-            ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
-            room = places[2, k] * places[2, k] - beside * beside
-            if room > 0.0 and ahead > 0.0:
-                entry = ahead - math.sqrt(room)
-                if entry < nearest or (entry == nearest and k < met):
-                    nearest, met = entry, k
+        entry, k = _first_of(places, first[block], first[block + 1], east, north, ux, uy)
+        if entry < nearest or (entry == nearest and k < met):
+            nearest, met = entry, k
     return max(nearest, 0.0), met
 
 
