@@ -107,38 +107,6 @@ def test_where_returns_get_lost_space_is_free_after_as_many_looks_as_make_a_miss
     assert seen.contains(place).all()
 
 
-@settings(max_examples=examples(10))
-@given(
-    seed=SEEDS,
-    field=st.sampled_from([360.0, 120.0]),
-    east=st.floats(BOUNDS[0], BOUNDS[2]),
-    noise=st.sampled_from([0.0, 20.0]),
-)
-def test_a_cell_is_free_where_the_beams_that_meet_it_went_beyond(
-    seed: int, field: float, east: float, noise: float
-) -> None:
-    (scan,) = scans(sensor(random_world(seed), rays=90, field_of_view_deg=field), [(east, MIDDLE[1])])
-    seen = FreeSpace(BOUNDS, CLEARANCE, RANGE, noise)
-    seen.update(scan)
-    # Where ranges err, three beams more to either side have to go beyond.
-    beside = 3.0 * scan.spacing_rad if noise else 0.0
-    rng, half = np.random.default_rng(seed), 0.75 * FREE_CELL
-    axes = scan.start_rad + scan.spacing_rad * np.arange(90)
-    columns, rows = (math.ceil((BOUNDS[2 + axis] - BOUNDS[axis]) / FREE_CELL) for axis in (0, 1))
-    for column, row in zip(rng.integers(0, columns, 500), rng.integers(0, rows, 500), strict=True):
-        middle = np.array((BOUNDS[0], BOUNDS[1])) + (np.array((column, row)) + 0.5) * FREE_CELL
-        x, y = middle - (scan.east_m, scan.north_m)
-        away = math.hypot(x, y)
-        wide = math.asin(half / away) if away > half else math.pi
-        off = np.abs((axes - math.atan2(x, y) + math.pi) % math.tau - math.pi)
-        meets = off <= wide + 0.5 * scan.beam_rad + beside
-        # All of it is in view: its outermost bearings are, too.
-        off_nose = abs((scan.heading_rad - math.atan2(x, y) + math.pi) % math.tau - math.pi)
-        inside = field == 360.0 or off_nose + wide + beside <= math.radians(field) / 2
-        beyond = min(RANGE, scan.ranges_m[meets].min(initial=math.inf))
-        assert seen.contains(middle[None])[0] == (inside and beyond - half - noise > away)
-
-
 @pytest.mark.parametrize("bearing", [0.0, 1.0, 2.5, math.pi, 4.0, 5.5])
 @pytest.mark.parametrize("away", [400.0, 1200.0])
 def test_what_has_appeared_hides_what_is_behind_it_on_both_its_sides_and_no_more(

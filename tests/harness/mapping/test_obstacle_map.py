@@ -97,22 +97,11 @@ def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
             assert gap.max() <= SPACING * math.sqrt(2.0) + 1e-6
 
 
-def test_a_sensor_that_returns_nothing_false_is_believed_at_once() -> None:
-    eye = sensor(world_of(WALL))
-    first, second = scans(eye, [MIDDLE, MIDDLE])
-    at_once, later = fed([first], doubtful=False), fed([first, second])
-    assert len(edges(at_once)) > 0
-    assert cells(edges(at_once)) == cells(edges(later))
-    assert at_once.revision == 1
-
-
-def test_a_wall_is_known_at_the_second_look() -> None:
-    eye, seen = sensor(world_of(WALL)), empty_map()
-    first, second = scans(eye, [MIDDLE, MIDDLE])
-    seen.update(first)
-    assert len(edges(seen)) == 0
-    seen.update(second)
-    known = edges(seen)
+def test_a_wall_is_known_at_the_second_look_and_at_once_where_no_return_is_false() -> None:
+    first, second = scans(sensor(world_of(WALL)), [MIDDLE, MIDDLE])
+    assert len(edges(fed([first]))) == 0
+    at_once, known = edges(fed([first], doubtful=False)), edges(fed([first, second]))
+    assert cells(at_once) == cells(known)
     assert known[:, 0].min() < 4000.0 + SPACING
     assert known[:, 0].max() > 6000.0 - SPACING
     assert np.diff(np.sort(known[:, 0])).max() < 2.0 * SPACING

@@ -1,10 +1,7 @@
 from __future__ import annotations
 
-import importlib.util
 import math
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +15,6 @@ from harness.world.world import Circle, Obstacle, Polygon, World
 from tests.examples import examples
 
 BOUNDS = (0.0, 0.0, 20_000.0, 20_000.0)
-REFEREE = Path(__file__).parents[4] / "shared" / "tools" / "referee.py"
 
 FloatArray = NDArray[np.float64]
 
@@ -165,31 +161,3 @@ def test_the_boundary_belongs_to_the_area() -> None:
     assert all(world.inside_bounds(*point) for point in ((0.0, 10.0), (100.0, 200.0), (50.0, 50.0)))
     outside = ((-0.001, 50.0), (100.001, 50.0), (50.0, 9.999), (50.0, 200.001), (math.nan, 50.0))
     assert not any(world.inside_bounds(*point) for point in outside)
-
-
-@pytest.mark.skipif(not REFEREE.exists(), reason="the independent referee is not beside this repository")
-def test_clearance_agrees_with_the_independent_referee() -> None:
-    spec = importlib.util.spec_from_file_location("referee", REFEREE)
-    assert spec is not None
-    assert spec.loader is not None
-    referee = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(referee)
-    rng = np.random.default_rng(11)
-    obstacles = random_obstacles(rng, 25, changing=True)
-    world = World(obstacles, BOUNDS)
-    for time in np.arange(0.0, 300.0, 20.0):
-        point = shapely.Point(rng.uniform(0.0, 20_000.0, 2))
-        shapes = [referee.geometry_of(_as_in_a_file(o), time) for o in obstacles]
-        truth = min((float(s.distance(point)) for s in shapes if s is not None), default=math.inf)
-        clearance = world.clearance_at(point.x, point.y, time)
-        # The referee's circles are polygons of 1024 edges, up to 1500 m in radius: 0.007 m short.
-        assert max(clearance, 0.0) == pytest.approx(truth, abs=0.01)
-        assert (clearance < 0) == any(s is not None and s.contains(point) for s in shapes)
-
-
-def _as_in_a_file(obstacle: Obstacle) -> dict[str, Any]:
-    shape = obstacle.shape
-    keys: dict[str, Any] = {"velocity_mps": obstacle.velocity_mps, "active_s": obstacle.active_s}
-    if isinstance(shape, Circle):
-        return keys | {"circle": {"center_m": shape.center_m, "radius_m": shape.radius_m}}
-    return keys | {"polygon": {"vertices_m": shape.vertices_m}}
