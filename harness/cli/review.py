@@ -204,7 +204,7 @@ def replay(
 
     For example: wayproof replay thor75.parquet --aircraft ultrastick25e --mission thor75.json
     """
-    from harness.replays.page import rows_of
+    from harness.replays.measures import rows_of
     from harness.replays.replay import default_folder
     from harness.replays.replay import replay as flown_anew
 

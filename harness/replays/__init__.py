@@ -1,1 +1,1 @@
-"""The breaking point of a scenario: the mildest condition under which a run fails."""
+"""Flown flights beside the same missions simulated."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
-from harness.replays.logs import MAX_BYTES, READERS, read_log
+from harness.replays.logs import READERS, read_log, reading
 from harness.run_files.drawn_lines import ALTITUDES, DEGREES, LOCAL
 
 if TYPE_CHECKING:
@@ -30,18 +30,12 @@ TABLES: Final = (".parquet", ".csv")
 
 @dataclass(frozen=True, eq=False)
 class FlownFlight:
-    """What was flown, one row an instant.
-
-    Attributes:
-        source: the file.
-        columns: (n,) float64 each: `time_s`, `east_m`, `north_m`, `up_m`, `ve_mps`, `vn_mps`, and those of `OPTIONAL`
-            that the file has.
-        notes: what was inferred, a sentence each.
-    """
+    """What was flown, one row an instant."""
 
     source: Path
     columns: Mapping[str, FloatArray]
-    notes: tuple[str, ...] = ()
+    """(n,) each: `time_s`, `east_m`, `north_m`, `up_m`, `ve_mps`, `vn_mps`, and those of `OPTIONAL` that are there."""
+    notes: tuple[str, ...] = ()  # what was inferred, a sentence each
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]
@@ -62,9 +56,7 @@ class FlownFlight:
 def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     """Reads a flown flight; rows by hand, before the autopilot was on, are left out where the file tells them.
 
-    Args:
-        path: .parquet or .csv with the columns that this module names, or a log of `harness.replays.logs`.
-        plane: positions in degrees are put into it; None: into one about a table's first.
+    Positions in degrees are put into the plane; None: into one about a table's first.
 
     Raises:
         InputError: it cannot be read or has no track.
@@ -74,8 +66,6 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
         columns, notes = _of_table(path, plane), list[str]()
     elif suffix in READERS:
         columns, notes = read_log(path, plane or LocalPlane(0.0, 0.0))
-        if not any(name in columns for name in AIRSPEEDS):
-            notes.append("airspeed: the log has none; taken to be constant where wind is fitted")
     else:
         told = ", ".join((*TABLES, *READERS))
         raise InputError(f"{path}: is no flight log that is read; must end in {told}")
@@ -88,20 +78,31 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     if "up_m" not in columns:
         notes.append("altitude: the table has none; taken to be 0 m")
         columns["up_m"] = np.zeros_like(columns["time_s"])
-    flight = FlownFlight(path, columns, tuple(notes))
-    switch = columns.get("autonomous", columns.get("lap"))
-    if switch is None:
-        return flight
-    if not (switch > 0).any():
+    by_autopilot = columns.get("autonomous", columns.get("lap", columns["time_s"] + 1.0)) > 0.0
+    if not by_autopilot.any():
         raise InputError(f"{path}: autonomous, lap: no row is flown by the autopilot")
-    return flight.rows(np.flatnonzero(switch > 0))
+    return FlownFlight(path, columns, tuple(notes)).rows(np.flatnonzero(by_autopilot))
 
 
 def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
     """Columns of a table, without the rows that have no place."""
-    table = _table(path)
-    place, wanted = _wanted(table.column_names, path)
-    columns = {new: _numbers(table, name, path) for name, new in wanted.items()}
+    import pyarrow.csv as csv
+    import pyarrow.parquet as parquet
+
+    with reading(path):
+        table = parquet.read_table(path) if path.suffix.lower() == ".parquet" else csv.read_csv(path)
+    table = table.rename_columns([name.strip() for name in table.column_names])
+    names = table.column_names
+    place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
+    if "time_s" not in names or place is None:
+        missing = next((name for name in ("time_s", *LOCAL[1]) if name not in names), "")
+        raise InputError(
+            f"{path}: has no column {missing}; must have time_s, and east_m, north_m or latitude_deg, longitude_deg"
+        )
+    wanted = {"time_s": "time_s", "east_m": place[0], "north_m": place[1]}
+    heights = [name for name in ("up_m", *ALTITUDES) if name in names]
+    wanted |= dict(zip(("up_m",), heights, strict=False)) | {name: name for name in OPTIONAL if name in names}
+    columns = {new: _numbers(table, name, path) for new, name in wanted.items()}
     known = np.isfinite([columns[name] for name in ("time_s", "east_m", "north_m")]).all(axis=0)
     columns = {name: each[known] for name, each in columns.items()}
     if place in DEGREES:
@@ -110,36 +111,6 @@ def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
         placed = np.array([plane.plane(*pair) for pair in pairs]).reshape(-1, 2)
         columns["east_m"], columns["north_m"] = placed.T
     return columns
-
-
-def _wanted(names: Sequence[str], path: Path) -> tuple[tuple[str, str], dict[str, str]]:
-    """The pair of columns of a place, and the columns that are read with what they are called here."""
-    place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
-    if "time_s" not in names or place is None:
-        missing = next((name for name in ("time_s", *LOCAL[1]) if name not in names), "")
-        raise InputError(
-            f"{path}: has no column {missing}; must have time_s, and east_m, north_m or latitude_deg, longitude_deg"
-        )
-    wanted = {"time_s": "time_s", place[0]: "east_m", place[1]: "north_m"}
-    wanted |= dict.fromkeys([name for name in ("up_m", *ALTITUDES) if name in names][:1], "up_m")
-    return place, wanted | {name: name for name in OPTIONAL if name in names}
-
-
-def _table(path: Path) -> pa.Table:
-    import pyarrow as pa
-    import pyarrow.csv
-    import pyarrow.parquet
-
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(f"{path}: has more than {MAX_BYTES / 1e6:g} MB")
-    try:
-        table = pa.parquet.read_table(path) if path.suffix.lower() == ".parquet" else pa.csv.read_csv(path)
-    except (pa.ArrowException, OSError) as error:
-        text = " ".join(str(error).split())[:200]
-        raise InputError(f"{path}: cannot be read as a table ({text})") from error
-    return table.rename_columns([name.strip() for name in table.column_names])
 
 
 def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:

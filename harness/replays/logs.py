@@ -1,12 +1,12 @@
-"""Flight logs of autopilots and gliders' loggers as rows of positions: ULog (PX4), DataFlash (ArduPilot), IGC."""
+"""Flight logs of autopilots as rows of positions: ULog (PX4), DataFlash (ArduPilot)."""
 
 from __future__ import annotations
 
-import contextlib
 import io
 import mmap
 import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -14,9 +14,8 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError
-from harness.files.wording import counted
 from harness.flight.record import FloatArray
-from harness.run_files.igc_path import NEEDS_LOGS, igc_fixes
+from harness.run_files.igc_path import NEEDS_LOGS
 
 MAX_BYTES: Final = 1_000_000_000
 LONGEST_S: Final = 1e7
@@ -32,55 +31,39 @@ DATAFLASH: Final = b"\xa3\x95\x80"
 LAST_PAGE: Final = 528
 """Bytes at the end of a DataFlash log that may hold anything: it is written in pages."""
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
-AIRSPEED_TOPICS: Final = {"airspeed_validated": "true_airspeed_m_s", "airspeed": "true_airspeed_m_s"}
-"""Topics of PX4 with the true airspeed, the better one first."""
+AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")
+TRUE_AIRSPEED: Final = "true_airspeed_m_s"
+"""Field of these topics of PX4, the better one first."""
 
 
 class Series(NamedTuple):
-    """What a log holds.
+    """What a log holds."""
 
-    Attributes:
-        places: (n, 4) time in s, latitude and longitude in degrees, altitude in m.
-        others: (m, 2) time in s and value, by the name of a column of `harness.replays.flown`.
-    """
-
-    places: FloatArray
-    others: dict[str, FloatArray]
+    places: FloatArray  # (n, 4) time in s, latitude and longitude in degrees, altitude in m
+    others: dict[str, FloatArray]  # (m, 2) time in s and value, by the name of a column of `flown`
 
 
 def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list[str]]:
-    """Reads a flight log; the name's ending says which kind it is.
-
-    Args:
-        path: .ulg (PX4), .bin (ArduPilot DataFlash) or .igc.
-        plane: positions are put into it.
-
-    Returns:
-        Columns of `harness.replays.flown`, and notes on what of the log cannot be read.
+    """Columns of `harness.replays.flown` from a log whose ending is in `READERS`, in a plane, and notes on it.
 
     Raises:
-        InputError: the file is none of these, cannot be read, or holds no track; or a package is missing.
+        InputError: the file cannot be read, or holds no track; or a package is missing.
     """
-    reader = READERS[path.suffix.lower()]
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(
-            f"{path}: has {path.stat().st_size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:g} MB are read"
-        )
     notes: list[str] = []
-    with _reading(path):
-        found = reader(path, notes)
+    with reading(path):
+        found = READERS[path.suffix.lower()](path, notes)
+    if not any(name.startswith("airspeed") for name, series in found.others.items() if len(series)):
+        notes.append("airspeed: the log has none; taken to be constant where wind is fitted")
     return _columns(found, plane, path), notes
 
 
 class Command(NamedTuple):
-    """A command of a mission: its number, MAV_CMD, first and second parameter, latitude and longitude in degrees."""
+    """A command of a mission."""
 
     number: int
-    command: int
-    first: float
-    acceptance_m: float
+    command: int  # MAV_CMD
+    first: float  # parameter 1
+    acceptance_m: float  # parameter 2
     latitude_deg: float
     longitude_deg: float
 
@@ -93,7 +76,7 @@ def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
     """
     commands: dict[int, Command] = {}
     parameters: dict[str, float] = {}
-    with _reading(path):
+    with reading(path):
         for each in _messages(path, ("CMD", "PARM"), []):
             if each.get_type() == "PARM":
                 parameters[each.Name] = float(each.Value)
@@ -103,11 +86,19 @@ def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
     return [commands[number] for number in sorted(commands)], parameters
 
 
-@contextlib.contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    """Makes one line of what a library says of a log, which may be damaged."""
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Makes one line of all that a library says of a file, which may be damaged, also in machine code."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(
+            f"{path}: has {path.stat().st_size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:g} MB are read"
+        )
+    kept, before = io.StringIO(), os.dup(2)
     try:
-        with _silent():  # of a damaged file libraries print a line for each byte
+        with open(os.devnull, "wb") as nothing, redirect_stdout(kept), redirect_stderr(kept):
+            os.dup2(nothing.fileno(), 2)  # of a damaged file libraries print a line for each byte
             yield
     except ImportError as error:
         raise InputError(f"{path}: {NEEDS_LOGS} ({error.name})") from error
@@ -116,6 +107,9 @@ def _reading(path: Path) -> Iterator[None]:
     except Exception as error:
         text = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(f"{path}: cannot be read as {path.suffix} ({text})") from error
+    finally:
+        os.dup2(before, 2)
+        os.close(before)
 
 
 def _columns(found: Series, plane: LocalPlane, path: Path) -> dict[str, FloatArray]:
@@ -160,11 +154,9 @@ def _ulog(path: Path, notes: list[str]) -> Series:
     for name in ("lat_lon_valid", "alt_valid"):  # since PX4 1.16: else a row is what was known once
         valid &= np.asarray(data.get(name, valid), dtype=bool)
     others = {}
-    topic = next((name for name, key in AIRSPEED_TOPICS.items() if key in topics.get(name, {})), None)
-    if topic is not None:
-        speed = topics[topic][AIRSPEED_TOPICS[topic]]
-        known = np.isfinite(speed)
-        others["airspeed_tas_mps"] = np.column_stack((topics[topic]["timestamp"] / 1e6, speed))[known]
+    for speeds in [topics[name] for name in AIRSPEED_TOPICS if TRUE_AIRSPEED in topics.get(name, {})][:1]:
+        series = np.column_stack((speeds["timestamp"] / 1e6, speeds[TRUE_AIRSPEED]))
+        others["airspeed_tas_mps"] = series[np.isfinite(series[:, 1])]
     if "q[3]" in topics.get("vehicle_attitude", {}):
         attitude = topics["vehicle_attitude"]
         w, x, y, z = (attitude[f"q[{axis}]"] for axis in range(4))
@@ -217,41 +209,5 @@ def _messages(path: Path, kinds: tuple[str, ...], notes: list[str]) -> Iterator[
         notes.append(DAMAGED)
 
 
-def _igc(path: Path, notes: list[str]) -> Series:
-    """Gliders: fixes with the receiver's altitude, or the pressure altitude where that is 0."""
-    fixes, broken = igc_fixes(path.read_text(encoding="latin-1"), str(path))
-    if broken:
-        notes.append(f"{counted(broken, 'B record')} that cannot be read passed over")
-    if any(fix["gps_alt"] for fix in fixes) and not all(fix["gps_alt"] for fix in fixes):
-        notes.append("where its receiver has no altitude, that of its barometer is taken, if there is one")
-    rows = [
-        (fix["datetime"].timestamp(), fix["lat"], fix["lon"], fix["gps_alt"] or fix["pressure_alt"] or 0)
-        for fix in fixes
-    ]
-    return Series(np.array(rows, dtype=np.float64), {})
-
-
-@contextlib.contextmanager
-def _silent() -> Iterator[None]:
-    """Lets nothing through to standard output and error, not of machine code either."""
-    kept = io.StringIO()
-    with (
-        open(os.devnull, "wb") as nothing,
-        contextlib.redirect_stdout(kept),
-        contextlib.redirect_stderr(kept),
-    ):
-        before = os.dup(2)
-        os.dup2(nothing.fileno(), 2)
-        try:
-            yield
-        finally:
-            os.dup2(before, 2)
-            os.close(before)
-
-
-READERS: Final[dict[str, Callable[[Path, list[str]], Series]]] = {
-    ".ulg": _ulog,
-    ".bin": _dataflash,
-    ".igc": _igc,
-}
+READERS: Final[dict[str, Callable[[Path, list[str]], Series]]] = {".ulg": _ulog, ".bin": _dataflash}
 """Reader by the ending of a file's name."""

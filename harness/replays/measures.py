@@ -17,6 +17,17 @@ FIRST_SETTLED: Final = 2
 """Laps before this one are not settled: the autopilot has just been switched on."""
 FAR_M: Final = 5.0
 """A corner counts as reached, where no radius is known, once the aircraft is so much farther away than it was."""
+FIGURES = {
+    "outside_p95_m": "outside the corners, p95, m",
+    "outside_max_mean_m": "mean of the largest of each lap, m",
+    "lap_mean_s": "time of a lap, s",
+    "bank_p95_deg": "bank, p95, deg",
+    "roll_rate_p95_degps": "roll rate, p95, deg/s",
+    "height_error_p95_m": "height error, p95, m",
+    "airspeed_mean_mps": "airspeed, mean, m/s",
+    "airspeed_p95_mps": "airspeed, p95, m/s",
+}
+"""Figures of `flown` and `simulated` in `replay.json`, with what people call them."""
 
 
 def legs_of(
@@ -24,11 +35,7 @@ def legs_of(
 ) -> FloatArray:
     """(n,) how many corners had been reached at each row of a flown flight: by its targets, else by its places.
 
-    Args:
-        columns: of the flight.
-        corners_m: (k, 2) of the mission.
-        first: number of the corner that the first row heads for.
-        radius_m: a corner counts as reached from here.
+    `first` is the number of the corner that the first row heads for; one counts as reached from `radius_m`.
     """
     if "target_index" in columns:
         target = columns["target_index"]
@@ -46,23 +53,15 @@ def legs_of(
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of the two flights, as it is measured.
-
-    Attributes:
-        columns: `time_s`, `east_m`, `north_m`, `up_m`, and `roll_deg`, `airspeed_mps` where they are known.
-        corners_m: (k, 2) of the mission.
-        legs: (n,) corners reached before each row.
-        laps: (n,) number of the lap of each row.
-        height_m: that was commanded.
-        ended: the last row has come to the end of its lap.
-    """
+    """One of the two flights, as it is measured."""
 
     columns: Mapping[str, FloatArray]
-    corners_m: FloatArray
-    legs: FloatArray
-    laps: FloatArray
-    height_m: float
-    ended: bool
+    """`time_s`, `east_m`, `north_m`, `up_m`, and `roll_deg`, `airspeed_mps` where they are known."""
+    corners_m: FloatArray  # (k, 2) of the mission
+    legs: FloatArray  # (n,) corners reached before each row
+    laps: FloatArray  # (n,) number of the lap of each row
+    height_m: float  # that was commanded
+    ended: bool  # the last row has come to the end of its lap
 
     @cached_property
     def outside(self) -> FloatArray:
@@ -150,3 +149,15 @@ def _spread(outside: FloatArray) -> dict[str, float]:
 
 def _p95(values: FloatArray) -> float:
     return float(np.nanpercentile(values, 95))
+
+
+def rows_of(told: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Name, flown, simulated and difference of each figure."""
+    rows = []
+    for name, label in FIGURES.items():
+        flown, simulated = told["flown"].get(name), told["simulated"].get(name)
+        if flown is None or simulated is None:
+            continue
+        share = f"{100 * (simulated / flown - 1):+.1f} %" if flown else "-"
+        rows.append((label, f"{flown:.2f}", f"{simulated:.2f}", share))
+    return rows

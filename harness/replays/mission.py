@@ -61,23 +61,14 @@ class MissionFile(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class FlownMission:
-    """What was to be flown, again and again.
+    """What was to be flown, again and again; None: not known."""
 
-    Attributes:
-        corners_m: (k, 2) east and north; after the last comes the first.
-        acceptance_m: a corner counts as reached from here; None: by the rule of the law.
-        airspeed_mps: commanded indicated airspeed; None: not known.
-        height_m: commanded barometric height; None: not known.
-        bank_limit_deg: of the autopilot; None: the aircraft's.
-        origin: of the plane; None: not known.
-    """
-
-    corners_m: FloatArray
-    acceptance_m: float | None = None
-    airspeed_mps: float | None = None
-    height_m: float | None = None
-    bank_limit_deg: float | None = None
-    origin: Origin | None = None
+    corners_m: FloatArray  # (k, 2) east and north; after the last comes the first
+    acceptance_m: float | None = None  # a corner counts as reached from here; None: by the rule of the law
+    airspeed_mps: float | None = None  # commanded, indicated
+    height_m: float | None = None  # commanded, barometric
+    bank_limit_deg: float | None = None  # of the autopilot; None: the aircraft's
+    origin: Origin | None = None  # of the plane
 
 
 def read_mission(path: Path) -> FlownMission:
@@ -108,8 +99,6 @@ def mission_of_log(path: Path) -> tuple[FlownMission, str]:
     Raises:
         InputError: the log has none, or more than waypoints is flown in it.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
     commands, parameters = logged_mission(path) if path.suffix.lower() == ".bin" else ([], {})
     lap = _lap(commands, path)
     radius = lap[0].acceptance_m or parameters.get("WP_RADIUS", 0.0)

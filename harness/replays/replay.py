@@ -12,10 +12,11 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 from harness.replays.flown import TABLES, FlownFlight, read_flown
-from harness.replays.measures import Side, compared, legs_of
+from harness.replays.measures import Side, compared, legs_of, rows_of
 from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, read_mission
 from harness.replays.simulated import Asked, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows
@@ -63,10 +64,8 @@ def replay(
         log: as `harness.replays.flown.read_flown` takes it.
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
         out: folder to write; None: `default_folder`.
-        mission: as `harness.replays.mission.read_mission` takes it; None: that of the log, or
-            of its column `target_index`.
-        overrides: keys of the simulated flight's scenario to replace, `guidance.kind` for one, as
-            `harness.scenario.scenario.load_scenario` takes them.
+        mission: as `harness.replays.mission.read_mission` takes it; None: that of the log or of its `target_index`.
+        overrides: keys of the simulated flight's scenario to replace, as `load_scenario` takes them.
         windows: the wind changes as the log shows it; else it is steady.
         recording: whether to write `flight.rrd`.
 
@@ -111,6 +110,8 @@ def replay(
 
 def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, list[str]]:
     """The mission, what was flown, and where the mission is from, if it is of the log."""
+    if not log.is_file():
+        raise InputError(f"{log}: no such file")
     if mission is None and log.suffix.lower() in TABLES:
         flight = read_flown(log)
         found, note = mission_of_targets(flight)
@@ -170,8 +171,11 @@ def _laps(legs: FloatArray, asked: Asked) -> FloatArray:
 
 def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
     """Writes the recording of both, the page and, last, the index."""
-    from harness.replays.page import replay_html
+    from harness.replays.replay_figure import replay_figure
+    from harness.report.figure_style import svg
+    from harness.report.page import Picture, rendered
 
+    told = found.told
     if recording:
         from harness.recording.tracks import write_tracks
 
@@ -183,6 +187,13 @@ def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
             }
             for name, each in sides.items()
         }
-        write_tracks(f"replay of {found.told['log']}", found.corners_m, tracks, found.folder / RECORDING)
-    replace_text(found.folder / "report.html", replay_html(found))
-    replace_text(found.folder / INDEX, json.dumps(found.told, indent=2) + "\n")
+        write_tracks(f"replay of {told['log']}", found.corners_m, tracks, found.folder / RECORDING)
+    between = told["distance_between_m"]
+    caption = (
+        f"The settled laps {', '.join(map(str, told['settled_laps']))}: flown and simulated, "
+        f"{between['p50']:.1f} m apart in the median, {between['p95']:.1f} m at 95 %."
+    )
+    picture = Picture(svg(replay_figure(found)), "Flown and simulated track from above", caption)
+    page = rendered("replay.html", told=told, rows=rows_of(told), picture=picture)
+    replace_text(found.folder / "report.html", page)
+    replace_text(found.folder / INDEX, json.dumps(told, indent=2) + "\n")

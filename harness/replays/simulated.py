@@ -45,21 +45,14 @@ COLUMNS: Final = ("time_s", "east_m", "north_m", "up_m", "roll_deg", "airspeed_m
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What is flown anew.
-
-    Attributes:
-        first: number of the corner that the flight was heading for at its first row.
-        winds: as fitted, time rising from the first row.
-        airspeed_mps: true airspeed that was commanded.
-        height_m: that was commanded, as `up_m` has it.
-    """
+    """What is flown anew."""
 
     flight: FlownFlight
     mission: FlownMission
-    first: int
-    winds: Sequence[FittedWind]
-    airspeed_mps: float
-    height_m: float
+    first: int  # number of the corner that the flight was heading for at its first row
+    winds: Sequence[FittedWind]  # as fitted, time rising from the first row
+    airspeed_mps: float  # true, that was commanded
+    height_m: float  # that was commanded, as `up_m` has it
 
     def route_m(self, laps: int) -> FloatArray:
         """(n, 2): from where the log begins through the corners, lap for lap, and half way on: its end is no corner."""
@@ -71,11 +64,7 @@ class Asked:
 
 
 class LapsEnd:
-    """Over once all legs are flown, or the time is up. Implements `Termination`.
-
-    Attributes:
-        switches_s: times of the updates in which a corner was reached.
-    """
+    """Over once all legs are flown, or the time is up. Implements `Termination`."""
 
     contact_m = math.inf
 
@@ -83,6 +72,7 @@ class LapsEnd:
         self._law, self._legs, self._limit_s = law, legs, limit_s
         self._before_s = 0.0
         self.switches_s: list[float] = []
+        """Times of the updates in which a corner was reached."""
 
     def to_go_m(self, state: AircraftState) -> float:
         """Nothing is known of it."""

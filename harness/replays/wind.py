@@ -25,20 +25,13 @@ WINDOW_S, WINDOW_EVERY_S = 20.0, 10.0
 
 @dataclass(frozen=True)
 class FittedWind:
-    """A wind.
-
-    Attributes:
-        east_mps, north_mps: the direction it blows towards.
-        residual_mps: root mean square of what is left of the airspeed.
-        time_s: middle of the window; 0 for a whole flight.
-        airspeed_mps: that was fitted with it, where none is known.
-    """
+    """A wind, as it blows towards east and north."""
 
     east_mps: float
     north_mps: float
-    residual_mps: float
-    time_s: float = 0.0
-    airspeed_mps: float = math.nan
+    residual_mps: float  # root mean square of what is left of the airspeed
+    time_s: float = 0.0  # middle of the window; 0 for a whole flight
+    airspeed_mps: float = math.nan  # that was fitted with it, where none is known
 
     @property
     def speed_mps(self) -> float:
@@ -56,12 +49,7 @@ class FittedWind:
 
 
 def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | None = None) -> FittedWind:
-    """The one wind that explains a flight best.
-
-    Args:
-        flight: the flight.
-        time_s: middle of the window that it is of.
-        airspeed: (n,) in place of the flight's.
+    """The one wind that explains a flight best; `airspeed` (n,) stands in place of the flight's.
 
     Raises:
         InputError: the flight does not turn enough to tell it.
