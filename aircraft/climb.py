@@ -17,6 +17,7 @@ from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import AircraftError
 from aircraft.start import StartConditions
+from aircraft.trials import KEPT_SPEED_SHARE, farthest
 
 STEEPEST = 0.4
 """Rates beyond this share of the airspeed (24 degrees) are not looked at."""
@@ -24,7 +25,6 @@ STEEPEST = 0.4
 SETTLING_S, JUDGED_S = 15.0, 10.0
 """A rate is flown for both together and judged over the second."""
 
-KEPT_SPEED_SHARE = 0.03
 KEPT_RATE_SHARE = 0.05
 TOLERANCE = 0.02
 """A rate is found to this share of the airspeed's steepest."""
@@ -37,17 +37,11 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class ClimbRates:
-    """What an aircraft can climb and sink by, between the speeds that were flown linear.
+    """What an aircraft can climb and sink by, between the speeds that were flown linear."""
 
-    Attributes:
-        airspeeds_mps: true airspeeds that were flown, rising.
-        climb_mps: the fastest climb at each, airspeed held and the throttle not quite full.
-        descent_mps: the fastest descent at each, likewise with the throttle not quite idle; positive.
-    """
-
-    airspeeds_mps: tuple[float, ...]
-    climb_mps: tuple[float, ...]
-    descent_mps: tuple[float, ...]
+    airspeeds_mps: tuple[float, ...]  # true, that were flown, rising
+    climb_mps: tuple[float, ...]  # the fastest at each, airspeed held and the throttle not quite full
+    descent_mps: tuple[float, ...]  # likewise with the throttle not quite idle; positive
 
     def at(self, airspeed_mps: float) -> tuple[float, float]:
         """Fastest climb and fastest descent at an airspeed, both positive."""
@@ -64,32 +58,25 @@ def climb_rates(frame: Airframe) -> ClimbRates:
     Raises:
         AircraftError: it cannot be flown at one of the speeds.
     """
-    return cached(f"{frame.name}-climb-{FORMAT}", frame.files.digest(), lambda: _measured(frame), _read)
 
+    def measured() -> dict[str, Any]:
+        low, high = frame.airspeed_range_mps
+        speeds = np.linspace(low, high, SPEEDS).round(1).clip(low, high).tolist()
+        rates = {"climb_mps": 1.0, "descent_mps": -1.0}
+        flown = {name: [steepest_mps(frame, speed, side) for speed in speeds] for name, side in rates.items()}
+        return {"airspeeds_mps": speeds, **flown}
 
-def _read(result: dict[str, Any]) -> ClimbRates:
-    return ClimbRates(**{name: tuple(column) for name, column in result.items()})
+    def read(result: dict[str, Any]) -> ClimbRates:
+        return ClimbRates(**{name: tuple(column) for name, column in result.items()})
 
-
-def _measured(frame: Airframe) -> dict[str, Any]:
-    low, high = frame.airspeed_range_mps
-    speeds = np.linspace(low, high, SPEEDS).round(1).clip(low, high).tolist()
-    return {
-        "airspeeds_mps": speeds,
-        "climb_mps": [steepest_mps(frame, speed, 1.0) for speed in speeds],
-        "descent_mps": [steepest_mps(frame, speed, -1.0) for speed in speeds],
-    }
+    return cached(f"{frame.name}-climb-{FORMAT}", frame.files.digest(), measured, read)
 
 
 def steepest_mps(frame: Airframe, airspeed_mps: float, side: float) -> float:
     """The fastest climb (side 1) or descent (side -1) at which an airspeed is held; positive, 0 where none is."""
-    good, bad = 0.0, STEEPEST * airspeed_mps
-    if keeps(frame, airspeed_mps, side * bad):
-        return round(bad, 3)
-    while bad - good > TOLERANCE * STEEPEST * airspeed_mps:
-        middle = 0.5 * (good + bad)
-        good, bad = (middle, bad) if keeps(frame, airspeed_mps, side * middle) else (good, middle)
-    return round(good, 3)
+    most_mps = STEEPEST * airspeed_mps
+    held = farthest(lambda rate: keeps(frame, airspeed_mps, side * rate), 0.0, most_mps, TOLERANCE * most_mps)
+    return round(held, 3)
 
 
 def keeps(frame: Airframe, airspeed_mps: float, rate_mps: float) -> bool:

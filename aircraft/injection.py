@@ -55,8 +55,6 @@ def with_autopilot(
         with_system = _with_system(model.read_bytes(), actuators, deviation, latency)
     except ElementTree.ParseError as error:
         raise ValueError(f"{model} is not well-formed XML: {error}") from None
-    if with_system is None:
-        raise ValueError(f"{model} is not a JSBSim model: its root element is not <fdm_config>")
     with TemporaryDirectory(prefix="wayproof-") as folder:
         derived = Path(folder, model.stem)
         derived.mkdir()
@@ -73,14 +71,11 @@ def _with_system(
     actuators: tuple[tuple[str, NormActuator], ...],
     deviation: Deviation,
     latency: tuple[float, int],
-) -> bytes | None:
-    """The XML of a model that starts with the autopilot system, writes no files of its own and listens to nobody.
-
-    None where it is no JSBSim model.
-    """
+) -> bytes:
+    """The XML of a model that starts with the autopilot system, writes no files of its own and listens to nobody."""
     root = ElementTree.fromstring(model)
     if root.tag != "fdm_config":
-        return None
+        raise ValueError(f"it is not a JSBSim model: its root element is <{root.tag}>, not <fdm_config>")
     system = ElementTree.fromstring(files("aircraft").joinpath("systems", "autopilot.xml").read_bytes())
     if deviation != AS_MODELLED:
         deviate(root, deviation)

@@ -23,7 +23,8 @@ from aircraft.guidance.preview import PreviewConfig
 from aircraft.guidance.registry import BUILT_IN, DEFAULT_KIND, GuidanceKind
 from aircraft.guidance.waypoints import waypoint_law
 from aircraft.model_files import AircraftError, ModelFiles
-from aircraft.route import weave
+from aircraft.route import route_length, weave
+from aircraft.start import Atmosphere
 
 WIND_SHARES = (0.0, 0.3, 0.6)
 """Winds that are flown, along the weave and against it, over the airspeed."""
@@ -134,7 +135,7 @@ def _worst(
 
     route, worst = weave(radius_m), (0.0, 0.0)
     for north_mps in (wind_mps, -wind_mps) if wind_mps else (0.0,):
-        most_s = SLOWEST_SHARE * float(route.segments[:, 5].sum()) / (speed_mps - abs(north_mps))
-        flown = tracked(frame, speed_mps, make(), route, north_mps, most_s)
-        worst = max(worst[0], flown[0]), max(worst[1], flown[1])
+        most_s = SLOWEST_SHARE * route_length(route) / (speed_mps - abs(north_mps))
+        flown = tracked(frame, speed_mps, make(), route, Atmosphere(wind_north_mps=north_mps), most_s)
+        worst = max(worst[0], flown.most_m), max(worst[1], flown.cut_share)
     return worst

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from aircraft.airframe import Airframe
 from aircraft.envelope import performance
@@ -37,10 +38,16 @@ KEPT_ROLL_DEG = 1.5
 UPDATE_STEPS = STEP_RATE_HZ // UPDATE_RATE_HZ
 
 
-def in_flight(frame: Airframe, speed: float, atmosphere: Atmosphere | None = None) -> JsbsimModel:
-    """An aircraft in level flight northwards."""
-    start = StartConditions(0.0, 0.0, REFERENCE_ALTITUDE_M, 0.0, speed)
-    return JsbsimModel(frame, start, LocalPlane(45.0, 0.0), atmosphere)
+def in_flight(
+    frame: Airframe,
+    speed: float,
+    atmosphere: Atmosphere | None = None,
+    start: tuple[float, float] = (0.0, 0.0),
+    course_rad: float = 0.0,
+) -> JsbsimModel:
+    """An aircraft in level flight, by default northwards from (0, 0)."""
+    begins = StartConditions(*start, REFERENCE_ALTITUDE_M, course_rad, speed)
+    return JsbsimModel(frame, begins, LocalPlane(45.0, 0.0), atmosphere)
 
 
 def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET) -> str | None:
@@ -71,7 +78,22 @@ def weaving_error_m(frame: Airframe, speed: float) -> float:
     """Largest cross-track error on a weave of lines and arcs at the radius of planning; infinite if lost."""
     limits = frame.guidance_limits(speed)
     law = PreviewLaw(PreviewConfig().resolved(limits), limits)
-    return tracked(frame, speed, law, weave(performance(frame, speed).turn_radius_m))[0]
+    return tracked(frame, speed, law, weave(performance(frame, speed).turn_radius_m)).most_m
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """How a route was tracked."""
+
+    cross_m: list[float]  # cross-track error at each update, at least 0
+    altitude_m: list[float]  # altitude error at each update, at least 0
+    cut_share: float  # share of the updates in which the bank limit cut the command
+    lost: str | None  # why the end was not reached
+
+    @property
+    def most_m(self) -> float:
+        """Largest cross-track error; infinite if the end was not reached."""
+        return math.inf if self.lost else max(self.cross_m, default=0.0)
 
 
 def tracked(
@@ -79,26 +101,27 @@ def tracked(
     speed: float,
     law: GuidanceLaw,
     route: Route,
-    north_mps: float = 0.0,
+    atmosphere: Atmosphere | None = None,
     most_s: float = math.inf,
-) -> tuple[float, float]:
-    """How a law tracks a route in a wind to the north, in so much time at most.
+) -> Tracked:
+    """Flies a law along a route from its start, in so much time at most.
 
-    Returns:
-        Largest cross-track error (m), infinite if lost, and the share of the time for which the bank was cut.
+    Raises:
+        AircraftError: the aircraft cannot start in this air.
+        ValueError: the law asks for what is not finite.
     """
     law.follow(route, 0.0)
     progress = None if measures_itself(law) else RouteProgress(route)
-    model = in_flight(frame, speed, Atmosphere(wind_north_mps=north_mps))
-    worst_m, cut, updates = 0.0, 0, 0
+    east, north, ahead_east, ahead_north = route.segments[0, :4].tolist()
+    model = in_flight(frame, speed, atmosphere, (east, north), math.atan2(ahead_east, ahead_north))
+    cross, altitude, cut, lost = list[float](), list[float](), 0, None
     past: deque[AircraftState] = deque()
-    while True:
+    while lost is None:
         state = as_it_was(past, model.state(), frame.files.latency_s)
         output = law.update(state)
-        if model.fault() or state.time_s > most_s:
-            return math.inf, 1.0
-        if output.past_end:
-            return worst_m, cut / max(updates, 1)
+        lost = model.fault() or ("it takes too long" if state.time_s > most_s else None)
+        if lost or output.past_end:
+            break
         if not math.isfinite(output.roll_command_rad + output.cross_track_m):
             raise ValueError(
                 f"it asks for a roll of {output.roll_command_rad} rad, {output.cross_track_m} m beside its route; both "
@@ -107,10 +130,13 @@ def tracked(
         beside_m = output.cross_track_m
         if progress is not None:  # a law that comes from elsewhere is not asked how well it flies
             beside_m = progress.nearest(state.east_m, state.north_m).cross_track_m
-        worst_m = max(worst_m, abs(beside_m))
-        cut, updates = cut + output.bank_saturated, updates + 1
-        model.command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed)
+        cross.append(abs(beside_m))
+        altitude.append(abs(state.up_m - REFERENCE_ALTITUDE_M))
+        cut += output.bank_saturated
+        model.command(output.roll_command_rad, REFERENCE_ALTITUDE_M, output.airspeed_or(speed))
         model.advance(UPDATE_STEPS)
+    after = f"control is lost after {state.time_s:.0f} s: {lost}" if lost else None
+    return Tracked(cross, altitude, cut / max(len(cross), 1), after)
 
 
 def departure(state: AircraftState, bank_deg: float, speed: float) -> str | None:
@@ -177,11 +203,15 @@ def steepest_level_bank_deg(frame: Airframe, speed: float) -> float:
                 return False
         return departure(model.state(), bank_deg, speed) is None
 
-    bad = frame.bank_limit_deg
-    if keeps(bad):
-        return bad
-    good = 0.0
-    while bad - good > BANK_STEP_DEG:
-        middle = 0.5 * (good + bad)
-        good, bad = (middle, bad) if keeps(middle) else (good, middle)
-    return math.floor(good)
+    found = farthest(keeps, 0.0, frame.bank_limit_deg, BANK_STEP_DEG)
+    return found if found == frame.bank_limit_deg else math.floor(found)
+
+
+def farthest(keeps: Callable[[float], bool], good: float, end: float, tolerance: float) -> float:
+    """The last value that is kept on the way from one that is to an end, by halving, to a tolerance."""
+    if keeps(end):
+        return end
+    while abs(end - good) > tolerance:
+        middle = 0.5 * (good + end)
+        good, end = (middle, end) if keeps(middle) else (good, middle)
+    return good

@@ -13,6 +13,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple, TypeVar
@@ -20,7 +21,7 @@ from typing import Any, NamedTuple, TypeVar
 from aircraft.interface import AircraftState
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.observer import Progress
-from harness.flight.record import AcceptedPlan, Track
+from harness.flight.record import AcceptedPlan, Flight, Track
 from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import atmosphere, fly_to_folder, jsbsim_aircraft, make_loop
 from harness.scenario.scenario import Scenario
@@ -51,44 +52,32 @@ class Turns(NamedTuple):
     flight_s: float
     figures: Mapping[str, Any]
 
-    @property
-    def ratio(self) -> float:
-        """Of the flight to the bare run."""
-        return self.flight_s / self.bare_s
-
 
 def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any]:
     """Measures a complete scenario, in this process.
 
     First the loop is flown once alone with its blocks timed: that gives their shares. Then come rounds of two whole
-    flights from the scenario to a complete run folder, one without and one with the recording. Either takes turns with
-    `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed start in the same air,
-    for as long as the flight takes, at the flight's own step rate; its loading and trimming are not counted.
+    flights to a complete run folder, one without and one with the recording. Either takes turns with `run()` of the
+    aircraft, autopilot on, commands set once, from the same start in the same air, for as long as the flight takes, at
+    its step rate; loading and trimming are not counted.
 
     Returns:
-        `scenario`, `outcome`; `step_rate_hz` of the flight and `bare_rate_hz` (the same) of the bare run; the ratios
-        `closed_loop_ratio` and `closed_loop_recording_ratio`; `planner_ms`, `p50`, `p99` and `max` of the processor
-        time of all searches of a flight, the least of all flights; `blocks`, the share of each in the flight with the
-        recording.
+        `scenario`, `outcome`, `step_rate_hz` and `bare_rate_hz` (the same); the ratios `closed_loop_ratio` and
+        `closed_loop_recording_ratio`; `planner_ms`, `p50`, `p99` and `max` of the processor time of all searches of a
+        flight, the least of all flights; `blocks`, the share of each in the flight with the recording.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
         ValueError: the flight is over before anything was planned or flown, so there is nothing to compare.
     """
-    seconds: dict[str, float] = defaultdict(float)
-    bare, loop = Bare(scenario), watched(make_loop(scenario), seconds)
-    whole_s, flight = _cpu_s(lambda: fly(loop, [bare], progress))
-    if not bare.steps or not flight.compute_ms:
-        raise ValueError(f"nothing to measure: {flight.reason}")
-    blocks = {block: whole_s / flight.wall_s * spent for block, spent in seconds.items()}
-    blocks["loop"] = whole_s - bare.cpu_s - sum(blocks.values())
+    flight, blocks = _flown_alone(scenario, progress)
     taken: dict[bool, list[Turns]] = {False: [], True: []}
     for number in range(ROUNDS + 1):
         if progress is not None:
             progress(flight.sim_s, 0.0, f"round {number + 1}")
         for recording, turns in taken.items():
             turns.append(in_turns(scenario, recording))
-    closed, recorded = (median(each.ratio for each in turns[1:]) for turns in taken.values())
+    closed, recorded = (median(each.flight_s / each.bare_s for each in turns[1:]) for turns in taken.values())
     searches = [each.figures["compute_ms"] for turns in taken.values() for each in turns[1:]]
     return {
         "scenario": scenario.name,
@@ -98,10 +87,20 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
         "closed_loop_ratio": closed,
         "closed_loop_recording_ratio": recorded,
         "planner_ms": {name: min(each[name] for each in searches) for name in ("p50", "p99", "max")},
-        "blocks": block_shares(
-            {block: spent / bare.cpu_s for block, spent in blocks.items()}, closed, max(recorded, closed)
-        ),
+        "blocks": block_shares(blocks, closed, max(recorded, closed)),
     }
+
+
+def _flown_alone(scenario: Scenario, progress: Progress | None) -> tuple[Flight, dict[str, float]]:
+    """One flight of the loop, and what each block of it cost, over the bare run; ValueError if there is nothing."""
+    seconds: dict[str, float] = defaultdict(float)
+    bare, loop = Bare(scenario), watched(make_loop(scenario), seconds)
+    whole_s, flight = _cpu_s(lambda: fly(loop, [bare], progress))
+    if not bare.steps or not flight.compute_ms:
+        raise ValueError(f"nothing to measure: {flight.reason}")
+    blocks = {block: whole_s / flight.wall_s * spent for block, spent in seconds.items()}
+    blocks["loop"] = whole_s - bare.cpu_s - sum(blocks.values())
+    return flight, {block: spent / bare.cpu_s for block, spent in blocks.items()}
 
 
 def watched(loop: Loop, seconds: dict[str, float]) -> Loop:
@@ -116,13 +115,8 @@ def watched(loop: Loop, seconds: dict[str, float]) -> Loop:
 def block_shares(in_loop: Mapping[str, float], closed: float, recorded: float) -> dict[str, float]:
     """Share of each block in a whole flight with the recording; they sum to 1.
 
-    What comes before and after the loop (loading, metrics, files) is booked to `record`, what the recording adds to
-    `recording`.
-
-    Args:
-        in_loop: cost of each block in a flight of the loop alone, in any unit.
-        closed: cost of the whole flight without the recording.
-        recorded: that of the whole flight with it, not less.
+    From the cost of each in a flight of the loop alone, and those of the whole flight without and with the recording.
+    What comes before and after the loop (loading, metrics, files) is booked to `record`.
     """
     loop = sum(in_loop.values())
     scale = min(1.0, closed / loop)  # the lone flight may have been disturbed
@@ -136,22 +130,18 @@ class _Watched:
     """A stand-in for a part of a loop, whose time in some methods is booked to a block."""
 
     def __init__(self, part: Any, block: str, methods: list[str], seconds: dict[str, float]) -> None:
+        def timed(name: str, *arguments: Any, **named: Any) -> Any:
+            begun = time.perf_counter()
+            try:
+                return getattr(part, name)(*arguments, **named)
+            finally:
+                seconds[block] += time.perf_counter() - begun
+
         self._part = part
-        self.__dict__.update({name: _timed(getattr(part, name), block, seconds) for name in methods})
+        self.__dict__.update({name: partial(timed, name) for name in methods})
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._part, name)
-
-
-def _timed(method: Callable[..., Any], block: str, seconds: dict[str, float]) -> Callable[..., Any]:
-    def timed(*arguments: Any, **named: Any) -> Any:
-        begun = time.perf_counter()
-        try:
-            return method(*arguments, **named)
-        finally:
-            seconds[block] += time.perf_counter() - begun
-
-    return timed
 
 
 class Bare:

@@ -16,11 +16,10 @@ from aircraft.airframes import AircraftError, airframe
 from aircraft.card_cache import cached
 from aircraft.climb import climb_rates
 from aircraft.envelope import performance
-from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.guidance.margins import law_margins
 from aircraft.interface import GRAVITY_MPS2
 from aircraft.start import Atmosphere
-from harness.bench.tracking import ALTITUDE_M, course, fly_course
+from harness.bench.tracking import course, fly_course
 from harness.scenario.kinds import GUIDANCE
 from planner.kernel_cache import seal
 
@@ -104,50 +103,43 @@ def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, floa
     """One turn at a bank, after 10 s of rolling in and settling, for 30 s.
 
     Returns:
-        `bank_deg`; `radius_m`, path length over change of course, None if control is lost on the way; the
-        greatest `load_factor`; `altitude_lost_m` and `airspeed_lost_mps`, the most below what was commanded from
-        the roll-in on.
+        `bank_deg`; `radius_m`, path length over change of course, None if control is lost on the way; the greatest
+        `load_factor`; `altitude_lost_m` and `airspeed_lost_mps`, the most below what was commanded from the roll-in on.
     """
-    from aircraft.trials import in_flight
+    from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M  # loads JSBSim
+    from aircraft.trials import UPDATE_STEPS, in_flight
 
     model = in_flight(frame, speed)
-    steps = model.step_rate_hz // UPDATE_RATE_HZ
-    model.command(math.radians(bank_deg), ALTITUDE_M, speed)
-    length = turned = lost_m = lost_mps = 0.0
-    load = 1.0
-    before = model.state()
-    while before.time_s < SETTLING_S + TURNING_S:
-        model.advance(steps)
-        state = model.state()
+    model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
+    length = turned = 0.0
+    states = [model.state()]
+    while states[-1].time_s < SETTLING_S + TURNING_S:
+        model.advance(UPDATE_STEPS)
         if model.fault():
             turned = math.nan
             break
-        lost_m = max(lost_m, ALTITUDE_M - state.up_m)
-        lost_mps = max(lost_mps, speed - state.airspeed_mps)
-        load = max(load, state.load_factor)
+        before, state = states[-1], model.state()
+        states.append(state)
         if before.time_s >= SETTLING_S:
             length += state.groundspeed_mps * (state.time_s - before.time_s)
             turned += math.remainder(state.course_rad - before.course_rad, math.tau)
-        before = state
     return {
         "bank_deg": bank_deg,
         "radius_m": None if math.isnan(turned) else length / turned,
-        "load_factor": load,
-        "altitude_lost_m": lost_m,
-        "airspeed_lost_mps": lost_mps,
+        "load_factor": max([1.0, *(each.load_factor for each in states[1:])]),
+        "altitude_lost_m": max([0.0, *(REFERENCE_ALTITUDE_M - each.up_m for each in states[1:])]),
+        "airspeed_lost_mps": max([0.0, *(speed - each.airspeed_mps for each in states[1:])]),
     }
 
 
 def tightest(frame: Airframe, speed: float, wind_mps: float) -> dict[str, float | None]:
     """The tightest radius of which a course of 8 turns is tracked in a wind without the bank being cut.
 
-    Tracked means within the error that planning allows for. The search is between the radius at the bank limit
-    in calm air and the one of planning, to 2 %.
-
-    Returns:
-        `wind_mps`, `planned_radius_m` as planning has it with its margins, and `tightest_radius_m`, None if even
-        that is not tracked.
+    Tracked means within the error that planning allows for. The search is between the radius at the bank limit in calm
+    air and that of planning, to 2 %; None if not even that is tracked.
     """
+    from aircraft.trials import farthest  # loads JSBSim
+
     planned = performance(frame, speed, wind_mps)
     air = Atmosphere(wind_east_mps=wind_mps)
 
@@ -158,11 +150,8 @@ def tightest(frame: Airframe, speed: float, wind_mps: float) -> dict[str, float 
             return False
         return flown.bank_saturation == 0.0 and flown.cross_track_max_m <= planned.tracking_error_m
 
-    good: float | None = None
-    bad = 0.9 * speed**2 / (GRAVITY_MPS2 * math.tan(math.radians(frame.bank_limit_deg)))
-    if tracks(planned.turn_radius_m):
-        good = planned.turn_radius_m
-        while good - bad > RADIUS_TOLERANCE * good:
-            middle = 0.5 * (good + bad)
-            good, bad = (middle, bad) if tracks(middle) else (good, middle)
-    return {"wind_mps": wind_mps, "planned_radius_m": planned.turn_radius_m, "tightest_radius_m": good}
+    least_m = 0.9 * speed**2 / (GRAVITY_MPS2 * math.tan(math.radians(frame.bank_limit_deg)))
+    planned_m, found = planned.turn_radius_m, None
+    if tracks(planned_m):
+        found = farthest(tracks, planned_m, least_m, RADIUS_TOLERANCE * least_m)
+    return {"wind_mps": wind_mps, "planned_radius_m": planned_m, "tightest_radius_m": found}

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,19 +17,13 @@ from aircraft.actuators import Actuators
 from aircraft.airframe import Airframe
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
-from aircraft.frames import LocalPlane
-from aircraft.guidance.interface import UPDATE_RATE_HZ
-from aircraft.guidance.progress import RouteProgress
 from aircraft.guidance.registry import DEFAULT_KIND
 from aircraft.interface import Route
 from aircraft.route import arc_point
-from aircraft.start import Atmosphere, StartConditions
-from harness.flight.navigation import Navigator, StateEstimator
+from aircraft.start import Atmosphere
 from harness.scenario.kinds import guidance_kinds
-from harness.scenario.navigation import Navigation
 from planner.kernel_cache import seal
 
-ALTITUDE_M: Final = 300.0
 COURSE_RAD: Final = 0.3
 TURNS: Final = 14
 TURN_DEG: Final = (20.0, 120.0)
@@ -48,41 +42,28 @@ class Tracking:
 
     def within(self, limits: Tracking) -> bool:
         """Whether no figure is above its limit."""
-        return all(mine <= limit for mine, limit in zip(self._figures, limits._figures, strict=True))
+        return self.worse(limits) == limits
 
     def worse(self, other: Tracking) -> Tracking:
         """The greater of each figure."""
-        return Tracking(*map(max, zip(self._figures, other._figures, strict=True)))
+        return Tracking(*map(max, zip(vars(self).values(), vars(other).values(), strict=True)))
 
     def times(self, factor: float) -> Tracking:
         """Limits for an aircraft that is coarser by a factor: bank is cut for 0.1 % more of the time for each."""
-        across, most, altitude, saturation = self._figures
+        across, most, altitude, saturation = vars(self).values()
         cut = saturation + 0.001 * max(factor - 1.0, 0.0)
         return Tracking(factor * across, factor * most, factor * altitude, cut)
-
-    @property
-    def _figures(self) -> tuple[float, float, float, float]:
-        return self.cross_track_p95_m, self.cross_track_max_m, self.altitude_p95_m, self.bank_saturation
 
 
 @dataclass(frozen=True)
 class Case:
-    """One kind of air, or of navigation.
-
-    Attributes:
-        name: for the table.
-        limits: promised for the Aerosonde; None where nothing is.
-        wind_share: steady wind over airspeed; its direction is drawn.
-        turbulence, intensity: as `Atmosphere` has them.
-        navigation: a preset of the scenario's section; its errors are drawn.
-    """
+    """One kind of air."""
 
     name: str
-    limits: Tracking | None
-    wind_share: float = 0.0
+    limits: Tracking  # promised for the Aerosonde
+    wind_share: float = 0.0  # steady wind over airspeed; its direction is drawn
     turbulence: str | None = None
     intensity: str | None = None
-    navigation: Literal["perfect", "gnss", "rtk", "dead_reckoning"] = "perfect"
 
     def atmosphere(self, airspeed_mps: float, seed: int) -> Atmosphere:
         """The air of a seed."""
@@ -90,12 +71,6 @@ class Case:
         wind = self.wind_share * airspeed_mps
         east, north = wind * math.sin(towards), wind * math.cos(towards)
         return Atmosphere(east, north, self.turbulence, self.intensity, seed)
-
-    def navigator(self, seed: int) -> StateEstimator:
-        """What the aircraft believes of its state, for a seed."""
-        if self.navigation == "perfect":
-            return StateEstimator()
-        return Navigator(Navigation(kind=self.navigation), np.random.SeedSequence((seed, 3)))
 
 
 CASES: Final = (
@@ -105,7 +80,6 @@ CASES: Final = (
     Case("moderate Tustin", Tracking(0.50, 2.0, 1.0, 0.0), 0.0, "tustin", "moderate"),
     Case("moderate Milspec", Tracking(0.50, 2.0, 1.0, 0.0), 0.0, "milspec", "moderate"),
     Case("severe, wind 30 %", Tracking(1.0, 4.0, 2.0, 0.05), 0.3, "tustin", "severe"),
-    Case("gnss", None, navigation="gnss"),
 )
 LIMIT_FACTORS: Final = {
     "aerosonde": 1.0,
@@ -134,72 +108,22 @@ def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
 
 
 def fly_course(
-    frame: Airframe,
-    airspeed_mps: float,
-    air: Atmosphere,
-    route: Route,
-    guidance: str = DEFAULT_KIND,
-    navigator: StateEstimator | None = None,
+    frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Route, guidance: str = DEFAULT_KIND
 ) -> Tracking:
-    """Flies a route from its start to its end, under a guidance law at its defaults.
-
-    Args:
-        frame: the aircraft.
-        airspeed_mps: true airspeed.
-        air: what it flies in.
-        route: from (0, 0) along `COURSE_RAD`; it is moved to where the aircraft believes that it begins, as a plan is.
-        guidance: the law.
-        navigator: what the aircraft believes of its state; None: the truth.
+    """Flies a route from its start to its end, at a true airspeed under a guidance law at its defaults.
 
     Raises:
         AircraftError: the aircraft cannot start in this air.
         ArithmeticError: control is lost on the way; the message says how.
     """
-    from aircraft.jsbsim_model import JsbsimModel
+    from aircraft import trials  # loads JSBSim
 
-    model = JsbsimModel(
-        frame,
-        StartConditions(0.0, 0.0, ALTITUDE_M, COURSE_RAD, airspeed_mps),
-        LocalPlane(47.0, 8.0),
-        air,
-    )
     law = guidance_kinds()[guidance].law(frame.guidance_limits(airspeed_mps))
-    navigator = navigator or StateEstimator()
-    if isinstance(navigator, Navigator):
-        start = navigator.believed(model.state())
-        route = _moved(route, start.east_m, start.north_m)
-    law.follow(route, 0.0)
-    progress = RouteProgress(route)
-    steps = model.step_rate_hz // UPDATE_RATE_HZ
-    cross, altitude, saturated = [], [], 0
-    while True:
-        true = model.state()
-        if fault := model.fault():
-            raise ArithmeticError(f"{frame.name}: control is lost after {true.time_s:.0f} s: {fault}")
-        believed = navigator.believed(true)
-        output = law.update(believed)
-        if output.past_end:
-            break
-        cross.append(abs(progress.nearest(true.east_m, true.north_m).cross_track_m))
-        altitude.append(abs(true.up_m - ALTITUDE_M))
-        saturated += output.bank_saturated
-        too_high_m, too_fast_mps = navigator.held_errors
-        model.command(
-            output.roll_command_rad, ALTITUDE_M - too_high_m, output.airspeed_or(airspeed_mps) - too_fast_mps
-        )
-        model.advance(steps)
-    return Tracking(
-        float(np.percentile(cross, 95)),
-        max(cross),
-        float(np.percentile(altitude, 95)),
-        saturated / len(cross),
-    )
-
-
-def _moved(route: Route, east_m: float, north_m: float) -> Route:
-    segments = route.segments.copy()
-    segments[:, :2] += east_m, north_m
-    return Route(segments, route.loiter)
+    flown = trials.tracked(frame, airspeed_mps, law, route, air)
+    if flown.lost:
+        raise ArithmeticError(f"{frame.name}: {flown.lost}")
+    cross, altitude = (float(np.percentile(each, 95)) for each in (flown.cross_m, flown.altitude_m))
+    return Tracking(cross, flown.most_m, altitude, flown.cut_share)
 
 
 def tracked(
@@ -221,8 +145,7 @@ def tracked(
     for seed in seeds:
         air = case.atmosphere(speed, seed)
         radius_m = performance(frame, speed, air.wind_mps, air.intensity).turn_radius_m
-        route, navigator = course(seed, radius_m), case.navigator(seed)
-        worst = worst.worse(fly_course(frame, speed, air, route, guidance, navigator))
+        worst = worst.worse(fly_course(frame, speed, air, course(seed, radius_m), guidance))
     return worst
 
 
@@ -247,7 +170,7 @@ def bench_tracking(
     for done, case in enumerate(CASES):
         if progress is not None:
             progress(done, len(CASES), case.name)
-        limits = case.limits.times(factor) if factor and case.limits else None
+        limits = case.limits.times(factor) if factor else None
         row: dict[str, Any] = {"case": case.name, "limits": vars(limits) if limits else None, "lost": None}
         try:
             flown = tracked(name, case, range(1, seeds + 1), guidance=guidance)

@@ -33,29 +33,12 @@ from tests.harness.bench.courses_table import AIRCRAFT
 
 AIRFRAMES = Path(__file__).parents[3] / "aircraft" / "airframes.yaml"
 CALM = CASES[0]
-PROMISED = [case for case in CASES if case.limits]
-BY_NAME = pytest.mark.parametrize("case", PROMISED, ids=[case.name for case in PROMISED])
 
 
-def promised(case: Case) -> Tracking:
-    assert case.limits is not None
-    return case.limits
-
-
-@BY_NAME
+@pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
 def test_the_aerosonde_keeps_what_is_promised(case: Case) -> None:
     flown = tracked("aerosonde", case, [1])
-    assert flown.within(promised(case)), flown
-
-
-@pytest.mark.flights
-def test_with_gnss_the_aircraft_is_off_by_what_it_does_not_know() -> None:
-    """Nothing is promised of the true error, which is that of the position: 4.7 m in each direction, 1 sigma."""
-    (case,) = (each for each in CASES if each.navigation == "gnss")
-    assert case.limits is None
-    assert 1.5 < tracked("aerosonde", case, [1]).cross_track_max_m < 4.0 * 4.7
-    perfect = tracked("aerosonde", replace(case, navigation="perfect"), [1])
-    assert perfect == tracked("aerosonde", CALM, [1])
+    assert flown.within(case.limits), flown
 
 
 @pytest.mark.flights
@@ -63,13 +46,13 @@ def test_two_courses_are_flown_no_better_than_the_worse_one() -> None:
     one, two = (tracked("aerosonde", CALM, [seed]) for seed in (4, 5))
     both = tracked("aerosonde", CALM, [4, 5])
     assert both == one.worse(two)
-    assert both.within(promised(CALM))
+    assert both.within(CALM.limits)
 
 
 @pytest.mark.flights
 @pytest.mark.parametrize("name", [name for name in LIMIT_FACTORS if name != "aerosonde"])
 def test_others_keep_their_multiple_of_it(name: str) -> None:
-    limits = promised(CASES[1]).times(LIMIT_FACTORS[name])
+    limits = CASES[1].limits.times(LIMIT_FACTORS[name])
     flown = tracked(name, CASES[1], [1])
     assert flown.within(limits), flown
 
@@ -78,11 +61,11 @@ def test_others_keep_their_multiple_of_it(name: str) -> None:
 @pytest.mark.parametrize("name", LIMIT_FACTORS)
 def test_courses_of_every_verified_aircraft(name: str) -> None:
     """Twenty of the three that the README has the figures of, two of the others in all air that they stay up in."""
-    for case in PROMISED:
+    for case in CASES:
         if (name, case.intensity) == ("f15", "severe"):
             continue  # it sinks to the sea
         flown = tracked(name, case, range(1, 21 if name in AIRCRAFT else 3))
-        assert flown.within(promised(case).times(LIMIT_FACTORS[name])), (case.name, flown)
+        assert flown.within(case.limits.times(LIMIT_FACTORS[name])), (case.name, flown)
 
 
 @pytest.mark.flights
@@ -107,7 +90,7 @@ def test_a_turn_that_is_too_tight_is_not_tracked() -> None:
     frame = airframe("aerosonde")
     tight = fly_course(frame, 25.0, Atmosphere(), course(1, 0.5 * performance(frame, 25.0).turn_radius_m))
     assert tight.bank_saturation > 0.1
-    assert not tight.within(promised(CALM))
+    assert not tight.within(CALM.limits)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -144,7 +127,7 @@ def test_the_table_names_what_is_not_kept(
 ) -> None:
     from harness.bench import tracking
 
-    strict = replace(CALM, limits=promised(CALM).times(0.01))
+    strict = replace(CALM, limits=CALM.limits.times(0.01))
     monkeypatch.setattr(tracking, "CASES", (CALM, strict))
     result = bench_tracking("aerosonde", 1)
     assert [case["kept"] for case in result["cases"]] == [True, False]
