@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 from aircraft.actuators import Actuators
 from aircraft.autopilot import Gains
@@ -105,6 +106,18 @@ class Airframe:
     gains: Gains
     verified: bool
     autopilot: AutopilotKeys = DERIVED
+
+    @staticmethod
+    def of(entry: AirframeEntry, files: ModelFiles, measured: Mapping[str, Any]) -> Airframe:
+        """The airframe of an entry and what was measured of its model: by attribute, as JSON has it."""
+        low, high = measured["airspeed_range_mps"]
+        given = {
+            "airspeed_range_mps": (low, high),
+            "level_banks": tuple((speed, bank) for speed, bank in measured["level_banks"]),
+            "gains": Gains(**measured["gains"]),
+        }
+        known = files.name, entry.summary, files
+        return Airframe(*known, **{**measured, **given}, verified=entry.verified, autopilot=entry.autopilot)
 
     @property
     def least_airspeed_mps(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from hashlib import sha256
 from importlib.resources import files
 from types import MappingProxyType
@@ -42,24 +42,7 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
 
         return survey(entry, found)
 
-    def read(measured: Mapping[str, Any]) -> Airframe:
-        low, high = measured["airspeed_range_mps"]
-        return Airframe(
-            name=found.name,
-            summary=entry.summary,
-            files=found,
-            airspeed_range_mps=(low, high),
-            level_banks=tuple((speed, bank) for speed, bank in measured["level_banks"]),
-            gains=Gains(**measured["gains"]),
-            verified=entry.verified,
-            autopilot=entry.autopilot,
-            **{
-                key: measured[key]
-                for key in ("mass_kg", "cruise_mps", "roll_in_s", "weave_error_m", *FIGURES)
-            },
-        )
-
-    return cached(*kept, surveyed, read)
+    return cached(*kept, surveyed, partial(Airframe.of, entry, found))
 
 
 def is_surveyed(name: str) -> bool:

@@ -44,11 +44,7 @@ AS_MODELLED: Final = Deviation()
 
 
 def deviate(root: ElementTree.Element, deviation: Deviation) -> None:
-    """Changes a JSBSim model in place.
-
-    Raises:
-        ValueError: the model does not show what is to differ.
-    """
+    """Changes a JSBSim model in place; ValueError if the model does not show what is to differ."""
     balance, aerodynamics = root.find("mass_balance"), root.find("aerodynamics")
     if balance is None or aerodynamics is None:
         raise ValueError("it has no <mass_balance> or no <aerodynamics>")

@@ -25,11 +25,7 @@ class LocalPlane:
     """East and north in metres about an origin on the WGS84 ellipsoid."""
 
     def __init__(self, latitude_deg: float, longitude_deg: float) -> None:
-        """Lays the plane about an origin.
-
-        Raises:
-            ValueError: if the origin is not finite or out of range.
-        """
+        """Lays the plane about an origin; ValueError if it is not finite or out of range."""
         if not abs(latitude_deg) <= 85.0:
             raise ValueError(f"latitude_deg of the origin must be in [-85, 85]; got {latitude_deg:g}")
         if not -180.0 <= longitude_deg <= 360.0:
@@ -82,17 +78,13 @@ class LocalPlane:
         return east * stretch, north * stretch, convergence
 
     def patch(self, latitude_rad: float, longitude_rad: float) -> tuple[float, ...]:
-        """The plane about a geodetic point, for whoever asks for many points near one another.
-
-        `project` to the second order, to a tenth of a millimetre: a polynomial through nine points of it, as
-        `aircraft.kernels.place_in_patch` works it out.
+        """`project` about a geodetic point to the second order, to 0.1 mm, for `aircraft.kernels.place_in_patch`.
 
         Returns:
-            19 numbers: latitude and longitude (rad) of its middle; how far from there it holds, to the north and the
-            south, to the east and the west (rad; `PATCH_M` on the ground); for east and then for north, the value in
-            the middle (m), its derivatives per radian by latitude and by longitude, and half of those by latitude
-            twice, by both, by longitude twice; meridian convergence (rad) in the middle, its derivatives by latitude
-            and longitude.
+            19 numbers: latitude and longitude (rad) of its middle; how far from there it holds, north and south, east
+            and west (rad; `PATCH_M` on the ground); for east and then for north, the value in the middle (m), its
+            derivatives per radian by latitude and by longitude, and half of those by latitude twice, by both, by
+            longitude twice; meridian convergence (rad) in the middle, its derivatives by latitude and longitude.
         """
         up = PATCH_M / self._meridian_m
         right = up / math.cos(latitude_rad)
@@ -153,7 +145,7 @@ class LocalPlane:
 class PatchedPlane:
     """Projects as `LocalPlane.project` does, to a tenth of a millimetre, in a twentieth of the time.
 
-    It keeps a patch of the plane about the last points, a polynomial, and lays a new one where a point is off it.
+    It keeps a patch of the plane about the last points, and lays a new one where a point is off it.
     """
 
     def __init__(self, plane: LocalPlane, latitude_rad: float, longitude_rad: float) -> None:

@@ -141,20 +141,14 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
         TrimError: there is no such flight.
         AircraftError: the model cannot be started.
     """
-    latitude_deg, longitude_deg = plane.geodetic(start.east_m, start.north_m)
-    values = {
-        "ic/lat-geod-deg": latitude_deg,
-        "ic/long-gc-deg": longitude_deg,
-        "ic/h-sl-ft": start.altitude_m / FOOT_M,
-        "ic/psi-true-rad": heading_rad % math.tau,
-        "ic/vt-fps": start.airspeed_mps / FOOT_M,
-        "gear/gear-cmd-norm": 0.0,
-    }
+    fdm["ic/lat-geod-deg"], fdm["ic/long-gc-deg"] = plane.geodetic(start.east_m, start.north_m)
+    fdm["ic/h-sl-ft"] = start.altitude_m / FOOT_M
+    fdm["ic/psi-true-rad"] = heading_rad % math.tau
+    fdm["ic/vt-fps"] = start.airspeed_mps / FOOT_M
+    fdm["gear/gear-cmd-norm"] = 0.0
     for engine in range(fdm.get_propulsion().get_num_engines()):
-        values[f"fcs/mixture-cmd-norm[{engine}]"] = 0.9
-        values[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
-    for path, value in values.items():
-        fdm[path] = value
+        fdm[f"fcs/mixture-cmd-norm[{engine}]"] = 0.9
+        fdm[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
     fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
     fault = _trim(fdm, FULL_TRIM)
     if fault == "" and RUDDER_NEEDED in "; ".join(_SILENCE.errors):
@@ -217,11 +211,6 @@ def mass_kg(fdm: Any) -> float:
     return float(fdm["inertia/mass-slugs"]) * SLUG_KG
 
 
-def angle_of_attack_rad(fdm: Any) -> float:
-    """Angle of attack of a trimmed aircraft."""
-    return float(fdm["aero/alpha-rad"])
-
-
 def most_lift_deg(files: ModelFiles, airspeed_mps: float) -> float | None:
     """Angle of attack at which the lift of a model stops rising, controls as trimmed at a true airspeed; None: nowhere.
 
@@ -229,7 +218,7 @@ def most_lift_deg(files: ModelFiles, airspeed_mps: float) -> float | None:
         AircraftError: the model cannot be loaded, or not trimmed.
     """
     fdm = trimmed(files, airspeed_mps)
-    before_lbf, start_deg = -math.inf, math.degrees(angle_of_attack_rad(fdm))
+    before_lbf, start_deg = -math.inf, math.degrees(fdm["aero/alpha-rad"])
     for alpha_deg in np.arange(start_deg, MOST_ALPHA_DEG, ALPHA_STEP_DEG):
         fdm["ic/vt-fps"] = airspeed_mps / FOOT_M
         fdm["ic/alpha-deg"] = float(alpha_deg)

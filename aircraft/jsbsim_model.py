@@ -257,16 +257,10 @@ class JsbsimModel:
         """
         fdm = self._fdm
         east_fps, north_fps = self._wind_true()
-        values = {
-            "ic/theta-rad": fdm["attitude/theta-rad"],
-            "ic/phi-rad": fdm["attitude/phi-rad"],
-            "ic/psi-true-rad": fdm["attitude/psi-rad"],
-            "ic/vn-fps": fdm["velocities/v-north-fps"] + north_fps,
-            "ic/ve-fps": fdm["velocities/v-east-fps"] + east_fps,
-            "ic/vd-fps": fdm["velocities/v-down-fps"],
-        }
-        for path, value in values.items():
-            fdm[path] = value
+        attitude = fdm["attitude/theta-rad"], fdm["attitude/phi-rad"], fdm["attitude/psi-rad"]
+        north, east, down = (fdm[f"velocities/v-{axis}-fps"] for axis in ("north", "east", "down"))
+        fdm["ic/theta-rad"], fdm["ic/phi-rad"], fdm["ic/psi-true-rad"] = attitude
+        fdm["ic/vn-fps"], fdm["ic/ve-fps"], fdm["ic/vd-fps"] = north + north_fps, east + east_fps, down
         fdm.run_ic()
         self._apply_wind()
 

@@ -17,15 +17,7 @@ WEAVE_DEG = (60.0, -30.0, 90.0, -60.0, -20.0, 20.0)
 
 
 def arc_point(row: SegmentRow, along_m: float) -> tuple[float, float, float, float]:
-    """Point and unit tangent on a segment of constant curvature.
-
-    Args:
-        row: start east, start north, tangent east, tangent north, curvature (1/m, positive left), length (m).
-        along_m: distance from the segment's start.
-
-    Returns:
-        East, north (m), tangent east, tangent north.
-    """
+    """East, north (m) and unit tangent on a segment of constant curvature, at a distance from its start."""
     east, north, tangent_east, tangent_north, curvature, _ = row
     half = 0.5 * curvature * along_m
     sine, cosine = math.sin(half), math.cos(half)
@@ -43,28 +35,6 @@ def arc_point(row: SegmentRow, along_m: float) -> tuple[float, float, float, flo
 def route_length(route: Route) -> float:
     """Length of a route (m), one turn of a closing loiter included."""
     return float(route.segments[:, 5].sum())
-
-
-def route_point(route: Route, arc_length_m: float) -> tuple[float, float, float, float]:
-    """Point and unit tangent of a route at a station.
-
-    Args:
-        route: any route.
-        arc_length_m: distance from its start; beyond the end a loiter goes round, any other route straight on.
-
-    Returns:
-        East, north (m), tangent east, tangent north.
-    """
-    starts = np.concatenate(([0.0], np.cumsum(route.segments[:-1, 5])))
-    index = max(int(np.searchsorted(starts, arc_length_m, side="right")) - 1, 0)
-    east, north, tangent_east, tangent_north, curvature, length = route.segments[index].tolist()
-    along = arc_length_m - float(starts[index])
-    over = 0.0
-    if index == len(starts) - 1 and not route.loiter:
-        over = max(along - length, 0.0)
-    row = (east, north, tangent_east, tangent_north, curvature, length)
-    east, north, tangent_east, tangent_north = arc_point(row, along - over)
-    return east + over * tangent_east, north + over * tangent_north, tangent_east, tangent_north
 
 
 def weave(radius_m: float) -> Route:

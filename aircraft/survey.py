@@ -25,20 +25,9 @@ from aircraft.autopilot import (
 )
 from aircraft.guidance.preview import bandwidth_of_delay_margin
 from aircraft.interface import GRAVITY_MPS2
-from aircraft.jsbsim_loading import (
-    linearised,
-    mass_kg,
-    most_lift_deg,
-    trimmed,
-)
+from aircraft.jsbsim_loading import linearised, mass_kg, most_lift_deg, trimmed
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
-from aircraft.trials import (
-    not_held,
-    roll_in_s,
-    steepest_level_bank_deg,
-    turn_rate_share,
-    weaving_error_m,
-)
+from aircraft.trials import not_held, roll_in_s, steepest_level_bank_deg, turn_rate_share, weaving_error_m
 
 SLOWEST_MPS, FASTEST_MPS = 8.0, 300.0
 """Speeds outside of these are not looked at: the air is taken for incompressible enough below."""
@@ -157,11 +146,9 @@ def _at_pace(
             return f"it turns at {share:.2g} of the rate of a coordinated turn"
         frame = replace(frame, turn_rate_share=share)
     error_m = weaving_error_m(frame, cruise)
-    return (
-        "control is lost on a weave of turns"
-        if error_m == math.inf
-        else replace(frame, weave_error_m=error_m)
-    )
+    if error_m == math.inf:
+        return "control is lost on a weave of turns"
+    return replace(frame, weave_error_m=error_m)
 
 
 def _lag_s(files: ModelFiles, control: str) -> float:
@@ -199,9 +186,8 @@ def _provisional(
     entry: AirframeEntry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains, pace: float
 ) -> Airframe:
     """The airframe before its limits are known."""
-    roll_rate_dps = ROLL_COMMAND_SHARE * math.degrees(
-        1.0 / max(abs(placed.aileron_p_forward), LEAST_AILERON_S)
-    )
+    full_aileron_dps = math.degrees(1.0 / max(abs(placed.aileron_p_forward), LEAST_AILERON_S))
+    roll_rate_dps = ROLL_COMMAND_SHARE * full_aileron_dps
     if any((servo.rate_limit_1ps or math.inf) < placed.roll for _, servo in files.actuators):
         roll_rate_dps *= pace  # a servo that takes longer to its stop than roll does cannot follow
     roll_rate_dps = float(math.floor(roll_rate_dps))
@@ -219,21 +205,16 @@ def _provisional(
         "turn_rate_share": 1.0,
         **entry.figures,
     }
-    return Airframe(
-        name=files.name,
-        summary=entry.summary,
-        files=files,
-        mass_kg=mass_kg(trimmed(files, cruise)),
-        airspeed_range_mps=(SLOWEST_MPS, FASTEST_MPS),
-        cruise_mps=cruise,
-        roll_in_s=1.0,
-        weave_error_m=0.0,
-        level_banks=((cruise, figures["bank_limit_deg"]),),
-        gains=placed,
-        verified=entry.verified,
-        autopilot=entry.autopilot,
-        **figures,
-    )
+    provisional = {
+        "mass_kg": mass_kg(trimmed(files, cruise)),
+        "airspeed_range_mps": (SLOWEST_MPS, FASTEST_MPS),
+        "cruise_mps": cruise,
+        "roll_in_s": 1.0,
+        "weave_error_m": 0.0,
+        "level_banks": ((cruise, figures["bank_limit_deg"]),),
+        "gains": vars(placed),
+    }
+    return Airframe.of(entry, files, {**provisional, **figures})
 
 
 def middle_of_trims(files: ModelFiles) -> float:

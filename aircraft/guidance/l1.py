@@ -83,8 +83,7 @@ class L1Motion(NamedTuple):
     place: complex
     velocity: complex
     yaw_rad: float
-    yaw_cd: int
-    """The same in hundredths of a degree, as the autopilot keeps it."""
+    yaw_cd: int  # the same in hundredths of a degree, as the autopilot keeps it
 
 
 class L1Memory(NamedTuple):
@@ -92,8 +91,7 @@ class L1Memory(NamedTuple):
 
     last_nu_rad: float = 0.0
     integrator_rad: float = 0.0
-    last_gain: float = 0.0
-    """The integrator begins at 0 when its gain has changed."""
+    last_gain: float = 0.0  # the integrator begins at 0 when its gain has changed
 
 
 class L1Leg(NamedTuple):
@@ -101,8 +99,7 @@ class L1Leg(NamedTuple):
 
     begin: complex
     end: complex
-    min_distance_m: float = 0.0
-    """Least L1 distance; 0 from the autopilot's plain missions."""
+    min_distance_m: float = 0.0  # least L1 distance; 0 from the autopilot's plain missions
 
 
 class L1Circle(NamedTuple):
@@ -110,18 +107,15 @@ class L1Circle(NamedTuple):
 
     centre: complex
     radius_m: float
-    direction: float
-    """+1 clockwise (right turns), -1 counter-clockwise."""
+    direction: float  # +1 clockwise (right turns), -1 counter-clockwise
 
 
 class L1Output(NamedTuple):
     """What to fly until the next call."""
 
     lateral_acceleration_mps2: float
-    crosstrack_m: float
-    """On a leg positive to its LEFT; on a circle positive outside."""
-    circling: bool
-    """The circle is held; before, it is approached."""
+    crosstrack_m: float  # on a leg positive to its LEFT; on a circle positive outside
+    circling: bool  # the circle is held; before, it is approached
 
 
 def dot(a: complex, b: complex) -> float:

@@ -15,10 +15,7 @@ GROWS_OLD: Final = AircraftState._fields[1 : AircraftState._fields.index("load_f
 def as_it_was(past: deque[AircraftState], state: AircraftState, latency_s: float) -> AircraftState:
     """The state some time ago, but for its time; before the first one it moves evenly.
 
-    Args:
-        past: states of earlier calls, the oldest first; this one is added, and those that are too old go.
-        state: the state now.
-        latency_s: how long ago.
+    `past` are states of earlier calls, the oldest first; this one is added, and those that are too old go.
     """
     if latency_s == 0.0:
         return state

@@ -16,25 +16,19 @@ HEADING_FOR_CENTRES: Final = ("l1", "npfg")
 
 @dataclass(frozen=True, eq=False)
 class MissionLeg:
-    """One leg: to a waypoint, along a way, or round a circle.
+    """One leg: to a waypoint, along a way, or round a circle."""
 
-    Attributes:
-        route: what the law follows.
-        stations_m: arc lengths at its ends on the route that the mission was made into.
-        end_m: the waypoint that it leads to; None: it is flown to its end.
-        acceptance_m: from where the waypoint counts as reached; None: by the rule of the law; 0: only when passed.
-        captured_radius_m: radius of the circle about the waypoint that is joined from far; 0: there is none.
-        centre_m: of a circle that the leg goes round.
-        swept_rad: how far round, from where the route begins.
-    """
-
-    route: Route
-    stations_m: tuple[float, float]
-    end_m: tuple[float, float] | None = None
-    acceptance_m: float | None = 0.0
-    captured_radius_m: float = 0.0
-    centre_m: tuple[float, float] | None = None
-    swept_rad: float = 0.0
+    route: Route  # what the law follows
+    stations_m: tuple[float, float]  # arc lengths at its ends on the route that the mission was made into
+    end_m: tuple[float, float] | None = None  # the waypoint that it leads to; None: it is flown to its end
+    acceptance_m: float | None = (
+        0.0  # the waypoint is reached from here; None: by the law's rule; 0: when passed
+    )
+    captured_radius_m: float = (
+        0.0  # of the circle about the waypoint that is joined from far; 0: there is none
+    )
+    centre_m: tuple[float, float] | None = None  # of a circle that the leg goes round
+    swept_rad: float = 0.0  # how far round, from where the route begins
 
     @property
     def direction(self) -> tuple[float, float]:

@@ -91,13 +91,10 @@ class NpfgInput(NamedTuple):
 
     place: complex
     velocity: complex
-    wind: complex
-    """The direction the wind blows towards."""
+    wind: complex  # the direction it blows towards
     path: complex
-    tangent: complex
-    """The path's unit tangent at that point."""
-    right_curvature_1pm: float
-    """The path's curvature there, positive for a right turn."""
+    tangent: complex  # the path's unit tangent at that point
+    right_curvature_1pm: float  # the path's there, positive for a right turn
 
 
 class NpfgOutput(NamedTuple):
@@ -105,18 +102,12 @@ class NpfgOutput(NamedTuple):
 
     lateral_acceleration_mps2: float
     airspeed_mps: float
-    heading_rad: float
-    """Direction of the wanted air velocity."""
-    course_rad: float
-    """Direction of the wanted ground velocity."""
-    track_error_m: float
-    """Distance from the path, positive to its right."""
-    track_proximity: float
-    """1 on the path, 0 at the track error bound and beyond."""
-    feasibility: float
-    """Of the bearing: 1 if it can be made good in this wind, 0 if not."""
-    period_s: float
-    """The period within its bounds."""
+    heading_rad: float  # direction of the wanted air velocity
+    course_rad: float  # direction of the wanted ground velocity
+    track_error_m: float  # distance from the path, positive to its right
+    track_proximity: float  # 1 on the path, 0 at the track error bound and beyond
+    feasibility: float  # of the bearing: 1 if it can be made good in this wind, 0 if not
+    period_s: float  # within its bounds
 
 
 def dot(a: complex, b: complex) -> float:

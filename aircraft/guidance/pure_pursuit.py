@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
@@ -47,17 +46,6 @@ class PurePursuitConfig:
         return replace(self, look_ahead_s=ahead)
 
 
-class PurePursuitOutput(NamedTuple):
-    """The turn towards the goal point."""
-
-    lateral_acceleration_mps2: float
-    """Across the course."""
-    right_curvature_1pm: float
-    """Of the arc to the goal point, positive for a right turn."""
-    roll_rad: float
-    """Bank of a coordinated turn with this acceleration at the crab angle of now, not limited."""
-
-
 def look_ahead_distance(velocity_east_mps: float, velocity_north_mps: float, has: PurePursuitConfig) -> float:
     """How far ahead the goal point is sought, m."""
     speed = math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps)
@@ -71,8 +59,8 @@ def pure_pursuit(
     velocity_north_mps: float,
     heading_rad: float,
     look_ahead_m: float,
-) -> PurePursuitOutput:
-    """The law, by the way to the goal point, the ground velocity, the nose and the look-ahead distance; no memory.
+) -> tuple[float, float]:
+    """Curvature (1/m, right) of the arc to the goal point, and the bank (rad) of a coordinated turn on it, not limited.
 
     Of the goal only the direction counts beside the distance. To one more than a right angle off the course the turn is
     as hard as to one at a right angle.
@@ -86,10 +74,8 @@ def pure_pursuit(
         if east * to_goal_east_m + north * to_goal_north_m < 0.0:
             sine = -1.0 if sine < 0.0 else 1.0
     curvature = 2.0 * sine / look_ahead_m
-    acceleration = speed * speed * curvature
     ahead = (east * math.sin(heading_rad) + north * math.cos(heading_rad)) / speed
-    roll = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead, LEAST_CRAB_COSINE)))
-    return PurePursuitOutput(acceleration, curvature, roll)
+    return curvature, math.atan(speed * speed * curvature / (GRAVITY_MPS2 * max(ahead, LEAST_CRAB_COSINE)))
 
 
 class PurePursuitLaw(RouteLaw):
@@ -104,7 +90,7 @@ class PurePursuitLaw(RouteLaw):
         velocity = state.velocity_east_mps, state.velocity_north_mps
         ahead_m = look_ahead_distance(*velocity, self._has)
         goal = self._goal(state.east_m, state.north_m, ahead_m)
-        return pure_pursuit(*goal, *velocity, state.heading_rad, ahead_m).roll_rad, math.nan
+        return pure_pursuit(*goal, *velocity, state.heading_rad, ahead_m)[1], math.nan
 
     def _goal(self, east_m: float, north_m: float, ahead_m: float) -> tuple[float, float]:
         """The way to the goal point (m). To go on by what is missing of the distance never oversteps it."""

@@ -22,22 +22,15 @@ DEFAULT_KIND = "preview"
 
 @dataclass(frozen=True)
 class GuidanceKind:
-    """A guidance law that scenarios may name.
+    """A guidance law that scenarios may name."""
 
-    Attributes:
-        kind: the name, as in `guidance.kind` of a scenario.
-        summary: one line for `wayproof list guidance`.
-        config: frozen dataclass of the law's own keys. Each field has a default and the metadata `doc` (a sentence),
-            `unit`, and `minimum` / `maximum` or `above` where there is such a bound. A default of None is derived:
-            `config.resolved(limits)` returns the config with no None left and raises ValueError, with a sentence,
-            where keys contradict each other.
-        make: the law for one flight, from a resolved config and what may be asked of the aircraft.
-    """
-
-    kind: str
-    summary: str
+    kind: str  # as in `guidance.kind` of a scenario
+    summary: str  # one line for `wayproof list guidance`
     config: type[Any]
+    """Frozen dataclass of the law's own keys, each a `key` with a default. One of None is derived: `resolved(limits)`
+    gives the config with no None left, and raises ValueError, with a sentence, where keys contradict each other."""
     make: Callable[[Any, GuidanceLimits], GuidanceLaw]
+    """The law for one flight, from a resolved config and what may be asked of the aircraft."""
 
     def law(self, limits: GuidanceLimits, **keys: Any) -> GuidanceLaw:
         """The law for one flight, its own keys given or at their defaults.

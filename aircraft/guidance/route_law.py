@@ -22,11 +22,7 @@ class RouteLaw(ABC):
 
     @property
     def progress(self) -> RouteProgress:
-        """The place on the route.
-
-        Raises:
-            RuntimeError: there is no route yet.
-        """
+        """The place on the route; RuntimeError if there is no route yet."""
         if self._progress is None:
             raise RuntimeError("follow() a route before update()")
         return self._progress

@@ -24,7 +24,7 @@ from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits, GuidanceOut
 from aircraft.guidance.mission_legs import MissionLeg, straight
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import GRAVITY_MPS2, AircraftState, FloatArray, Route
-from aircraft.route import arc_point
+from aircraft.route import SegmentRow, arc_point, route_length
 
 WP_RADIUS_M = 90.0
 """ArduPilot's WP_RADIUS: the most that `l1` accepts a waypoint from."""
@@ -74,26 +74,30 @@ def mission_waypoints(route: Route) -> FloatArray:
     points = [rows[0][:2]]
     along = rows[0][2:4]
     for row in rows:
-        if along[0] * row[2] + along[1] * row[3] < math.cos(LEAST_TURN_RAD):
-            points.append(row[:2])
+        bends = along[0] * row[2] + along[1] * row[3] < math.cos(LEAST_TURN_RAD)
+        points += [row[:2]] if bends else []
+        points += _corners(row)
         along = arc_point(row, row[5])[2:]
-        turn = abs(row[4] * row[5])
-        parts = max(1, math.ceil(turn / CORNER_RAD - 1e-9))
-        for part in range(parts if turn >= LEAST_TURN_RAD else 0):
-            east, north, along_east, along_north = arc_point(row, part * row[5] / parts)
-            ahead = math.tan(0.5 * turn / parts) / abs(row[4])
-            points.append((east + ahead * along_east, north + ahead * along_north))
-    last = arc_point(rows[-1], rows[-1][5])[:2]
-    kept = [points[0]]
+    last_east, last_north, along_east, along_north = arc_point(rows[-1], rows[-1][5])
+    kept, last = [points[0]], (last_east, last_north)
     for point in points[1:]:
         if math.dist(point, kept[-1]) >= LEAST_LEG_M:
             kept.append(point)
-    while len(kept) > 1 and math.dist(kept[-1], last) < LEAST_LEG_M:
+    while kept and math.dist(kept[-1], last) < LEAST_LEG_M:
         kept.pop()
-    if math.dist(last, kept[-1]) < LEAST_LEG_M and len(kept) == 1:
-        _, _, along_east, along_north = arc_point(rows[-1], rows[-1][5])
-        kept[0] = (last[0] - LEAST_LEG_M * along_east, last[1] - LEAST_LEG_M * along_north)
-    return np.array([*kept, last])
+    before_last = (last_east - LEAST_LEG_M * along_east, last_north - LEAST_LEG_M * along_north)
+    return np.array([*(kept or [before_last]), last])
+
+
+def _corners(row: SegmentRow) -> list[tuple[float, float]]:
+    """The corners that an arc rounds, each of 90 degrees at the most; none of a line."""
+    turn, found = abs(row[4] * row[5]), []
+    parts = max(1, math.ceil(turn / CORNER_RAD - 1e-9)) if turn >= LEAST_TURN_RAD else 0
+    for part in range(parts):
+        east, north, along_east, along_north = arc_point(row, part * row[5] / parts)
+        ahead = math.tan(0.5 * turn / parts) / abs(row[4])
+        found.append((east + ahead * along_east, north + ahead * along_north))
+    return found
 
 
 class Along(NamedTuple):
@@ -169,7 +173,7 @@ class WaypointLaw:
             past_end = share >= 1.0
         else:
             on_leg = self._on_leg.nearest(state.east_m, state.north_m)
-            share = on_leg.arc_length_m / (float(leg.route.segments[:, 5].sum()) - leg.captured_radius_m)
+            share = on_leg.arc_length_m / (route_length(leg.route) - leg.captured_radius_m)
             past_end = on_leg.past_end
         station_m = first + min(max(share, 0.0), 1.0) * (last - first)
         self._progress.restart(station_m)

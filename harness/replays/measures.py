@@ -121,11 +121,7 @@ class Side:
 
 
 def compared(flown: Side, simulated: Side) -> dict[str, Any]:
-    """Laps and figures of both.
-
-    Raises:
-        InputError: they have no settled lap in common.
-    """
+    """Laps and figures of both; InputError if they have no settled lap in common."""
     settled = [lap for lap in flown.whole if lap in simulated.whole]
     if not settled:
         missing = "the log" if not flown.whole else "the simulated flight"

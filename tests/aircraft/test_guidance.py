@@ -15,10 +15,11 @@ from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw, GuidanceLim
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import route_rows
 from aircraft.interface import AircraftState, Route
-from aircraft.route import arc_point, route_length, route_point
+from aircraft.route import arc_point, route_length
 from aircraft.start import Atmosphere, StartConditions
 from tests.examples import examples
 from tests.point_mass import PointMass
+from tests.routes import route_point
 
 AIRSPEED = 25.0
 ALTITUDE = 300.0

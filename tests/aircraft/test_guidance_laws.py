@@ -69,9 +69,9 @@ def test_pure_pursuit_turns_on_the_arc_through_the_goal() -> None:
     # The goal on a circle of 300 m that the aircraft is on: the arc is that circle.
     angle = 0.4
     east, north = 300.0 * (1.0 - math.cos(angle)), 300.0 * math.sin(angle)
-    output = pure_pursuit(east, north, 0.0, 20.0, 0.0, math.hypot(east, north))
-    assert output.right_curvature_1pm == pytest.approx(1.0 / 300.0)
-    assert output.roll_rad == pytest.approx(math.atan(400.0 / (300.0 * GRAVITY_MPS2)))
+    curvature_1pm, roll_rad = pure_pursuit(east, north, 0.0, 20.0, 0.0, math.hypot(east, north))
+    assert curvature_1pm == pytest.approx(1.0 / 300.0)
+    assert roll_rad == pytest.approx(math.atan(400.0 / (300.0 * GRAVITY_MPS2)))
 
 
 def test_pure_pursuit_looks_ahead_by_time() -> None:

@@ -15,7 +15,8 @@ from aircraft.guidance.interface import GuidanceOutput
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import AircraftState, Route
-from aircraft.route import arc_point, route_length, route_point
+from aircraft.route import arc_point, route_length
+from tests.routes import route_point
 
 LIMITS = airframe("aerosonde").guidance_limits()
 CIRCLE = (1.0 / 120.0, math.tau * 120.0)

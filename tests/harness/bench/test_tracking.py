@@ -14,7 +14,6 @@ import pytest
 
 from aircraft.airframes import aircraft_names, airframe
 from aircraft.envelope import performance
-from aircraft.route import route_point
 from aircraft.start import Atmosphere
 from harness.bench.tracking import (
     CASES,
@@ -30,6 +29,7 @@ from harness.bench.tracking import (
 from harness.cli.bench import tracking_rows
 from harness.cli.terminal import print_table
 from tests.harness.bench.courses_table import AIRCRAFT
+from tests.routes import route_point
 
 AIRFRAMES = Path(__file__).parents[3] / "aircraft" / "airframes.yaml"
 CALM = CASES[0]
@@ -161,10 +161,13 @@ def test_other_laws_are_flown_and_promise_nothing(monkeypatch: pytest.MonkeyPatc
 def test_an_aircraft_that_is_lost_is_a_row_of_the_table(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In gusts of 45 knots and half its airspeed of wind an Ultra Stick of 2 kg stalls."""
-    storm = replace(CASES[5], name="storm", wind_share=0.5)
-    monkeypatch.setattr("harness.bench.tracking.CASES", (storm,))
-    result = bench_tracking("ultrastick25e", 3)
+    monkeypatch.setattr("harness.bench.tracking.CASES", (replace(CASES[5], name="storm"),))
+
+    def lost(*_: object) -> None:
+        raise ArithmeticError("c172p: control is lost after 9 s: stalled")
+
+    monkeypatch.setattr("harness.bench.tracking.fly_course", lost)
+    result = bench_tracking("c172p", 1)
     (case,) = result["cases"]
     assert case["kept"] is False
     assert case["cross_track_max_m"] is None
