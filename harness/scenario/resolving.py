@@ -23,7 +23,7 @@ from harness.scenario.performance import LEAST_CLEARANCE, mission_of, performanc
 from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec
 from harness.scenario.start import check_level_flight
 from harness.scenario.validation import KeyFault
-from planner.geometry.margin import TOLERATED_SHARE
+from planner.geometry.clearance import TOLERATED_SHARE
 
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe

@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.baselines.steering import Steerer, ahead, off
+from planner.geometry.clearance import margin_of
 from planner.geometry.curves import Point, Pose
-from planner.geometry.margin import margin_of
 from planner.interface import FloatArray, Mission
 from planner.keys import key
 

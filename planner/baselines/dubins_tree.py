@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.baselines.steering import Replanner, Start
+from planner.geometry.clearance import margin_of
 from planner.geometry.curves import Point, Pose, Segment, along, between, turn_onto
-from planner.geometry.margin import margin_of
 from planner.geometry.terrain import Terrain
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.keys import key, margin_key

@@ -22,9 +22,8 @@ from functools import partial
 import numpy as np
 
 from planner.baselines.steering import Replanner, Start
-from planner.geometry.clearance import first_breach, inside_bounds
+from planner.geometry.clearance import first_breach, inside_bounds, margin_of
 from planner.geometry.curves import Pose, Segment, along
-from planner.geometry.margin import margin_of
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.kernels.segments import to_nearest
 from planner.keys import key, margin_key

@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.baselines.steering import Steerer, off
+from planner.geometry.clearance import margin_of
 from planner.geometry.curves import Pose
-from planner.geometry.margin import margin_of
 from planner.interface import BoolArray, FloatArray, Mission, PlanPicture, PlanRequest
 from planner.keys import key, margin_key
 

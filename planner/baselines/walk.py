@@ -21,9 +21,8 @@ import numpy as np
 
 from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import NOWHERE, Mark, beside, length_of, piece
-from planner.geometry.clearance import first_breach
+from planner.geometry.clearance import first_breach, margin_of
 from planner.geometry.curves import SHORTEST_M, Point, end_of, pose_at
-from planner.geometry.margin import margin_of
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.keys import margin_key
 from planner.world_stability import WorldStability

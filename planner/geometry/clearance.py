@@ -1,4 +1,4 @@
-"""Distances between paths and sensed edge points."""
+"""Distances between paths and sensed edge points, and how much is planned to be kept."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import math
 import numpy as np
 
 from planner.geometry.curves import Point
-from planner.interface import BoolArray, FloatArray, Path
+from planner.interface import BoolArray, FloatArray, Mission, Path
 from planner.kernels import segments
+
+TOLERATED_SHARE, TOLERATED_ERRORS = 0.1, 2.0
 
 
 def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -54,3 +56,11 @@ def behind(places_m: FloatArray, eye_m: Point, edges_m: FloatArray, beside_m: fl
         # The shadow is a fan: at twice the distance it is twice as wide.
         hidden |= (along_m > away_m) & (aside_m < beside_m * along_m / away_m)
     return hidden
+
+
+def margin_of(mission: Mission) -> float:
+    """Planned distance beyond the clearance where none is given (m).
+
+    A tenth of the clearance, or twice the tracking error that the aircraft showed in tight turns where that is more.
+    """
+    return max(TOLERATED_SHARE * mission.clearance_m, TOLERATED_ERRORS * mission.tracking_error_m)

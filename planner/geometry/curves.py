@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.interface import FloatArray, Mission, Path
+from planner.kernels import segments as kernel
 
 Point = tuple[float, float]
 Segment = tuple[float, float, float, float, float, float]
@@ -109,6 +110,24 @@ def sample(path: Path, spacing_m: float, deviation_m: float = math.inf) -> Float
         sine, versine = np.sin(curvature * s) / curvature, (1.0 - np.cos(curvature * s)) / curvature
         pieces.append(np.column_stack((x + tx * sine - ty * versine, y + ty * sine + tx * versine)))
     return np.concatenate(pieces)
+
+
+def poses_at(path: Path, arc_lengths_m: FloatArray) -> FloatArray:
+    """(k, 4) poses at (k,) arc lengths along a path, clamped to its ends."""
+    return kernel.poses_at(path.segments, np.ascontiguousarray(arc_lengths_m))
+
+
+def places_along(path: Path, end_m: float, pieces: int) -> FloatArray:
+    """(pieces + 1, 2) places along a path, clamped to its ends, from its start to an arc length and evenly spaced."""
+    return kernel.places_along(path.segments, end_m, pieces)
+
+
+def turn_centres(path: Path, arc_lengths_m: FloatArray, radius_m: float, roll_m: float) -> FloatArray:
+    """(k, 2, 2) centres of the turns off a path at (k,) arc lengths: to the left, and to the right.
+
+    Where the path turns the other way, the turn begins after a straight of `roll_m`.
+    """
+    return kernel.turn_centres(path.segments, np.ascontiguousarray(arc_lengths_m), radius_m, roll_m)
 
 
 def turns_onto(pose: Pose, target: Point, radius_m: float) -> list[list[Segment]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from planner.geometry.margin import margin_of
+from planner.geometry.clearance import margin_of
 from planner.interface import Mission
 from planner.keys import key, margin_key
 from planner.paper.model import most_units

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from planner.geometry.clearance import margin_of
 from planner.geometry.joining import LEAD_S as LEAD_S
-from planner.geometry.margin import margin_of
 from planner.interface import Mission
 from planner.keys import key, margin_key
 from planner.shield.certificate import least_sensor_range_m

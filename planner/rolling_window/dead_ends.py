@@ -34,16 +34,17 @@ class GivingUp:
         stability: when something last moved or appeared.
         effort: how often the work of a wide search is doubled; grows with every search that found nothing.
         tried_again: what was given up has been tried again for want of another way.
+        given_up_at_m: arc length of the plan in effect at which a place was given up last.
+        whole_turn_m: length of a whole turn.
     """
 
     def __init__(self, mission: Mission, memory: ObstacleMemory) -> None:
         self._mission, self._memory = mission, memory
-        self._whole_turn_m = math.tau * mission.turn_radius_m
+        self.whole_turn_m = math.tau * mission.turn_radius_m
         self._turned_before: list[Point] = []
         self._retry_s = math.inf
         self._retries = 0
-        self._given_up_at_m = 0.0
-        self._loitered: object = None
+        self.given_up_at_m = 0.0
         self.stability = WorldStability()
         self.effort = 0
         self.tried_again = False
@@ -83,15 +84,6 @@ class GivingUp:
             aside_m = i * clearance_m
             self._memory.refuse((east - aside_m * along_north, north + aside_m * along_east))
 
-    def first_in_loiter(self, plan: object) -> bool:
-        """Whether a plan is not the one whose loiter was entered last, which is remembered."""
-        first, self._loitered = plan is not self._loitered, plan
-        return first
-
-    def new_plan(self) -> None:
-        """A new plan is in effect: arc lengths are counted from its start."""
-        self._given_up_at_m = 0.0
-
     @property
     def certain(self) -> bool:
         """Whether all that was seen still stands, and nothing has contradicted seen-free space."""
@@ -102,40 +94,32 @@ class GivingUp:
         """Whether the search has been repeated with all the effort that there is."""
         return self.effort == MOST_EFFORT
 
-    def whole_turn(self, since_m: float) -> bool:
-        """Whether a whole turn has been flown since an arc length was counted from."""
-        return since_m >= self._whole_turn_m
-
     def turned_since(self, loiter_entry_m: float, arc_length_m: float) -> bool:
         """Whether more than a whole turn has been flown since the loiter was entered or a place was given up."""
-        return arc_length_m - max(loiter_entry_m, self._given_up_at_m) > self._whole_turn_m
+        return arc_length_m - max(loiter_entry_m, self.given_up_at_m) > self.whole_turn_m
 
     def effort_spent(self, edges_went: bool, only_given_up: bool) -> bool:
         """Whether all searches have been made that a proof for want of room to turn has to wait for."""
         needed = MOST_EFFORT if edges_went else 1
         return self.effort >= needed or (only_given_up and self.tried_again)
 
-    def give_up(self, place: Pose, arc_length_m: float) -> None:
-        """Gives up a place: the whole turn before it has shown nothing more of it."""
-        self._given_up_at_m = arc_length_m
-        self.refuse(place)
+    @property
+    def out_of_retries(self) -> bool:
+        """Whether everything has been tried again as often as it is."""
+        return self._retries == MOST_RETRIES
 
-    def narrow(self, no_room: bool, settled: bool) -> bool:
+    def narrow(self, no_room: bool, time_s: float) -> bool:
         """Whether nothing is left but ways without room to turn."""
         # What moved may have closed the way. Where edge points were taken back the sensor errs, and a place that was
         # given up may be seen to be free at another look.
         doubtful = self.stability.ever or self._memory.ever_cleared
-        return no_room and settled and not (doubtful and len(self._memory.refused_m))
-
-    def retries_used(self) -> bool:
-        """Whether everything has been tried again as often as it is."""
-        return self._retries == MOST_RETRIES
+        return no_room and self.stability.settled(time_s) and not (doubtful and len(self._memory.refused_m))
 
     def try_again(self, narrow: bool, at_end: bool, arc_length_m: float) -> None:
         """After a search that found nothing: doubles the effort, or tries again what was given up."""
         self._retries += narrow
         if narrow or at_end:
-            self._given_up_at_m = arc_length_m
+            self.given_up_at_m = arc_length_m
             self._memory.forgive()
             self.tried_again = True
         self.effort = 0 if narrow else min(self.effort + 1, MOST_EFFORT)

@@ -97,6 +97,7 @@ class RollingWindow:
             self._proofs.no_way,
         )
         self._threats: Threats | None = None  # while something moves or has just appeared
+        self._loitered: CommittedPlan | None = None  # the plan whose turn was entered last
         self._served: tuple[object, ...] = ()  # by what the plan in effect served, as long as nothing is due
         self.state = PlanningState.ESCAPING
 
@@ -134,7 +135,6 @@ class RollingWindow:
         if plan.holds(here_m) or self._due(request, plan, here_m, newly_cut=False):
             return False
         self._local.trail.add(request.position_m)
-        self._monitor.nothing_new()
         return True
 
     def _planned(self, request: PlanRequest) -> Plan:
@@ -149,7 +149,7 @@ class RollingWindow:
             now = Situation(request, plan, on_loiter(plan.path, request.arc_length_m))
             self._loiter(now, plan)
         self._search.anew |= self._free_again(now)
-        newly_cut = self._monitor.look(plan, now.here_m, request.position_m, fresh_m)
+        newly_cut = self._monitor.look(plan, now.here_m, fresh_m)
         if not self._due(request, plan, now.here_m, newly_cut) and self._search.running is None:
             if self._nothing_waits(request.seen):
                 self._served = request.flown, request.seen.revision, request.seen.last_contradiction_s
@@ -160,7 +160,7 @@ class RollingWindow:
     def _nothing_waits(self, seen: MapView) -> bool:
         """Whether, as long as nothing is seen, only the way flown can make a search due."""
         feared = self._threats is not None or len(seen.moving) > 0
-        waits = self._search.freed or self._monitor.waits or self._giving_up.waits
+        waits = self._search.freed or self._giving_up.waits
         return self.state is PlanningState.FOLLOWING and not (feared or waits)
 
     def _take_in(self, request: PlanRequest) -> FloatArray:
@@ -172,7 +172,7 @@ class RollingWindow:
         self._threats = self._escapes.threats(request)
         gone = self._memory.cleared - self._search.gone
         if self._monitor.take_effect(request.flown, self._memory.standing_m, gone):
-            self._giving_up.new_plan()
+            self._giving_up.given_up_at_m = 0.0  # arc lengths are counted from the new plan's start
         if self._monitor.plan is not None and self._monitor.plan.over(request.arc_length_m):
             self._monitor.plan = None
         return fresh_m
@@ -185,7 +185,7 @@ class RollingWindow:
             return True
         since_m = request.arc_length_m - self._monitor.searched_at_m
         if self._giving_up.out_of_effort and self._search.up_to_date:
-            return self._giving_up.whole_turn(since_m)
+            return since_m >= self._giving_up.whole_turn_m
         return self._monitor.due(plan, here_m, since_m, newly_cut) or met or self._search.anew
 
     def _free_again(self, now: Situation) -> bool:
@@ -261,7 +261,8 @@ class RollingWindow:
     def _loiter(self, now: Situation, plan: CommittedPlan) -> None:
         """FOLLOWING -> LOITERING: the aircraft is in its turn. A place that was turned before twice is given up."""
         self.state = PlanningState.LOITERING
-        if not plan.course.to_goal or not self._giving_up.first_in_loiter(plan):
+        first, self._loitered = plan is not self._loitered, plan
+        if not plan.course.to_goal or not first:
             return
         place = self._commitment.unseen(plan.course, now.request.seen)
         if self._giving_up.turned_twice(place[:2]):
@@ -348,10 +349,11 @@ class RollingWindow:
         turned = giving_up.turned_since(plan.loiter_entry_m, arc_length_m)
         if search.stuck is not None:
             if turned:
-                giving_up.give_up(self._commitment.unseen(search.stuck, now.request.seen), arc_length_m)
+                giving_up.given_up_at_m = arc_length_m
+                giving_up.refuse(self._commitment.unseen(search.stuck, now.request.seen))
             return Plan(PlanStatus.NO_PATH, NO_WAY_ON)
-        narrow = giving_up.narrow(no_room, giving_up.stability.settled(now.request.time_s))
-        if narrow and giving_up.retries_used():
+        narrow = giving_up.narrow(no_room, now.request.time_s)
+        if narrow and giving_up.out_of_retries:
             return self._end_without_room_to_turn(now)
         # No way is left but those given up, or one that takes more looking for. Or none that can be flown from here:
         # elsewhere on the turn there may be one.

@@ -30,8 +30,10 @@ from planner.geometry.curves import (
     end_of,
     full_turn,
     place_on,
+    places_along,
+    poses_at,
+    turn_centres,
 )
-from planner.geometry.path_samples import places_along, poses_at, turn_centres
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, MapView, Path
 

@@ -8,15 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.geometry.clearance import behind
 from planner.geometry.course import Course
-from planner.geometry.curves import Point, Segment, onward, place_on, sample
+from planner.geometry.curves import Point, Segment, onward, place_on, places_along, sample
 from planner.geometry.joining import divert_to_loiter
-from planner.geometry.path_samples import places_along
 from planner.geometry.terrain import Terrain
 from planner.interface import MapView, Mission, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
@@ -118,20 +118,20 @@ class Escapes:
             if math.dist(self._began_m, request.position_m) > UNSEEN_SHARE * self._mission.clearance_m:
                 raise NoWayToBegin(NOT_SEEN)
             return Escape(Plan(PlanStatus.NO_PATH, NOT_SEEN))
-        hidden_too: Path | None = None
+        first: Path | None = None
         for share in LOITER_SHARES:
             standing = self._standing(share)
             turn = divert_to_loiter(ahead, 0.0, lead_m, self._room.holds, standing)
             for way in [turn, *ways] if turn is not None else ways:
-                if not self._best([_Option(way, way)], standing, None, threats, share)[0]:
+                if self._best([_Option(way, way)], standing, None, threats, share) is None:
                     continue
                 if not self._leads_behind(way, request):
                     return self._away(request, way, TURNING_AWAY)
-                hidden_too = hidden_too or way
-        if hidden_too is not None:
-            self._began_hidden = True
-            return self._away(request, hidden_too, TURNING_AWAY)
-        return Escape(Plan(PlanStatus.NO_PATH, NO_ROOM))
+                first = first or way
+        if first is None:
+            return Escape(Plan(PlanStatus.NO_PATH, NO_ROOM))
+        self._began_hidden = True
+        return self._away(request, first, TURNING_AWAY)
 
     def _leads_behind(self, path: Path, request: PlanRequest) -> bool:
         """Whether a path leads behind a face that is seen: what lies there may be part of the obstacle."""
@@ -184,25 +184,18 @@ class Escapes:
                 ways.extend(() if ways else rolled_out(prefix, self._room.limits))
                 yield from (_Option(way, way, IN_THE_WAY) for way in ways)
 
-        # What hides behind something that moves or has appeared is no better than that: space seen to be free first.
-        seen, best, unseen = request.seen if threats else None, None, None
-        for share in LOITER_SHARES:
-            # A turn that keeps so much of all that stands can be flown for ever.
-            terrain = self._standing(share)
-            best, other = self._best(options(terrain), terrain, seen, threats, share)
-            unseen = unseen or other
-            if best is not None:
-                break
-        best = best or unseen
-        if best is not None:
+        # A turn that keeps a share of what is wanted of all that stands can be flown for ever. What hides behind
+        # something that moves or has appeared is no better than that: space seen to be free first.
+        terrains = [(share, self._standing(share)) for share in LOITER_SHARES]
+        for seen, (share, terrain) in product((request.seen, None) if threats else (None,), terrains):
+            best = self._best(options(terrain), terrain, seen, threats, share)
+            if best is None:
+                continue
             if best.path is left:
                 return Escape(Plan(PlanStatus.NO_PATH, best.reason), broken=False)
-            committed_to = best.committed
-            return (
-                Escape(committed_to.plan, committed_to)
-                if committed_to
-                else self._away(request, best.path, best.reason)
-            )
+            if best.committed is not None:
+                return Escape(best.committed.plan, best.committed)
+            return self._away(request, best.path, best.reason)
         if certain and not self._began_hidden:
             raise CertificateBroken(request.time_s)
         ways = ways or list(rolled_out(prefix, self._room.limits))
@@ -224,27 +217,24 @@ class Escapes:
         seen: MapView | None,
         threats: Threats | None,
         share: float,
-    ) -> tuple[_Option | None, _Option | None]:
+    ) -> _Option | None:
         """The option that keeps furthest from what is near, of those that keep a share of what is wanted.
 
-        More than what is wanted is no better; each must be clearer than those before it. What is met is met, be it far
-        ahead: with less to be kept, being far ahead counts for less. Returns the best of those in space that was
-        `seen` to be free, and of all; without `seen` they are the same.
+        More than what is wanted is no better; each must be clearer than those before it, and lie in space that was
+        `seen` to be free, if that is given. What is met is met, be it far ahead: with less to be kept, being far ahead
+        counts for less.
         """
         keeps_m = self._room.path_keeps_m
-        best: list[_Option | None] = [None, None]
-        least_m = [share * keeps_m] * 2
+        best, least_m = None, share * keeps_m
         for each in options:
-            room = room_m(each.path, threats, min(least_m), share * LATER)
-            if room < min(least_m) or not (each.standing is None or terrain.admits(each.standing)):
+            room = room_m(each.path, threats, least_m, share * LATER)
+            if room < least_m or not (each.standing is None or terrain.admits(each.standing)):
                 continue
-            free = seen is None or self._certifier.seen_free_to_m(each.path, seen) >= each.path.length_m
-            for i in (0, 1) if free else (1,):
-                if room >= least_m[i]:
-                    best[i], least_m[i] = each, room + CLEARER * keeps_m
-            if least_m[0] > keeps_m:
+            if seen is None or self._certifier.seen_free_to_m(each.path, seen) >= each.path.length_m:
+                best, least_m = each, room + CLEARER * keeps_m
+            if least_m > keeps_m:
                 break
-        return best[0], best[1]
+        return best
 
     def _standing(self, share: float) -> Terrain:
         """Where a curve keeps a share of what is wanted from what stands: what was only refused is in nobody's way."""

@@ -17,8 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.geometry.clearance import inside_bounds
-from planner.geometry.curves import Limits, Point, Pose, Segment, along, full_turn
-from planner.geometry.path_samples import poses_at
+from planner.geometry.curves import Limits, Point, Pose, Segment, along, full_turn, poses_at
 from planner.interface import FloatArray, Mission, Path, PlanRequest
 from planner.kernels.buckets import Buckets, bucketed
 from planner.kernels.room import room_along

@@ -24,9 +24,8 @@ import numpy as np
 
 from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
-from planner.geometry.curves import Point, Pose, Segment, along, between, on_loiter, place_on
+from planner.geometry.curves import Point, Pose, Segment, along, between, on_loiter, place_on, poses_at
 from planner.geometry.joining import LEAD_S
-from planner.geometry.path_samples import poses_at
 from planner.geometry.terrain import WorkCount
 from planner.interface import (
     FloatArray,
@@ -116,7 +115,7 @@ class Shield:
         effective, here_m = self._monitor.plan, request.arc_length_m
         if effective is not None:
             here_m = on_loiter(effective.path, here_m)
-            self._monitor.look(effective, here_m, request.position_m, fresh_m)
+            self._monitor.look(effective, here_m, fresh_m)
             self._monitor.broken |= meets(effective, here_m, self._mission, self._threats)
         answer = self._asked(request, here_m)
         found = self._certified(request, here_m, answer)

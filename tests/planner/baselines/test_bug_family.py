@@ -21,8 +21,8 @@ from planner.baselines.bug import Bug1, Bug2
 from planner.baselines.tangent_bug import TangentBug
 from planner.baselines.walk import PointConfig, WalkLeg, connected
 from planner.contract import GivenMap
+from planner.geometry.clearance import margin_of
 from planner.geometry.curves import Point, pose_at
-from planner.geometry.margin import margin_of
 from planner.interface import BoolArray, FloatArray, Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.plan_checks import checked_plan
 from planner.world_stability import SETTLED_S

@@ -27,11 +27,13 @@ from planner.geometry.curves import (
     onward,
     onward_in_turn,
     place_on,
+    places_along,
     pose_at,
+    poses_at,
     sample,
+    turn_centres,
     turn_onto,
 )
-from planner.geometry.path_samples import places_along, poses_at, turn_centres
 from planner.interface import FloatArray, Path
 from tests.examples import examples
 

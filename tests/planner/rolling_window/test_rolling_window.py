@@ -12,8 +12,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.geometry.curves import end_of, pose_at, sample
-from planner.geometry.path_samples import poses_at
+from planner.geometry.curves import end_of, pose_at, poses_at, sample
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
 from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.config import RollingWindowConfig

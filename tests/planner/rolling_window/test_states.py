@@ -112,7 +112,7 @@ def test_a_place_that_was_turned_before_twice_is_given_up_on_entering_the_loiter
     pilot, now = in_the_loiter()
     assert now.plan is not None
     assert len(pilot._memory.refused_m) == 0
-    pilot._giving_up.first_in_loiter(None)  # as if another plan had come to the same place
+    pilot._loitered = None  # as if another plan had come to the same place
     pilot._loiter(now, now.plan)
     assert pilot.state is PlanningState.LOITERING
     assert len(pilot._memory.refused_m) > 0
@@ -234,8 +234,8 @@ def test_no_room_to_turn_is_no_verdict_while_a_place_is_given_up_that_the_sensor
     giving_up = GivingUp(MISSION, memory)
     giving_up.try_again(narrow=False, at_end=True, arc_length_m=0.0)
     memory.refuse((500.0, 0.0))
-    assert giving_up.narrow(no_room=True, settled=True)
+    assert giving_up.narrow(no_room=True, time_s=0.0)
     memory.ever_cleared = True
-    assert not giving_up.narrow(no_room=True, settled=True)
+    assert not giving_up.narrow(no_room=True, time_s=0.0)
     memory.forgive()
-    assert giving_up.narrow(no_room=True, settled=True)
+    assert giving_up.narrow(no_room=True, time_s=0.0)

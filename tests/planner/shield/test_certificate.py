@@ -12,8 +12,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.geometry.curves import Limits, along, between, end_of, pose_at, sample
-from planner.geometry.path_samples import poses_at
+from planner.geometry.curves import Limits, along, between, end_of, pose_at, poses_at, sample
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, Path
 from planner.shield.certificate import Certified, Certifier, disc_radius_m

@@ -12,8 +12,7 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from planner.geometry.curves import Limits, onward, pose_at, sample
-from planner.geometry.path_samples import poses_at
+from planner.geometry.curves import Limits, onward, pose_at, poses_at, sample
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, PlanStatus
 from planner.rolling_window.planner import RollingWindow
 from planner.shield.encounters import EARLIEST, LATEST
