@@ -7,7 +7,8 @@ initial and terminal positions and tangents", American Journal of Mathematics 79
 A branch leads from a pose to a place: a turn at the turn radius and straight on, the shortest such curve to a place
 outside the turning circles on whatever course. What has not been seen is taken to be free. The tree grows for a number
 of iterations, not for a time, from a seed, so that the same flight is planned the same way. Every new branch tries the
-goal, and of the ways found the shortest is taken, after places in between that can be passed by have been left out.
+goal; from a way that is found the places that can be passed by are left out, and no place is tried any more through
+which no shorter way can lead. The shortest way is taken.
 """
 
 from __future__ import annotations
@@ -108,15 +109,20 @@ class DubinsTree(Replanner):
         low = np.maximum(ends.min(axis=0) - reach_m, bounds[0])
         high = np.minimum(ends.max(axis=0) + reach_m, bounds[1])
         for east, north in self._random.uniform(low, high, (self._iterations, 2)).tolist():
-            nearest = min(nodes, key=lambda node: math.dist(node.pose[:2], (east, north)))
-            new = self._onward(nearest, (east, north), terrain, 0.5 * reach_m)
+            aim, best_m = (east, north), math.inf if best is None else best.length_m
+            if math.dist(start[:2], aim) + math.dist(aim, goal) >= best_m:
+                continue
+            nearest = min(nodes, key=lambda node: math.dist(node.pose[:2], aim))
+            new = self._onward(nearest, aim, terrain, 0.5 * reach_m)
             if new is None:
                 continue
             nodes.append(new)
             there = self._onward(new, goal, terrain)
-            if there is not None and (best is None or there.length_m < best.length_m):
-                best = there
-        return best and self._shortened(nodes[0], best, terrain)
+            if there is not None:
+                best = min(
+                    self._shortened(nodes[0], there, terrain), best or there, key=lambda node: node.length_m
+                )
+        return best
 
     def _onward(self, node: Node, place: Point, terrain: Terrain, most_m: float = math.inf) -> Node | None:
         """The node at the end of a branch towards a place, at most so long; None where it is not free."""
