@@ -3,7 +3,8 @@
 Each world with a way to the goal, and each without one, is flown by the Aerosonde, in calm air if nothing else is
 said, and judged by the independent referee, which knows the true obstacles. Prints a row for each family, then what
 the referee or the verdict found wrong, and exits with 1 where that is anything. MOST is how many worlds of a family
-are flown, WIND the speed of a wind from 300 degrees, m/s.
+are flown, WIND the speed of a wind from 300 degrees, m/s. Beside the tail of the flights stands that of an exact point
+robot with the same sensing range in the same worlds (`tests.closed_loop.point_robot`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 from harness.run.scenario_flight import fly_to_folder
 from harness.scenario.scenario import load_scenario
+from tests.closed_loop.point_robot import over_the_optimum
 
 SHARED: Final = Path(__file__).parents[3] / "shared"
 FAMILIES: Final[dict[str, tuple[str, ...]]] = {
@@ -61,6 +63,7 @@ def judged(world: Path, folder: Path, wind: str) -> dict[str, Any]:
     return {
         "end": metrics["outcome"],
         "ratio": metrics["flown_length_m"] / facts["optimum_m"] if reached else None,
+        "point": over_the_optimum(facts) if reached else None,
         "p50_ms": metrics["compute_ms"]["p50"],
         "p99_ms": metrics["compute_ms"]["p99"],
         "faults": [f"{world.stem}: {fault}" for fault in faults],
@@ -84,8 +87,14 @@ def worlds(folders: tuple[str, ...], most: int) -> list[Path]:
 
 def row(name: str, flown: list[dict[str, Any]]) -> str:
     """The row of a family, and how its flights ended."""
-    ratios = [each["ratio"] for each in flown if each["ratio"] is not None]
-    length = f"{np.median(ratios):.2f} | {np.percentile(ratios, 95):.2f}" if ratios else "- | -"
+    ratios, point = (
+        np.array([each[key] for each in flown if each["ratio"] is not None]) for key in ("ratio", "point")
+    )
+    length = "- | - | -"
+    if len(ratios):
+        # A point that is caught has no length: it is the longest.
+        tails = [np.percentile(each, 95) for each in (ratios, point)]
+        length = f"{np.median(ratios):.2f} | {tails[0]:.2f} | {tails[1]:.2f}"
     half, tail = np.median([each["p50_ms"] for each in flown]), max(each["p99_ms"] for each in flown)
     ends = ", ".join(f"{count} {end}" for end, count in Counter(each["end"] for each in flown).most_common())
     return f"| {name} | {len(flown)} | {length} | {half:.1f} | {tail:.0f} | ({ends})"
@@ -94,7 +103,8 @@ def row(name: str, flown: list[dict[str, Any]]) -> str:
 def main(most: int, wind: str = "") -> int:
     wrong: list[str] = []
     print(
-        "| worlds | number | length over the optimum: median | p95 | planner p50: median, ms | p99: largest, ms |"
+        "| worlds | number | length over the optimum: median | p95 | p95 of a point robot "
+        "| planner p50: median, ms | p99: largest, ms |"
     )
     with tempfile.TemporaryDirectory() as folder:
         for name, folders in FAMILIES.items():

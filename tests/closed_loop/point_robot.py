@@ -1,0 +1,146 @@
+"""An exact point robot: the shortest way through what it has seen, taken anew whenever something seen blocks that.
+
+It turns on the spot, sees every edge point within its range that nothing hides, forgets nothing, and takes what it has
+not seen to be free. No planner of that sensing range and memory that trusts free space is shorter at every turn: its
+tail is what the tail of an aircraft is measured against. `python -m tests.closed_loop.point_robot WORLD.json...` prints
+its length over the optimum in shared worlds.
+"""
+
+from __future__ import annotations
+
+import heapq
+import json
+import math
+import sys
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import shapely
+
+from planner.baselines.grown import GrownObstacles
+from planner.baselines.polyline import length_of, piece
+from planner.contract import GivenMap
+from planner.geometry.curves import Point
+from planner.interface import FloatArray, Mission
+
+SIMPLER_SHARE: Final = 0.03
+"""Outlines at the clearance are simplified by a fifth of this share of it."""
+SPACING_SHARE: Final = 1.0 / 6.0
+"""Edge points are this share of the clearance apart: outlines have dents of 0.4 % of it."""
+LOOKS: Final = 40
+"""It looks this many times in a sensing range."""
+HIDDEN_M: Final = 0.5
+"""An edge point is seen unless the line to it goes this deep through an obstacle."""
+ON_RIM_M: Final = 0.01
+"""A place so near to an outline is on it."""
+FURTHEST: Final = 30.0
+"""It gives up after so many times the optimum."""
+
+
+class Seen(GivenMap):
+    """The edge points of true obstacles that have been in sight from somewhere."""
+
+    def __init__(self, obstacles: list[Any], range_m: float, spacing_m: float) -> None:
+        super().__init__(np.zeros((0, 2)))
+        self.revision, self._range = 0, range_m
+        self._unseen = shapely.get_coordinates(shapely.segmentize(shapely.boundary(obstacles), spacing_m))
+        self._shown: list[FloatArray] = []
+        self._solid = shapely.union_all(shapely.buffer(obstacles, -HIDDEN_M))
+        shapely.prepare(self._solid)
+
+    def look(self, place: Point) -> bool:
+        """Whether something new is in sight."""
+        near = np.flatnonzero(np.hypot(*(self._unseen - place).T) < self._range)
+        lines = shapely.linestrings(np.stack(np.broadcast_arrays(place, self._unseen[near]), axis=1))
+        fresh = near[~shapely.intersects(self._solid, lines)]
+        if len(fresh):
+            self._shown.append(self._unseen[fresh])
+            self._unseen = np.delete(self._unseen, fresh, axis=0)
+            self.revision += 1
+        return len(fresh) > 0
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return np.concatenate([self._points, *self._shown[max(revision, 0) :]])
+
+
+def shortest(known: GrownObstacles, start: Point, goal: Point) -> list[Point]:
+    """The shortest way through what is known, by A* over tangents; none where none leads there."""
+    every = set(range(10_000))  # of the obstacles, however many there are
+    best: dict[Point, float] = {start: 0.0}
+    before: dict[Point, Point] = {}
+    queue, done = [(math.dist(start, goal), start)], set[Point]()
+    while queue:
+        _, place = heapq.heappop(queue)
+        if place == goal:
+            way = [goal]
+            while way[-1] != start:
+                way.append(before[way[-1]])
+            return way[::-1]
+        if place in done:
+            continue
+        done.add(place)
+        onward = [each.place for each in known.tangents(place, every, math.inf) if each.seen]
+        if math.isinf(known.first_hit(place, goal)[0]):
+            onward.append(goal)
+        if known.off_m(place) < ON_RIM_M:  # between two small dents no corner is in sight
+            rims = (known.boundary(place, side, known.keep_m) for side in (1.0, -1.0))
+            onward += [(float(rim[1, 0]), float(rim[1, 1])) for rim in rims]
+        for there in onward:
+            way_m = best[place] + math.dist(place, there)
+            if way_m < best.get(there, math.inf):
+                best[there], before[there] = way_m, place
+                heapq.heappush(queue, (way_m + math.dist(there, goal), there))
+    return []
+
+
+def walked_m(obstacles: list[Any], mission: Mission, start: Point, most_m: float) -> float:
+    """Length of its way to the goal circle; infinite where it finds none, or none so short."""
+    keep_m, step_m = mission.clearance_m, mission.sensor_range_m / LOOKS
+    margin_m = SIMPLER_SHARE * keep_m
+    known = GrownObstacles(replace(mission, clearance_m=keep_m - margin_m), margin_m)
+    seen = Seen(obstacles, mission.sensor_range_m, SPACING_SHARE * keep_m)
+    place, way, length_m = start, [start, mission.goal_m], 0.0
+    while math.dist(place, mission.goal_m) > mission.goal_radius_m and length_m < most_m:
+        if seen.look(place):
+            known.take_in(seen)
+            if any(math.isfinite(known.first_hit(a, b)[0]) for a, b in pairwise(way)):
+                way = shortest(known, place, mission.goal_m)
+                if not way:  # an outline has grown over it by a hair
+                    rim = known.boundary(place, 1.0, 0.0)[0]
+                    way = [place, *shortest(known, (float(rim[0]), float(rim[1])), mission.goal_m)]
+                if len(way) < 2:
+                    return math.inf
+        left_m = min(step_m, math.dist(place, mission.goal_m) - 0.99 * mission.goal_radius_m)
+        flown = piece(np.array(way), 0.0, left_m)
+        length_m += length_of(flown)
+        place = (float(flown[-1, 0]), float(flown[-1, 1]))
+        way = [place, *map(tuple, piece(np.array(way), left_m, math.inf)[1:].tolist())]
+    return length_m if length_m < most_m else math.inf
+
+
+def over_the_optimum(world: dict[str, Any]) -> float:
+    """Its length over the optimum in a shared world, to the goal circle as flights are."""
+    circles = [shapely.Point(each[:2]).buffer(each[2], quad_segs=64) for each in world["circles_m"]]
+    obstacles = [*circles, *(shapely.Polygon(each) for each in world["polygons_m"])]
+    goal, bounds = tuple(world["goal_m"]), tuple(world["bounds_m"])
+    mission = Mission(
+        goal,
+        world["goal_radius_m"],
+        bounds,
+        world["clearance_m"],
+        1.0,
+        1.0,
+        1.0,
+        1.0,
+        world["sensor_range_m"],
+    )
+    optimum_m = float(world["optimum_m"])
+    return walked_m(obstacles, mission, tuple(world["start_m"]), FURTHEST * optimum_m) / optimum_m
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        print(Path(name).stem, f"{over_the_optimum(json.loads(Path(name).read_text())):.3f}", flush=True)
