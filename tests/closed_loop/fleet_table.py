@@ -23,12 +23,12 @@ from aircraft.envelope import performance
 from aircraft.law_cards import law_card
 from harness.analysis.metrics import metrics
 from harness.bench.tracking import CASES
-from harness.certification.bounds import clopper_pearson
 from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
 from harness.run.scenario_flight import flight_limits, make_loop
 from harness.scenario.kinds import guidance_kinds
 from harness.scenario.scenario import Scenario, scenario_of
+from tests.closed_loop.tables import line, upper
 
 LAWS: Final = ("preview", "npfg", "l1", "vector_field", "pure_pursuit", "bearing")
 AIRS: Final = {case.name: case for case in CASES if case.limits}
@@ -147,10 +147,10 @@ def flown(name: str, law: str, air: str, seed: int, range_radii: float = RANGE) 
     return Flown(name, law, air, seed, *ended, share, off_m, high_m, ", ".join(sorted(causes)))
 
 
-def table(head: str, key: int, flights: list[Flown]) -> None:
+def table(title: str, key: int, flights: list[Flown]) -> None:
     """Prints a row for each value of a column of `Flown`, and all."""
     laws = [law for law in LAWS if any(each.law == law for each in flights)]
-    print(f"\n| {head} | {' | '.join(f'`{law}`' for law in laws)} |")
+    print("", line(title, *(f"`{law}`" for law in laws)), sep="\n")
     for value in [*dict.fromkeys(each[key] for each in flights), "all"]:
         rows = [each for each in flights if value in (each[key], "all")]
         cells = [[each for each in rows if each.law == law] for law in laws]
@@ -159,7 +159,7 @@ def table(head: str, key: int, flights: list[Flown]) -> None:
             f"{len(there)}, {sum(not each.causes for each in there)} of {len(cell)}"
             for there, cell in zip(reached, cells, strict=True)
         )
-        print(f"| {value} | {' | '.join(told)} |")
+        print(line(str(value), *told))
 
 
 def main(log: Path, names: list[str]) -> int:
@@ -173,8 +173,7 @@ def main(log: Path, names: list[str]) -> int:
     flights = list(known.values())
     hit = sum(each.outcome == "collision" for each in flights)
     count = sum(each.outcome != "refused" for each in flights)
-    most = 1.0 - clopper_pearson(count - hit, count, 0.95)[0]
-    print(f"{hit} of {count} flights hit an obstacle: less than {most:.2%} at 95 %")
+    print(f"{hit} of {count} flights hit an obstacle: less than {upper(hit, count):.2%} at 95 %")
     table("aircraft", 0, flights)
     table("air", 2, flights)
     for each in flights:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import csv
 import math
-import re
 import sys
 import time
 from pathlib import Path
@@ -19,7 +18,6 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
-from scipy.stats import beta
 from shapely import LineString, Point, Polygon, box
 
 import wayproof
@@ -27,6 +25,7 @@ from harness.scenario.kinds import planner_kinds
 from planner.interface import Mission, Plan, Planner, PlanRequest
 from planner.shield.shield import Shield
 from tests.closed_loop.hostile import HOSTILE
+from tests.closed_loop.tables import fill, head, line, upper
 
 KINDS: Final = ("improved_bug", "tangent_bug", "bug2", "bug1", "vfh_plus", "bendy_ruler", "mppi")
 OWN: Final = "rolling_window"
@@ -153,19 +152,20 @@ def flown(name: str, number: int, shield: str, limit_s: float = 130.0) -> dict[s
     }
 
 
-def upper(hits: int, flights: int) -> float:
-    """Upper 95 % bound of a share, Clopper and Pearson, one-sided."""
-    return float(beta.ppf(0.95, hits + 1, flights - hits)) if flights > hits else 1.0
-
-
 def table(rows: pd.DataFrame) -> str:
     """A row a planner, in Markdown, and the bounds over all."""
-    told = [
-        "| planner | flights | reached | of those without a wall | contacts, departures | bare: contacts "
-        "| length over bare: median, p95 (n) | refused, share of calls | on the backup, s a flight "
-        "| shield alone, p50, p99 of the median flight, ms |",
-        "|" + " --- |" * 10,
-    ]
+    told = head(
+        "planner",
+        "flights",
+        "reached",
+        "of those without a wall",
+        "contacts, departures",
+        "bare: contacts",
+        "length over bare: median, p95 (n)",
+        "refused, share of calls",
+        "on the backup, s a flight",
+        "shield alone, p50, p99 of the median flight, ms",
+    )
     safe, bare = rows[rows.shield == "loiter"], rows[rows.shield == "none"]
     for name in PLANNERS:
         mine = safe[safe.planner == name]
@@ -179,27 +179,25 @@ def table(rows: pd.DataFrame) -> str:
         open_ = mine[mine.world % 3 != 0]
         own = f"{mine.own_p50_ms.median():.1f}, {mine.own_p99_ms.median():.1f}" if mine.calls.sum() else "-"
         told.append(
-            f"| {TOLD.get(name, f'`{name}`')} | {len(mine)} | {(mine.outcome == 'reached').sum()} | "
-            f"{(open_.outcome == 'reached').sum()} of {len(open_)} | {mine.contact.sum()}, {mine.departed.sum()} | "
-            f"{bare_hits} | {ratio} | {refused} | {mine.backup_s.mean():.1f} | {own} |"
+            line(
+                TOLD.get(name, f"`{name}`"),
+                f"{len(mine)}",
+                f"{(mine.outcome == 'reached').sum()}",
+                f"{(open_.outcome == 'reached').sum()} of {len(open_)}",
+                f"{mine.contact.sum()}, {mine.departed.sum()}",
+                bare_hits,
+                ratio,
+                refused,
+                f"{mine.backup_s.mean():.1f}",
+                own,
+            )
         )
-    told += [f"least distance: {safe.away_m.min():.1f} m"]
+    told += ["", f"least distance: {safe.away_m.min():.1f} m"]
     for what in ("contact", "departed"):
         hits, flights = int(safe[what].sum()), len(safe)
         bound = f"below {100 * upper(hits, flights):.2f} % at 95 %"
         told += [f"{what}: {hits} of {flights}, {bound}; bare {bare[what].sum()} of {len(bare)}"]
     return "\n".join(told)
-
-
-def put(table: str, file: Path) -> None:
-    """Puts the tables of a text into a Markdown file, in place of those that have the same heads."""
-    old = file.read_text()
-    for new in re.findall(r"(?m)(?:^\|.*\n?)+", table):
-        head, rows = new.split("\n", 1)
-        begin = old.index(head)
-        end = old.find("\n\n", begin)
-        old = f"{old[:begin]}{head}\n{rows.rstrip()}{old[end:]}"
-    file.write_text(old)
 
 
 def main(file: Path, flights: int, part: int = 0, parts: int = 1) -> None:
@@ -224,6 +222,6 @@ if __name__ == "__main__":
         text = table(pd.concat([pd.read_csv(each) for each in given if each.endswith(".csv")]))
         print(text)
         if given[-1].endswith(".md"):
-            put(text, Path(given[-1]))
+            fill("shield", text.partition("\n\n")[0], Path(given[-1]))
     else:
         main(Path(given[0]), *map(int, given[1:]))

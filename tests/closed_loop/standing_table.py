@@ -1,8 +1,9 @@
 """The standing table of `planner/MEASURED.md` from a campaign: `python -m tests.closed_loop.standing_table FOLDER`.
 
 A row each planner and wind, in Markdown; then every planner in pairs with `rolling_window` in the same world and wind.
-With `planner/MEASURED.md` behind it, the tables are put there.
-The campaign's page has the rest; `wayproof report FOLDER --format latex` and `csv` have its own table.
+With `planner/MEASURED.md` behind it, the tables are put there. Only worlds that every planner has flown count, so that
+a campaign which is still being flown compares like with like. The campaign's page has the rest; `wayproof report FOLDER
+--format latex` and `csv` have its own table.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from scipy import stats
 
 from harness.campaign.cell import wilson
 from harness.campaign.paired import mean_estimate
-from tests.closed_loop.shield_table import put, upper
+from tests.closed_loop.tables import fill, head, line, upper
 
 WIND: Final = "environment.wind.speed_mps"
 YARDSTICK: Final = "rolling_window"
@@ -41,6 +42,8 @@ def load(folder: Path) -> pd.DataFrame:
     rows = pd.read_parquet(folder / "results.parquet").merge(
         pd.read_parquet(folder / "timings.parquet"), on="run"
     )
+    planners = rows.groupby("case").planner.nunique()
+    rows = rows[rows.case.map(planners) == rows.planner.nunique()].copy()
     rows["reached"] = rows.outcome == "reached"
     rows["contact"] = rows.outcome == "collision"
     best = rows[rows.reached].groupby("case").flown_length_m.min()
@@ -68,7 +71,7 @@ def row(name: str, wind: float, of: pd.DataFrame) -> str:
         f"{of['trackability.not_trackable'].sum():.0f} of {of['trackability.legs'].sum():.0f}",
         f"{of['compute_ms.p50'].median():.1f}, {of['compute_ms.p99'].median():.1f}",
     )
-    return f"| {' | '.join(cells)} |"
+    return line(*cells)
 
 
 def pairs(rows: pd.DataFrame) -> list[str]:
@@ -86,23 +89,18 @@ def pairs(rows: pd.DataFrame) -> list[str]:
         least = max(least, min(1.0, p * (len(found) - place)))
         mean = mean_estimate(log.to_numpy(), log.index.to_numpy())
         low, high = np.exp((mean.low or 0.0, mean.high or 0.0))
-        told.append(
-            f"| `{name}` | {len(log)} | {np.exp(log.mean()):.3f} [{low:.3f}, {high:.3f}] | {least:.2g} |"
-        )
+        ratio = f"{np.exp(log.mean()):.3f} [{low:.3f}, {high:.3f}]"
+        told.append(line(f"`{name}`", f"{len(log)}", ratio, f"{least:.2g}"))
     return told
 
 
 def tables(folder: Path) -> str:
     """Both tables."""
     rows = load(folder)
-    told = [f"| {' | '.join(HEAD)} |", f"|{' --- |' * len(HEAD)}"]
+    told = head(*HEAD)
     for name in rows.planner.unique():
         told += [row(name, wind, of) for wind, of in rows[rows.planner == name].groupby(WIND)]
-    told += [
-        "",
-        f"| planner | pairs | length over `{YARDSTICK}`, mean [95 %] | p |",
-        "| --- | --- | --- | --- |",
-    ]
+    told += ["", *head("planner", "pairs", f"length over `{YARDSTICK}`, mean [95 %]", "p")]
     return "\n".join((*told, *pairs(rows)))
 
 
@@ -110,4 +108,4 @@ if __name__ == "__main__":
     text = tables(Path(sys.argv[1]))
     print(text)
     if len(sys.argv) > 2:
-        put(text, Path(sys.argv[2]))
+        fill("standing table", text, Path(sys.argv[2]))

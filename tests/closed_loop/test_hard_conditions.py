@@ -21,11 +21,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from harness.certification.bounds import clopper_pearson
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight, Outcome
 from harness.run.scenario_flight import fly_to_folder, make_loop
 from harness.scenario.scenario import Scenario, scenario_of
+from tests.closed_loop.tables import fill, head, line, upper
 from tests.closed_loop.worlds_table import SHARED, referee_faults
 
 WORLDS = SHARED / "worlds"
@@ -192,12 +192,7 @@ class Cell(NamedTuple):
         """Goals reached, collisions and the bound of their share at 95 %, least clearance over the wanted one."""
         hit = self.ends.count("collision")
         reached = f"{self.ends.count('reached')}/{len(self.ends)}"
-        return f"{reached}, {hit} (< {most_share(hit, len(self.ends)):.0%}), {min(self.shares):.2f}"
-
-
-def most_share(hit: int, flights: int) -> float:
-    """Upper bound of the share of flights that hit, at 95 %."""
-    return 1.0 - clopper_pearson(flights - hit, flights, 0.95)[0]
+        return f"{reached}, {hit} (< {upper(hit, len(self.ends)):.0%}), {min(self.shares):.2f}"
 
 
 def _cell(family: str, condition: str, most: int, folder: Path, day: str | None) -> Cell:
@@ -224,37 +219,23 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--write", action="store_true")
     asked = parser.parse_args(arguments)
     cells: list[Cell] = []
-    lines: list[str] = []
-
-    def tell(*words: str) -> None:
-        lines.append(f"| {' | '.join(words)} |")
-        print(lines[-1], flush=True)
-
-    tell("condition", *asked.families)
-    tell("---", *["---"] * len(asked.families))
+    lines = head("condition", *asked.families)
+    print(*lines, sep="\n", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         for condition in CONDITIONS:
             row = [_cell(each, condition, asked.most, Path(folder), asked.day) for each in asked.families]
             cells += row
-            tell(condition, *map(str, row))
+            lines.append(line(condition, *map(str, row)))
+            print(lines[-1], flush=True)
     ends = [end for cell in cells for end in cell.ends]
     hit, faults = ends.count("collision"), [fault for cell in cells for fault in cell.faults]
-    below = f"{hit} hit (below {most_share(hit, len(ends)):.2%} at 95 %)"
+    below = f"{hit} hit (below {upper(hit, len(ends)):.2%} at 95 %)"
     judged = " ".join(faults) or "the referee has no fault to find"
     summary = f"{ends.count('reached')} of {len(ends)} flights reached the goal, {below}; {judged}."
     print(summary)
     if asked.write and asked.day:
-        write(asked.day, "\n".join([*lines, "", summary]))
+        fill(f"hard conditions: {asked.day}", "\n".join([*lines, "", summary]))
     return 1 if faults else 0
-
-
-def write(name: str, text: str) -> None:
-    """Puts a table between its two marks in planner/MEASURED.md."""
-    page = Path(__file__).parents[2] / "planner" / "MEASURED.md"
-    before, begin, rest = page.read_text("utf-8").partition(f"<!-- hard conditions: {name} -->\n")
-    _, end, after = rest.partition("<!-- end -->")
-    assert end, f"{page} has no place for {name}"
-    page.write_text(f"{before}{begin}{text}\n{end}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ import numpy as np
 from harness.run.scenario_flight import fly_to_folder
 from harness.scenario.scenario import load_scenario
 from tests.closed_loop.point_robot import over_the_optimum
+from tests.closed_loop.tables import head, line
 
 SHARED: Final = Path(__file__).parents[3] / "shared"
 FAMILIES: Final[dict[str, tuple[str, ...]]] = {
@@ -90,22 +91,20 @@ def row(name: str, flown: list[dict[str, Any]]) -> str:
     ratios, point = (
         np.array([each[key] for each in flown if each["ratio"] is not None]) for key in ("ratio", "point")
     )
-    length = "- | - | -"
+    length = ["-", "-", "-"]
     if len(ratios):
         # A point that is caught has no length: it is the longest.
         tails = [np.percentile(each, 95) for each in (ratios, point)]
-        length = f"{np.median(ratios):.2f} | {tails[0]:.2f} | {tails[1]:.2f}"
+        length = [f"{each:.2f}" for each in (np.median(ratios), *tails)]
     half, tail = np.median([each["p50_ms"] for each in flown]), max(each["p99_ms"] for each in flown)
     ends = ", ".join(f"{count} {end}" for end, count in Counter(each["end"] for each in flown).most_common())
-    return f"| {name} | {len(flown)} | {length} | {half:.1f} | {tail:.0f} | ({ends})"
+    return line(name, f"{len(flown)}", *length, f"{half:.1f}", f"{tail:.0f}") + f" ({ends})"
 
 
 def main(most: int, wind: str = "") -> int:
     wrong: list[str] = []
-    print(
-        "| worlds | number | length over the optimum: median | p95 | p95 of a point robot "
-        "| planner p50: median, ms | p99: largest, ms |"
-    )
+    titles = ("worlds", "number", "length over the optimum: median", "p95", "p95 of a point robot")
+    print(*head(*titles, "planner p50: median, ms", "p99: largest, ms"), sep="\n")
     with tempfile.TemporaryDirectory() as folder:
         for name, folders in FAMILIES.items():
             flown = [judged(world, Path(folder), wind) for world in worlds(folders, most)]
