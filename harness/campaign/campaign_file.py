@@ -20,7 +20,7 @@ from harness.scenario.kinds import planner_kinds
 from harness.scenario.resolving import model_or_folder
 from harness.scenario.sections import AircraftSpec, PlannerSpec, Section
 from harness.scenario.shipped import shipped_scenarios
-from harness.scenario.validation import NAME_PATTERN, KeyFault, input_error, shown
+from harness.scenario.validation import NAME_PATTERN, KeyFault, KeyFaults, shown
 
 SCHEMA: Final = "wayproof/campaign/1"
 MAX_RUNS: Final = 1_000_000
@@ -267,7 +267,7 @@ def _validated(root: Node, source: str) -> Campaign:
     try:
         return Campaign.model_validate(root.plain())
     except ValidationError as error:
-        raise input_error(error, Campaign, root, source) from error
+        raise KeyFaults.of(error, Campaign).in_file(root, source) from error
 
 
 def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list[Path]:

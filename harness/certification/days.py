@@ -22,7 +22,7 @@ from harness.campaign.runs import CampaignRuns
 from harness.files.strict_yaml import COMMAND_LINE, InputError, node_of
 from harness.run.path_check import PathCheck
 from harness.scenario.scenario import Scenario
-from harness.scenario.validation import input_error
+from harness.scenario.validation import KeyFaults
 
 Settings = Sequence[tuple[str, str]]
 
@@ -70,7 +70,7 @@ class Days(CampaignRuns):
         try:
             campaign = Campaign.model_validate(plain)
         except ValidationError as error:
-            raise input_error(error, Campaign, root, "command line") from error
+            raise KeyFaults.of(error, Campaign).in_file(root, "command line") from error
         super().__init__(CampaignFile(campaign, "command line", root, (base,)), *sources)
         self.claim: Claim = claim
         self.vary = vary

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
+from contextlib import redirect_stdout
 from pathlib import Path
 from traceback import walk_tb
 from typing import Final, NamedTuple
 
 from harness.files.crash import sentence, trace
-from harness.files.printing import PrintingAside
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport
@@ -76,7 +77,7 @@ class AskedPlanner:
         """
         begun, began = time.thread_time(), time.perf_counter()
         try:
-            with PrintingAside():
+            with redirect_stdout(sys.stderr):
                 own = self._planner.plan(request)
                 if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
                     self.compute_ms = 1e3 * (time.thread_time() - begun)
@@ -87,7 +88,7 @@ class AskedPlanner:
         except WrongAnswerError as error:
             raise PlannerFailedError(str(error), trace(error)) from None
         except BaseException as error:  # whatever it is, it is no more than a plan that failed
-            with PrintingAside():
+            with redirect_stdout(sys.stderr):
                 told = f"the planner raised {sentence(error)}{_where(error)}"
                 raise PlannerFailedError(told, trace(error)) from None
 

@@ -35,11 +35,7 @@ def _prepare(model: str) -> None:
 
 
 def airframe_of(spec: AircraftSpec) -> Airframe:
-    """The airframe of a scenario, with its servos and its autopilot.
-
-    Raises:
-        AircraftError: there is none, or it cannot be flown.
-    """
+    """The airframe of a scenario, with its servos and its autopilot; an AircraftError says why it cannot be flown."""
     from aircraft.actuators import Actuator, Actuators
     from aircraft.airframe import DERIVED, AutopilotKeys
     from aircraft.airframes import airframe
@@ -56,11 +52,7 @@ def airframe_of(spec: AircraftSpec) -> Airframe:
 
 
 def flown_airframe(spec: AircraftSpec) -> Airframe:
-    """The same, with a model that deviates from what figures, limits and gains are of.
-
-    Raises:
-        AircraftError: there is none, or it cannot be flown.
-    """
+    """The same, with a model that deviates from what figures, limits and gains are of."""
     from aircraft.deviation import Deviation
 
     frame = airframe_of(spec)

@@ -12,11 +12,9 @@ south-west corner and the goal in the north-east one, `room_m` from both edges.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 
 from harness.scenario.sections import MAX_COORDINATE_M, Length, Section
@@ -86,28 +84,36 @@ class Circles(Section):
 
     @property
     def most_each(self) -> int:
-        """Obstacles that one of them can consist of."""
+        """Discs that one of them can consist of."""
         return 1
 
     def world(self, rng: np.random.Generator) -> GeneratedWorld:
-        """The area with discs in it."""
-        radii = rng.uniform(*self.radius_m, self.number)
-        rows = zip(self._places(radii, rng), radii.tolist(), strict=True)
-        return self._with(_circle(place, radius) for place, radius in rows if place)
-
-    def _with(self, obstacles: Iterable[ObstacleKeys]) -> GeneratedWorld:
+        """The area with its obstacles."""
+        groups = self._groups(rng)
+        reach = [max(math.hypot(*at) + radius for at, radius in group) for group in groups]
         (width, height), room = self.size_m, self.room_m
-        ends = (room, room), (width - room, height - room)
-        return GeneratedWorld((0.0, 0.0, width, height), *ends, tuple(obstacles))
+        start, goal = (room, room), (width - room, height - room)
+        obstacles = [
+            _circle((place[0] + at[0], place[1] + at[1]), radius)
+            for place, group in zip(self._places(reach, (start, goal), rng), groups, strict=True)
+            if place
+            for at, radius in group
+        ]
+        return GeneratedWorld((0.0, 0.0, width, height), start, goal, tuple(obstacles))
 
-    def _places(self, radii_m: NDArray[np.float64], rng: np.random.Generator) -> list[Place | None]:
-        """A middle for each disc of these radii, None for one without a place."""
-        ends = self._with(())
-        taken = np.empty((len(radii_m) + 2, 3))  # east, north, what is kept from it
-        taken[:2] = (*ends.start_m, self.room_m), (*ends.goal_m, self.room_m)
+    def _groups(self, rng: np.random.Generator) -> list[list[tuple[Place, float]]]:
+        """Of each obstacle the discs: their middles from its own, and their radii."""
+        return [[((0.0, 0.0), radius)] for radius in rng.uniform(*self.radius_m, self.number).tolist()]
+
+    def _places(
+        self, reach_m: list[float], ends_m: tuple[Place, Place], rng: np.random.Generator
+    ) -> list[Place | None]:
+        """A middle for each obstacle that reaches so far about it, None for one without a place."""
+        taken = np.empty((len(reach_m) + 2, 3))  # east, north, what is kept from it
+        taken[:2] = [(*end, self.room_m) for end in ends_m]
         found: list[Place | None] = []
         in_vain = 0
-        for radius in radii_m.tolist():
+        for radius in reach_m:
             discs = taken[: len(found) - in_vain + 2]
             found.append(None)
             for _ in range(TRIES // AT_ONCE if in_vain < FULL else 0):
@@ -136,16 +142,8 @@ class Forest(Circles):
         """The trunks of a copse."""
         return self.trunks[1]
 
-    def world(self, rng: np.random.Generator) -> GeneratedWorld:
-        """The area with copses in it."""
-        copses = [self._copse(rng) for _ in range(self.number)]
-        reach = np.array([max(math.hypot(*at) + radius for at, radius in copse) for copse in copses])
-        return self._with(
-            _circle((place[0] + at[0], place[1] + at[1]), radius)
-            for place, copse in zip(self._places(reach, rng), copses, strict=True)
-            if place
-            for at, radius in copse
-        )
+    def _groups(self, rng: np.random.Generator) -> list[list[tuple[Place, float]]]:
+        return [self._copse(rng) for _ in range(self.number)]
 
     def _copse(self, rng: np.random.Generator) -> list[tuple[Place, float]]:
         """Trunks about (0, 0): the first there, the others overlapping it."""

@@ -7,7 +7,6 @@ itself, an object with the part's methods.
 
 from __future__ import annotations
 
-import functools
 import importlib
 import importlib.util
 import inspect
@@ -15,6 +14,7 @@ import sys
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -48,10 +48,8 @@ def own_words(planner: str | None, law: str | None) -> list[str]:
 def registered(given: object, part: LoopPart = PLANNER) -> str:
     """Registers what was given, unless it has been; returns the name by which scenarios of this process know it.
 
-    As text it is a kind that is known, or FILE.py:NAME or MODULE:NAME.
-
-    Raises:
-        ValueError: it is none of these, or what it names cannot be imported; one sentence.
+    As text it is a kind that is known, or FILE.py:NAME or MODULE:NAME. A ValueError, one sentence, says why it is none
+    of these, or cannot be imported.
     """
     if isinstance(given, str):
         return registered_source(given, part) if is_source(given) else given
@@ -67,11 +65,10 @@ def registered(given: object, part: LoopPart = PLANNER) -> str:
 def registered_source(source: str, part: LoopPart = PLANNER) -> str:
     """Imports what FILE.py:NAME or MODULE:NAME names and registers it under that name, without the file's folder.
 
-    Raises:
-        ValueError: there is no such file, module or object, it cannot be imported, or it is no such part.
+    A ValueError says that there is no such file, module or object, why it cannot be imported, or is no such part.
     """
     place, _, name = source.rpartition(":")
-    module = _file(Path(place)) if place.endswith(".py") else _module(place, source)
+    module = _imported(place, source)
     if not name.isidentifier() or not hasattr(module, name):
         there = [each for each, value in vars(module).items() if _is_own(value, module)]
         raise ValueError(
@@ -82,18 +79,8 @@ def registered_source(source: str, part: LoopPart = PLANNER) -> str:
     return kind.kind
 
 
-@functools.lru_cache(maxsize=64)
-def _same_kind_of(given: object, part: LoopPart) -> Kind:
-    """The same kind for the same object: what was measured of it holds on."""
-    return kind_of(given, part)
-
-
 def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
-    """What was given, as the registry of its part has it.
-
-    Raises:
-        ValueError: it is not what this module says.
-    """
+    """What was given, as the registry of its part has it; a ValueError says why it is not what this module says."""
     if isinstance(given, PlannerKind | GuidanceKind) and type(given) is part.kind:
         return given
     made: Callable[[Any, Any], Any] = lambda _keys, _told: given  # noqa: E731
@@ -107,6 +94,10 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
     summary = (inspect.getdoc(given) or f"a {part.noun} given in Python").splitlines()[0]
     kind: Kind = part.kind(_name(given), summary, NoKeys, made)
     return kind
+
+
+_same_kind_of = lru_cache(maxsize=64)(kind_of)
+"""The same kind for the same object: what was measured of it holds on."""
 
 
 def _is_part(given: object, part: LoopPart) -> bool:
@@ -147,42 +138,38 @@ def _maker(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], An
     return make
 
 
-def _file(path: Path) -> Any:
-    """The module of a source file; what lies beside the file can be imported by it."""
-    if not path.is_file():
-        raise ValueError(f"{path}: no such file; give FILE.py:NAME")
-    # A name of its own: the file may be called planner.py.
-    name = f"given_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path.resolve())
+def _imported(place: str, source: str) -> Any:
+    """The module that a place names: a file, beside which lies what it imports, or a module by its name."""
+    path = Path(place)
+    if path.suffix == ".py" and not path.is_file():
+        raise ValueError(f"{place}: no such file; give FILE.py:NAME")
+    try:
+        with redirect_stdout(sys.stderr):
+            return _executed(path.resolve()) if path.suffix == ".py" else importlib.import_module(place)
+    except (Exception, SystemExit) as error:
+        if isinstance(error, ModuleNotFoundError) and error.name in (place, place.partition(".")[0]):
+            raise ValueError(
+                f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME"
+            ) from error
+        told = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        raise ValueError(f"{place} cannot be imported: {told}") from error
+
+
+def _executed(path: Path) -> Any:
+    """The module of a source file."""
+    name = f"given_{path.stem}"  # a name of its own: the file may be called planner.py
+    spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
-    folder = str(path.resolve().parent)
-    if folder not in sys.path:
-        sys.path.append(folder)
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
     module = sys.modules[name] = importlib.util.module_from_spec(spec)
     try:
-        with redirect_stdout(sys.stderr):
-            spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
+        spec.loader.exec_module(module)
+    except BaseException:
         del sys.modules[name]
-        raise _not_imported(str(path), error) from error
+        raise
     return module
-
-
-def _module(name: str, source: str) -> Any:
-    try:
-        with redirect_stdout(sys.stderr):
-            return importlib.import_module(name)
-    except (Exception, SystemExit) as error:
-        if isinstance(error, ModuleNotFoundError) and error.name in (name, name.partition(".")[0]):
-            raise ValueError(
-                f"{source}: there is no module {name}; give FILE.py:NAME or MODULE:NAME"
-            ) from error
-        raise _not_imported(name, error) from error
-
-
-def _not_imported(what: str, error: BaseException) -> ValueError:
-    return ValueError(f"{what} cannot be imported: {type(error).__name__}: {' '.join(str(error).split())}")
 
 
 def _is_own(value: object, module: Any) -> bool:

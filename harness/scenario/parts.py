@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import fields
 from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
@@ -12,12 +14,11 @@ from pydantic import Field, ValidationError, create_model
 
 from aircraft.guidance.registry import GuidanceKind
 from harness.files.crash import PlannerError, sentence
-from harness.files.printing import PrintingAside
 from harness.scenario.craft import airframe_of, limits_of
 from harness.scenario.given import Kind, is_source
 from harness.scenario.kinds import GUIDANCE, PLANNER, guidance_kinds, planner_kinds
 from harness.scenario.sections import AircraftSpec, GuidanceSpec, PartSpec, PlannerSpec, Section
-from harness.scenario.validation import KeyFault, first_fault, unknown_key
+from harness.scenario.validation import KeyFault, KeyFaults, unknown_key
 from planner.compiled import compile_all
 from planner.kernel_cache import seal
 from planner.registry import PlannerKind
@@ -31,19 +32,28 @@ if TYPE_CHECKING:
 AnyKind = TypeVar("AnyKind", PlannerKind, GuidanceKind)
 
 
+@contextmanager
+def _code_of_others(fault: Callable[[str], Exception]) -> Iterator[None]:
+    """In this block what is printed goes to standard error, and what is raised becomes a fault with its sentence."""
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    except (KeyboardInterrupt, KeyFault):
+        raise
+    except BaseException as error:
+        raise fault(sentence(error)) from error
+
+
 def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False) -> PlannerSpec:
     """The planner's section with its own keys checked and every default filled in from what it is told.
 
-    That of a run folder (`as_flown`) is complete: a planner given by a source file, or in Python, need not be here.
-
-    Raises:
-        KeyFault: there is no such planner or key, or the keys contradict each other or the mission.
+    That of a run folder (`as_flown`) is complete: a planner given by a source file, or in Python, need not be here. A
+    KeyFault says that there is no such planner or key, or that keys contradict each other or the mission.
     """
     if as_flown and spec.kind not in planner_kinds():
         return spec
-    with PrintingAside():
-        kind = _named("planner", spec, planner_kinds())
-        own = _resolved_keys("planner", spec, kind, mission)
+    kind = _named("planner", spec, planner_kinds())
+    own = _resolved_keys("planner", spec, kind, mission)
     chosen = getattr(spec, "shield", None) or ("none" if kind.bare is None else "loiter")
     return spec.model_copy(update={"shield": chosen, **own})
 
@@ -52,9 +62,8 @@ def resolved_guidance(spec: GuidanceSpec, aircraft: AircraftSpec, as_flown: bool
     """The same of the guidance section, for an aircraft whose airspeed is filled in."""
     if as_flown and not is_here(spec):
         return spec
-    with PrintingAside():
-        kind = _named("guidance", spec, guidance_kinds())
-        return spec.model_copy(update=_resolved_keys("guidance", spec, kind, limits_of(aircraft)))
+    kind = _named("guidance", spec, guidance_kinds())
+    return spec.model_copy(update=_resolved_keys("guidance", spec, kind, limits_of(aircraft)))
 
 
 def is_here(spec: GuidanceSpec) -> bool:
@@ -65,23 +74,17 @@ def is_here(spec: GuidanceSpec) -> bool:
 def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
     """The planner for one flight, from a section that `resolved_planner` returned; nothing is left to compile in it.
 
-    Raises:
-        PlannerError: whatever its constructor raised; or the run of its scenario was read back, and it is not here.
+    A PlannerError says what its constructor raised, or that the run of its scenario was read back and it is not here.
     """
     compile_all()
     kind = planner_kinds().get(spec.kind)
     if kind is None:
         raise PlannerError(f"the planner {spec.kind} is not here; give it anew (planner=, or --planner)")
-    try:
-        with PrintingAside():
-            if spec.shield == "none":
-                return (kind.bare or kind.make)(kind.config(**spec.own), mission)
-            made = kind.make(kind.config(**spec.own), mission)
-            return made if kind.bare is not None else Shield(made, mission)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        raise PlannerError(f"the planner {spec.kind} cannot be made: {sentence(error)}") from error
+    with _code_of_others(lambda said: PlannerError(f"the planner {spec.kind} cannot be made: {said}")):
+        if spec.shield == "none":
+            return (kind.bare or kind.make)(kind.config(**spec.own), mission)
+        made = kind.make(kind.config(**spec.own), mission)
+        return made if kind.bare is not None else Shield(made, mission)
 
 
 def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
@@ -89,7 +92,7 @@ def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
     seal()  # before the laws' machine code is loaded
     kind, config = _kind_and_config(spec)
     limits = limits_of(aircraft)
-    with PrintingAside():
+    with redirect_stdout(sys.stderr):
         law = kind.make(config, limits)
     if spec.follow == "path":
         return law
@@ -101,8 +104,7 @@ def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
 def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     """How the law tracks with the aircraft, flown unless that is known; None: as the aircraft's survey says.
 
-    Raises:
-        KeyFault: the law does not track with this aircraft, or raised an exception.
+    A KeyFault says that the law does not track with this aircraft, or what it raised.
     """
     from aircraft.airframes import AircraftError
     from aircraft.law_cards import law_card
@@ -111,8 +113,9 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     waypoints = spec.follow == "waypoints"
     if waypoints and not getattr(config, "switch_by_passing", True):
         return None  # it flies to points: where it is beside the legs says nothing of how it tracks
-    try:
-        with PrintingAside():
+    at = ("guidance", "kind")
+    with _code_of_others(lambda said: KeyFault(at, f"{spec.kind}: it cannot be flown: {said}")):
+        try:
             return law_card(
                 airframe_of(aircraft),
                 kind,
@@ -122,19 +125,14 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
                 acceptance_radius_m=spec.acceptance_radius_m,
                 before_flying=seal,
             )
-    except AircraftError as error:
-        raise KeyFault(("guidance", "kind"), str(error)) from error
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        raise KeyFault(("guidance", "kind"), f"{spec.kind}: it cannot be flown: {sentence(error)}") from error
+        except AircraftError as error:
+            raise KeyFault(at, str(error)) from error
 
 
 def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
     if not is_here(spec):
-        raise KeyFault(
-            ("guidance", "kind"), f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
-        )
+        told = f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
+        raise KeyFault(("guidance", "kind"), told)
     kind = guidance_kinds()[spec.kind]
     return kind, kind.config(**spec.own)
 
@@ -156,22 +154,20 @@ def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[
     for name in spec.own:
         if name not in known:
             raise KeyFault((section, name), unknown_key(name, (*type(spec).model_fields, *known)))
+    keys = _keys_section(kind)
     try:
-        own = dict(_keys_section(kind).model_validate(spec.own))
+        own = dict(keys.model_validate(spec.own))
     except ValidationError as error:
-        fault = first_fault(error)
-        raise KeyFault((section, *fault.loc), str(fault)) from error
-    try:
-        config = kind.config(**own).resolved(told)
-    except ValueError as error:
-        other = re.match(r"(\w+)\.(\w+) (is .*)", str(error), re.DOTALL)  # as `sensor.range_m is ...`
-        if other is not None:
-            raise KeyFault((other[1], other[2]), other[3]) from error
-        raise KeyFault((section, *[name for name in known if name in str(error)][:1]), str(error)) from error
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        raise KeyFault((section, "kind"), f"cannot be configured: {sentence(error)}") from error
+        loc, said = KeyFaults.of(error, keys).every[0]
+        raise KeyFault((section, *loc), said) from error
+    with _code_of_others(lambda said: KeyFault((section, "kind"), f"cannot be configured: {said}")):
+        try:
+            config = kind.config(**own).resolved(told)
+        except ValueError as error:
+            other = re.match(r"(\w+)\.(\w+) (is .*)", str(error), re.DOTALL)  # as `sensor.range_m is ...`
+            own_key = [name for name in known if name in str(error)][:1]
+            loc, said = (other.groups()[:2], other[3]) if other else ((section, *own_key), str(error))
+            raise KeyFault(loc, said) from error
     return {name: getattr(config, name) for name in known}
 
 

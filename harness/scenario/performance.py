@@ -24,8 +24,7 @@ MAX_WIND_FRACTION: Final = 0.9
 def performance_of(scenario: ScenarioKeys) -> Performance:
     """What the scenario's aircraft can do at its airspeed under its guidance, in its wind and turbulence.
 
-    Raises:
-        KeyFault: it cannot hold the airspeed, its wind is too strong, or the guidance law does not track with it.
+    A KeyFault says that it cannot hold the airspeed, its wind is too strong, or the law does not track with it.
     """
     from aircraft.airframes import AircraftError
     from aircraft.envelope import performance
@@ -63,9 +62,6 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
     than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size. The same margin is kept from
     the border of the area, as far as start and goal lie within it. The tracking error is kept as well, but from a side
     that start or goal is near to.
-
-    Raises:
-        KeyFault: as `performance_of` has it.
     """
     from planner.interface import Mission
 

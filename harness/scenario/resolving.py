@@ -39,10 +39,8 @@ def resolve(
 ) -> ScenarioKeys:
     """The same flight with every default filled in and every file of obstacles expanded.
 
-    The arguments are those of `scenario.validated`.
-
-    Raises:
-        KeyFault: keys contradict each other, or the aircraft cannot do what they ask for.
+    The arguments are those of `scenario.validated`. A KeyFault says that keys contradict each other, or that the
+    aircraft cannot do what they ask for.
     """
     sensor = keys.sensor
     simulation = keys.simulation.filled(rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
@@ -53,10 +51,12 @@ def resolve(
     keys = with_servos(keys.updated(simulation=simulation, mission=mission, aircraft=aircraft), nominal)
     aircraft = keys.aircraft.filled(airspeed_mps=_airframe(keys.aircraft, "actuators").cruise_mps)
     keys = with_day(keys.updated(aircraft=aircraft), nominal)
-    aircraft = _with_latency(keys.aircraft, keys.navigation.latency_s)
-    keys = keys.updated(aircraft=aircraft)
+    aircraft, latency_s = keys.aircraft, keys.navigation.latency_s
+    if latency_s or aircraft.autopilot is not None:
+        autopilot = (aircraft.autopilot or AutopilotSpec()).filled(state_latency_s=latency_s)
+        aircraft = aircraft.model_copy(update={"autopilot": autopilot})
     guidance = resolved_guidance(keys.guidance, aircraft, as_flown)
-    scenario = keys.updated(guidance=guidance)
+    scenario = keys.updated(aircraft=aircraft, guidance=guidance)
     if as_flown and not is_here(guidance):
         return scenario  # what follows from how the law tracks stands there
 
@@ -75,21 +75,22 @@ def resolve(
         beam_deg=sensor.field_of_view_deg / sensor.rays,
         least_width_m=max(planner.clearance_m, LEAST_CLEARANCE * radius_m),
     )
-    fastest_mps, unseen_m = aircraft.airspeed_mps + wind_mps, math.pi * radius_m
+    fastest_mps = aircraft.airspeed_mps + wind_mps
     margin_m = planning_margin_m(
         keys.navigation,
         fastest_mps,
         mission.time_limit_s,
-        unseen_m=unseen_m,
+        unseen_m=math.pi * radius_m,
         clearance_m=planner.clearance_m,
         turn_radius_m=radius_m,
     )
     navigation = keys.navigation.filled(margin_m=margin_m)
+    weight_lb = airframe_of(aircraft).mass_kg / POUND_KG
     limits = keys.trackability.filled(
         cross_track_m=TOLERATED_SHARE * keys.planner.clearance_m if keys.planner.clearance_m else TOLERANCE_M,
         altitude_m=TOLERANCE_M,
         airspeed_mps=0.1 * aircraft.airspeed_mps,
-        load_factor=_limit_load_factor(aircraft),
+        load_factor=min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0)),
     )
     scenario = scenario.updated(
         mission=mission, sensor=sensor, planner=planner, navigation=navigation, trackability=limits
@@ -101,17 +102,12 @@ def resolve(
     scenario, names = with_files_expanded(scenario, folder)
     if ends_checked:
         check_start_and_goal(scenario.area, scenario.obstacles, mission, planner.clearance_m, names)
-        check_start_leads_in(scenario.area, mission, _tightest_m(aircraft, wind_mps))
+        tightest_m = fastest_mps**2 / (
+            GRAVITY_MPS2 * math.tan(limits_of(aircraft).bank_limit_rad)
+        )  # downwind
+        check_start_leads_in(scenario.area, mission, tightest_m)
     told = mission_of(scenario, performance)
     return scenario.updated(planner=resolved_planner(planner, told, as_flown))
-
-
-def _with_latency(aircraft: AircraftSpec, latency_s: float) -> AircraftSpec:
-    """An aircraft whose autopilot is tuned for the age of the state, where there is one."""
-    if not latency_s and aircraft.autopilot is None:
-        return aircraft
-    autopilot = (aircraft.autopilot or AutopilotSpec()).filled(state_latency_s=latency_s)
-    return aircraft.model_copy(update={"autopilot": autopilot})
 
 
 def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
@@ -144,17 +140,6 @@ def _airframe(spec: AircraftSpec, key: str) -> Airframe:
         return airframe_of(spec)
     except AircraftError as error:
         raise KeyFault(("aircraft", key), str(error)) from error
-
-
-def _limit_load_factor(spec: AircraftSpec) -> float:
-    weight_lb = airframe_of(spec).mass_kg / POUND_KG
-    return min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0))
-
-
-def _tightest_m(spec: AircraftSpec, wind_mps: float) -> float:
-    """Radius of the tightest turn over the ground, downwind."""
-    bank_rad = limits_of(spec).bank_limit_rad
-    return (spec.airspeed_mps + wind_mps) ** 2 / (GRAVITY_MPS2 * math.tan(bank_rad))
 
 
 def _rounded_up(value: float, step: int) -> float:

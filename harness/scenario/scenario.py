@@ -9,7 +9,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -21,10 +21,7 @@ from harness.scenario.overrides import Given, changed, overridden
 from harness.scenario.parts import with_own_keys
 from harness.scenario.resolving import resolve
 from harness.scenario.shipped import scenario_path
-from harness.scenario.validation import KeyFault, KeyFaults, fault_error, faults
-
-PIECE: Final = 1000
-"""More obstacles are written in pieces of so many: on the way each takes some 3 KB."""
+from harness.scenario.validation import KeyFault, KeyFaults
 
 
 class Scenario(ScenarioKeys):
@@ -38,11 +35,7 @@ class Scenario(ScenarioKeys):
     def of(
         cls, keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
     ) -> Scenario:
-        """The complete scenario of some keys, as `resolve` has it.
-
-        Raises:
-            KeyFault: keys contradict each other, or the aircraft cannot do what they ask for.
-        """
+        """The complete scenario of some keys, as `resolve` has it; a KeyFault says why there is none."""
         complete = resolve(keys, folder, ends_checked, as_flown)
         scenario = cls.model_construct(keys.model_fields_set, **dict(complete))
         object.__setattr__(scenario, "_given", Given(keys.given, folder))
@@ -52,14 +45,12 @@ class Scenario(ScenarioKeys):
         """This scenario with some keys changed, checked anew; defaults that follow from others are derived anew.
 
         A key counts as given where the scenario's file, or an earlier `with_`, named it; all others follow. A new
-        `planner.kind` drops the own keys of the planner before. This scenario stays as it is.
+        `planner.kind` drops the own keys of the planner before. This scenario stays as it is. An InputError names the
+        key that cannot be flown.
 
         Args:
             keys: values by key path, as `{"seed": 3, "obstacles[0].circle.radius_m": 50}`; plain values, numpy's, or
                 sections. None stands for the default.
-
-        Raises:
-            InputError: the changed scenario is none that can be flown; the fault names the key.
         """
         given: Given = self.__dict__["_given"]
         return validated(changed(given, keys), "with_", given.folder)
@@ -75,15 +66,12 @@ class Scenario(ScenarioKeys):
 
 
 def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-    """Reads a scenario file, every default filled in.
+    """Reads a scenario file, every default filled in; a line of an InputError names file, line and key.
 
     Args:
         path: the file, or the name of a scenario that comes with wayproof, such as `paper_circles`.
         overrides: keys to replace before anything is checked, as (`"sensor.range_m"`, `"5000"`): key path and
             value as YAML; `obstacles[0].circle.radius_m` reaches into a list.
-
-    Raises:
-        InputError: the file cannot be read or is not a scenario; a line of its text names file, line and key.
     """
     path = scenario_path(str(path))
     return validated(overridden(strict_yaml.read(path), overrides), str(path), path.absolute().parent)
@@ -92,13 +80,10 @@ def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -
 def parse_scenario(
     text: str, source: str = "scenario", as_flown: bool = False, folder: Path | None = None
 ) -> Scenario:
-    """Reads a scenario from YAML text; faults call it `source`, and files are looked for in `folder` first.
+    """Reads a scenario from YAML text; an InputError calls it `source`, and files are looked for in `folder` first.
 
     One of a run folder (`as_flown`) is complete: start and goal are not checked again, and a planner or guidance law
     that was given by a source file, or in Python, need not be here.
-
-    Raises:
-        InputError: it is not a scenario.
     """
     return validated(strict_yaml.parse(text, source), source, folder, not as_flown, as_flown)
 
@@ -111,14 +96,7 @@ def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = 
 
 def dump_scenario(scenario: Scenario) -> str:
     """The YAML text of a scenario, all defaults written out; it loads back to an equal one, bit for bit."""
-    plain = scenario.model_dump(by_alias=True, exclude_none=True)
-    every = plain["obstacles"]
-    if len(every) <= PIECE:
-        return strict_yaml.dump(plain)
-    at = list(plain).index("obstacles")
-    before, after = dict(list(plain.items())[:at]), dict(list(plain.items())[at + 1 :])
-    first, *more = (every[begin : begin + PIECE] for begin in range(0, len(every), PIECE))
-    return "".join(map(strict_yaml.dump, (before, {"obstacles": first}, *more, after)))
+    return strict_yaml.dump(scenario.model_dump(by_alias=True, exclude_none=True))
 
 
 def packed(scenario: Scenario) -> bytes:
@@ -140,35 +118,24 @@ def scenario_schema() -> dict[str, Any]:
 def validated(
     root: Node, source: str, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
 ) -> Scenario:
-    """A scenario from what was read, every default filled in.
+    """A scenario from what was read, every default filled in; an InputError calls it `source`.
 
-    Args:
-        root: its keys.
-        source: what faults name it.
-        folder: where the folder of an aircraft, and files of obstacles, are sought first.
-        ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
-        as_flown: it is of a run folder, as `parse_scenario` takes it.
-
-    Raises:
-        InputError: it is not a scenario.
+    The folder of an aircraft, and files of obstacles, are sought in `folder` first. With `ends_checked` start and goal
+    must keep the clearance from obstacles and lie in the area. `as_flown` is as `parse_scenario` takes it.
     """
     try:
         return scenario_from(root.plain(), folder, ends_checked, as_flown)
     except KeyFaults as error:
-        raise fault_error(error, root, source) from error
+        raise error.in_file(root, source) from error
 
 
 def scenario_from(
     plain: Any, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
 ) -> Scenario:
-    """The same from plain values, as YAML has them.
-
-    Raises:
-        KeyFaults: they are not a scenario.
-    """
+    """The same from plain values, as YAML has them; KeyFaults say why they are no scenario."""
     try:
         return Scenario.of(ScenarioKeys.model_validate(plain), folder, ends_checked, as_flown)
     except ValidationError as error:
-        raise KeyFaults(faults(error, ScenarioKeys)) from error
+        raise KeyFaults.of(error, ScenarioKeys) from error
     except KeyFault as error:
         raise KeyFaults([(error.loc, str(error))]) from error

@@ -1,4 +1,4 @@
-"""How a scenario's flight begins, and whether the aircraft can fly level there."""
+"""How a scenario's flight begins, its air, and whether the aircraft can fly level there."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from harness.scenario.validation import KeyFault
 if TYPE_CHECKING:
     from aircraft.model_files import ModelFiles
 
-INSIDE_M = 1e-3
+INSIDE_M: Final = 1e-3
 """A flight begins no nearer to the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
 SURVEYED_M: Final = 300.0
 """Altitude above the sea at which an aircraft's range of airspeeds is measured."""
 NEAR_M: Final = (50.0, 1000.0)
 MIDDLE: Final = 1.05
-"""Between these altitudes an aircraft flies level at an airspeed that is by this factor within the range measured at
-`SURVEYED_M`: the density of the air differs by 7 % at most, which moves the ends of the range by less. It need not be
-trimmed. Near the ground the wheels may touch it."""
+"""Between the altitudes `NEAR_M` an aircraft flies level at an airspeed that is by this factor within the range
+measured at `SURVEYED_M`: the density of the air differs by 7 % at most, which moves the ends of the range by less. It
+need not be trimmed. Near the ground the wheels may touch it."""
 STEP_M: Final = 50.0
-"""To so much the highest altitude of level flight is told."""
+"""The highest altitude of level flight is told to this."""
 
 
 def start_conditions(scenario: ScenarioKeys) -> StartConditions:
@@ -34,22 +34,20 @@ def start_conditions(scenario: ScenarioKeys) -> StartConditions:
 
     A given path may begin outside the area; then the flight does, too.
     """
-    course_deg, airspeed_mps = scenario.mission.course_deg, scenario.aircraft.airspeed_mps
-    assert course_deg is not None
-    assert airspeed_mps is not None
-    xmin, ymin, xmax, ymax = scenario.area.bounds_m
-    east, north = scenario.mission.start_m
+    mission, (xmin, ymin, xmax, ymax) = scenario.mission, scenario.area.bounds_m
+    east, north = mission.start_m
     if xmin <= east <= xmax and ymin <= north <= ymax:
         inside_m = min(INSIDE_M, 0.5 * (xmax - xmin), 0.5 * (ymax - ymin))
         east = min(max(east, xmin + inside_m), xmax - inside_m)
         north = min(max(north, ymin + inside_m), ymax - inside_m)
-    return StartConditions(east, north, scenario.mission.altitude_m, math.radians(course_deg), airspeed_mps)
+    course_rad = math.radians(mission.course_deg)
+    return StartConditions(east, north, mission.altitude_m, course_rad, scenario.aircraft.airspeed_mps)
 
 
 def steady_wind_mps(scenario: ScenarioKeys) -> tuple[float, float]:
     """East and north of the wind at time 0, at the height at which it is measured."""
     wind = scenario.environment.wind
-    return towards(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0)
+    return _towards(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0)
 
 
 def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
@@ -62,23 +60,22 @@ def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
         turbulence=air.turbulence.model if air.turbulence and air.gusts else None,
         intensity=air.gusts,
         seed=seed,
-        changes=tuple((time_s, *towards(speed, degrees)) for time_s, speed, degrees in changes),
+        changes=tuple((time_s, *_towards(speed, degrees)) for time_s, speed, degrees in changes),
         measured_at_m=wind.measured_at_m if wind else None,
         vertical_gusts=VerticalGusts(**dict(vertical)) if vertical else None,
     )
 
 
-def towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
+def _towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
     """East and north of a wind that blows from a direction."""
     blows = math.radians(from_deg) + math.pi
     return speed_mps * math.sin(blows), speed_mps * math.cos(blows)
 
 
 def check_level_flight(scenario: ScenarioKeys) -> None:
-    """Trims the aircraft as the flight would, unless its survey shows that it flies level.
+    """Raises a KeyFault if the aircraft cannot fly level at the altitude.
 
-    Raises:
-        KeyFault: it cannot fly level at the altitude.
+    It is trimmed as the flight would trim it, unless its survey shows that it flies level.
     """
     from aircraft.airframes import AircraftError
 
@@ -92,15 +89,14 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
         near = NEAR_M[0] <= start.altitude_m <= NEAR_M[1]
         if near and MIDDLE * slowest <= start.airspeed_mps <= fastest / MIDDLE:
             return
-        files = frame.files
-        fault = _fault(files, place, start, heading_rad)
+        fault = _fault(frame.files, place, start, heading_rad)
     except (AircraftError, ValueError) as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
     if fault is None:
         return
 
     def flies(altitude_m: float) -> bool:
-        return _fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
+        return _fault(frame.files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
 
     if not flies(SURVEYED_M):
         raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
@@ -108,11 +104,9 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     while abs(good - bad) > STEP_M:
         middle = 0.5 * (good + bad)
         good, bad = (middle, bad) if flies(middle) else (good, middle)
-    bound, steps = (
-        ("at most", math.floor(good / STEP_M)) if bad > good else ("at least", math.ceil(good / STEP_M))
-    )
-    told_m = STEP_M * steps
-    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {bound} {told_m:g}: {fault}")
+    steps = math.floor(good / STEP_M) if bad > good else math.ceil(good / STEP_M)
+    told = f"{'at most' if bad > good else 'at least'} {STEP_M * steps:g}"
+    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {told}: {fault}")
 
 
 @lru_cache(maxsize=512)

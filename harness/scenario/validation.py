@@ -56,66 +56,42 @@ class KeyFaults(ValueError):
     """What is wrong with the keys of a file: key and sentence of `every` fault."""
 
     def __init__(self, every: Sequence[tuple[Loc, str]]) -> None:
-        super().__init__("; ".join(sentence for _, sentence in every))
+        super().__init__("; ".join(said for _, said in every))
         self.every = tuple(every)
 
+    @classmethod
+    def of(cls, error: ValidationError, model: type[BaseModel]) -> KeyFaults:
+        """What pydantic says of values that should have been a model."""
+        every = error.errors(include_url=False)
+        missing = [each for each in every if each["type"] == "missing"]
+        short = {each["loc"][:-1]: each for each in missing if isinstance(each["loc"][-1], int)}
+        found: list[tuple[Loc, str]] = []
+        for details in every:
+            loc, cause = details["loc"], details.get("ctx", {}).get("error")
+            last = short.get(loc[:-1]) if details["type"] == "missing" else None
+            if last is not None:  # numbers of a list that is too short
+                given, wanted = str(list(last["input"]))[:80], int(last["loc"][-1]) + 1
+                found.append((loc[:-1], f"is {given}; must have {wanted} numbers"))
+            elif isinstance(cause, KeyFault):
+                found.append(((*loc, *cause.loc), str(cause)))
+            else:
+                known = _known_keys(model, loc[:-1]) if details["type"] == "extra_forbidden" else ()
+                found.append((loc, _sentence(details, known)))
+        return cls(found)
 
-def input_error(error: ValidationError, model: type[BaseModel], root: Node, source: str) -> InputError:
-    """What pydantic says of the values of a file that should have been a model, at most MAX_FAULTS lines of it."""
-    return fault_error(KeyFaults(faults(error, model)), root, source)
-
-
-def fault_error(found: KeyFaults, root: Node, source: str) -> InputError:
-    """The same of faults that are told already."""
-    return in_lines([fault_line(source, root.line_of(loc), loc, told) for loc, told in found.every], source)
-
-
-def faults(error: ValidationError, model: type[BaseModel]) -> list[tuple[Loc, str]]:
-    """Key and sentence of every fault."""
-    every = error.errors(include_url=False)
-    short = {
-        each["loc"][:-1]: each
-        for each in every
-        if each["type"] == "missing" and isinstance(each["loc"][-1], int)
-    }
-    found = []
-    for details in every:
-        loc: Loc = details["loc"]
-        last = short.get(loc[:-1])
-        if last is not None and details["type"] == "missing":  # numbers of a list that is too short
-            found.append(
-                (
-                    loc[:-1],
-                    f"is {str(list(last['input']))[:80]}; must have {int(last['loc'][-1]) + 1} numbers",
-                )
-            )
-        else:
-            found.append(_located(details, model))
-    return found
+    def in_file(self, root: Node, source: str) -> InputError:
+        """The same with file, line and key, at most `MAX_FAULTS` lines."""
+        return in_lines(
+            [fault_line(source, root.line_of(loc), loc, said) for loc, said in self.every], source
+        )
 
 
 def in_lines(every: Sequence[str], source: str) -> InputError:
-    """Faults of a file as one error, each once, at most MAX_FAULTS lines."""
+    """Faults of a file as one error, each once, at most `MAX_FAULTS` lines."""
     lines = list(dict.fromkeys(every))
     if len(lines) > MAX_FAULTS:
         lines[MAX_FAULTS - 1 :] = [f"{source}: and {len(lines) - MAX_FAULTS + 1} more"]
     return InputError("\n".join(lines))
-
-
-def first_fault(error: ValidationError) -> KeyFault:
-    """The first fault, for values that have no file of their own."""
-    details = error.errors(include_url=False)[0]
-    return KeyFault(details["loc"], sentence(details))
-
-
-def _located(details: ErrorDetails, model: type[BaseModel]) -> tuple[Loc, str]:
-    """Key and sentence of one fault."""
-    loc: Loc = details["loc"]
-    cause = details.get("ctx", {}).get("error")
-    if isinstance(cause, KeyFault):
-        return (*loc, *cause.loc), str(cause)
-    known = _known_keys(model, loc[:-1]) if details["type"] == "extra_forbidden" else ()
-    return loc, sentence(details, known)
 
 
 def _known_keys(model: type[BaseModel], loc: Loc) -> tuple[str, ...]:
@@ -131,7 +107,7 @@ def _known_keys(model: type[BaseModel], loc: Loc) -> tuple[str, ...]:
     return tuple(part["properties"])
 
 
-def sentence(details: ErrorDetails, known: tuple[str, ...] = ()) -> str:
+def _sentence(details: ErrorDetails, known: tuple[str, ...]) -> str:
     """What is wrong, and what would be right."""
     kind, value, context = details["type"], details["input"], details.get("ctx", {})
     if kind == "value_error":
