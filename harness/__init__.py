@@ -29,77 +29,22 @@ if TYPE_CHECKING:
     from planner.registry import PlannerKind
 
 __all__ = [
-    "AircraftError",
-    "AircraftState",
-    "CampaignResult",
-    "ComparisonResult",
-    "FlightResult",
-    "GuidanceLimits",
-    "GuidanceOutput",
-    "InputError",
-    "MapView",
-    "Metrics",
-    "Mission",
-    "Path",
-    "Plan",
-    "PlanPicture",
-    "PlanRequest",
-    "PlanStatus",
-    "Planner",
-    "PlannerError",
-    "PlannerKind",
-    "Route",
-    "Scenario",
-    "Status",
-    "SteppedFlight",
-    "WriteError",
-    "certify",
-    "check",
-    "compare",
-    "dump_scenario",
-    "fly",
-    "load_campaign",
-    "load_run",
-    "load_scenario",
-    "make",
-    "replay",
-    "sweep",
-]
-
-_HOMES = {
-    "aircraft.airframes": ("AircraftError",),
-    "aircraft.guidance.interface": ("GuidanceLimits", "GuidanceOutput"),
-    "aircraft.interface": ("AircraftState", "Route"),
-    "harness.api.campaigns": ("certify", "compare", "load_campaign", "sweep"),
-    "harness.api.flights": ("fly", "load_run"),
-    "harness.api.metrics": ("Metrics",),
-    "harness.api.paths": ("check", "replay"),
-    "harness.api.results": ("CampaignResult", "ComparisonResult", "FlightResult"),
-    "harness.api.stepping": ("SteppedFlight", "make"),
-    "harness.files.crash": ("PlannerError",),
-    "harness.files.errors": ("WriteError",),
-    "harness.files.input_file": ("InputError",),
-    "harness.flight.stepped": ("Status",),
-    "harness.scenario.scenario": ("Scenario", "dump_scenario", "load_scenario"),
-    "planner.interface": (
-        "MapView",
-        "Mission",
-        "Path",
-        "Plan",
-        "PlanPicture",
-        "PlanRequest",
-        "PlanStatus",
-        "Planner",
-    ),
-    "planner.registry": ("PlannerKind",),
-}
-"""The names of the front door, by the module in which each is made."""
+    "AircraftError", "AircraftState", "CampaignResult", "ComparisonResult", "FlightResult", "GuidanceLimits",
+    "GuidanceOutput", "InputError", "MapView", "Metrics", "Mission", "Path", "Plan", "PlanPicture",
+    "PlanRequest", "PlanStatus", "Planner", "PlannerError", "PlannerKind", "Route", "Scenario", "Status",
+    "SteppedFlight", "WriteError", "certify", "check", "compare", "dump_scenario", "fly", "load_campaign",
+    "load_run", "load_scenario", "make", "replay", "sweep",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    """A name of the front door, imported now."""
-    for home, names in _HOMES.items():
-        if name in names:
-            globals()[name] = found = getattr(import_module(home), name)
+    """A name of the front door, imported now from the module that the lines above say."""
+    import ast
+
+    with open(__file__, encoding="utf-8") as file:
+        lines = ast.walk(ast.parse(file.read()))
+    for line in lines if name in __all__ else ():
+        if isinstance(line, ast.ImportFrom) and name in [each.name for each in line.names]:
+            globals()[name] = found = getattr(import_module(str(line.module)), name)
             return found
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,8 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.api.errors import as_input_errors
-from harness.api.flights import in_python
+from harness.api.flights import as_input_errors, in_python
 from harness.api.results import CampaignResult, ComparisonResult
 from harness.files.input_file import InputError
 from harness.scenario.scenario import Scenario, load_scenario

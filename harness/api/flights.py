@@ -3,20 +3,42 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
-from harness.api.errors import as_input_errors
 from harness.api.metrics import Metrics
 from harness.api.results import FlightResult
+from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.scenario.given import registered
 from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart
 from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
+from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
     from harness.flight.observer import Progress
+
+NEEDED: Final = (
+    *("outcome", "reason", "flown_length_m", "cross_track_m", "trackable", "trackability", "digest"),
+)
+"""Figures of every run."""
+
+
+@contextmanager
+def as_input_errors() -> Iterator[None]:
+    """Lets an error about an aircraft or a folder come out as an InputError with the text of the command line."""
+    from aircraft.airframes import AircraftError
+
+    try:
+        yield
+    except KeyFault as error:
+        raise InputError(f"wayproof: {'.'.join(map(str, error.loc))}: {error}") from error
+    except (AircraftError, RunFolderError) as error:
+        raise InputError(f"wayproof: {error}") from error
 
 
 def fly(
@@ -47,57 +69,26 @@ def fly(
         PlannerError: the planner cannot be made.
         WriteError: the run could not be written to its end.
     """
+    from harness.flight.closed_loop import fly as fly_loop
+    from harness.run.scenario_flight import fly_to_folder, make_loop
+
     flown = given_parts(scenario, planner, guidance)
-    return _flown(flown, Path(out) if out is not None else None, recording, progress)
+    if out is None and not recording:
+        with as_input_errors():
+            return FlightResult.of(flown, fly_loop(make_loop(flown), (), progress))
+    called = f"fly({flown.name!r}, planner={flown.planner.kind!r}, guidance={flown.guidance.kind!r})"
+    command = in_python(f"wayproof.{called}")
+    return flown_into(
+        out, flown, lambda folder: fly_to_folder(flown, folder, recording, progress, command=command)
+    )
 
 
 def given_parts(scenario: Scenario | str | Path, planner: object, guidance: object) -> Scenario:
-    """A scenario with a planner and a guidance law that were given, as `fly` takes them.
-
-    Raises:
-        InputError: one of them cannot be used.
-    """
+    """A scenario with a planner and a law as `fly` takes them; an InputError says which cannot be used."""
     given = {"planner.kind": (planner, PLANNER), "guidance.kind": (guidance, GUIDANCE)}
     kinds = {key: _name_of(*each) for key, each in given.items() if each[0] is not None}
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     return loaded.with_(kinds) if kinds else loaded
-
-
-def load_run(folder: str | Path) -> FlightResult:
-    """Reads a run folder back.
-
-    Raises:
-        InputError: the folder holds no run, or an incomplete or damaged one.
-    """
-    from harness.run_files import run_folder
-
-    with as_input_errors():
-        run = run_folder.load_run(Path(folder))
-    track, plans = run_folder.tables(run.folder)
-    try:
-        metrics = Metrics.of(run.metrics)
-    except KeyError as error:
-        file = run.folder / run_folder.METRICS
-        raise InputError(
-            f"{file}: {error.args[0]}: is missing; another version of wayproof flew this run, or the file was changed"
-        ) from error
-    return FlightResult(
-        parse_scenario(run.scenario_yaml, str(run.folder / run_folder.SCENARIO), as_flown=True),
-        metrics,
-        track,
-        plans,
-        run.folder,
-        run.manifest,
-    )
-
-
-def in_python(what: str) -> str:
-    """The command of a manifest, for what was done in Python: what was called, and from where."""
-    main = sys.modules.get("__main__")
-    script = getattr(main, "__file__", None)
-    if "ipykernel" in sys.modules and script is not None and "ipykernel" in str(script):
-        return f"{what} in a notebook"
-    return f"{what} in {Path(script).name}" if script else f"{what} in Python"
 
 
 def _name_of(given: object, part: LoopPart) -> str:
@@ -107,24 +98,35 @@ def _name_of(given: object, part: LoopPart) -> str:
         raise InputError(f"wayproof: {part.noun}: {error}") from error
 
 
-def _flown(scenario: Scenario, out: Path | None, recording: bool, progress: Progress | None) -> FlightResult:
-    from harness.run.scenario_flight import fly_to_folder
-
-    if out is None and not recording:
-        return _in_memory(scenario, progress)
+def flown_into(out: str | Path | None, scenario: Scenario, fly_to: Callable[[Path], object]) -> FlightResult:
+    """What a flight leaves in a run folder, or in one that is there as long as the result."""
     scratch = TemporaryDirectory(prefix="wayproof-run-") if out is None else None
-    folder = Path(scratch.name) if scratch else Path(out or "")
-    named = f"{scenario.name!r}, planner={scenario.planner.kind!r}, guidance={scenario.guidance.kind!r}"
+    folder = Path(scratch.name if scratch else out or "")
     with as_input_errors():
-        fly_to_folder(scenario, folder, recording, progress, command=in_python(f"wayproof.fly({named})"))
-    read: dict[str, Any] = dict(vars(load_run(folder)))
-    return FlightResult(**{**read, "scenario": scenario, "_scratch": scratch})
+        fly_to(folder)
+    return replace(load_run(folder), scenario=scenario, _scratch=scratch)
 
 
-def _in_memory(scenario: Scenario, progress: Progress | None) -> FlightResult:
-    from harness.flight.closed_loop import fly as fly_loop
-    from harness.run.scenario_flight import make_loop
+def load_run(folder: str | Path) -> FlightResult:
+    """Reads a run folder back; an InputError says that it holds no run, or an incomplete or damaged one."""
+    from harness.run_files import run_folder
 
     with as_input_errors():
-        flight = fly_loop(make_loop(scenario), (), progress)
-    return FlightResult.of(scenario, flight)
+        run = run_folder.load_run(Path(folder))
+    missing = [name for name in NEEDED if name not in run.metrics]
+    if missing:
+        raise InputError(
+            f"{run.folder / run_folder.METRICS}: {missing[0]}: is missing; another version of wayproof flew this run, "
+            "or the file was changed"
+        )
+    flown = parse_scenario(run.scenario_yaml, str(run.folder / run_folder.SCENARIO), as_flown=True)
+    return FlightResult(flown, Metrics(run.metrics), *run_folder.tables(run.folder), run.folder, run.manifest)
+
+
+def in_python(what: str) -> str:
+    """The command of a manifest, for what was done in Python: what was called, and from where."""
+    main = sys.modules.get("__main__")
+    script = getattr(main, "__file__", None)
+    if "ipykernel" in sys.modules and script is not None and "ipykernel" in str(script):
+        return f"{what} in a notebook"
+    return f"{what} in {Path(script).name}" if script else f"{what} in Python"

@@ -16,17 +16,6 @@ OPTIONAL: Final = frozenset(metric.path.partition(".")[0] for metric in METRICS 
 }
 """Figures that are None where a run does not have them: a run without a given path has no `check`."""
 
-NEEDED: Final = (
-    "outcome",
-    "reason",
-    "flown_length_m",
-    "cross_track_m",
-    "trackable",
-    "trackability",
-    "digest",
-)
-"""Figures of every run."""
-
 
 class Figures(dict[str, Any]):
     """A mapping of `metrics.json`, read only: a key is an attribute too, and a nested mapping is one of these.
@@ -55,10 +44,10 @@ class Figures(dict[str, Any]):
 
     def __repr__(self) -> str:
         """Its first figures, shortened."""
-        plain = {name: value for name, value in self.items() if not isinstance(value, dict | tuple)}
         told = [
             f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value!r:.40}"
-            for name, value in plain.items()
+            for name, value in self.items()
+            if not isinstance(value, dict | tuple)
         ]
         return f"{type(self).__name__}({', '.join(told[:5])}{', ...' if len(self) > 5 else ''})"
 
@@ -70,17 +59,6 @@ class Figures(dict[str, Any]):
 
 class Metrics(Figures):
     """All figures of one run; one of `OPTIONAL` that the run does not have is None."""
-
-    @classmethod
-    def of(cls, content: Mapping[str, Any]) -> Metrics:
-        """The metrics in the content of a `metrics.json`.
-
-        Raises:
-            KeyError: a figure that every run has is missing.
-        """
-        for name in NEEDED:
-            content[name]
-        return cls(content)
 
     def __getattr__(self, name: str) -> Any:
         return None if name in OPTIONAL and name not in self else super().__getattr__(name)

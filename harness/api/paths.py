@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
-from harness.api.errors import as_input_errors
-from harness.api.flights import in_python, load_run
+from harness.api.flights import as_input_errors, flown_into, in_python
 from harness.api.results import FlightResult
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.scenario.shipped import scenario_path
@@ -59,38 +60,31 @@ def check(
     from harness.run.path_check import asked, fly_check, origin_of
     from harness.run_files.path_files import given_points, read_path
 
-    sections: dict[str, dict[str, Any]] = {"aircraft": {"model": aircraft}, "environment": {}}
-    if airspeed_mps is not None:
-        sections["aircraft"]["airspeed_mps"] = airspeed_mps
-    if wind is not None:
-        sections["environment"]["wind"] = {"speed_mps": wind[0], "from_deg": wind[1]}
-    if tolerance_m is not None:
-        sections["trackability"] = {"cross_track_m": tolerance_m}
-    keep = out is not None or recording
+    keys: dict[str, Any] = {
+        "aircraft.model": str(aircraft),
+        "aircraft.airspeed_mps": None if airspeed_mps is None else float(airspeed_mps),
+        "environment.wind": wind and {"speed_mps": float(wind[0]), "from_deg": float(wind[1])},
+        "trackability.cross_track_m": None if tolerance_m is None else float(tolerance_m),
+    }
+    given = [(key, json.dumps(value)) for key, value in keys.items() if value is not None]
+    file = Path(path) if isinstance(path, str | Path) else None
     with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as kept:
         world = _world(scenario, Path(kept))
-        if isinstance(path, str | Path):
-            given = read_path(Path(path), altitude_m is not None, origin_of(world))
+        if file is not None:
+            points = read_path(file, altitude_m is not None, origin_of(world))
         else:
-            given = given_points(path)
+            points = given_points(cast("Points", path))
         check = asked(
-            given,
-            sections,
-            list((settings or {}).items()),
-            world=world,
-            altitude_m=altitude_m,
-            corner_m=corner_m,
+            points, [*given, *(settings or {}).items()], world=world, altitude_m=altitude_m, corner_m=corner_m
         )
-        scratch = TemporaryDirectory(prefix="wayproof-run-") if out is None else None
-        folder = Path(scratch.name) if scratch else Path(out or "")
-        what = f"wayproof.check({str(path) if isinstance(path, str | Path) else 'points'!r}, {aircraft!r})"
-        fly_check(check, folder, recording, command=in_python(what))
-    read = dict(vars(load_run(folder)))
-    if scratch is not None and not keep:
-        scratch.cleanup()
-    return FlightResult(
-        **{**read, "scenario": check.scenario, "_scratch": scratch, "folder": folder if keep else None}
-    )
+        command = in_python(f"wayproof.check({'points' if file is None else str(path)!r}, {aircraft!r})")
+        flown = flown_into(
+            out, check.scenario, lambda folder: fly_check(check, folder, recording, command=command)
+        )
+    if flown._scratch is None or recording:
+        return flown
+    flown._scratch.cleanup()
+    return replace(flown, folder=None, _scratch=None)
 
 
 def replay(

@@ -9,7 +9,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from harness.api.look import comparison_html, flight_html
 from harness.api.metrics import Metrics
 from harness.files.input_file import InputError
 from harness.scenario.scenario import Scenario
@@ -49,7 +48,7 @@ class FlightResult:
         from harness.run.scenario_flight import flight_limits
         from harness.run_files.run_tables import plans_table, track_table
 
-        figures = Metrics.of(metrics(flight, flight_limits(scenario)))
+        figures = Metrics(metrics(flight, flight_limits(scenario)))
         return cls(scenario, figures, track_table(flight.track), plans_table(flight.plans))
 
     @property
@@ -109,9 +108,6 @@ class FlightResult:
 
         return GIVEN if self.metrics.check is not None else self.scenario.planner.label
 
-    def _repr_html_(self) -> str:
-        return flight_html(repr(self)[len("FlightResult(") : -1], self.metrics.to_dict())
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComparisonResult:
@@ -134,9 +130,6 @@ class ComparisonResult:
         """A line for people."""
         reached = self.table["outcome"].to_pylist().count("reached")
         return f"ComparisonResult({len(self.table)} flights, {reached} reached; {self.folder})"
-
-    def _repr_html_(self) -> str:
-        return comparison_html(repr(self)[len("ComparisonResult(") : -1], self.table)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.api.errors import as_input_errors
-from harness.api.flights import given_parts
+from harness.api.flights import as_input_errors, given_parts
 from harness.api.results import FlightResult
 from harness.flight.stepped import Status, SteppedLoop
 from harness.scenario.scenario import Scenario

@@ -127,7 +127,7 @@ def _measured(job: Job, scenario: Scenario) -> dict[str, Any]:
     if job.path is not None:
         from harness.run.path_check import fly_check
 
-        return fly_check(job.path).metrics
+        return fly_check(job.path)
     from harness.analysis.metrics import metrics
     from harness.flight.closed_loop import fly
     from harness.run.scenario_flight import flight_limits, make_loop
@@ -141,7 +141,7 @@ def _kept(job: Job, scenario: Scenario) -> dict[str, Any]:
     if job.path is not None:
         from harness.run.path_check import fly_check
 
-        return fly_check(job.path, job.folder, recording, command=again).metrics
+        return fly_check(job.path, job.folder, recording, command=again)
     from harness.run.scenario_flight import fly_to_folder
 
     try:

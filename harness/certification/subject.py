@@ -174,8 +174,8 @@ def _path_days(asked: Asked, subject: str | Path | Sequence[Sequence[float]], wo
     name = _name(subject)
 
     def ask(replaced: Settings) -> PathCheck:
-        sections = {"aircraft": {"model": model}}
-        return path_check(path, sections, [*settings, *replaced], world=world, name=name)
+        keys = [("aircraft.model", json.dumps(model)), *settings, *replaced]
+        return path_check(path, keys, world=world, name=name)
 
     words = ["wayproof", "check", str(subject), "--aircraft", model]
     words += ["--scenario", str(world)] if world else []

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -29,7 +29,7 @@ from harness.cli.standard_output import say
 from harness.cli.terminal import plain, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from harness.run.path_check import CheckedPath, PathCheck
+    from harness.run.path_check import PathCheck
 
 
 PATH: Final = "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints)."
@@ -93,7 +93,6 @@ def check(
     def on_day(day: Sequence[tuple[str, str]]) -> PathCheck:
         return asked(
             points,
-            {"aircraft": {"model": aircraft}},
             [*replaced, *day],
             world=world,
             altitude_m=altitude_m,
@@ -106,11 +105,11 @@ def check(
     differs = [(name, str(value)) for name, value in beside.items() if value is not None]
     apart = told_apart([*differs, *(each for each in replaced if each[0] != "aircraft.model")], named=())
     folder = out or Path("runs") / "check" / f"{check.scenario.name}-{Path(aircraft).name}{apart}"
-    flown = _fly(check, folder, recording=not no_recording, silent=quiet)
+    metrics = _fly(check, folder, recording=not no_recording, silent=quiet)
     if as_json:
-        print_json(flown.metrics)
+        print_json(metrics)
     elif not quiet:
-        _print_verdict(f"{path.name}: {aircraft}", flown, folder)
+        _print_verdict(f"{path.name}: {aircraft}", check, metrics, folder)
     if days is not None:
         from harness.certification.days import PathDays
         from harness.cli.certify import fly_path_days
@@ -122,7 +121,7 @@ def check(
         )
         fly_path_days(drawn, folder / "days", silent=quiet or as_json)
         _show_band(folder)
-    return 0 if flown.ok else FAILED
+    return 0 if metrics["check"]["ok"] else FAILED
 
 
 def _show_band(folder: Path) -> None:
@@ -137,7 +136,7 @@ def _show_band(folder: Path) -> None:
         add_band(folder / RECORDING, *band[1:])
 
 
-def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> CheckedPath:
+def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:
     """Flies into a folder, with progress on standard error."""
     import numpy as np
 
@@ -150,12 +149,12 @@ def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> Ch
         return fly_check(check, folder, recording, report)
 
 
-def _print_verdict(title: str, flown: CheckedPath, folder: Path) -> None:
+def _print_verdict(title: str, check: PathCheck, metrics: dict[str, Any], folder: Path) -> None:
     """The table of a path, its verdict and its conditions first."""
     from harness.scenario.conditions import told
 
-    scenario = flown.check.scenario
-    verdict, *rows = verdict_rows(flown.metrics).items()
+    scenario = check.scenario
+    verdict, *rows = verdict_rows(metrics).items()
     conditions = ("conditions", plain(told(scenario)))
     print_table(f"{title}, {scenario.aircraft.airspeed_mps:g} m/s", dict([verdict, conditions, *rows]))
     say(f"run folder: {folder}")

@@ -56,9 +56,9 @@ def check() -> Check:
     def fly_it(
         points: FloatArray, model: str = "aerosonde", corner_m: float | None = None, **keys: float
     ) -> dict[str, Any]:
-        overrides = [(name.replace("__", "."), str(value)) for name, value in keys.items()]
-        check = asked(given_points(points), {"aircraft": {"model": model}}, overrides, corner_m=corner_m)
-        return fly_check(check).metrics
+        settings = [(name.replace("__", "."), str(value)) for name, value in keys.items()]
+        check = asked(given_points(points), [("aircraft.model", model), *settings], corner_m=corner_m)
+        return fly_check(check)
 
     return fly_it
 

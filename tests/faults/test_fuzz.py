@@ -120,7 +120,7 @@ def read_campaign(path: Path) -> None:
 def read_given_path(path: Path) -> None:
     """Reads a path and makes of it what `check` flies."""
     given = read_path(path, any_altitude=True)
-    check = asked(given, {})
+    check = asked(given)
     assert len(check.plan.way.segments) >= 1
 
 

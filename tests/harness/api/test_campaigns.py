@@ -56,7 +56,6 @@ def test_planners_are_compared_and_one_of_them_comes_from_a_file(
     compared = wayproof.compare(small(), ["vfh_plus", f"{source}:Beeline"], out=tmp_path / "out", workers=1)
     assert compared.all_reached
     assert compared.table["planner"].to_pylist() == ["vfh_plus", "planner.py:Beeline"]
-    assert "vfh_plus" in compared._repr_html_()
     assert len(repr(compared)) < 200
     index = json.loads((tmp_path / "out" / "comparison.json").read_text())
     assert index["command"].startswith("wayproof.compare(['short'], ['vfh_plus', 'planner.py:Beeline'])")

@@ -73,16 +73,10 @@ def test_figures_are_attributes_and_keys_and_cannot_be_changed(run: wayproof.Fli
         metrics.outcome = "collision"
 
 
-def test_reprs_are_short_and_a_notebook_sees_a_table(
-    run: wayproof.FlightResult, kept: wayproof.FlightResult
-) -> None:
+def test_reprs_are_short(run: wayproof.FlightResult, kept: wayproof.FlightResult) -> None:
     for thing in (run, kept, run.metrics, run.scenario, run.metrics.cross_track_m):
         assert len(repr(thing)) < 250
     assert repr(run) == "FlightResult(short: reached; rolling_window, aerosonde, seed 1)"
-    page = kept._repr_html_()
-    assert "<table>" in page
-    assert "total system error" in page
-    assert "[bold" not in page
 
 
 def test_a_figure_that_a_run_lacks_is_told(kept: wayproof.FlightResult, tmp_path: Path) -> None:
@@ -279,7 +273,6 @@ def test_the_names_are_those_of_harness() -> None:
     assert dir(wayproof) == sorted(harness.__all__)
     for name in harness.__all__:
         assert getattr(wayproof, name) is getattr(harness, name)
-    assert sorted(name for names in harness._HOMES.values() for name in names) == sorted(harness.__all__)
     for module in (harness, wayproof):
         with pytest.raises(AttributeError):
             _ = module.no_such_name

@@ -20,7 +20,6 @@ def test_points_are_checked_and_nothing_is_left_behind() -> None:
     assert (run.outcome, run.folder, run.pilot) == ("reached", None, "path as given")
     assert run.metrics.deviation_from_given_m is not None
     assert run.track.num_rows > 200
-    assert "flown as given" in run._repr_html_()
 
 
 def test_a_path_through_an_obstacle_of_a_scenario_is_told(tmp_path: Path) -> None:
