@@ -1,37 +1,39 @@
-"""The rows of a comparison and their forms: CSV for programs, Markdown for papers, labels for people."""
+"""The rows of a comparison and their forms: CSV for programs, tables for papers, labels for people."""
 
 from __future__ import annotations
 
 import csv
 import html
 import io
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
 
 from harness.analysis.metric import Metric
 from harness.analysis.registry import METRICS
 from harness.files.wording import printable
 
-DASH = "\N{EN DASH}"
+DASH: Final = "\N{EN DASH}"
 
-COMPARED = {metric.name: metric for metric in METRICS if metric.short or metric.derived}
+COMPARED: Final = {metric.name: metric for metric in METRICS if metric.short or metric.derived}
 """The figures of a row, by name: those that people are shown, and those that take more than `metrics.json`."""
 
-ON_TERMINAL = (
-    "outcome",
-    "km",
-    "ratio",
-    "clear m",
-    "\N{GREEK SMALL LETTER KAPPA}\N{MIDDLE DOT}R",
-    "tracks",
-    "tse max",
-    "p99 ms",
+ON_TERMINAL: Final = (
+    *("outcome", "km", "ratio", "clear m"),
+    *("\N{GREEK SMALL LETTER KAPPA}\N{MIDDLE DOT}R", "tracks", "tse max", "p99 ms"),
 )
 """Those that fit 80 columns, by `Metric.short`."""
 
+LATEX: Final = str.maketrans(
+    {
+        **{each: f"\\{each}" for each in "&%$#_{}"},
+        **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"},
+        **{"<": r"$<$", ">": r"$>$", "\N{EN DASH}": "--", "\N{GREEK SMALL LETTER KAPPA}": r"$\kappa$"},
+        **{"\N{MIDDLE DOT}": r"$\cdot$", "\N{DEGREE SIGN}": r"$^\circ$"},
+    }
+)
+"""What LaTeX takes for something else, or its fonts lack, as it takes it."""
 
-@dataclass(frozen=True, init=False, repr=False)
+
 class Row:
     """One planner, under one guidance law, on one scenario.
 
@@ -45,26 +47,17 @@ class Row:
         figures: all figures, by name.
     """
 
-    scenario: str
-    planner: str
-    reason: str
-    guidance: str
-    figures: Mapping[str, Any]
-
     def __init__(
         self, scenario: str, planner: str, outcome: str, reason: str, guidance: str = "", **figures: Any
     ) -> None:
         unknown = figures.keys() - COMPARED.keys()
         if unknown:
             raise TypeError(f"no figures of a comparison: {', '.join(sorted(unknown))}")
-        known = {**dict.fromkeys(COMPARED), **figures, "outcome": outcome}
-        for name, value in zip(
-            self.__dataclass_fields__, (scenario, planner, reason, guidance, known), strict=True
-        ):
-            object.__setattr__(self, name, value)
+        self.scenario, self.planner, self.reason, self.guidance = scenario, planner, reason, guidance
+        self.figures: Mapping[str, Any] = {**dict.fromkeys(COMPARED), **figures, "outcome": outcome}
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_") or name not in COMPARED:
+        if name not in COMPARED:
             raise AttributeError(name)
         return self.figures[name]
 
@@ -79,13 +72,14 @@ class Row:
 
     def plain(self) -> dict[str, Any]:
         """All of it, column by column."""
-        names = {
-            "scenario": self.scenario,
-            "planner": self.planner,
+        names = {"scenario": self.scenario, "planner": self.planner}
+        return {
+            **names,
             "outcome": self.outcome,
             "reason": self.reason,
+            **self.figures,
+            "guidance": self.guidance,
         }
-        return {**names, **self.figures, "guidance": self.guidance}
 
 
 def row_of(
@@ -100,12 +94,13 @@ def row_of(
     """The row of a flight that came to an end."""
     flown = {name: metric.value(metrics) for name, metric in COMPARED.items() if not metric.derived}
     length, reached = metrics["flown_length_m"], metrics["outcome"] == "reached"
+    smooth = metrics["smoothness"]
     flown |= {
         "optimum_m": optimum_m,
         "ratio": length / optimum_m if reached and optimum_m else None,
         "turn_radius_m": turn_radius_m,
-        "tightest_turn": metrics["smoothness"]["planned"]["max_curvature_1pm"] * turn_radius_m,
-        "tightest_flown_turn": metrics["smoothness"]["flown"]["max_curvature_1pm"] * turn_radius_m,
+        "tightest_turn": smooth["planned"]["max_curvature_1pm"] * turn_radius_m,
+        "tightest_flown_turn": smooth["flown"]["max_curvature_1pm"] * turn_radius_m,
     }
     return Row(scenario, planner, flown.pop("outcome"), metrics["reason"], guidance, **flown)
 
@@ -119,51 +114,42 @@ def shown_figures(rows: Sequence[Row]) -> list[Metric]:
     ]
 
 
-def rows_for_paper(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of the table for a paper: a line a flight, the figures of `ON_TERMINAL`."""
-    shown = _on_terminal()
-    heads = ["scenario", "planner", *(each.short for each in shown)]
-    return heads, [[row.scenario, row.label, *(row.text(each) or DASH for each in shown)] for row in rows]
+def rows_for_paper(rows: Sequence[Row]) -> tuple[list[str], list[list[str]], list[str]]:
+    """Headings, a line a flight, and what each heading is, with its unit: the figures of `ON_TERMINAL`."""
+    shown = [next(each for each in METRICS if each.short == short) for short in ON_TERMINAL]
+    heads = ["scenario", "planner", *ON_TERMINAL]
+    lines = [[row.scenario, row.label, *(row.text(each) or DASH for each in shown)] for row in rows]
+    units = {each.short: f", in {each.unit}" if each.unit else "" for each in shown}
+    told = [f"{each.short}: {each.title}{units[each.short]}." for each in shown if each.title != each.short]
+    return heads, lines, told
 
 
-def legend() -> list[str]:
-    """What each of those figures is, with its unit."""
-    shown = [each for each in _on_terminal() if each.title != each.short]
-    return [f"{each.short}: {each.title}{f', in {each.unit}' if each.unit else ''}." for each in shown]
+def latex(heads: Sequence[str], rows: Iterable[Sequence[str]], legend: Sequence[str]) -> str:
+    """A `tabular` with the rules of the package booktabs; comments before it say so, and have the legend.
+
+    The first column is aligned left, numbers right.
+    """
+    first, *others = (" & ".join(printable(cell).translate(LATEX) for cell in row) for row in (heads, *rows))
+    lines = [
+        *(r"% \usepackage{booktabs}", *(f"% {printable(each)}" for each in legend)),
+        *(f"\\begin{{tabular}}{{l{'r' * (len(heads) - 1)}}}", "\\toprule", f"{first} \\\\", "\\midrule"),
+        *(*(f"{line} \\\\" for line in others), "\\bottomrule", "\\end{tabular}"),
+    ]
+    return "\n".join(lines) + "\n"
 
 
-def _on_terminal() -> list[Metric]:
-    return [next(each for each in METRICS if each.short == short) for short in ON_TERMINAL]
+def csv_table(rows: Iterable[Sequence[Any]]) -> str:
+    """Rows as CSV, headings first; None is an empty cell."""
+    text = io.StringIO()
+    plain = ([printable(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
+    csv.writer(text, lineterminator="\n").writerows(plain)
+    return text.getvalue()
 
 
 def to_csv(rows: Sequence[Row]) -> str:
     """All figures at full precision; a figure that does not exist is an empty cell."""
-    text = io.StringIO()
-    columns = Row("", "", "", "").plain()
-    writer = csv.DictWriter(text, list(columns), lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        cells = row.plain().items()
-        writer.writerow({key: printable(cell) if isinstance(cell, str) else cell for key, cell in cells})
-    return text.getvalue()
-
-
-def to_markdown(rows: Sequence[Row]) -> str:
-    """One table a scenario: a line for each figure, a column for each planner."""
-    parts = []
-    for name in dict.fromkeys(row.scenario for row in rows):
-        own = [row for row in rows if row.scenario == name]
-        lines = [f"## {escaped(name)}", "", _line(["", *(row.label for row in own)])]
-        lines.append(_line(["---", *("---:" for _ in own)]))
-        shown = shown_figures(own)
-        lines += [_line([figure.label, *(row.text(figure) or DASH for row in own)]) for figure in shown]
-        lines += ["", *(f"- {escaped(row.label)}: {escaped(row.reason)}" for row in own), ""]
-        parts.append("\n".join(lines))
-    return "\n".join(parts)
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(map(escaped, cells))} |"
+    heads = Row("", "", "", "").plain()
+    return csv_table([list(heads), *(list(row.plain().values()) for row in rows)])
 
 
 def escaped(text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import typer
 
@@ -17,12 +17,9 @@ from harness.cli.terminal import print_table
 from harness.files.errors import RunFolderError, WriteError
 from harness.files.input_file import InputError
 
-if TYPE_CHECKING:
-    from harness.analysis.paper_table import Format
-
 RUN_DIRS: Final = "Run folders (several are overlaid), or a campaign's folder, as a table of runs."
 BY: Final = "Of a campaign: a table by these keys; can be repeated."
-FORMAT: Final = "Of a campaign or comparison: only its table: latex, csv, markdown."
+FORMAT: Final = "Of a campaign or comparison: only its table: latex, csv."
 LOG: Final = "A table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...)."
 MISSION: Final = "Its mission: a file of `check`, or a JSON with its corners. Default: that of the log."
 STEADY: Final = "Fly one wind, not the wind as it changed in the log."
@@ -65,16 +62,16 @@ def _need_folder(run: Path) -> None:
 def report(
     run: Annotated[Path, argument("RUN_DIR", "The folder of a complete run, or of a campaign.")],
     by: Annotated[list[str] | None, option("KEY[,KEY]", BY)] = None,
-    table: Annotated[Literal["latex", "csv", "markdown"] | None, option("FORMAT", FORMAT, "--format")] = None,
+    table: Annotated[Literal["latex", "csv"] | None, option("FORMAT", FORMAT, "--format")] = None,
     out: Annotated[Path | None, option("FILE", "Of --format: a file in place of standard output.")] = None,
 ) -> int:
     """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
 
-    Beside report.html lie its figures as SVG and PNG, and its table as CSV and Markdown.
+    Beside report.html lie its figures as SVG and PNG, and its table as CSV.
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
 
-    With --format latex, csv or markdown the table of a campaign or a comparison, for a paper: wayproof report
+    With --format latex or csv the table of a campaign or a comparison, for a paper: wayproof report
     runs/comparison --format latex
     """
     from harness.campaign.results import RESULTS
@@ -124,10 +121,9 @@ def _summary(folder: Path, keys: Sequence[Sequence[str]] | None) -> None:
     say(f"summary: {page}")
 
 
-def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: Format, out: Path | None) -> None:
+def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str, out: Path | None) -> None:
     """The table of a campaign or a comparison for a paper."""
     from harness.analysis import rows as compared
-    from harness.analysis.paper_table import paper_table
     from harness.campaign import cell, report
     from harness.campaign.results import RESULTS
     from harness.campaign.summary import summarise
@@ -135,9 +131,10 @@ def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: Form
     from harness.files.whole_file import replace_text
 
     if (folder / RESULTS).is_file():
-        text = paper_table(*report.rows_for_paper(summarise(folder, keys)), table, cell.legend())
+        heads, lines, told = *report.rows_for_paper(summarise(folder, keys)), cell.legend()
     else:
-        text = paper_table(*compared.rows_for_paper(read_rows(folder)), table, compared.legend())
+        heads, lines, told = compared.rows_for_paper(read_rows(folder))
+    text = compared.csv_table([heads, *lines]) if table == "csv" else compared.latex(heads, lines, told)
     if out is None:
         say(text.removesuffix("\n"))
         return

@@ -10,12 +10,11 @@ from typing import Any
 from harness.analysis.causes import FINDINGS
 from harness.analysis.findings import CONTRADICTED
 from harness.analysis.metric import number
-from harness.analysis.rows import escaped, to_csv, to_markdown
+from harness.analysis.rows import to_csv
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
-from harness.files.wording import printable
 from harness.report.chapters import entry, optimum_of, run_chapter
 from harness.report.page import rendered
 from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
@@ -76,10 +75,6 @@ def _written(run: Run, folder: Path) -> Path:
         written=manifest["started_utc"],
     )
     replace_text(page.with_suffix(".csv"), to_csv([flight.row]))
-    # A line of code shows HTML and does not follow it; a program that makes HTML of all of it must not either.
-    shown = printable(" ".join(command.splitlines())).replace("<", "&lt;")
-    repeat = f"## How to repeat it\n\n    {shown}\n\nDigest of the track: `{escaped(flight.row.digest)}`\n"
-    replace_text(page.with_suffix(".md"), f"{to_markdown([flight.row])}\n{repeat}")
     replace_text(page, text)
     return page
 

@@ -19,7 +19,7 @@ from harness.cli.app import main
 from harness.files.whole_file import PARTIAL
 from tests.faults.command import FOREST
 
-OUTPUTS = ("report.html", "report.csv", "report.md", "path.svg", "path.png")
+OUTPUTS = ("report.html", "report.csv", "path.svg", "path.png")
 
 
 @pytest.fixture

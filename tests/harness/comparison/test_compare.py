@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from harness.analysis.metric import number
-from harness.analysis.rows import Row, row_of, to_csv, to_markdown
+from harness.analysis.rows import Row, row_of, to_csv
 from harness.cli.app import main
 from harness.cli.compare import print_comparison
 from harness.flight.record import AcceptedPlan, Track
@@ -456,25 +456,6 @@ def test_the_terminal_table_has_planner_and_law_whole(
         wanted = len(planners) if name in laws else len(laws) if len(planners) > 1 else 0
         assert begins.count(name) == wanted, name
     assert lines[0].rstrip() == ("world, rolling_window" if len(planners) == 1 else "world")
-
-
-def test_markdown_is_a_table_whatever_the_names_are() -> None:
-    text = to_markdown([Row("s", "a", "reached", "a | b <i>", ratio=1.5), Row("s", "b", "error", "c")])
-    table = [line for line in text.splitlines() if line.startswith("| ")]
-    assert {line.count("|") for line in table} == {4}
-    assert "| ratio to the clairvoyant optimum | 1.5000 | \N{EN DASH} |" in table
-    assert "- a: a \\| b &lt;i&gt;" in text
-
-
-def test_under_several_guidance_laws_a_row_is_called_after_both() -> None:
-    rows = [
-        Row("s", "a", "reached", "x", guidance=law, bank_saturation_fraction=0.25, cause=cause)
-        for law, cause in (("preview", ""), ("l1", "tracking error"))
-    ]
-    text = to_markdown(rows)
-    assert "|  | a, preview | a, l1 |" in text
-    assert "| cause of the first leg not tracked | \N{EN DASH} | tracking error |" in text
-    assert "| time at the bank limit, % | 25 | 25 |" in text
 
 
 def test_csv_of_a_crash_has_empty_cells() -> None:
