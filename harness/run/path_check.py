@@ -106,16 +106,7 @@ def asked(
         corner_m: how far off corners may be passed; None: as `PathCheck.allowed_cut_m` has it.
         name: of the scenario.
     """
-    if world is not None and given.origin_deg is not None and origin_of(world) is None:
-        raise InputError(f"{world}: area.origin: is missing; a path in degrees needs it")
-    keys: dict[Loc, Any] = {("schema",): "wayproof/scenario/1", ("name",): name}
-    if altitude_m is not None:
-        keys["mission", "altitude_m"] = altitude_m
-    elif len(given.altitudes_m) and not given.above_ground:
-        keys["mission", "altitude_m"] = float(given.altitudes_m[0])
-    if world is None and given.origin_deg is not None:
-        latitude, longitude = given.origin_deg
-        keys["area", "origin"] = {"latitude_deg": latitude, "longitude_deg": longitude}
+    keys = {("name",): name, **_own_keys(given, world, altitude_m)}
     base, source = _of_the_world(world), "command line" if world is None else str(world)
     folder = None if world is None else world.parent
 
@@ -134,8 +125,23 @@ def asked(
             root, files = _without_files(root, folder)
             root = _with(root, {("ground",): scenario.ground.model_dump()} if scenario.ground else {})
         scenario = validated(root, source, folder, ends_checked=False)
-    named = any(key.strip().startswith("area") and "origin" not in key for key, _ in settings)
-    return PathCheck(given, scenario, plan, named or world is not None, corner_m, files)
+    named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
+    return PathCheck(given, scenario, plan, bool(named or world), corner_m, files)
+
+
+def _own_keys(given: PathAsGiven, world: FilePath | None, altitude_m: float | None) -> dict[Loc, Any]:
+    """Keys that a path has, wherever it is flown."""
+    keys: dict[Loc, Any] = {("schema",): "wayproof/scenario/1"}
+    if altitude_m is not None:
+        keys["mission", "altitude_m"] = altitude_m
+    elif len(given.altitudes_m) and not given.above_ground:
+        keys["mission", "altitude_m"] = float(given.altitudes_m[0])
+    if world is None and given.origin_deg is not None:
+        latitude, longitude = given.origin_deg
+        keys["area", "origin"] = {"latitude_deg": latitude, "longitude_deg": longitude}
+    elif given.origin_deg is not None and origin_of(world) is None:
+        raise InputError(f"{world}: area.origin: is missing; a path in degrees needs it")
+    return keys
 
 
 def _of_the_world(world: FilePath | None) -> Node:

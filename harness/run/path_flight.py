@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -67,10 +66,10 @@ class PathPlan:
     legs: tuple[MissionLeg, ...] = ()
     """The path leg by leg, for a law that flies to its waypoints."""
 
-    @property
+    @cached_property
     def climb_mps(self) -> Callable[[float], tuple[float, float]]:
-        """Fastest climb and descent at an airspeed."""
-        return _climb_of(self.frame)
+        """Fastest climb and descent at an airspeed; flown when it is first asked for."""
+        return lru_cache(maxsize=1000)(lambda airspeed_mps: climb_rates(self.frame).at(airspeed_mps))
 
     @cached_property
     def climb_limit_mps(self) -> float | None:
@@ -89,47 +88,48 @@ def planned(
 ) -> PathPlan:
     """Makes of a path what is flown.
 
-    Raises:
-        InputError: it cannot be made into a path: altitudes above a ground that is not known, an airspeed at which
-            the wind is too strong.
+    An InputError says why it cannot be: altitudes above a ground that is not known, a wind too strong for an airspeed.
     """
     if given.mission is None:
         return _planned_line(given, scenario, altitude_m, ground, corner_m)
-    frame = airframe_of(scenario.aircraft)
+    frame, kind = airframe_of(scenario.aircraft), scenario.guidance.kind
     by_waypoints = scenario.guidance.follow == "waypoints"
     flying = Flying(
         airspeed_mps=scenario.aircraft.airspeed_mps,
         airspeed_range_mps=(_slowest_turning_mps(frame), frame.airspeed_range_mps[1]),
         turn_radius_m=_turn_radius_of(given, scenario),
-        climb_mps=_climb_of(frame),
+        climb_mps=lru_cache(maxsize=1000)(lambda airspeed_mps: climb_rates(frame).at(airspeed_mps)),
         free_cut_m=FREE_SHARE * scenario.trackability.cross_track_m,
         ground=ground,
         least_radius_m=frame.least_radius_m,
-        heads_for_centres=by_waypoints and scenario.guidance.kind in HEADING_FOR_CENTRES,
+        heads_for_centres=by_waypoints and kind in HEADING_FOR_CENTRES,
         corner_m=corner_m,
         wind_mps=complex(*steady_wind_mps(scenario)),
     )
     route = mission_route(given.mission, flying, given.source)
     profile, notes = route.profile, list(route.notes)
+    lowest, highest = ALTITUDES_M
     if altitude_m is not None:
-        level = np.full_like(profile.altitude_m, altitude_m)
-        profile = VerticalProfile(profile.arc_length_m, level, profile.speed_from_m, profile.airspeed_mps)
-    else:
-        profile, low = _no_lower(profile)
-        notes += low
-        if ground is None and given.mission.above_ground:
-            items = ", ".join(map(str, given.mission.above_ground[:6]))
-            more = " and others" if len(given.mission.above_ground) > 6 else ""
-            notes.append(
-                f"items {items}{more}: above ground, which is taken to be as high as home everywhere"
-            )
+        profile = replace(profile, altitude_m=np.full_like(profile.altitude_m, altitude_m))
+    elif profile.altitude_m.min() < lowest or profile.altitude_m.max() > highest:
+        profile = replace(profile, altitude_m=np.clip(profile.altitude_m, lowest, highest))
+        notes.append(f"altitudes below {lowest:g} m or above {highest:g} m above the sea: flown at these")
+    if altitude_m is None and ground is None:
+        notes += _above_home(given.mission.above_ground)
     if by_waypoints and any(step.loiter is not None for step in given.mission.steps):
         heads, joins = "heads for its centre and then joins it", "joins it along a tangent"
         how = heads if flying.heads_for_centres else joins
-        notes.append(f"to a loiter's circle the aircraft {how}, with the law {scenario.guidance.kind}")
+        notes.append(f"to a loiter's circle the aircraft {how}, with the law {kind}")
     return PathPlan(
         route.way, profile, route.asked_mps, frame, route.marks, notes=tuple(notes), legs=route.legs
     )
+
+
+def _above_home(items: Sequence[int]) -> list[str]:
+    """What is assumed of items whose altitudes are above a ground that is not known."""
+    told = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
+    said = f"items {told}: above ground, which is taken to be as high as home everywhere"
+    return [said] if items else []
 
 
 def _planned_line(
@@ -145,7 +145,10 @@ def _planned_line(
     limit_m = across_m if corner_m is None else corner_m
     tightest = Tightest(frame.least_radius_m(speed), limit_m, complex(*steady_wind_mps(scenario)) / speed)
     way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, FREE_SHARE * across_m, tightest)
-    profile = _drawn_profile(given, way, scenario, altitude_m, ground)
+    if altitude_m is not None or not len(given.altitudes_m):
+        profile = flat(scenario.mission.altitude_m, speed)
+    else:
+        profile = _drawn_profile(given, way, frame, speed, ground)
     bends = _bends(profile, BEND_SHARE * scenario.trackability.altitude_m)
     places = way.waypoints_m[:, 0] + 1j * way.waypoints_m[:, 1]
     ends = zip(pairwise(places.tolist()), pairwise(way.stations_m.tolist()), strict=True)
@@ -153,44 +156,29 @@ def _planned_line(
     return PathPlan(way, profile, profile.airspeed_mps, frame, bends=bends, legs=legs)
 
 
-def _no_lower(profile: VerticalProfile) -> tuple[VerticalProfile, list[str]]:
-    """A profile that keeps above the lowest altitude that is simulated, and what is said of it."""
-    lowest, highest = ALTITUDES_M
-    if lowest <= profile.altitude_m.min() and profile.altitude_m.max() <= highest:
-        return profile, []
-    told = f"altitudes below {lowest:g} m or above {highest:g} m above the sea: flown at these"
-    return dataclasses.replace(profile, altitude_m=np.clip(profile.altitude_m, lowest, highest)), [told]
-
-
 def _drawn_profile(
-    given: PathAsGiven, way: FlyBy, scenario: Scenario, altitude_m: float | None, ground: Ground | None
+    given: PathAsGiven, way: FlyBy, frame: Airframe, speed_mps: float, ground: Ground | None
 ) -> VerticalProfile:
-    """Altitudes along a drawn line."""
-    speed = scenario.aircraft.airspeed_mps
-    if altitude_m is not None or not len(given.altitudes_m):
-        return flat(scenario.mission.altitude_m, speed)
+    """Altitudes along a drawn line that has some."""
     altitudes = given.altitudes_m
     if given.above_ground:
+        remedy = "give --altitude-m"
         if ground is None:
             raise InputError(
-                f"{given.source}: has altitudes above ground, and the ground is not known; give --altitude-m"
+                f"{given.source}: has altitudes above ground, and the ground is not known; {remedy}"
             )
         altitudes = altitudes + ground(*given.points_m.T)
-        if not np.isfinite(altitudes).all():
-            number = int(np.flatnonzero(~np.isfinite(altitudes))[0])
-            raise InputError(
-                f"{given.source}: point {number} is where the ground is not known; give --altitude-m"
-            )
+        unknown = np.flatnonzero(~np.isfinite(altitudes))
+        if len(unknown):
+            raise InputError(f"{given.source}: point {unknown[0]} is where the ground is not known; {remedy}")
     if np.ptp(altitudes) <= SAME_ALTITUDE_M:
-        return flat(float(altitudes[0]), speed)
+        return flat(float(altitudes[0]), speed_mps)
     stations = way.stations_of(given.points_m).tolist()
-
-    def slope() -> float:
-        return CLIMB_SHARE * min(climb_rates(airframe_of(scenario.aircraft)).at(speed)) / speed
-
-    along, high = np.array(without_steps(list(zip(stations, altitudes.tolist(), strict=True)), slope)).T
-    nought = np.zeros(1)
-    return VerticalProfile(along, high, nought, nought + speed)
+    steps = list(zip(stations, altitudes.tolist(), strict=True))
+    along, high = np.array(
+        without_steps(steps, lambda: CLIMB_SHARE * min(climb_rates(frame).at(speed_mps)) / speed_mps)
+    ).T
+    return VerticalProfile(along, high, np.zeros(1), np.full(1, speed_mps))
 
 
 def _bends(profile: VerticalProfile, tolerance_m: float) -> tuple[tuple[int, float], ...]:
@@ -209,18 +197,8 @@ def _slowest_turning_mps(frame: Airframe) -> float:
     """The slowest airspeed at which an aircraft keeps its altitude in the turns of a mission."""
     low, _ = frame.airspeed_range_mps
     enough = frame.level_bank_deg(frame.cruise_mps) - SPARE_BANK_DEG
-    speeds = np.linspace(low, max(frame.cruise_mps, low), 50)
-    able: list[float] = [speed for speed in speeds.tolist() if frame.level_bank_deg(speed) >= enough]
-    return round(able[0], 1)
-
-
-def _climb_of(frame: Airframe) -> Callable[[float], tuple[float, float]]:
-    """Fastest climb and descent at an airspeed; flown when it is first asked for."""
-
-    def climb_mps(airspeed_mps: float) -> tuple[float, float]:
-        return climb_rates(frame).at(airspeed_mps)
-
-    return lru_cache(maxsize=1000)(climb_mps)
+    speeds: list[float] = np.linspace(low, max(frame.cruise_mps, low), 50).tolist()
+    return round(next(speed for speed in speeds if frame.level_bank_deg(speed) >= enough), 1)
 
 
 def _turn_radius_of(given: PathAsGiven, scenario: Scenario) -> Callable[[float], float]:
@@ -264,6 +242,15 @@ def fly_along(
     return replace(fly(along, observers, progress), compute_ms=())  # nothing was searched for
 
 
+def _slowest_mps(state: AircraftState, plan: PathPlan) -> float:
+    """Slowest speed over the ground, against the wind that the aircraft starts in."""
+    wind = math.hypot(
+        state.velocity_east_mps - state.airspeed_mps * math.sin(state.heading_rad),
+        state.velocity_north_mps - state.airspeed_mps * math.cos(state.heading_rad),
+    )
+    return float(plan.profile.airspeed_mps.min()) - wind
+
+
 class GivenPath:
     """A planner whose first answer is a path, and which keeps to it. Implements `Planner`."""
 
@@ -276,48 +263,31 @@ class GivenPath:
         return self._kept if request.flown else self._found
 
 
+@dataclass
 class PathEnd:
     """A flight along a path: over at its end, or when it takes too long. Implements `Termination`."""
 
-    contact_m = math.inf
-
-    def __init__(
-        self,
-        where: Callable[[AircraftState], Along | PathPoint],
-        length_m: float,
-        near_m: float,
-        limit_s: float,
-    ) -> None:
-        self._where, self._length_m = where, length_m
-        self._near_m, self._limit_s = near_m, limit_s
+    where: Callable[[AircraftState], Along | PathPoint]
+    length_m: float
+    near_m: float
+    limit_s: float
+    contact_m: float = math.inf
 
     def to_go_m(self, state: AircraftState) -> float:
         """Length of the path that is left."""
-        return self._length_m - self._where(state).arc_length_m
+        return self.length_m - self.where(state).arc_length_m
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
         """How the flight ends now; None while it goes on."""
         if fault is not None:
             return Ending(Outcome.LOST_CONTROL, fault)
-        time_s, nearest = state.time_s, self._where(state)
+        after, nearest = f"after {state.time_s:.0f} s", self.where(state)
         off_m = abs(nearest.cross_track_m)
-        if nearest.past_end and off_m > self._near_m:
-            return Ending(
-                Outcome.TIMEOUT, f"passed the end of the path {off_m:,.0f} m beside it after {time_s:.0f} s"
-            )
+        if nearest.past_end and off_m > self.near_m:
+            return Ending(Outcome.TIMEOUT, f"passed the end of the path {off_m:,.0f} m beside it {after}")
         if nearest.past_end:
-            return Ending(Outcome.REACHED, f"at the end of the path after {time_s:.0f} s")
-        if time_s >= self._limit_s:
-            return Ending(
-                Outcome.TIMEOUT, f"not at the end of the path after {time_s:.0f} s, twice what it should take"
-            )
+            return Ending(Outcome.REACHED, f"at the end of the path {after}")
+        if state.time_s >= self.limit_s:
+            told = f"not at the end of the path {after}, twice what it should take"
+            return Ending(Outcome.TIMEOUT, told)
         return None
-
-
-def _slowest_mps(state: AircraftState, plan: PathPlan) -> float:
-    """Slowest speed over the ground, against the wind that the aircraft starts in."""
-    wind = math.hypot(
-        state.velocity_east_mps - state.airspeed_mps * math.sin(state.heading_rad),
-        state.velocity_north_mps - state.airspeed_mps * math.cos(state.heading_rad),
-    )
-    return float(plan.profile.airspeed_mps.min()) - wind

@@ -58,8 +58,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
     corners = [Corner(**vars(each), allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
     window_m = WINDOW_RADII * limits.turn_radius_m
     found = believed = deviation(track, way.given_m, SPACING_SHARE * tolerance, window_m)
-    off_m, allowed = np.nan_to_num(found.by_row_m), allowed_m(track, tolerance, corners)
-    asked = _as_given(check.plan, track, corners, off_m, allowed)
+    asked = _as_given(check.plan, track, corners, np.nan_to_num(found.by_row_m), tolerance)
     if track.has_beliefs:
         east, north = track.believed_m[:, :2].T
         as_believed = replace(track, east_m=east, north_m=north)
@@ -72,44 +71,58 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         first = seen.contacts[0]
         figures["outcome"] = Outcome.COLLISION.value
         figures["reason"] = f"touched {first.name} after {first.start_s:.0f} s; {flight.reason}"
-    passed = [_passed(corner, track, off_m, tolerance) for corner in corners]
-    figures["trackable"] = (
-        figures["trackable"]
-        and figures["outcome"] == Outcome.REACHED.value
-        and all(corner["kept"] for corner in passed)
-    )
-    worst = _worst(track, off_m, allowed, corners)
-    high_m = np.abs(track.up_m - asked.altitude_m).max()
-    speed = max(float(track.groundspeed_mps.mean()), 1e-3)
-    told = {
-        "ok": False,
-        "verdict": "",
-        "drawn": check.given.drawn,
-        "points": len(check.given.points_m),
-        "given_length_m": float(np.hypot(*np.diff(_line(check.plan), axis=0).T).sum()),
-        "worst": worst,
-        "limit_used": {
-            "off_path": worst["off_m"] / worst["allowed_m"] if worst["allowed_m"] else None,
-            "altitude": float(high_m) / limits.max_altitude_error_m,
-            "bank": _bank_used(check, flight, limits, asked),
-        },
-        "corner_m_that_would_do": _sufficient_m(track, off_m, tolerance, corners),
-        "given": dataclasses.asdict(smoothness(polyline_profile(_line(check.plan), speed), speed)),
-        "corners": passed,
-        "fences": [fence.plain() for fence in check.given.fences.every],
-        "items": [dataclasses.asdict(told) for told in check.given.mission.items]
-        if check.given.mission
-        else [],
-        "notes": [*check.given.notes, *check.plan.notes],
-    }
+    told = _told(check, flight, limits, asked, corners)
+    figures["trackable"] &= figures["outcome"] == "reached" and all(each["kept"] for each in told["corners"])
     told["ok"], told["verdict"] = verdict(figures, told, seen, limits)
     return {
         **figures,
         "total_system_error_m": error_figures(found.rows_m),
         "flight_technical_error_m": error_figures(believed.rows_m),
-        **_kept_figures(seen),
+        "min_clearance_m": seen.margin_m if np.isfinite(seen.margin_m) else None,
+        "contact": bool(seen.contacts),
+        "contacts": [dict(vars(each)) for each in seen.contacts],
+        "breaches": [dict(vars(each)) for each in seen.crossings],
+        **({} if seen.height_m is None else {"height_above_ground_m": seen.height_m}),
         "deviation_from_given_m": found.figures(),
         "check": told,
+    }
+
+
+def _told(
+    check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven, corners: Sequence[Corner]
+) -> dict[str, Any]:
+    """What stands under `check`; whether it is ok, and the verdict, follow from it."""
+    track, given, plan = flight.track, check.given, check.plan
+    off_m, tolerance_m = asked.deviation_m, limits.cross_track_threshold_m
+    # The place where the track is furthest off the path in relation to what is allowed there.
+    row = int((off_m / np.maximum(asked.allowed_m, 1e-9)).argmax())
+    worst_m, most_m = float(off_m[row]), float(asked.allowed_m[row])
+    line, speed = _line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
+    return {
+        "ok": False,
+        "verdict": "",
+        "drawn": given.drawn,
+        "points": len(given.points_m),
+        "given_length_m": float(np.hypot(*np.diff(line, axis=0).T).sum()),
+        "worst": {
+            "time_s": float(track.time_s[row]),
+            "east_m": float(track.east_m[row]),
+            "north_m": float(track.north_m[row]),
+            "off_m": worst_m,
+            "allowed_m": most_m,
+            "waypoint": next((each.waypoint for each in corners if at_corner(track, each)[row]), None),
+        },
+        "limit_used": {
+            "off_path": worst_m / most_m if most_m else None,
+            "altitude": float(np.abs(track.up_m - asked.altitude_m).max()) / limits.max_altitude_error_m,
+            "bank": _bank_used(check, flight, limits, asked),
+        },
+        "corner_m_that_would_do": _sufficient_m(track, off_m, tolerance_m, corners),
+        "given": dataclasses.asdict(smoothness(polyline_profile(line, speed), speed)),
+        "corners": [_passed(corner, track, off_m, tolerance_m) for corner in corners],
+        "fences": [fence.plain() for fence in given.fences.every],
+        "items": [dataclasses.asdict(item) for item in given.mission.items] if given.mission else [],
+        "notes": [*given.notes, *plan.notes],
     }
 
 
@@ -120,11 +133,20 @@ def verdict(
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
     touched, high_m = _touched(seen), figures["altitude_error_m"]["max"]
     ended = [] if figures["outcome"] in ("reached", "collision") else [str(figures["reason"])]
-    corners_alone = not touched and not ended and _at_speed(figures["trackability"], limits)
-    faults = touched + ([tallied(bad, "legs")] if bad else []) + _how_far(told, high_m, corners_alone) + ended
+    share = told["limit_used"]["altitude"]
+    high = [f"{high_m:.3g} m off in altitude where {high_m / share:.3g} m are allowed"] if share > 1.0 else []
+    alone = not (touched or ended or high) and _at_speed(figures["trackability"], limits)
+    faults = [*touched, *([tallied(bad, "legs")] if bad else []), *_how_far(told, alone), *high, *ended]
     if not faults and not figures["trackable"]:
         faults.append("no leg was flown")
     return (False, "no: " + "; ".join(faults)) if faults else (True, _yes(told, limits))
+
+
+def _touched(seen: Kept) -> list[str]:
+    """What was touched, entered and left, the deepest of each kind."""
+    kinds = (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves"))
+    crossed = [([each for each in seen.crossings if each.kind == kind], verb) for kind, verb in kinds]
+    return [_deepest(some, verb) for some, verb in ((seen.contacts, "touches"), *crossed) if some]
 
 
 def _yes(told: Mapping[str, Any], limits: FlightLimits) -> str:
@@ -134,9 +156,8 @@ def _yes(told: Mapping[str, Any], limits: FlightLimits) -> str:
     wide_m = max((corner["allowed_cut_m"] for corner in told["corners"]), default=0.0)
     corners = f", corners within {wide_m:.3g} m" if wide_m > tolerance_m else ""
     most = max(used["off_path"] or 0.0, used["altitude"])
-    limit_rad = limits.bank_limit_rad
-    bank_deg = math.degrees(math.atan((used["bank"] or 0.0) * math.tan(limit_rad)))
-    turns = f", turns take {bank_deg:.0f} of {math.degrees(limit_rad):.0f} deg of bank"
+    bank_deg = math.degrees(math.atan((used["bank"] or 0.0) * math.tan(limits.bank_limit_rad)))
+    turns = f", turns take {bank_deg:.0f} of {math.degrees(limits.bank_limit_rad):.0f} deg of bank"
     bank = turns if bank_deg >= 1.0 else ""
     return f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most{bank}"
 
@@ -149,18 +170,9 @@ def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, asked: As
     rows = np.flatnonzero(flight.track.plan_index >= 0)
     if check.scenario.guidance.follow == "waypoints" or not len(rows):
         return None
-    track = flight.track.part(int(rows[0]), int(rows[-1]) + 1)
-    force = InForce.of(flight.track, limits, asked.airspeed_mps).part(int(rows[0]), int(rows[-1]) + 1)
-    return demand(track, flight.plans, force).windy
-
-
-def _touched(seen: Kept) -> list[str]:
-    """What was touched, entered and left, the first of each kind."""
-    faults = [_deepest(seen.contacts, "touches")] if seen.contacts else []
-    for kind, verb in (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves")):
-        crossed = [each for each in seen.crossings if each.kind == kind]
-        faults += [_deepest(crossed, verb)] if crossed else []
-    return faults
+    flown = int(rows[0]), int(rows[-1]) + 1
+    force = InForce.of(flight.track, limits, asked.airspeed_mps).part(*flown)
+    return demand(flight.track.part(*flown), flight.plans, force).windy
 
 
 def _at_speed(legs: Sequence[Mapping[str, Any]], limits: FlightLimits) -> bool:
@@ -172,27 +184,24 @@ def _at_speed(legs: Sequence[Mapping[str, Any]], limits: FlightLimits) -> bool:
     )
 
 
-def _how_far(told: Mapping[str, Any], high_m: float, corners_alone: bool) -> list[str]:
-    """How far off the path, a corner and its altitude an aircraft was, where that was too far.
+def _how_far(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
+    """How far off the path and a corner an aircraft was, where that was too far.
 
-    Another limit at the corners makes a yes only where nothing else is wrong (`corners_alone`, and the altitude).
+    Another limit at the corners makes a yes only where nothing else is wrong (`corners_alone`).
     """
-    worst, used, enough_m = told["worst"], told["limit_used"], told["corner_m_that_would_do"]
-    off = [corner for corner in told["corners"] if not corner["kept"]]
+    worst, enough_m = told["worst"], told["corner_m_that_would_do"]
+    missed = next((corner for corner in told["corners"] if not corner["kept"]), None)
     noun, faults = "waypoint" if told["drawn"] else "item", []
     if worst["off_m"] > worst["allowed_m"]:
         where = "" if worst["waypoint"] is None else f" at {noun} {worst['waypoint']}"
         faults.append(f"{worst['off_m']:.3g} m off{where} where {worst['allowed_m']:.3g} m are allowed")
-    elif off:
-        reached = (
-            "not reached" if off[0]["flown_cut_m"] is None else f"passed {off[0]['most_off_m']:.3g} m off"
-        )
-        faults.append(f"{noun} {off[0]['waypoint']} {reached}, {off[0]['allowed_cut_m']:.3g} m are allowed")
+    elif missed is not None:
+        came = missed["flown_cut_m"] is not None
+        how = f"passed {missed['most_off_m']:.3g} m off" if came else "not reached"
+        faults.append(f"{noun} {missed['waypoint']} {how}, {missed['allowed_cut_m']:.3g} m are allowed")
     if faults and enough_m is not None:
-        would = "be yes" if corners_alone and used["altitude"] <= 1.0 else "do for the corners alone"
+        would = "be yes" if corners_alone else "do for the corners alone"
         faults.append(f"--corner-m {enough_m:g} would {would}")
-    if used["altitude"] > 1.0:
-        faults.append(f"{high_m:.3g} m off in altitude where {high_m / used['altitude']:.3g} m are allowed")
     return faults
 
 
@@ -203,40 +212,22 @@ def _deepest(found: Sequence[Breach], verb: str) -> str:
     return f"{verb} {deepest.name} at {deepest.start_s:.0f} s, by {deepest.depth_m:.3g} m{more}"
 
 
-def _worst(track: Track, off_m: FloatArray, allowed: FloatArray, corners: Sequence[Corner]) -> dict[str, Any]:
-    """The place where the track is furthest off the path in relation to what is allowed there."""
-    row = int((off_m / np.maximum(allowed, 1e-9)).argmax())
-    near = [corner.waypoint for corner in corners if at_corner(track, corner)[row]]
-    return {
-        "time_s": float(track.time_s[row]),
-        "east_m": float(track.east_m[row]),
-        "north_m": float(track.north_m[row]),
-        "off_m": float(off_m[row]),
-        "allowed_m": float(allowed[row]),
-        "waypoint": near[0] if near else None,
-    }
-
-
 def _sufficient_m(
     track: Track, off_m: FloatArray, tolerance_m: float, corners: Sequence[Corner]
 ) -> float | None:
     """The limit at all corners that would have been kept, rounded up to 1 m; None where none would, or no other."""
-
-    def off_at_corners(these: Sequence[Corner]) -> float:
-        return max(float(_passed(corner, track, off_m, tolerance_m)["most_off_m"]) for corner in these)
-
     reached = [_passed(corner, track, off_m, tolerance_m) for corner in corners]
     if all(each["kept"] for each in reached) or any(each["flown_cut_m"] is None for each in reached):
         return None
     limit_m = 0.0
     for _ in range(MOST_TRIES):
         tried = [replace(corner, allowed_cut_m=limit_m) for corner in corners]
-        needed_m = off_at_corners(tried)
+        needed_m = max(_passed(corner, track, off_m, tolerance_m)["most_off_m"] for corner in tried)
         if needed_m <= limit_m and bool((off_m <= allowed_m(track, tolerance_m, tried)).all()):
             return limit_m
         limit_m = float(math.ceil(max(needed_m, WIDER * limit_m)))
         if limit_m > MOST_WIDER * needed_m:  # it is off where no corner is
-            return None
+            break
     return None
 
 
@@ -245,55 +236,44 @@ def _line(plan: PathPlan) -> FloatArray:
     if not plan.marks:
         return plan.way.waypoints_m
     line = plan.way.given_m[:, :2]
-    apart = np.hypot(*np.diff(line, axis=0).T) > SAME_PLACE_M
-    every: FloatArray = line[np.append(True, apart)]
+    every: FloatArray = line[np.append(True, np.hypot(*np.diff(line, axis=0).T) > SAME_PLACE_M)]
     return every
 
 
 def _as_given(
-    plan: PathPlan, track: Track, corners: list[Corner], off_m: FloatArray, allowed: FloatArray
+    plan: PathPlan, track: Track, corners: list[Corner], off_m: FloatArray, tolerance_m: float
 ) -> AsGiven:
     """What the path asks for, row by row."""
-    along = np.nan_to_num(track.arc_length_m)
-    profile = plan.profile
-    asked = np.searchsorted(profile.speed_from_m, along, side="right") - 1
-    speeds = slewed(plan.asked_mps[np.maximum(asked, 0)], track.time_s, float(plan.asked_mps[0]))
-    if profile.level:
-        fastest = np.full((len(track), 2), np.inf)
-    else:
+    along, profile = np.nan_to_num(track.arc_length_m), plan.profile
+    asked = np.maximum(np.searchsorted(profile.speed_from_m, along, side="right") - 1, 0)
+    fastest = np.full((len(track), 2), np.inf)
+    if not profile.level:
         rates = {speed: plan.climb_mps(speed) for speed in set(profile.airspeed_mps.tolist())}
         fastest = np.array([rates[speed] for speed in profile.airspeeds(along).tolist()]).reshape(-1, 2)
     return AsGiven(
         _ends(plan, corners),
         off_m,
-        allowed,
+        allowed_m(track, tolerance_m, corners),
         altitude_m=profile.altitudes(along),
         climb_mps=profile.slopes(along) * track.groundspeed_mps,
         fastest_mps=fastest,
-        airspeed_mps=speeds,
-        unheld_mps=np.abs(plan.asked_mps - profile.airspeed_mps)[np.maximum(asked, 0)],
+        airspeed_mps=slewed(plan.asked_mps[asked], track.time_s, float(plan.asked_mps[0])),
+        unheld_mps=np.abs(plan.asked_mps - profile.airspeed_mps)[asked],
     )
 
 
 def _ends(plan: PathPlan, corners: list[Corner]) -> list[Corner]:
     """Where legs end: at every item of a mission; at the corners of a drawn line, and where its slope changes."""
     known = {(corner.waypoint, round(corner.arc_length_m, 3)): corner for corner in corners}
-    ends = [] if plan.marks else corners.copy()
-    for number, along in plan.marks or plan.bends:
-        plain = Corner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along, 0.0)
-        corner = known.get((number, round(along, 3)), plain)
-        ends += [corner] if plan.marks or corner is plain else []
+    plain = {(number, round(along, 3)): _plain(number, along) for number, along in plan.marks or plan.bends}
+    every = plain | known
+    ends = [every[key] for key in plain] if plan.marks else list(every.values())
     return sorted(ends, key=lambda each: each.arc_length_m)
 
 
-def _kept_figures(seen: Kept) -> dict[str, Any]:
-    return {
-        "min_clearance_m": seen.margin_m if np.isfinite(seen.margin_m) else None,
-        "contact": bool(seen.contacts),
-        "contacts": [dict(vars(each)) for each in seen.contacts],
-        "breaches": [dict(vars(each)) for each in seen.crossings],
-        **({} if seen.height_m is None else {"height_above_ground_m": seen.height_m}),
-    }
+def _plain(number: int, along_m: float) -> Corner:
+    """An end of a leg that is no corner."""
+    return Corner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along_m, 0.0)
 
 
 def _passed(corner: Corner, track: Track, off_m: FloatArray, tolerance_m: float) -> dict[str, Any]:
@@ -309,12 +289,8 @@ def _passed(corner: Corner, track: Track, off_m: FloatArray, tolerance_m: float)
         about[last : last + int(back[0]) if len(back) else len(track)] = True
         flown = float(np.hypot(track.east_m - corner.east_m, track.north_m - corner.north_m)[about].min())
         most = max(flown, float(off_m[about].max()))
-    return {
-        **vars(corner),
-        "flown_cut_m": flown,
-        "most_off_m": most,
-        "kept": flown is not None and most <= corner.allowed_cut_m,
-    }
+    kept_there = flown is not None and most <= corner.allowed_cut_m
+    return {**vars(corner), "flown_cut_m": flown, "most_off_m": most, "kept": kept_there}
 
 
 def layer_contacts(
@@ -330,25 +306,20 @@ def layer_contacts(
     from harness.world_files.plane import Place
 
     specs = [each for each in files if loaded_file(each.path, each.kind, each.reading).terrain is None]
-    if not specs or not len(track):
-        return (), math.inf
     origin = scenario.area.origin
     place = Place(origin.latitude_deg, origin.longitude_deg)
     known = None if scenario.ground is None else scenario.ground.field()
-    deep = max(LAYER_M, float(np.ptp(track.up_m)) / MOST_LAYERS)
+    deep = max(LAYER_M, float(np.ptp(track.up_m)) / MOST_LAYERS) if specs else LAYER_M
+    thick = [replace(spec, vertical_clearance_m=spec.vertical_clearance_m + 0.5 * deep) for spec in specs]
     layer = np.floor(track.up_m / deep).astype(np.int64)
-    margins = {spec.path.name: np.full(len(track), np.inf) for spec in specs}
     found: list[Breach] = []
-    for number in np.unique(layer).tolist():
-        rows = layer == number
-        thick = [replace(spec, vertical_clearance_m=spec.vertical_clearance_m + 0.5 * deep) for spec in specs]
+    least = math.inf
+    for number in np.unique(layer).tolist() if specs else ():
         sources = expanded(thick, place, scenario.area.bounds_m, (number + 0.5) * deep, ground=known).sources
         for source in sources:
             if source.polygons:
                 solid = shapely.union_all(source.polygons)
-                margin: FloatArray = np.where(rows, -inside_m(track, solid), np.inf)
-                name = source.spec.path.name
-                margins[name] = np.minimum(margins[name], margin)
-                found += crossings(track, margin, CONTACT, name, outside_of=solid)
-    least = min(float(margin.min()) for margin in margins.values())
+                margin: FloatArray = np.where(layer == number, -inside_m(track, solid), np.inf)
+                least = min(least, float(margin.min()))
+                found += crossings(track, margin, CONTACT, source.spec.path.name, outside_of=solid)
     return tuple(found), least

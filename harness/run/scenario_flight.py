@@ -52,11 +52,7 @@ Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
 def make_loop(
     scenario: Scenario, make_model: Callable[[StartConditions, Atmosphere], FlightModel] | None = None
 ) -> Loop:
-    """All parts of a scenario's flight.
-
-    Raises:
-        AircraftError: the aircraft cannot be loaded or trimmed.
-    """
+    """All parts of a scenario's flight; an AircraftError says why its aircraft cannot be loaded or trimmed."""
     mission = mission_of(scenario)
     world = World.from_scenario(scenario)
     start, air = start_conditions(scenario), atmosphere(scenario)
@@ -76,7 +72,7 @@ def make_loop(
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
         guidance=law_of(scenario.guidance, scenario.aircraft),
-        termination=MissionEnd(world, mission, _given(scenario.mission.time_limit_s)),
+        termination=MissionEnd(world, mission, scenario.mission.time_limit_s),
         mission=mission,
         vertical=LevelFlight(scenario.mission.altitude_m, mission.speed_mps),
         scan_rate_hz=scenario.sensor.rate_hz,
@@ -113,29 +109,28 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
     performance, limits = performance_of(scenario), scenario.trackability
     frame = airframe_of(scenario.aircraft)
     guidance = frame.guidance_limits()
-    speed, clearance = performance.airspeed_mps, _given(scenario.planner.clearance_m)
-    planned_m = clearance + _given(scenario.navigation.margin_m)
-    wind = wind_mps_of(scenario)
-    sensor = scenario.sensor
+    speed, sensor = performance.airspeed_mps, scenario.sensor
+    margin_m, clearance_m = scenario.navigation.margin_m, scenario.planner.clearance_m
     blind_s = scenario.planner.compute_latency_s + sensor.latency_s + 1.0 / sensor.rate_hz
+    seen_late_m = (speed + wind_mps_of(scenario)) * (blind_s + performance.roll_in_s)
     return FlightLimits(
         altitude_m=scenario.mission.altitude_m,
-        clearance_m=clearance,
+        clearance_m=clearance_m,
         bank_limit_rad=guidance.bank_limit_rad,
         turn_radius_m=performance.turn_radius_m,
         airspeed_mps=speed,
         roll_rate_radps=guidance.roll_rate_radps,
         stall_angle_deg=frame.stall_angle_deg,
-        sensor_range_m=_given(sensor.range_m),
+        sensor_range_m=sensor.range_m,
         no_wind=scenario.environment.wind is None,
         scan_period_s=1.0 / sensor.rate_hz,
         compute_latency_s=scenario.planner.compute_latency_s,
-        horizon_m=performance.turn_radius_m + planned_m + (speed + wind) * (blind_s + performance.roll_in_s),
-        max_cross_track_m=_given(limits.cross_track_m),
-        max_altitude_error_m=_given(limits.altitude_m),
-        max_airspeed_error_mps=_given(limits.airspeed_mps),
-        max_load_factor=_given(limits.load_factor),
-        navigation_margin_m=_given(scenario.navigation.margin_m) if planned else 0.0,
+        horizon_m=performance.turn_radius_m + (clearance_m + margin_m) + seen_late_m,
+        max_cross_track_m=limits.cross_track_m,
+        max_altitude_error_m=limits.altitude_m,
+        max_airspeed_error_mps=limits.airspeed_mps,
+        max_load_factor=limits.load_factor,
+        navigation_margin_m=margin_m if planned else 0.0,
     )
 
 
@@ -156,21 +151,21 @@ def fly_to_folder(
     command: str | None = None,
     profile: Callable[[FloatArray], FloatArray] | None = None,
 ) -> dict[str, Any]:
-    """Flies a scenario into a run folder and returns the content of its `metrics.json`.
+    """Flies a complete scenario into a run folder and returns the content of its `metrics.json`.
 
     Args:
-        scenario: a complete scenario.
+        scenario: what is flown.
         out: the run folder, made or written anew.
         recording: whether to write `flight.rrd`.
         progress: told of the flight as it goes on.
-        make: makes the parts of the flight.
-        flown_by: flies the parts to an end.
-        measured_by: gives the content of `metrics.json`.
+        make: makes the parts of the flight; `flown_by` flies them to an end, `measured_by` gives the figures.
         watching: observers besides those that write the folder.
         pilot: stands in the recording's name; default: the planner's kind.
         identity: of the recording among others; default: its name with a hash of all settings and versions.
         varied: keys that a campaign varied, for the recording's properties.
         thin: whether the recording has no more than track, plans and obstacles.
+        flown_by: see `make`.
+        measured_by: see `make`.
         command: what the manifest says was called; default: the command line.
         profile: altitudes to be held at arc lengths along the path, for the recording; None: the mission's.
 
@@ -184,8 +179,9 @@ def fly_to_folder(
     try:
         with ExitStack() as stack:
             told = [command or shlex.join(sys.argv)]
+            sources = [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
             radius_m = loop.mission.turn_radius_m
-            folder = stack.enter_context(RunFolder.create(out, text, told, _sources(scenario), radius_m))
+            folder = stack.enter_context(RunFolder.create(out, text, told, sources, radius_m))
             so_far, observers = _SoFar(), [*watching]
             scene = replace(scene_of(scenario, loop, text, pilot), profile=profile) if recording else None
             log = None if scene is None else _recording(scene, loop, folder, identity, thin)
@@ -236,11 +232,6 @@ class _SoFar(Observer):
             folder.leave(Track.joined(self._blocks), self._plans)
 
 
-def _sources(scenario: Scenario) -> list[dict[str, str]]:
-    """Files that obstacles and ground were made of, for the manifest."""
-    return [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
-
-
 def _recording(scene: Scene, loop: Loop, folder: RunFolder, identity: str | None, thin: bool) -> Any:
     from harness.recording.log import RerunLog
 
@@ -270,9 +261,3 @@ def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None
 
 def _stream(seed: int, number: int) -> np.random.SeedSequence:
     return np.random.SeedSequence(seed, spawn_key=(number,))
-
-
-def _given(value: float | None) -> float:
-    """A key that a complete scenario always has."""
-    assert value is not None
-    return value
