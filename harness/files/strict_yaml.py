@@ -75,13 +75,8 @@ class Node:
 
     def line_of(self, loc: Loc) -> int:
         """Line of the value at `loc`, or of the innermost one on the way to it that exists."""
-        node = self
-        for step in loc:
-            inner = node.inner(step)
-            if inner is None:
-                break
-            node = inner
-        return node.line
+        inner = self.inner(loc[0]) if loc else None
+        return inner.line_of(loc[1:]) if inner else self.line
 
     def inner(self, step: str | int) -> Node | None:
         """What a mapping has under a key, or a list at an index; None where there is nothing."""
@@ -107,13 +102,9 @@ def key_path(loc: Loc) -> str:
 
 
 def loc_of(path: str) -> Loc:
-    """`obstacles[2].circle` as `("obstacles", 2, "circle")`.
-
-    Raises:
-        ValueError: a step is empty, or no key; or there are too many.
-    """
+    """`obstacles[2].circle` as `("obstacles", 2, "circle")`; a ValueError says that a path is none."""
     steps = path.replace("[", ".").replace("]", "").split(".")
-    if not all(steps) or not all(map(is_key, steps)) or len(steps) > MAX_DEPTH:
+    if not all(steps) or not all(map(_is_key, steps)) or len(steps) > MAX_DEPTH:
         raise ValueError(f"{path[:60]!r} is not a key path; write it as sensor.range_m")
     return tuple(int(step) if step.isdecimal() else step for step in steps)
 
@@ -161,24 +152,22 @@ class _Composer:
     """Builds nodes from the events of one document."""
 
     def __init__(self, text: str, source: str) -> None:
-        self.text = text
-        self.source = source
-        self.values = 0
+        self.text, self.source, self.values = text, source, 0
         self.events: Iterator[yaml.Event] = yaml.parse(text, Loader=_LOADER)
 
     def document(self) -> Node:
         self.next(())
-        if isinstance(self.next(()), yaml.StreamEndEvent):
-            raise self.fault(1, (), "is empty; must be a mapping that begins with `schema:`")
+        event = self.next(())
+        if isinstance(event, yaml.StreamEndEvent):
+            raise InputError(f"{self.source}:1: is empty; must be a mapping that begins with `schema:`")
         node = self.node(self.next(()), (), 1)
         self.next(())
-        event = self.next(())
-        if not isinstance(event, yaml.StreamEndEvent):
-            raise self.fault(_line(event), (), "a second document begins here; must be one document a file")
+        if not isinstance(event := self.next(()), yaml.StreamEndEvent):
+            raise self.fault(event, (), "a second document begins here; must be one document a file")
         return node
 
-    def fault(self, line: int, loc: Loc, sentence: str) -> InputError:
-        return InputError(fault_line(self.source, line, loc, sentence))
+    def fault(self, event: yaml.Event, loc: Loc, sentence: str) -> InputError:
+        return InputError(fault_line(self.source, _line(event), loc, sentence))
 
     def next(self, loc: Loc) -> yaml.Event:
         """The next event; `loc` says where we are in case the text is broken."""
@@ -189,56 +178,52 @@ class _Composer:
             mark = error.context_mark if opened and error.context_mark else error.problem_mark
             lines = self.text.split("\n")
             line = min(mark.line + 1, len(lines)) if mark else 1
-            if _TAB_BEFORE.match(lines[line - 1]):
-                sentence = "has a tab; indent with spaces"
-            else:
-                sentence = f"is not YAML ({error.problem}); check indentation, colons, brackets and quotes"
-            raise self.fault(line, loc, sentence) from error
+            if _TAB_BEFORE.match(lines[line - 1]):  # which key the line is of cannot be told
+                raise InputError(f"{self.source}:{line}: has a tab; indent with spaces") from error
+            sentence = f"is not YAML ({error.problem}); check indentation, colons, brackets and quotes"
+            raise InputError(fault_line(self.source, line, loc, sentence)) from error
 
     def node(self, event: yaml.Event, loc: Loc, line: int) -> Node:
-        if isinstance(event, yaml.AliasEvent):
-            raise self.fault(_line(event), loc, f"is the alias *{event.anchor:.40}; write the value out")
         self.check_bare(event, loc)
         self.values += 1
         if self.values > MAX_VALUES:
-            raise self.fault(_line(event), loc[:3], f"is value {MAX_VALUES + 1} of the file; must be fewer")
+            raise self.fault(event, loc[:3], f"is value {MAX_VALUES + 1} of the file; must be fewer")
         if len(loc) > MAX_DEPTH:
-            raise self.fault(
-                _line(event), loc[:3], f"is nested deeper than {MAX_DEPTH} levels; must be flatter"
-            )
+            raise self.fault(event, loc[:3], f"is nested deeper than {MAX_DEPTH} levels; must be flatter")
         if isinstance(event, yaml.MappingStartEvent):
             return Node(self.mapping(loc), line)
         if isinstance(event, yaml.SequenceStartEvent):
             return Node(self.sequence(loc), line)
-        if not isinstance(event, yaml.ScalarEvent):
-            raise self.fault(_line(event), loc, "is not a value; must be a scalar, a list or a mapping")
+        assert isinstance(event, yaml.ScalarEvent)
         return Node(value_of(event.value) if event.implicit[0] else event.value, line)
 
     def check_bare(self, event: yaml.Event, loc: Loc) -> None:
-        """Refuses anchors and tags."""
+        """Refuses aliases, anchors and tags."""
+        if isinstance(event, yaml.AliasEvent):
+            raise self.fault(event, loc, f"is the alias *{event.anchor:.40}; write the value out")
         if isinstance(event, yaml.NodeEvent) and event.anchor is not None:
-            raise self.fault(_line(event), loc, f"has the anchor &{event.anchor:.40}; write every value out")
+            raise self.fault(event, loc, f"has the anchor &{event.anchor:.40}; write every value out")
         if isinstance(event, (yaml.ScalarEvent, yaml.CollectionStartEvent)) and event.tag is not None:
-            raise self.fault(_line(event), loc, f"has the tag {event.tag:.60}; write the plain value")
+            raise self.fault(event, loc, f"has the tag {event.tag:.60}; write the plain value")
 
     def mapping(self, loc: Loc) -> dict[str, Node]:
         nodes: dict[str, Node] = {}
         while not isinstance(event := self.next(loc), yaml.MappingEndEvent):
-            line = _line(event)
             if not isinstance(event, yaml.ScalarEvent):
-                raise self.fault(line, loc, "has a key that is not plain text; must be `key: value`")
+                raise self.fault(event, loc, "has a key that is not plain text; must be `key: value`")
             key = str(event.value)
-            if not is_key(key):
-                raise self.fault(line, loc, f"has the key {key[:40]!r}; {KEY_RULE}")
+            if not _is_key(key):
+                rule = f"a key must be printable and at most {MAX_KEY_LENGTH} characters long"
+                raise self.fault(event, loc, f"has the key {key[:40]!r}; {rule}")
             self.check_bare(event, (*loc, key))
             if key == "<<":
-                raise self.fault(line, loc, "has the merge key <<; write the keys out")
+                raise self.fault(event, loc, "has the merge key <<; write the keys out")
             if key in nodes:
-                first = nodes[key].line
-                raise self.fault(line, (*loc, key), f"is given twice, first in line {first}; keep one")
+                told = f"is given twice, first in line {nodes[key].line}; keep one"
+                raise self.fault(event, (*loc, key), told)
             if len(nodes) == MAX_KEYS:
-                raise self.fault(line, loc, f"has more than {MAX_KEYS} keys; must have fewer")
-            nodes[key] = self.node(self.next((*loc, key)), (*loc, key), line)
+                raise self.fault(event, loc, f"has more than {MAX_KEYS} keys; must have fewer")
+            nodes[key] = self.node(self.next((*loc, key)), (*loc, key), _line(event))
         return nodes
 
     def sequence(self, loc: Loc) -> tuple[Node, ...]:
@@ -252,19 +237,15 @@ def _line(event: yaml.Event) -> int:
     return event.start_mark.line + 1 if event.start_mark else 1
 
 
-def is_key(text: str) -> bool:
+def _is_key(text: str) -> bool:
     """Whether a key can be shown in a line."""
     return len(text) <= MAX_KEY_LENGTH and text.isprintable()
-
-
-KEY_RULE: Final = f"a key must be printable and at most {MAX_KEY_LENGTH} characters long"
 
 
 def replaced(node: Node, loc: Loc, new: Node, depth: int = 0) -> Node:
     """A copy of `node` with `new` at `loc` behind `depth` steps; mappings on the way are made where they are missing.
 
-    Raises:
-        InputError: a step of `loc` leads into a scalar or past the end of a list.
+    An InputError says that a step of `loc` leads into a scalar or past the end of a list.
     """
     if depth == len(loc):
         return new

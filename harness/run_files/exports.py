@@ -72,7 +72,7 @@ def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
         notes.append(f"the run did not reach its goal, and its mission would not either ({ended})")
     if origin == Origin():  # nobody knows any more whether it was given
         place = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
-        notes.append(f"area.origin is the default: the file lies about {place}")
+        notes.append(f"area.origin is {place}, as where a scenario gives none: the file lies there")
     return FORMATS[form](path).encode(), notes
 
 

@@ -44,7 +44,7 @@ def damage(draw: st.DrawFn, whole: Path, name: str) -> bytes:
     )
 
 
-NOTES = ("the run did not reach its goal", "area.origin is the default")
+NOTES = ("the run did not reach its goal", "area.origin is 47, 8, as where")
 """How what is said of a file that was written begins."""
 
 

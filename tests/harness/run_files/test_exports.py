@@ -192,7 +192,7 @@ def test_what_its_user_should_know_is_said(
     """A file of degrees lies somewhere, though nobody said where; a mission may be flown."""
     copy = tmp_path / "copy"
     shutil.copytree(run.folder, copy)
-    place = "area.origin is the default: the file lies about 47, 8\n"
+    place = "area.origin is 47, 8, as where a scenario gives none: the file lies there\n"
     text = run.scenario_yaml.replace("latitude_deg: 61.0", "latitude_deg: 47.0").replace("179.5", "8.0")
     assert parse_scenario(text).area.origin == Origin()
     (copy / "scenario.yaml").write_text(text)

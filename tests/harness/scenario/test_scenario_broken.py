@@ -192,7 +192,7 @@ BROKEN = {
     "tag": ("seed: 1", "seed: !!int 1", "3: seed", "has the tag tag:yaml.org,2002:int"),
     "python tag": ("seed: 1", "seed: !!python/name:os.system x", "3: seed", "has the tag"),
     "list as a key": ("seed: 1", "[1, 2]: 1", "3: has a key that is not plain text", ""),
-    "tab": ("  course_deg: 90", "\tcourse_deg: 90", "13: mission", "has a tab; indent with spaces"),
+    "tab": ("  course_deg: 90", "\tcourse_deg: 90", "13: has a tab; indent with spaces", ""),
     "tab elsewhere": ("  course_deg: 90", "  course_deg: 90: 5  # a\tb", "13: mission", "is not YAML (mapping"),
     "bad indentation": ("  goal_m", "   goal_m", "14: mission", "is not YAML"),
     "open bracket": ("[0, 0, 20000, 10000]", "[0, 0, 20000, 10000", "5: area.bounds_m", "is not YAML"),
