@@ -60,17 +60,12 @@ def write_band(folder: Path, runs: Sequence[Path]) -> None:
 
     if not runs:
         return
-    columns = ("arc_length_m", "east_m", "north_m")
-    tables = [pq.read_table(run / "track.parquet", columns=list(columns)) for run in runs]
+    columns = ["arc_length_m", "east_m", "north_m"]
+    tables = [pq.read_table(run / "track.parquet", columns=columns) for run in runs]
     tracks = [np.column_stack([table[name].to_numpy() for name in columns]) for table in tables]
     left, right = band_of([track for track in tracks if np.isfinite(track[:, 0]).any()])
-    told = {
-        "schema": SCHEMA,
-        "share": SHARE,
-        "days": len(runs),
-        "left_m": left.tolist(),
-        "right_m": right.tolist(),
-    }
+    edges = {"left_m": left.tolist(), "right_m": right.tolist()}
+    told = {"schema": SCHEMA, "share": SHARE, "days": len(runs), **edges}
     replace_text(folder / BAND, json.dumps(told, allow_nan=False) + "\n")
 
 

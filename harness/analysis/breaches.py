@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from harness.files.mavlink.fences import Fence
 from harness.flight.record import FloatArray, Track
 from harness.run_files.fences import Fences
 from harness.world.world import World
@@ -77,8 +76,7 @@ def kept(
     import shapely
 
     heights = track.altitude_above_ground_m
-    found = _contacts(track, world)
-    found += others[0]
+    found = [*_contacts(track, world), *others[0]]
     margins = [float(np.min(track.clearance_m, initial=np.inf)), others[1]]
     for fence in fences.exclusions:
         margin = -inside_m(track, fence.area)
@@ -88,7 +86,9 @@ def kept(
     if allowed is not None:
         margin = inside_m(track, allowed)
         margins.append(float(margin.min()))
-        found += crossings(track, margin, "inclusion", _names(fences.inclusions), inside_of=allowed)
+        names = ", ".join(fence.name for fence in fences.inclusions)
+        name = names if len(fences.inclusions) == 1 else f"all of {names}"
+        found += crossings(track, margin, "inclusion", name, inside_of=allowed)
     margins += [-each.depth_m for each in found]
     if heights is not None:
         found += _stretches(track, np.nan_to_num(heights, nan=np.inf), TERRAIN, "the ground")
@@ -103,46 +103,34 @@ def _heights(track: Track, heights_m: FloatArray | None) -> dict[str, float] | N
     if heights_m is None or not np.isfinite(heights_m).any():
         return None
     row = int(np.nanargmin(heights_m))
-    return {
-        "min": float(heights_m[row]),
-        "mean": float(np.nanmean(heights_m)),
-        "time_s": float(track.time_s[row]),
-        "east_m": float(track.east_m[row]),
-        "north_m": float(track.north_m[row]),
-    }
+    told = {"min": float(heights_m[row]), "mean": float(np.nanmean(heights_m))}
+    return told | _where(track, row)
 
 
-def _names(fences: Sequence[Fence]) -> str:
-    return fences[0].name if len(fences) == 1 else f"all of {', '.join(fence.name for fence in fences)}"
+def _where(track: Track, row: int) -> dict[str, float]:
+    return {name: float(getattr(track, name)[row]) for name in ("time_s", "east_m", "north_m")}
 
 
 def _contacts(track: Track, world: World) -> list[Breach]:
     """Contacts with obstacles, one by one."""
     steps_m = np.append(np.hypot(np.diff(track.east_m), np.diff(track.north_m)), 0.0)
     steps_m += world.max_obstacle_speed_mps * np.append(np.diff(track.time_s), 0.0)
-    close = np.flatnonzero(track.clearance_m <= steps_m)
-    touched = {
-        index
-        for row in close.tolist()
-        for index in world.near(
-            track.east_m[row], track.north_m[row], float(steps_m[row]), float(track.time_s[row])
-        )
-    }
+    fixes = np.column_stack((track.east_m, track.north_m, track.time_s))
+    touched: set[int] = set()
+    for row in np.flatnonzero(track.clearance_m <= steps_m).tolist():
+        east, north, time_s = fixes[row].tolist()
+        touched.update(world.near(east, north, float(steps_m[row]), time_s))
     found = []
     for index in sorted(touched):
         one = World([world.obstacles[index]], world.bounds_m)
-        margin = one.clearance(np.column_stack((track.east_m, track.north_m)), track.time_s)
+        margin = one.clearance(fixes[:, :2], track.time_s)
         between = np.full(len(track), np.inf)
         near = np.flatnonzero((margin[:-1] >= 0.0) & (margin[1:] >= 0.0) & (margin[:-1] <= steps_m[:-1]))
         for row in near.tolist():
-            begin, end = _fix(track, row), _fix(track, row + 1)
-            between[row] = one.contact_between(begin, float(margin[row]), end, float(margin[row + 1]))
+            (begin, end), (before, after) = fixes[row : row + 2].tolist(), margin[row : row + 2].tolist()
+            between[row] = one.contact_between(tuple(begin), before, tuple(end), after)
         found += _stretches(track, np.minimum(margin, between), CONTACT, f"obstacles[{index}]")
     return found
-
-
-def _fix(track: Track, row: int) -> tuple[float, float, float]:
-    return float(track.east_m[row]), float(track.north_m[row]), float(track.time_s[row])
 
 
 def inside_m(track: Track, area: Geometry) -> FloatArray:
@@ -191,16 +179,9 @@ def _stretches(track: Track, margin_m: FloatArray, kind: str, name: str) -> list
     found = []
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         row = first + int(margin_m[first:stop].argmin())
+        end_s = float(track.time_s[min(stop, len(track) - 1)])
+        depth_m = float(-margin_m[row])
         found.append(
-            Breach(
-                kind=kind,
-                name=name,
-                start_s=float(track.time_s[first]),
-                end_s=float(track.time_s[min(stop, len(track) - 1)]),
-                time_s=float(track.time_s[row]),
-                east_m=float(track.east_m[row]),
-                north_m=float(track.north_m[row]),
-                depth_m=float(-margin_m[row]),
-            )
+            Breach(kind, name, float(track.time_s[first]), end_s, **_where(track, row), depth_m=depth_m)
         )
     return found

@@ -13,10 +13,10 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from aircraft.interface import GRAVITY_MPS2
-from harness.analysis.as_given import AsGiven, Corner
-from harness.analysis.flight_limits import LOAD_S, FlightLimits
+from harness.analysis.flight_limits import LOAD_S, AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.flight.record import SURFACES, AcceptedPlan, FloatArray, Track
+from harness.run_files.given_path import CutCorner
 
 LEAD_S = 5.0
 """The cause is looked for from this time before the error became too large up to where it is largest."""
@@ -44,6 +44,9 @@ AT_STOP = 0.995
 
 LEAST_CLIMB_MPS = 0.2
 """A path that climbs or sinks more slowly is level."""
+
+FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
+"""Throttle from which on, and down to which, it is at a stop."""
 
 NAVIGATION_ERROR = "navigation error"
 """Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
@@ -94,16 +97,17 @@ def is_allowed_for(causes: Collection[str], error_m: float | None, margin_m: flo
     return set(causes) == {NAVIGATION_ERROR} and error_m <= margin_m
 
 
-FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
-
-
 def cross_track_cause(
     track: Track, peak: int, plans: Sequence[AcceptedPlan], limits: FlightLimits, force: InForce
 ) -> str:
     """Why the aircraft is off the plan, at the row where it is most: the first cause that applies."""
-    first, stop = _before_peak(track, peak, limits.cross_track_threshold_m), peak + 1
-    lead, force = track.part(first, stop), force.part(first, stop)
-    if _is_late(track, lead, limits):
+    within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= limits.cross_track_threshold_m)
+    grows = int(within[-1]) if len(within) else 0
+    first = int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S))
+    lead, force = track.part(first, peak + 1), force.part(first, peak + 1)
+    taken_up = int(np.searchsorted(track.plan_index, lead.plan_index[-1]))
+    at_start_m, most_m = abs(float(track.cross_track_m[taken_up])), abs(float(lead.cross_track_m[-1]))
+    if at_start_m > limits.cross_track_threshold_m and at_start_m >= LATE_SHARE * most_m:
         return "planner too late"
     asked = demand(lead, plans, force)
     if asked.calm > ROUNDING:
@@ -117,7 +121,7 @@ def cross_track_cause(
     return _at_a_limit(lead, limits, force, asked.roll_rate > ROUNDING)
 
 
-def corner_cause(corner: Corner, allowed_m: float, row: int, force: InForce) -> str | None:
+def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) -> str | None:
     """Why a corner was passed too far off: whether any turn would do in calm air, whether any would in that wind."""
     half_rad = math.radians(abs(corner.turn_deg)) / 2.0
     outside = 1.0 / max(math.cos(half_rad), 1e-9) - 1.0
@@ -125,9 +129,7 @@ def corner_cause(corner: Corner, allowed_m: float, row: int, force: InForce) -> 
     speed, wind = float(force.commanded_mps[row]), float(np.hypot(*force.wind_mps[row]))
     if speed**2 > needed:
         return "turn radius too tight"
-    if (speed + wind) ** 2 > needed:
-        return "wind drift"
-    return None
+    return "wind drift" if (speed + wind) ** 2 > needed else None
 
 
 def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven | None) -> str:
@@ -135,14 +137,14 @@ def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven
     wanted_m = given.altitude_m if given else np.full(len(track), limits.altitude_m)
     good = np.flatnonzero(np.abs(track.up_m[:peak] - wanted_m[:peak]) <= 0.5 * limits.max_altitude_error_m)
     steep = steepness_cause(track, int(good[-1]) if len(good) else 0, peak + 1, given)
-    if steep is not None:
-        return steep
     last = max(peak, 1)
     lead = track.part(int(np.searchsorted(track.time_s, track.time_s[last] - LEAD_S)), last)
-    limit = _vertical_limit(lead, limits)
-    if limit is not None:
-        return limit
-    return "speed or throttle saturation" if _at_a_stop(lead).mean() >= SATURATED_SHARE else "tracking error"
+    at_a_stop = _throttle_share(lead) >= SATURATED_SHARE
+    return (
+        steep
+        or _vertical_limit(lead, limits)
+        or ("speed or throttle saturation" if at_a_stop else "tracking error")
+    )
 
 
 def speed_cause(lead: Track, limits: FlightLimits) -> str:
@@ -174,56 +176,39 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     return "climb too steep" if up >= down else "descent too steep"
 
 
-def _before_peak(track: Track, peak: int, threshold_m: float) -> int:
-    """The row shortly before the one at which a cross-track error outgrew what it may be, on the way to its peak."""
-    within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= threshold_m)
-    grows = int(within[-1]) if len(within) else 0
-    return int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S))
-
-
-def _is_late(track: Track, lead: Track, limits: FlightLimits) -> bool:
-    """Whether the aircraft was off the plan by much of the largest error already when the plan took effect."""
-    begins = int(np.searchsorted(track.plan_index, lead.plan_index[-1]))
-    at_start = abs(float(track.cross_track_m[begins]))
-    return at_start > limits.cross_track_threshold_m and at_start >= LATE_SHARE * abs(
-        float(lead.cross_track_m[-1])
-    )
-
-
 def _at_a_limit(lead: Track, limits: FlightLimits, force: InForce, rolls_too_fast: bool) -> str:
     """The limit that the aircraft was at while it came off a plan that asks for no more than is in force."""
-    if _stalled(lead, limits):
-        return "stall"
-    rolling = _rolling(lead, force.roll_rate_radps) if len(lead) > 1 else np.zeros(len(lead), bool)
+    rate = np.abs(np.diff(lead.roll_deg)) / np.maximum(np.diff(lead.time_s), 1e-9)
+    rolling = np.append(False, rate >= ROLL_RATE_SHARE * math.degrees(force.roll_rate_radps))
     rolled = float(rolling.mean())
     banked = float((saturated(lead, force.bank_limit_rad) & ~rolling).mean())
-    full_aileron = _surface_share(lead, ("aileron",)) >= SATURATED_SHARE
-    if rolls_too_fast and (full_aileron or rolled >= ROLLED_SHARE):
-        return "roll rate"
-    if _surface_share(lead, SURFACES) >= SATURATED_SHARE:
-        return "control saturation"
-    if banked >= max(SATURATED_SHARE, rolled):
-        return "bank limit"
-    drift = _wind_from_left_mps(lead)
-    if abs(drift) >= WIND_SHARE * lead.airspeed_mps.mean() and drift * lead.cross_track_m[-1] > 0:
-        return "wind drift"
-    if _lateral_servo_share(lead) >= SATURATED_SHARE:
-        return "actuator"
-    if rolled >= SATURATED_SHARE:
-        return "roll rate"
-    if averaged(lead.load_factor, lead, LOAD_S).max() > limits.max_load_factor:
-        return "load factor"
-    return "tracking error"
+    full_aileron = _stop_share(lead, ("aileron",)) >= SATURATED_SHARE
+    # The mean wind across the course, positive towards the right; sideslip is taken to be zero.
+    across = -lead.airspeed_mps * np.sin(np.radians(lead.heading_deg - lead.course_deg))
+    drift, blown = float(across.mean()), WIND_SHARE * lead.airspeed_mps.mean()
+    lateral_servos = _servo_share(lead, lateral=True)
+    load = averaged(lead.load_factor, lead, LOAD_S).max()
+    found = {
+        "stall": _stalled(lead, limits),
+        "roll rate": rolls_too_fast and (full_aileron or rolled >= ROLLED_SHARE),
+        "control saturation": _stop_share(lead, SURFACES) >= SATURATED_SHARE,
+        "bank limit": banked >= max(SATURATED_SHARE, rolled),
+        "wind drift": abs(drift) >= blown and drift * lead.cross_track_m[-1] > 0,
+        "actuator": lateral_servos >= SATURATED_SHARE,
+        "load factor": rolled < SATURATED_SHARE and load > limits.max_load_factor,
+    }
+    other = "roll rate" if rolled >= SATURATED_SHARE else "tracking error"
+    return next((cause for cause, holds in found.items() if holds), other)
 
 
 def _vertical_limit(lead: Track, limits: FlightLimits) -> str | None:
     """The limit of wing, elevator or servo that kept the aircraft from its altitude or airspeed; None without one."""
     if _stalled(lead, limits):
         return "stall"
-    if _surface_share(lead, ("elevator",)) >= SATURATED_SHARE:
+    if _stop_share(lead, ("elevator",)) >= SATURATED_SHARE:
         return "control saturation"
-    slow_servo = _vertical_servo_share(lead)
-    return "actuator" if slow_servo >= max(SATURATED_SHARE, float(_at_a_stop(lead).mean())) else None
+    slow_servo = _servo_share(lead, lateral=False)
+    return "actuator" if slow_servo >= max(SATURATED_SHARE, _throttle_share(lead)) else None
 
 
 def _stalled(lead: Track, limits: FlightLimits) -> bool:
@@ -232,7 +217,7 @@ def _stalled(lead: Track, limits: FlightLimits) -> bool:
     return bool((np.abs(lead.angle_of_attack_deg) > limits.stall_angle_deg).any())
 
 
-def _surface_share(lead: Track, names: Sequence[str]) -> float:
+def _stop_share(lead: Track, names: Sequence[str]) -> float:
     """Share of the rows in which one of some control surfaces was at its stop; 0 where that is not known."""
     deflected = np.nan_to_num(np.abs([getattr(lead, name) for name in names])).max(axis=0)
     return float((deflected >= AT_STOP).mean())
@@ -245,35 +230,21 @@ def saturated(track: Track, bank_limit_rad: float) -> np.ndarray[tuple[int], np.
     return at_limit
 
 
-def _rolling(track: Track, roll_rate_radps: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(n,) whether the aircraft rolls about as fast as it may from the row before."""
-    rate = np.abs(np.diff(track.roll_deg)) / np.maximum(np.diff(track.time_s), 1e-9)
-    fast: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    fast = np.append(False, rate >= ROLL_RATE_SHARE * math.degrees(roll_rate_radps))
-    return fast
+def _servo_share(lead: Track, lateral: bool) -> float:
+    """Share of the time for which servos were at their rate limits, each counted.
+
+    They are those of aileron and rudder (`lateral`), or of elevator and throttle.
+    """
+    limited_s, every_s = lead.vertical_actuator_limited_s, lead.actuator_limited_s
+    assert limited_s is not None
+    assert every_s is not None
+    limited_s = every_s - limited_s if lateral else limited_s
+    return float(limited_s[-1] - limited_s[0]) / max(float(lead.time_s[-1] - lead.time_s[0]), 1e-9)
 
 
-def _lateral_servo_share(track: Track) -> float:
-    """Share of the time for which the servos of aileron and rudder were at their rate limits, each counted."""
-    assert track.actuator_limited_s is not None
-    assert track.vertical_actuator_limited_s is not None
-    return _share(track.actuator_limited_s - track.vertical_actuator_limited_s, track)
-
-
-def _vertical_servo_share(track: Track) -> float:
-    """Share of the time for which the servos of elevator and throttle were at their rate limits, each counted."""
-    assert track.vertical_actuator_limited_s is not None
-    return _share(track.vertical_actuator_limited_s, track)
-
-
-def _share(limited_s: FloatArray, track: Track) -> float:
-    """How much a time that is counted grows over the rows, over how much time goes by."""
-    return float(limited_s[-1] - limited_s[0]) / max(float(track.time_s[-1] - track.time_s[0]), 1e-9)
-
-
-def _at_a_stop(track: Track) -> FloatArray:
-    """(n,) 1 where the throttle is full or idle, else 0; 0 without an engine."""
-    return np.where((track.throttle >= FULL_THROTTLE) | (track.throttle <= IDLE_THROTTLE), 1.0, 0.0)
+def _throttle_share(track: Track) -> float:
+    """Share of the rows in which the throttle is full or idle; 0 without an engine."""
+    return float(((track.throttle >= FULL_THROTTLE) | (track.throttle <= IDLE_THROTTLE)).mean())
 
 
 def averaged(values: FloatArray, track: Track, over_s: float) -> FloatArray:
@@ -283,10 +254,3 @@ def averaged(values: FloatArray, track: Track, over_s: float) -> FloatArray:
     total = np.append(0.0, np.cumsum(values))
     mean: FloatArray = (total[rows:] - total[:-rows]) / rows
     return mean
-
-
-def _wind_from_left_mps(track: Track) -> float:
-    """Mean wind across the course, positive towards the right; sideslip is taken to be zero."""
-    angle = np.radians(track.heading_deg - track.course_deg)
-    across: FloatArray = -track.airspeed_mps * np.sin(angle)
-    return float(across.mean())

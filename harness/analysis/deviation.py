@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.analysis.as_given import Corner
 from harness.flight.record import FloatArray, Track
+from harness.run_files.given_path import CutCorner
 
 BLOCK = 256
 """Points that are measured together: numpy is then quick, and what is near them is a short part of the other line."""
@@ -75,7 +75,7 @@ def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: flo
     return Deviation(rows, distances_m(points, line, window_m), flown[_row(line[:, 2], points[:, 2])])
 
 
-def allowed_m(track: Track, tolerance_m: float, corners: Iterable[Corner]) -> FloatArray:
+def allowed_m(track: Track, tolerance_m: float, corners: Iterable[CutCorner]) -> FloatArray:
     """(n,) what each row may be off the path as given: the tolerance, or about a corner what that may be passed at."""
     of_corners = np.full(len(track), -np.inf)
     for corner in corners:
@@ -84,7 +84,7 @@ def allowed_m(track: Track, tolerance_m: float, corners: Iterable[Corner]) -> Fl
     return np.where(np.isfinite(of_corners), of_corners, tolerance_m)
 
 
-def at_corner(track: Track, corner: Corner) -> NDArray[np.bool_]:
+def at_corner(track: Track, corner: CutCorner) -> NDArray[np.bool_]:
     """(n,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
 
     They reach as far as the planned path is off the corner's legs and one limit more, and at least `ABOUT` limits to

@@ -82,23 +82,17 @@ def contradictions_s(track: Track, plans: Sequence[AcceptedPlan]) -> list[float]
     index = track.plan_index
     times = []
     for row in (np.flatnonzero(np.diff(index) > 0) + 1).tolist():
-        before, after = int(index[row - 1]), int(index[row])
+        if index[row - 1] < 0:
+            continue
         reach = AHEAD_S * float(track.groundspeed_mps[row])
         course = math.pi / 2.0 - math.radians(float(track.course_deg[row]))
-        turns = [
-            math.remainder(_direction(plans[each], float(track.arc_length_m[at]) + reach) - course, math.tau)
-            for each, at in ((before, row - 1), (after, row))
-            if before >= 0
-        ]
-        if turns and turns[0] * turns[1] < 0.0 and min(map(abs, turns)) >= math.radians(APART_DEG):
+        turns = []
+        for at in (row - 1, row):
+            east, north = tangent_of(plans[index[at]], float(track.arc_length_m[at]) + reach)
+            turns.append(math.remainder(math.atan2(north, east) - course, math.tau))
+        if turns[0] * turns[1] < 0.0 and min(map(abs, turns)) >= math.radians(APART_DEG):
             times.append(float(track.time_s[row]))
     return times
-
-
-def _direction(plan: AcceptedPlan, arc_length_m: float) -> float:
-    """Direction of a plan at a station, counter-clockwise from east."""
-    east, north = tangent_of(plan, arc_length_m)
-    return math.atan2(north, east)
 
 
 def _ended(flight: Flight, limits: FlightLimits) -> Finding | None:
@@ -111,8 +105,8 @@ def _ended(flight: Flight, limits: FlightLimits) -> Finding | None:
 
 
 def _slow(flight: Flight, limits: FlightLimits) -> Finding | None:
-    allowed_s = max(limits.scan_period_s, limits.compute_latency_s)
-    slow = [each for each in flight.compute_ms if each > 1e3 * allowed_s]
+    allowed_ms = 1e3 * max(limits.scan_period_s, limits.compute_latency_s)
+    slow = [each for each in flight.compute_ms if each > allowed_ms]
     if not slow:
         return None
     text = (
@@ -120,10 +114,8 @@ def _slow(flight: Flight, limits: FlightLimits) -> Finding | None:
         f"from scan to scan, up to {max(slow):,.0f} ms; flown as if they took "
         f"{1e3 * limits.compute_latency_s:,.0f} ms (planner.compute_latency_s)"
     )
-    plan = next((plan for plan in flight.plans if plan.compute_ms > 1e3 * allowed_s), None)
-    return Finding(
-        "planner slower than the scans", float(flight.track.time_s[0]) if plan is None else plan.time_s, text
-    )
+    times = [plan.time_s for plan in flight.plans if plan.compute_ms > allowed_ms]
+    return Finding("planner slower than the scans", next(iter(times), float(flight.track.time_s[0])), text)
 
 
 def _contradicted(flight: Flight) -> Finding | None:

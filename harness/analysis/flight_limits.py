@@ -1,9 +1,13 @@
-"""What a flight is measured against."""
+"""What a flight is measured against: its limits, and a path that was given."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+from harness.flight.record import FloatArray
+from harness.run_files.given_path import CutCorner
 
 SPEED_S = 20.0
 """Airspeed is averaged over this, so that it is what the engine can hold and not what a gust adds."""
@@ -50,3 +54,30 @@ class FlightLimits:
     def cross_track_threshold_m(self) -> float:
         """What the cross-track error may be."""
         return self.max_cross_track_m + self.navigation_margin_m
+
+
+@dataclass(frozen=True, eq=False)
+class AsGiven:
+    """A path that was given and how it was flown, row by row of the track.
+
+    Attributes:
+        corners: places on the path, in order; each ends a leg. One that is no corner has no `cut_m` and no `half_m`.
+        deviation_m: (n,) distance between the track and the path as given.
+        allowed_m: (n,) what it may be.
+        altitude_m: (n,) altitude that the path has there.
+        climb_mps: (n,) climb that it asks for there, negative for a descent.
+        fastest_mps: (n, 2) fastest climb and descent of the aircraft at its airspeed there.
+        airspeed_mps: (n,) true airspeed that was commanded there.
+        unheld_mps: (n,) by how much that is beyond the airspeeds that the aircraft holds.
+        believed_off_m: (n,) distance of the believed position from the path; None where navigation is perfect.
+    """
+
+    corners: Sequence[CutCorner]
+    deviation_m: FloatArray
+    allowed_m: FloatArray
+    altitude_m: FloatArray
+    climb_mps: FloatArray
+    fastest_mps: FloatArray
+    airspeed_mps: FloatArray
+    unheld_mps: FloatArray | float = 0.0
+    believed_off_m: FloatArray | None = None

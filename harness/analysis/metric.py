@@ -13,14 +13,8 @@ ERROR: Final = "error"
 """Outcome of a flight whose software failed before its end; the other outcomes are those of `metrics.json`."""
 
 SEVERITY: Final[Mapping[str, float]] = {
-    "collision": 8.0,
-    "lost_control": 7.0,
-    "out_of_bounds": 6.0,
-    "planner_failed": 5.0,
-    ERROR: 4.0,
-    "timeout": 3.0,
-    "unreachable": 2.0,
-    "reached": 0.0,
+    **{"collision": 8.0, "lost_control": 7.0, "out_of_bounds": 6.0, "planner_failed": 5.0},
+    **{ERROR: 4.0, "timeout": 3.0, "unreachable": 2.0, "reached": 0.0},
 }
 """How bad an outcome is, the worst first. A flight that reached its goal and was not tracked, or came nearer to an
 obstacle than was wanted, has 1."""
@@ -96,10 +90,8 @@ class Metric:
             return ""
         if self.kind == "bool":
             return "yes" if value else "no"
-        if self.kind == "text":
+        if self.kind in ("text", "int"):
             return str(value)[:12] if self.name == "digest" else str(value)
-        if self.kind == "int":
-            return str(value)
         return number(value, self.factor) if self.digits is None else f"{value * self.factor:.{self.digits}f}"
 
 

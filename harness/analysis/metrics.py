@@ -9,10 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from harness.analysis.as_given import AsGiven
 from harness.analysis.causes import saturated
 from harness.analysis.findings import findings
-from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.registry import METRICS
 from harness.analysis.smoothness import (
     flown_lengths,
@@ -41,8 +40,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     intervals at whose end the distance to an obstacle edge was below the wanted clearance. `compute_ms` is processor
     time of all calls in which the planner searched, `timing.planner_wall_ms` the wall-clock time of the same.
 
-    Raises:
-        ValueError: the track is empty.
+    A ValueError says that the track is empty.
     """
     track = flight.track
     if not len(track):
@@ -53,7 +51,10 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     planned = planned_profile(track, flight.plans, window)
     lost = flight.reason if flight.outcome is Outcome.LOST_CONTROL else None
     verdicts = legs(track, flight.plans, limits, lost, given)
-    followed = track.cross_track_m[track.plan_index >= 0]
+    believed_m = track.believed_cross_track_m if track.has_beliefs else track.cross_track_m
+    assert believed_m is not None
+    under_plan = track.plan_index >= 0
+    off_path = error_figures(track.cross_track_m[under_plan])
     return {
         "outcome": flight.outcome.value,
         "reason": flight.reason,
@@ -63,9 +64,9 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "min_clearance_m": _finite(nearest_m.min()),
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
         "clearance_violation_s": clearance_violation_s(track.time_s, nearest_m, limits.clearance_m),
-        "cross_track_m": error_figures(followed),
-        "total_system_error_m": error_figures(followed),
-        "flight_technical_error_m": error_figures(_believed_off_m(track)),
+        "cross_track_m": off_path,
+        "total_system_error_m": {**off_path},
+        "flight_technical_error_m": error_figures(believed_m[under_plan]),
         **_navigation(track, limits),
         "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
         "smoothness": {
@@ -79,7 +80,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "findings": [dataclasses.asdict(each) for each in findings(flight, limits)],
         **{metric.path: metric.of(flight, limits) for metric in METRICS if metric.of is not None},
         "replans": max(len(flight.plans) - 1, 0),
-        "shield": dataclasses.asdict(flight.shield) if flight.shield else None,
+        "shield": flight.shield and dataclasses.asdict(flight.shield),
         "plan_delay_s": percentiles([plan.delay_s for plan in flight.plans if math.isfinite(plan.delay_s)]),
         "lost_returns": lost_returns(flight.lost_returns),
         "compute_ms": percentiles(flight.compute_ms),
@@ -92,13 +93,6 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "digest": digest(track),
         "error": flight.error,
     }
-
-
-def _believed_off_m(track: Track) -> FloatArray:
-    """How far off the plan guidance believed to be, in the rows flown under one."""
-    off = track.believed_cross_track_m if track.has_beliefs else track.cross_track_m
-    assert off is not None
-    return off[track.plan_index >= 0]
 
 
 def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:

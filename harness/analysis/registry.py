@@ -22,17 +22,16 @@ def _causes(metrics: Mapping[str, Any]) -> list[str]:
 
 
 def _spread(name: str, title: str, short: str = "", rare: bool = False) -> list[Metric]:
-    """rms, 95th percentile and maximum of an error in metres; the largest is a property of recordings."""
+    """rms, 95th percentile and maximum of an error in metres; the two last are properties of recordings."""
     stem = name.removesuffix("_m")
-    told = {
-        of: Metric(
-            f"{stem}_{of}_m", f"{title} {of}", "m", f"{short} {of}" if short else "", f"{name}.{of}",
-            worse="more", rare=rare, recorded=True,
-            heading=f"{title} max, m" if short and not rare and of == "max" else "",
+    told = [
+        Metric(
+            f"{stem}_{of}_m", f"{title} {of}", "m", short and f"{short} {of}", f"{name}.{of}", worse="more", rare=rare,
+            recorded=True, heading=f"{title} max, m" if short and not rare and of == "max" else "",
         )
         for of in ("p95", "max")
-    }  # fmt: skip
-    return [Metric(f"{stem}_rms_m", path=f"{name}.rms"), *told.values()]
+    ]  # fmt: skip
+    return [Metric(f"{stem}_rms_m", path=f"{name}.rms"), *told]
 
 
 def _smooth(figure: str, title: str, unit: str, short: tuple[str, str], factor: float = 1.0) -> list[Metric]:
@@ -123,23 +122,11 @@ _METRICS: Final = (
     Metric("plan_contradictions", "plans that contradict the one before", short="contra", kind="int", worse="more",
            rare=True, recorded=True, of=lambda flight, limits: len(contradictions_s(flight.track, flight.plans))),
     Metric("replans", "replans", short="replans", kind="int", recorded=True, heading="replans"),
-    Metric(
-        "shield_interventions",
-        "interventions of the shield",
-        short="shield",
-        path="shield.interventions",
-        kind="int",
-        rare=True,
-    ),
+    Metric("shield_interventions", "interventions of the shield", "", "shield", "shield.interventions", "int",
+           rare=True),
     Metric("shield_backup_s", "time on the backup", "s", "backup s", "shield.time_on_backup_s", rare=True),
-    Metric(
-        "shield_refused_plans",
-        "plans that the shield refused",
-        short="refused",
-        path="shield.refused_plans",
-        kind="int",
-        rare=True,
-    ),
+    Metric("shield_refused_plans", "plans that the shield refused", "", "refused", "shield.refused_plans", "int",
+           rare=True),
     Metric("deviation_p95_m", path="deviation_from_given_m.p95", worse="more"),
     Metric("deviation_max_m", path="deviation_from_given_m.max", worse="more"),
     Metric("check_ok", path="check.ok", kind="bool", worse="less"),
@@ -150,9 +137,3 @@ _METRICS: Final = (
 # fmt: on
 METRICS: Final[tuple[Metric, ...]] = tuple(replace(each, hint=HINTS.get(each.name, "")) for each in _METRICS)
 """All figures, in the order in which people are shown them."""
-
-BY_NAME: Final[Mapping[str, Metric]] = {metric.name: metric for metric in METRICS}
-"""The same by name."""
-
-BY_PATH: Final[Mapping[str, Metric]] = {metric.path: metric for metric in METRICS if not metric.derived}
-"""Those of `metrics.json` alone by their place in it."""

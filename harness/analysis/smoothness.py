@@ -21,6 +21,8 @@ from planner.geometry.curves import along
 if TYPE_CHECKING:
     from harness.run_files.run_tables import PlanRow
 
+    FlownPlan = AcceptedPlan | PlanRow
+
 COURSE_WINDOW_S = 1.0
 """Time over which the curvature rate is taken. The flown curvature is averaged over an odd number of rows' intervals,
 the most that are no longer: 0.9 s at 10 Hz."""
@@ -28,18 +30,12 @@ the most that are no longer: 0.9 s at 10 Hz."""
 CORNER_RAD = 1e-6
 """A smaller change of tangent between two segments is rounding, not a corner."""
 
-
 ROUNDING_M = 1e-6
 """Joints closer than this are one."""
 
 
 class Profile(NamedTuple):
-    """Consecutive pieces of constant curvature.
-
-    Attributes:
-        length_m: (n,) lengths.
-        curvature_1pm: (n,) curvatures, positive = left.
-    """
+    """Consecutive pieces of constant curvature, (n,) lengths and (n,) curvatures, positive = left."""
 
     length_m: FloatArray
     curvature_1pm: FloatArray
@@ -108,7 +104,7 @@ def flown_lengths(track: Track) -> FloatArray:
     return np.hypot(np.diff(track.east_m), np.diff(track.north_m))
 
 
-def planned_profile(track: Track, plans: Sequence[AcceptedPlan | PlanRow], window_m: float) -> Profile:
+def planned_profile(track: Track, plans: Sequence[FlownPlan], window_m: float) -> Profile:
     """Curvature profile of what was planned and in effect, plan after plan.
 
     Of every plan, the part between the stations at which it was taken up and replaced counts. A corner, where
@@ -127,7 +123,7 @@ def planned_profile(track: Track, plans: Sequence[AcceptedPlan | PlanRow], windo
     return Profile(length, curvature)
 
 
-def turn_onto_first_plan_1pm(track: Track, plans: Sequence[AcceptedPlan | PlanRow], window_m: float) -> float:
+def turn_onto_first_plan_1pm(track: Track, plans: Sequence[FlownPlan], window_m: float) -> float:
     """Curvature of the corner from the course of the aircraft onto the first plan, where it takes that up."""
     flown = np.flatnonzero(track.plan_index >= 0)
     if not len(flown) or track.plan_index[flown[0]] != 0 or track.arc_length_m[flown[0]] > window_m:
@@ -178,9 +174,7 @@ def stations_in_effect(track: Track) -> list[tuple[int, float, float]]:
     return stretches
 
 
-def _stretch(
-    accepted: AcceptedPlan | PlanRow, start_m: float, end_m: float, window_m: float
-) -> list[tuple[float, float]]:
+def _stretch(accepted: FlownPlan, start_m: float, end_m: float, window_m: float) -> list[tuple[float, float]]:
     """Length and curvature of pieces of a plan between two stations; beyond its end a line, or the circle again."""
     pieces: list[tuple[float, float]] = []
     begins, arrived = 0.0, None
@@ -194,7 +188,7 @@ def _stretch(
     return pieces
 
 
-def tangent_of(accepted: AcceptedPlan | PlanRow, arc_length_m: float) -> tuple[float, float]:
+def tangent_of(accepted: FlownPlan, arc_length_m: float) -> tuple[float, float]:
     """Unit tangent of a plan at a station; beyond its end that of the line, or the loiter circle, there."""
     *before, last = accepted.segments.tolist()
     away = max(arc_length_m, 0.0)

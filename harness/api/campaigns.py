@@ -48,25 +48,21 @@ def compare(
     given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [each if isinstance(each, Scenario) else load_scenario(each) for each in given]
     kinds = _named(planners, PLANNER, "planners")
-    laws = None if guidance is None else _named(guidance, GUIDANCE, "guidance")
-    of_laws = "" if laws is None else f", guidance={laws}"
-    sources, law_sources = (tuple(filter(is_source, names)) for names in (planners, guidance or ()))
+    laws = [] if guidance is None else _named(guidance, GUIDANCE, "guidance")
+    told = f"{[each.name for each in loaded]}, {kinds}" + (f", guidance={laws}" if laws else "")
+    parts = [{"planner.kind": kind} for kind in kinds]
+    if laws:
+        parts = [{**part, "guidance.kind": law} for part in parts for law in laws]
     with as_input_errors():
         compared = fly_and_compare(
-            [each.with_(keys) for each in loaded for keys in _combinations(kinds, laws)],
+            [each.with_(keys) for each in loaded for keys in parts],
             Path(out),
             recording=recording,
             workers=workers or os.cpu_count() or 1,
-            command=in_python(f"wayproof.compare({[each.name for each in loaded]}, {kinds}{of_laws})"),
-            sources=(sources, law_sources),
+            command=in_python(f"wayproof.compare({told})"),
+            sources=(tuple(filter(is_source, planners)), tuple(filter(is_source, guidance or ()))),
         )
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
-
-
-def _combinations(kinds: Sequence[str], laws: Sequence[str] | None) -> list[dict[str, Any]]:
-    """Keys of every planner, under every law where there are laws."""
-    planners = [{"planner.kind": kind} for kind in kinds]
-    return planners if laws is None else [each | {"guidance.kind": law} for each in planners for law in laws]
 
 
 def _named(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
@@ -134,11 +130,7 @@ def sweep(
 
 
 def load_campaign(folder: str | Path) -> CampaignResult:
-    """Reads the folder of a campaign, where `sweep` wrote, complete or not.
-
-    Raises:
-        InputError: the folder holds no campaign, or a file of it cannot be read.
-    """
+    """Reads the folder of a campaign, complete or not; an InputError says that it holds none, or is damaged."""
     path = Path(folder)
     if path.is_file():
         raise InputError(

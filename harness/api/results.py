@@ -77,8 +77,7 @@ class FlightResult:
     def show(self, width_px: int = 1000, height_px: int = 600) -> Any:
         """The recording in rerun's viewer: in a notebook as a widget, elsewhere in a window of its own.
 
-        Raises:
-            InputError: there is no recording, no screen, or a package that the viewer needs is missing.
+        An InputError says that there is no recording, no screen, or that a package that the viewer needs is missing.
         """
         if self.recording is None:
             raise InputError("wayproof: the run has no recording to show; fly it with recording=True")
@@ -95,11 +94,8 @@ class FlightResult:
     def __repr__(self) -> str:
         """A line for people."""
         where = f", in {self.folder}" if self.folder and self._scratch is None else ""
-        scenario = self.scenario
-        return (
-            f"FlightResult({scenario.name}: {self.outcome}; {self.pilot}, {Path(scenario.aircraft.model).name}, "
-            f"seed {scenario.seed}{where})"
-        )
+        name, model, seed = self.scenario.name, Path(self.scenario.aircraft.model).name, self.scenario.seed
+        return f"FlightResult({name}: {self.outcome}; {self.pilot}, {model}, seed {seed}{where})"
 
     @property
     def pilot(self) -> str:
@@ -134,13 +130,10 @@ class ComparisonResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CampaignResult:
-    """A campaign, or the part of it that has been flown.
-
-    Attributes:
-        folder: the campaign's folder.
-    """
+    """A campaign, or the part of it that has been flown."""
 
     folder: Path
+    """The campaign's folder."""
 
     @cached_property
     def table(self) -> pa.Table:

@@ -16,34 +16,25 @@ if TYPE_CHECKING:
 
 
 class SteppedFlight(SteppedLoop):
-    """The closed loop of one scenario, flown step by step and as often as it is reset.
-
-    Attributes:
-        scenario: what is flown, every default filled in.
-    """
+    """The closed loop of one scenario, flown step by step and as often as it is reset."""
 
     def __init__(self, scenario: Scenario, observers: Sequence[Observer] = ()) -> None:
         from harness.run.scenario_flight import make_loop
 
         super().__init__(lambda: make_loop(scenario), observers)
         self.scenario = scenario
+        """What is flown, every default filled in."""
 
     def reset(self) -> Status:
         """Begins a new flight, whether or not the one before has ended, and returns its status at the start.
 
-        Raises:
-            InputError: the aircraft cannot be loaded or trimmed.
-            PlannerError: the planner cannot be made.
+        An InputError says why the aircraft cannot be loaded or trimmed, a PlannerError why the planner cannot be made.
         """
         with as_input_errors():
             return super().reset()
 
     def result(self) -> FlightResult:
-        """The result of the flight, as `fly` gives it.
-
-        Raises:
-            RuntimeError: no flight has begun, or it is not over.
-        """
+        """The result of the flight, as `fly` gives it; a RuntimeError says that none has begun, or it is not over."""
         return FlightResult.of(self.scenario, self.flight())
 
 
@@ -68,9 +59,6 @@ def make(
 
     Scenario, planner and law are as `fly` takes them; an object serves every flight, a class makes one for each.
     `observers` are told of each scan, plan and event, and of the track in blocks (`harness.flight.observer.Observer`).
-    `reset()` begins the flight.
-
-    Raises:
-        InputError: the scenario or planner cannot be used.
+    `reset()` begins the flight. An InputError says that the scenario or planner cannot be used.
     """
     return SteppedFlight(given_parts(scenario, planner, guidance), observers)

@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from aircraft.guidance.altitude import slewed
-from harness.analysis.as_given import AsGiven, Corner
 from harness.analysis.breaches import CONTACT, Breach, Kept, crossings, inside_m, kept
 from harness.analysis.deviation import allowed_m, at_corner, deviation
-from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.analysis.metrics import error_figures, metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.wording import tallied
 from harness.flight.record import Flight, Outcome, Track
-from harness.run_files.given_path import SAME_PLACE_M, FloatArray
+from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray
 from harness.world.world import World
 
 if TYPE_CHECKING:
@@ -55,7 +54,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
     worst place, the corners, what was given, and what became of the items of a mission.
     """
     track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
-    corners = [Corner(**vars(each), allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
+    corners = [replace(each, allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
     window_m = WINDOW_RADII * limits.turn_radius_m
     found = believed = deviation(track, way.given_m, SPACING_SHARE * tolerance, window_m)
     asked = _as_given(check.plan, track, corners, np.nan_to_num(found.by_row_m), tolerance)
@@ -89,7 +88,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
 
 
 def _told(
-    check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven, corners: Sequence[Corner]
+    check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven, corners: Sequence[CutCorner]
 ) -> dict[str, Any]:
     """What stands under `check`; whether it is ok, and the verdict, follow from it."""
     track, given, plan = flight.track, check.given, check.plan
@@ -213,7 +212,7 @@ def _deepest(found: Sequence[Breach], verb: str) -> str:
 
 
 def _sufficient_m(
-    track: Track, off_m: FloatArray, tolerance_m: float, corners: Sequence[Corner]
+    track: Track, off_m: FloatArray, tolerance_m: float, corners: Sequence[CutCorner]
 ) -> float | None:
     """The limit at all corners that would have been kept, rounded up to 1 m; None where none would, or no other."""
     reached = [_passed(corner, track, off_m, tolerance_m) for corner in corners]
@@ -241,7 +240,7 @@ def _line(plan: PathPlan) -> FloatArray:
 
 
 def _as_given(
-    plan: PathPlan, track: Track, corners: list[Corner], off_m: FloatArray, tolerance_m: float
+    plan: PathPlan, track: Track, corners: list[CutCorner], off_m: FloatArray, tolerance_m: float
 ) -> AsGiven:
     """What the path asks for, row by row."""
     along, profile = np.nan_to_num(track.arc_length_m), plan.profile
@@ -262,7 +261,7 @@ def _as_given(
     )
 
 
-def _ends(plan: PathPlan, corners: list[Corner]) -> list[Corner]:
+def _ends(plan: PathPlan, corners: list[CutCorner]) -> list[CutCorner]:
     """Where legs end: at every item of a mission; at the corners of a drawn line, and where its slope changes."""
     known = {(corner.waypoint, round(corner.arc_length_m, 3)): corner for corner in corners}
     plain = {(number, round(along, 3)): _plain(number, along) for number, along in plan.marks or plan.bends}
@@ -271,12 +270,12 @@ def _ends(plan: PathPlan, corners: list[Corner]) -> list[Corner]:
     return sorted(ends, key=lambda each: each.arc_length_m)
 
 
-def _plain(number: int, along_m: float) -> Corner:
+def _plain(number: int, along_m: float) -> CutCorner:
     """An end of a leg that is no corner."""
-    return Corner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along_m, 0.0)
+    return CutCorner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along_m, 0.0)
 
 
-def _passed(corner: Corner, track: Track, off_m: FloatArray, tolerance_m: float) -> dict[str, Any]:
+def _passed(corner: CutCorner, track: Track, off_m: FloatArray, tolerance_m: float) -> dict[str, Any]:
     """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there.
 
     What it is off counts up to where it is within the tolerance of the path again.

@@ -69,6 +69,7 @@ class CutCorner:
         cut_m: how far from the corner that arc passes.
         arc_length_m: distance along the flown path to the place that belongs to the corner.
         half_m: the flown path is off the two legs for no longer than this before and after that place.
+        allowed_cut_m: how far off it may be passed, where the path is judged.
     """
 
     waypoint: int
@@ -79,6 +80,7 @@ class CutCorner:
     cut_m: float
     arc_length_m: float
     half_m: float
+    allowed_cut_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import shapely
 
-from harness.analysis.as_given import Corner
 from harness.analysis.deviation import allowed_m, deviation, distances_m
 from harness.flight.record import FloatArray, Track
+from harness.run_files.given_path import CutCorner
 
 MakeTrack = Callable[..., Track]
 
@@ -62,7 +62,7 @@ def test_what_was_not_flown_yet_is_not_compared(make_track: MakeTrack) -> None:
 def test_a_corner_may_be_cut_by_its_own_figure(make_track: MakeTrack) -> None:
     track = make_track(401)
     corners = [
-        Corner(1, 0.0, along_m, 90.0, 80.0, 33.0, along_m, half_m, allowed_cut)
+        CutCorner(1, 0.0, along_m, 90.0, 80.0, 33.0, along_m, half_m, allowed_cut)
         for along_m, half_m, allowed_cut in ((250.0, 80.0, 60.0), (600.0, 60.0, 20.0), (750.0, 0.5, 0.5))
     ]
     allowed = allowed_m(track, 10.0, corners)

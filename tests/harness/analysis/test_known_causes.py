@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.analysis.as_given import AsGiven
 from harness.analysis.causes import FINDINGS
-from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.trackability import legs
 from harness.flight.record import AcceptedPlan, Track
 from tests.harness.conftest import plan, track

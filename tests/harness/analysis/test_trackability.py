@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.analysis.as_given import AsGiven, Corner
-from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.trackability import legs
 from harness.flight.record import AcceptedPlan, FloatArray, Track
+from harness.run_files.given_path import CutCorner
 
 LIMITS = FlightLimits(
     altitude_m=300.0,
@@ -127,11 +127,11 @@ def test_thresholds_can_be_given() -> None:
     assert replace(LIMITS, max_cross_track_m=1.5).cross_track_threshold_m == 1.5
 
 
-def passed(arc_length_m: float, cut_m: float, waypoint: int) -> Corner:
-    return Corner(waypoint, 0.0, arc_length_m, 90.0, 100.0, cut_m, arc_length_m, 30.0, 50.0)
+def passed(arc_length_m: float, cut_m: float, waypoint: int) -> CutCorner:
+    return CutCorner(waypoint, 0.0, arc_length_m, 90.0, 100.0, cut_m, arc_length_m, 30.0, 50.0)
 
 
-def as_given(track: Track, corners: list[Corner], off_m: FloatArray, allowed_m: float) -> AsGiven:
+def as_given(track: Track, corners: list[CutCorner], off_m: FloatArray, allowed_m: float) -> AsGiven:
     """A level path for an aircraft that climbs at 5 m/s and sinks at 8."""
     rows = len(track)
     return AsGiven(
