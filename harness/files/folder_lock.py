@@ -25,21 +25,17 @@ class FolderLock:
     """
 
     def __init__(self, path: Path, name: str | None = None) -> None:
-        self._descriptor = (
-            os.open(path, os.O_RDONLY | os.O_DIRECTORY)
-            if name is None
-            else os.open(path / name, os.O_RDWR | os.O_CREAT, 0o666)
-        )
+        flags = os.O_RDONLY | os.O_DIRECTORY if name is None else os.O_RDWR | os.O_CREAT
+        self._descriptor = os.open(path / (name or ""), flags, 0o666)
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+        except OSError as error:
             self.release()
+            if not isinstance(error, BlockingIOError):
+                raise
             raise RunFolderError(
                 f"another wayproof is writing to {path}: wait until it has ended or choose another folder"
             ) from error
-        except OSError:
-            self.release()
-            raise
 
     def release(self) -> None:
         """Lets others write; again it does nothing."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import json
 import os
 import stat
@@ -17,23 +16,18 @@ class InputError(ValueError):
 
 
 _KINDS: Final = {
-    stat.S_IFIFO: "a pipe",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-    stat.S_IFSOCK: "a socket",
+    **{stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"},
+    **{stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"},
 }
 
 
-def read_text(path: Path, max_bytes: int, what: str, utf_16: bool = False) -> str:
-    """The text of a regular file, without a byte order mark.
+def read_text(path: Path, max_bytes: int, what: str) -> str:
+    """The text of a regular file, UTF-8 without a byte order mark.
 
-    `what` says what the file should be, for faults: "a scenario, in YAML". With `utf_16`, UTF-16 that says so is taken,
-    too: Windows' editors write it.
-
-    Raises:
-        InputError: it cannot be opened, is not a regular file, is larger than `max_bytes` or is not UTF-8 text.
+    An InputError says why it cannot be read, that it is larger than `max_bytes`, or no text. `what` says there what the
+    file should be: "a scenario, in YAML".
     """
-    return decoded(read_data(path, max_bytes, what), str(path), what, utf_16)
+    return decoded(read_data(path, max_bytes, what), str(path), what)
 
 
 def read_data(path: Path, max_bytes: int, what: str) -> bytes:
@@ -41,11 +35,11 @@ def read_data(path: Path, max_bytes: int, what: str) -> bytes:
     try:
         with open_regular(path) as file:
             data: bytes = file.read(max_bytes + 1)
+    except InputError:
+        raise
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such file; give the path of a file") from error
     except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        if isinstance(error, FileNotFoundError):
-            raise InputError(f"{path}: no such file; give the path of a file") from error
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"{path}: cannot be read ({reason}); give the path of a file") from error
     if len(data) > max_bytes:
@@ -53,10 +47,8 @@ def read_data(path: Path, max_bytes: int, what: str) -> bytes:
     return data
 
 
-def decoded(data: bytes, source: str, what: str, utf_16: bool = False) -> str:
+def decoded(data: bytes, source: str, what: str) -> str:
     """The text that the bytes of a file are; arguments and faults are those of `read_text`."""
-    if utf_16 and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        data = data.decode("utf-16", "replace").encode()
     if b"\0" in data:
         raise InputError(f"{source}: is not a text file; must be {what}, as UTF-8")
     try:
@@ -75,13 +67,13 @@ def open_regular(path: Path) -> BinaryIO:
         InputError: it is not a regular file.
         OSError: it cannot be opened.
     """
-    file: BinaryIO = open(path, "rb", opener=_at_once)  # noqa: SIM115 - handed on
-    kind = stat.S_IFMT(os.fstat(file.fileno()).st_mode)
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
     if kind != stat.S_IFREG:
-        file.close()
-        shown = _KINDS.get(kind, "something else")
-        raise InputError(f"{path}: is {shown}, not a file; give the path of a file")
-    return file
+        os.close(descriptor)
+        told = f"is {_KINDS.get(kind, 'something else')}, not a file; give the path of a file"
+        raise InputError(f"{path}: {told}")
+    return os.fdopen(descriptor, "rb")
 
 
 def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any] | None:
@@ -91,8 +83,3 @@ def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict
     except (ValueError, RecursionError):
         return None
     return index if isinstance(index, dict) and index.get("schema") == schema else None
-
-
-def _at_once(path: str, flags: int) -> int:
-    """Opens a file; opening a pipe that nobody writes to would wait for ever."""
-    return os.open(path, flags | os.O_NONBLOCK)

@@ -17,18 +17,11 @@ from harness.files.values import finite, shown
 from harness.files.zip_archive import unpacked
 
 LINES: Final = ("LineString", "Track")
-OTHERS: Final = (
-    "Point",
-    "Model",
-    "NetworkLink",
-    "GroundOverlay",
-    "ScreenOverlay",
-    "PhotoOverlay",
-    "LinearRing",
+OTHERS: Final = frozenset(
+    ["Point", "Model", "NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay", "LinearRing"]
 )
 GIVEN_UP: Final = ("altitudeOffset", "MultiTrack")
 """Elements of Google's extension that are refused by name."""
-BOUNDARIES: Final = ("outerBoundaryIs", "innerBoundaryIs")
 COMMA: Final = re.compile(r"\s*,\s*")
 
 Element = ElementTree.Element
@@ -37,36 +30,32 @@ Point = tuple[float, float, float | None]
 
 
 class Shape(NamedTuple):
-    """A line or a polygon of KML.
-
-    Attributes:
-        name: of its Placemark, or the Placemark's number.
-        mode: altitudeMode; empty where there is none.
-        rings: points of the line; of a polygon those of its outer boundary, then of the inner ones.
-        data: ExtendedData of its Placemark.
-    """
+    """A line or a polygon of KML."""
 
     name: str
+    """Of its Placemark, or the Placemark's number."""
     mode: str
+    """Its altitudeMode; empty where there is none."""
     rings: tuple[tuple[Point, ...], ...]
+    """Points of the line; of a polygon those of its outer boundary, then of the inner ones."""
     data: Mapping[str, str]
+    """ExtendedData of its Placemark."""
 
 
 class Kml(NamedTuple):
     """What a KML file has: lines, polygons, and how many of what else; its name for faults."""
 
     source: str
-    lines: tuple[Shape, ...]
-    polygons: tuple[Shape, ...]
+    lines: list[Shape]
+    polygons: list[Shape]
     others: Counter[str]
 
 
 def read_kml(data: bytes, source: str, most: int) -> Kml:
     """Reads the bytes of a KML file, or of an archive with one that unpacks to at most `most` bytes.
 
-    Raises:
-        InputError: it is none, cannot be unpacked, has a coordinate that is no number, or what is refused by name. The
-            text begins with `source`, the file or nothing.
+    An InputError, which begins with `source`, the file or nothing, says that it is none, cannot be unpacked, has a
+    coordinate that is no number, or what is refused by name.
     """
     if data.startswith(b"PK"):
         try:
@@ -75,38 +64,33 @@ def read_kml(data: bytes, source: str, most: int) -> Kml:
             raise InputError(f"{source}: {error}" if source else str(error)) from error
         source = f"{source} ({name})" if source else ""
     root = parsed_xml(data, source, "kml")
-    lines: list[Shape] = []
-    polygons: list[Shape] = []
+    found = Kml(source, [], [], Counter(kind for each in root.iter() if (kind := name_of(each)) in OTHERS))
     for number, each in enumerate(named(root, "Placemark"), start=1):
-        name, kept = shown(text_of(each, "name") or f"Placemark {number}"), dict(_data(each))
+        name = shown(text_of(each, "name") or f"Placemark {number}")
         where = f"{source}: {name}" if source else name
-        lines += [
-            Shape(name, text_of(line, "altitudeMode"), (_points(line, where, "point"),), kept)
-            for kind in LINES
-            for line in named(each, kind)
-        ]
-        polygons += [
-            Shape(name, text_of(area, "altitudeMode"), _rings(area, where), kept)
-            for area in named(each, "Polygon")
-        ]
-    others = Counter(kind for each in root.iter() if (kind := name_of(each)) in OTHERS)
-    others["LinearRing"] -= sum(len(each.rings) for each in polygons)
-    return Kml(source, tuple(lines), tuple(polygons), others)
+        kept = {item.get("name", ""): text_of(item, "value") for item in named(each, "Data")}
+        kept |= {item.get("name", ""): (item.text or "").strip() for item in named(each, "SimpleData")}
+        for line in (line for kind in LINES for line in named(each, kind)):
+            points = _points(line, where, "point")
+            found.lines.append(Shape(name, text_of(line, "altitudeMode"), (points,), kept))
+        for area in named(each, "Polygon"):
+            found.polygons.append(Shape(name, text_of(area, "altitudeMode"), _rings(area, where), kept))
+    found.others["LinearRing"] -= sum(len(each.rings) for each in found.polygons)
+    return found
 
 
 def _rings(area: Element, where: str) -> tuple[tuple[Point, ...], ...]:
     """The boundaries of a polygon, the outer one first."""
-    rings = [ring for boundary in BOUNDARIES for ring in named(area, boundary)]
+    rings = [ring for kind in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(area, kind)]
     if not rings:
         raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
     return tuple(_points(ring, where, "corner") for ring in rings)
 
 
 def parsed_xml(data: bytes, source: str, root: str) -> Element:
-    """The root of an XML text; `source` begins a fault.
+    """The root of an XML text; `source` begins an InputError.
 
-    Raises:
-        InputError: it is no whole XML, declares entities, is of another root, or has an element of `GIVEN_UP`.
+    It says that it is no whole XML, declares entities, is of another root, or has an element of `GIVEN_UP`.
     """
     where = f"{source}: " if source else ""
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # a few lines of entities unpack to gigabytes
@@ -141,14 +125,6 @@ def named(element: Element, name: str) -> Iterator[Element]:
 def text_of(element: Element, name: str) -> str:
     """The text of the first element of a name; empty where there is none."""
     return next(((each.text or "").strip() for each in named(element, name)), "")
-
-
-def _data(placemark: Element) -> Iterator[tuple[str, str]]:
-    """Names and values of ExtendedData, untyped and typed."""
-    for each in named(placemark, "Data"):
-        yield each.get("name", ""), text_of(each, "value")
-    for each in named(placemark, "SimpleData"):
-        yield each.get("name", ""), (each.text or "").strip()
 
 
 def _points(element: Element, where: str, what: str) -> tuple[Point, ...]:

@@ -44,7 +44,5 @@ def open_standard_files() -> None:
     for number in range(3):
         try:
             os.fstat(number)
-        except OSError:
-            os.set_inheritable(
-                os.open(os.devnull, os.O_RDWR), True
-            )  # gets the lowest number that is free: this one
+        except OSError:  # a file that is opened gets the lowest number that is free: this one
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)

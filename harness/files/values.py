@@ -12,9 +12,8 @@ from harness.files.input_file import InputError
 def parsed_json(text: str, source: str, once: bool = True) -> Any:
     """What a JSON text holds.
 
-    Raises:
-        InputError: it is not JSON, has a number that is not finite, or where `once` a key twice in one place; the text
-            begins with `source`, the file or nothing.
+    An InputError, which begins with `source`, the file or nothing, says that it is not JSON, has a number that is not
+    finite, or where `once` a key twice in one place.
     """
 
     def fault(sentence: str, line: int | None = None) -> InputError:

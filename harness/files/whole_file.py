@@ -33,8 +33,7 @@ def replace_bytes(path: Path, content: bytes) -> None:
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """A new file, which takes the place of `path` when the block ends without an error, and is on the disk then.
 
-    Raises:
-        OSError: it cannot be written, or a pipe, a device or a folder lies there; `strerror` names the file.
+    The `strerror` of an OSError names the file: it cannot be written, or a pipe, a device or a folder lies there.
     """
     partial = path.with_name(path.name + PARTIAL)
     with _naming(path):
@@ -51,11 +50,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def fresh(path: Path) -> BinaryIO:
-    """A new file in the place of what lies there, a link perhaps, which is not followed.
-
-    Raises:
-        OSError: it cannot be made, or a pipe, a device or a folder lies there; `strerror` names the file.
-    """
+    """A new file in the place of what lies there, a link perhaps, which is not followed; OSErrors as `replacing`."""
     with _naming(path):
         _check_replaceable(path)
         path.unlink(missing_ok=True)
@@ -64,11 +59,7 @@ def fresh(path: Path) -> BinaryIO:
 
 
 def append_to(path: Path) -> BinaryIO:
-    """A regular file to write behind its end, made where missing; a link is not followed.
-
-    Raises:
-        OSError: it cannot be opened, or is something else; `strerror` names the file.
-    """
+    """A regular file to write behind its end, made where missing; a link is not followed. OSErrors as `replacing`."""
     with _naming(path):
         if path.is_symlink() or (path.exists() and not path.is_file()):
             raise OSError(errno.EINVAL, "is a link, a pipe or a device, not a file")

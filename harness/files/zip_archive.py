@@ -21,8 +21,6 @@ DAMAGES: Final = (
     *(EOFError, OSError, ValueError, IndexError),
 )
 """What Python's unpacking raises of damaged archives."""
-FORKS: Final = ("__macosx/", "._")
-"""How names begin that macOS adds to archives: they have the endings of files, and none of their content."""
 TOLD: Final = 3
 """Names of files that a fault has at most, each of at most 60 characters."""
 
@@ -60,19 +58,16 @@ def member_path(path: Path, ending: str, most: int) -> str:
 
 def _chosen(names: list[str], ending: str) -> str:
     """The one file of an archive with an ending."""
+    own = [name for name in names if not name.lower().startswith("__macosx/")]  # macOS adds forks of files
     held = [
-        name
-        for name in names
-        if name.lower().endswith(ending)
-        and not name.lower().startswith(FORKS[0])
-        and not name.rpartition("/")[2].startswith(FORKS[1])
+        each for each in own if each.lower().endswith(ending) and not each.rpartition("/")[2].startswith("._")
     ]
     if len(held) == 1:
         return held[0]
+    if not held:
+        raise InputError(f"is a ZIP archive without a {ending} file")
     told = ", ".join(printable(name)[:60] for name in held[:TOLD]) + (", ..." if len(held) > TOLD else "")
     raise InputError(
         f"is a ZIP archive with {counted(len(held), f'{ending} file')} ({told}); must have one: unpack it and give the "
         "file that is meant"
-        if held
-        else f"is a ZIP archive without a {ending} file"
     )

@@ -99,7 +99,7 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
     elif suffix == ".igc":  # loggers write names in Latin-1
         found = read_igc(data.decode("latin-1"), source)
     else:
-        text = decoded(data, source, "a path", utf_16=True)
+        text = decoded(data, source, "a path")
         mission = _mission_reader(text, suffix)
         if mission is not None:
             return _of_mission(mission(text, source), origin_deg)

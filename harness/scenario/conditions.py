@@ -8,8 +8,7 @@ all keys stand.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -45,31 +44,26 @@ GUST_LENGTH_M: Final = 100.0
 """Length of a discrete vertical gust: twice a gradient distance of 50 m, amid the 9 to 107 m of CS 25.341."""
 
 
-@dataclass(frozen=True)
-class Day:
-    """The figures of one kind of day; their sources stand in `aircraft/README.md`.
-
-    Attributes:
-        wind_mps: mean of the wind speed 10 m over ground, Rayleigh distributed, or the ends of a uniform one.
-        most_wind: the wind at the mission's altitude is at most this share of the airspeed.
-        speed_change, direction_change_deg: 1 sigma of the wind's changes, of its speed as a share.
-        turbulence: intensity.
-        vertical_gust_mps, vertical_gust_every_s: of the discrete vertical gusts.
-        navigation: keys of a satellite receiver with a barometer, and the age of its state.
-        servos: of all surfaces and the throttle.
-        uncertainty: 1 sigma of each deviation; that of the centre of gravity over the cube root of the mass (m/kg^1/3).
-    """
+class Day(NamedTuple):
+    """The figures of one kind of day; their sources stand in `aircraft/README.md`."""
 
     wind_mps: float | tuple[float, float]
+    """Mean of the wind speed 10 m over ground, Rayleigh distributed, or the ends of a uniform one."""
     most_wind: float
+    """The wind at the mission's altitude is at most this share of the airspeed."""
     speed_change: float
+    """1 sigma of the wind's changes of speed, as a share."""
     direction_change_deg: float
+    """1 sigma of its changes of direction."""
     turbulence: Literal["light", "moderate"]
     vertical_gust_mps: float
     vertical_gust_every_s: float
     navigation: dict[str, Any]
+    """Keys of a satellite receiver with a barometer, and the age of its state."""
     servos: dict[str, float]
+    """Of all surfaces and the throttle."""
     uncertainty: dict[str, float]
+    """1 sigma of each deviation; that of the centre of gravity over the cube root of the mass (m/kg^1/3)."""
 
 
 # fmt: off
@@ -105,12 +99,7 @@ DAYS: Final = {
 
 
 def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
-    """The scenario with the servos of its day, where neither it nor the aircraft's card names any.
-
-    Args:
-        keys: its aircraft's model resolved.
-        frame: the aircraft without servos of the scenario.
-    """
+    """The scenario with the servos of its day, where neither it nor the card of its aircraft (`frame`) names any."""
     day = DAYS.get(keys.conditions)
     if day is None or keys.aircraft.actuators is not None or frame.files.actuators:
         return keys
@@ -119,18 +108,11 @@ def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
 
 
 def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
-    """The scenario with navigation, air and deviations of its day, as far as it leaves them out.
-
-    Args:
-        keys: its aircraft with servos and airspeed.
-        frame: the aircraft.
-    """
+    """The scenario, airspeed known, with navigation, air and deviations of its day, as far as it leaves them out."""
     day = DAYS.get(keys.conditions)
     if day is not None:
-        keys = keys.updated(
-            environment=_air(keys, day, _stream(keys.seed, CONDITIONS_STREAM)),
-            navigation=_navigation(keys, day),
-        )
+        air = _air(keys, day, _stream(keys.seed, CONDITIONS_STREAM))
+        keys = keys.updated(environment=air, navigation=_navigation(keys, day))
     uncertainty = _uncertainty(keys.uncertainty, day, frame.mass_kg)
     deviation = _deviation(keys.aircraft, uncertainty, _stream(keys.seed, DEVIATION_STREAM))
     aircraft = keys.aircraft.model_copy(update={"deviation": deviation})
@@ -139,14 +121,12 @@ def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
 
 def _air(keys: ScenarioKeys, day: Day, rng: np.random.Generator) -> Environment:
     """The air: what is drawn is drawn whether or not the file has it, so that one key changes nothing else."""
-    air, airspeed_mps = keys.environment, keys.aircraft.airspeed_mps
-    share = profile_share(keys.mission.altitude_m, WIND_FROM_M)
-    most_mps = day.most_wind * airspeed_mps / share
-    low_high = day.wind_mps
-    if isinstance(low_high, tuple):
-        mean_mps = float(rng.uniform(*low_high))
+    airspeed_mps, every_s = keys.aircraft.airspeed_mps, day.vertical_gust_every_s
+    most_mps = day.most_wind * airspeed_mps / profile_share(keys.mission.altitude_m, WIND_FROM_M)
+    if isinstance(day.wind_mps, tuple):
+        mean_mps = float(rng.uniform(*day.wind_mps))
     else:
-        mean_mps = float(rng.rayleigh(low_high / math.sqrt(math.pi / 2.0)))
+        mean_mps = float(rng.rayleigh(day.wind_mps / math.sqrt(math.pi / 2.0)))
     mean_mps, from_deg = min(mean_mps, most_mps), float(rng.uniform(0.0, 360.0))
     count = round(CHANGING_FOR_S / CHANGE_EVERY_S)
     swings = rng.standard_normal((count, 2)).clip(-MOST_SIGMAS, MOST_SIGMAS)
@@ -158,21 +138,18 @@ def _air(keys: ScenarioKeys, day: Day, rng: np.random.Generator) -> Environment:
         )
         for number, (speed, turn) in enumerate(swings.tolist())
     )
-    every_s = day.vertical_gust_every_s
-    first_s = float(rng.uniform(0.0, every_s))
-    wind = Wind(
-        speed_mps=round(mean_mps, 3),
-        from_deg=round(from_deg, 2),
-        measured_at_m=WIND_FROM_M,
-        changes=changes,
-    )
+    first = {"speed_mps": round(mean_mps, 3), "from_deg": round(from_deg, 2)}
     gusts = VerticalGustsSpec(
         speed_mps=day.vertical_gust_mps,
         duration_s=round(min(GUST_LENGTH_M / airspeed_mps, every_s), 3),
         every_s=every_s,
-        start_s=round(first_s, 2),
+        start_s=round(float(rng.uniform(0.0, every_s)), 2),
     )
-    return air.filled(wind=wind, turbulence=Turbulence(intensity=day.turbulence), vertical_gusts=gusts)
+    return keys.environment.filled(
+        wind=Wind(**first, measured_at_m=WIND_FROM_M, changes=changes),
+        turbulence=Turbulence(intensity=day.turbulence),
+        vertical_gusts=gusts,
+    )
 
 
 def _navigation(keys: ScenarioKeys, day: Day) -> Navigation:
@@ -189,9 +166,8 @@ def _navigation(keys: ScenarioKeys, day: Day) -> Navigation:
 def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float) -> UncertaintySpec | None:
     if day is None:
         return given and given.filled(**dict.fromkeys(UncertaintySpec.model_fields, 0.0))
-    figures = dict(day.uncertainty)
-    figures["centre_of_gravity_m"] = round(figures["centre_of_gravity_m"] * mass_kg ** (1.0 / 3.0), 5)
-    return (given or UncertaintySpec()).filled(**figures)
+    shift_m = round(day.uncertainty["centre_of_gravity_m"] * mass_kg ** (1.0 / 3.0), 5)
+    return (given or UncertaintySpec()).filled(**day.uncertainty | {"centre_of_gravity_m": shift_m})
 
 
 def _deviation(
@@ -216,10 +192,13 @@ def _stream(seed: int, number: int) -> np.random.Generator:
 def told(scenario: ScenarioKeys) -> str:
     """What kind of day a scenario is flown on, with its air and navigation, for the first lines of a summary."""
     air, navigation, deviation = scenario.environment, scenario.navigation, scenario.aircraft.deviation
-    wind = air.wind if air.wind and air.wind.fastest_mps else None
+    wind = air.wind if air.wind and air.wind.fastest_mps else Wind()
+    at = f" at {wind.measured_at_m:g} m" if wind.measured_at_m else ""
     exact = navigation.kind == "perfect" and not navigation.latency_s
     sayings = {
-        _wind_told(wind) if wind else "": wind,
+        f"wind {wind.speed_mps:.3g} m/s from {wind.from_deg:.0f} deg{at}{', changing' if wind.changes else ''}": (
+            wind.fastest_mps
+        ),
         f"{air.gusts} turbulence": air.gusts,
         "gusts": air.vertical_gusts,
         f"{navigation.kind} navigation": not exact,
@@ -229,10 +208,5 @@ def told(scenario: ScenarioKeys) -> str:
     other = [saying for saying, holds in sayings.items() if holds]
     if scenario.conditions == "ideal" and other:
         return f"ideal, but for what the scenario sets: {', '.join(other)}"
-    said = [*([] if wind else ["calm"]), *other, *(["state known exactly"] if exact else [])]
-    return f"{scenario.conditions}: {', '.join(said)}"
-
-
-def _wind_told(wind: Wind) -> str:
-    at = f" at {wind.measured_at_m:g} m" if wind.measured_at_m else ""
-    return f"wind {wind.speed_mps:.3g} m/s from {wind.from_deg:.0f} deg{at}{', changing' if wind.changes else ''}"
+    calm, known = [] if wind.fastest_mps else ["calm"], ["state known exactly"] if exact else []
+    return f"{scenario.conditions}: {', '.join([*calm, *other, *known])}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
@@ -13,7 +12,6 @@ from harness.scenario.validation import KeyFault
 if TYPE_CHECKING:
     from harness.world_files.height_field import HeightField
 
-Note = Annotated[str, Field(min_length=1)]
 Spacing = Annotated[float, Field(gt=0, le=MAX_COORDINATE_M)]
 
 STEP_M = 0.1
@@ -45,11 +43,7 @@ class GroundSpec(Section):
         return self
 
     def field(self) -> HeightField:
-        """The heights.
-
-        Raises:
-            ValueError: the text does not hold them.
-        """
+        """The heights; a ValueError says that the text does not hold them."""
         from harness.world_files.height_field import HeightField, unpacked
 
         heights_m = unpacked(self.heights, self.rows, self.columns, self.lowest_m, self.step_m)
@@ -62,9 +56,8 @@ class GroundSpec(Section):
 
         from harness.world_files.height_field import packed
 
-        lowest_m = float(np.floor(np.nanmin(field.heights_m)))
+        (rows, columns), lowest_m = field.heights_m.shape, float(np.floor(np.nanmin(field.heights_m)))
         step_m = max(STEP_M, float(np.nanmax(field.heights_m) - lowest_m) / 60_000)
-        rows, columns = field.heights_m.shape
         nodes = {"corner_m": field.corner_m, "spacing_m": field.spacing_m, "rows": rows, "columns": columns}
         heights = packed(field.heights_m, lowest_m, step_m)
         return cls.model_construct(**nodes, lowest_m=lowest_m, step_m=step_m, heights=heights)
@@ -81,7 +74,7 @@ class SourceSpec(Section):
     """SHA-256 of its bytes."""
     polygons: Annotated[int, Field(ge=0)]
     """How many obstacles were made of it."""
-    notes: Annotated[tuple[Note, ...], Strict(False)] = ()
+    notes: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Strict(False)] = ()
     """What was assumed or passed over. Default: nothing."""
 
 
@@ -93,9 +86,9 @@ Change = Annotated[tuple[Time, WindSpeed, Direction], Strict(False)]
 class Wind(Section):
     """Wind, the same everywhere at one height and time; steady unless changes are given."""
 
-    speed_mps: Annotated[float, Field(ge=0, le=200)] = 0.0
+    speed_mps: WindSpeed = 0.0
     """Wind speed; must be below 0.9 of the airspeed."""
-    from_deg: Annotated[float, Field(ge=0, le=360)] = 270.0
+    from_deg: Direction = 270.0
     """Direction it blows from."""
     measured_at_m: Annotated[float | None, Field(ge=1, le=300)] = None
     """Height over ground of these speeds; above and below, the wind has the logarithmic profile of MIL-F-8785C.
@@ -106,12 +99,12 @@ class Wind(Section):
 
     @model_validator(mode="after")
     def _times_rise(self) -> Wind:
-        times = [0.0, *(time_s for time_s, _, _ in self.changes)]
-        for index, (before, after) in enumerate(itertools.pairwise(times)):
-            if not before < after:
-                raise KeyFault(
-                    ("changes", index), f"is at {after:g} s; must be later than {before:g} s, the one before"
-                )
+        before = 0.0
+        for index, (time_s, _, _) in enumerate(self.changes):
+            if not before < time_s:
+                told = f"is at {time_s:g} s; must be later than {before:g} s, the one before"
+                raise KeyFault(("changes", index), told)
+            before = time_s
         return self
 
     @property
@@ -135,9 +128,8 @@ class VerticalGustsSpec(Section):
     @model_validator(mode="after")
     def _one_after_the_other(self) -> VerticalGustsSpec:
         if self.duration_s > self.every_s:
-            raise KeyFault(
-                ("duration_s",), f"is {self.duration_s:g}; must be at most every_s {self.every_s:g}"
-            )
+            told = f"is {self.duration_s:g}; must be at most every_s {self.every_s:g}"
+            raise KeyFault(("duration_s",), told)
         return self
 
 

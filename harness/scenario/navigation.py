@@ -19,13 +19,15 @@ SIGMAS: Final = 3.0
 """The planner's margin covers so many sigma of the position error: 98.9 % of all errors in the plane are smaller."""
 
 _PERFECT: Final[dict[str, Any]] = {
-    **dict.fromkeys(
-        ("position_sigma_m", "velocity_sigma_mps", "heading_sigma_deg", "airspeed_sigma_mps"), 0.0
-    ),
-    **dict.fromkeys(("altitude_sigma_m", "drift_share", "latency_s"), 0.0),
+    **{
+        "position_sigma_m": 0.0,
+        "velocity_sigma_mps": 0.0,
+        "heading_sigma_deg": 0.0,
+        "airspeed_sigma_mps": 0.0,
+    },
+    **{"altitude_sigma_m": 0.0, "drift_share": 0.0, "latency_s": 0.0},
     "position_correlation_s": 1100.0,  # [BM], 1 / k_GPS of the Gauss-Markov table
-    "position_bias_m": (0.0, 0.0),
-    "outages_s": (),
+    **{"position_bias_m": (0.0, 0.0), "outages_s": ()},
 }
 _GNSS: Final[dict[str, Any]] = _PERFECT | {
     "position_sigma_m": 4.7,  # [BM], nominal errors: 11.5 m at 95 %; [SPS] has 8 m on average, at worst 15 m
@@ -102,17 +104,14 @@ class Navigation(Section):
                 object.__setattr__(self, name, value)
             elif self.kind == "perfect" and name != "position_correlation_s" and given != value:
                 told = f"is {given:g}" if isinstance(given, float) else "is given"
-                raise KeyFault(
-                    (name,), f"{told}, but kind perfect has no error; must be left out, or kind be gnss"
-                )
+                told += ", but kind perfect has no error; must be left out, or kind be gnss"
+                raise KeyFault((name,), told)
         last_s = -math.inf
         for index, (begin_s, end_s) in enumerate(self.outages_s):
             if not last_s < begin_s < end_s:
-                after = "" if math.isinf(last_s) else f", after the one before ends at {last_s:g} s"
-                raise KeyFault(
-                    ("outages_s", index),
-                    f"is [{begin_s:g}, {end_s:g}]; must be [from, to] with from < to{after}",
-                )
+                told = f"is [{begin_s:g}, {end_s:g}]; must be [from, to] with from < to"
+                told += "" if math.isinf(last_s) else f", after the one before ends at {last_s:g} s"
+                raise KeyFault(("outages_s", index), told)
             last_s = end_s
         return self
 
@@ -128,27 +127,17 @@ def planning_margin_m(
 ) -> float:
     """What clearance must have on top, so that the true aircraft keeps it where the believed one does (m).
 
-    `k` sigma of the position error, its bias, what is flown while the state grows old, and the drift of the longest
-    outage. The map drifts as the aircraft does: what stands in it is off only by what was drifted since it was last
-    seen. Of an error with two normal components of one sigma, 1 - exp(-k^2 / 2) lies within k sigma.
+    `k` sigma of the position error, its bias, what is flown at `speed_mps`, wind included, while the state grows old,
+    and the drift of the longest outage, up to `time_limit_s`. The map drifts as the aircraft does: what stands in it is
+    off only by what was drifted since it was last seen, no longer ago than `unseen_m` flown. Of an error with two
+    normal components of one sigma, 1 - exp(-k^2 / 2) lies within k sigma.
 
     A heading error turns the scan: an edge at distance d is misplaced by d times the error, square to where it is seen.
     The map places an edge anew whenever it is seen from 0.7 of the distance (`harness.mapping.obstacle_map`), the last
     time within c / 0.7 of an edge that is passed at the clearance c, sqrt(1 / 0.7^2 - 1) c = c before it is passed. An
     aircraft of turn radius R that turns aside by the error e, left and right, flies 4 R e: the longer way counts.
-
-    Args:
-        navigation: its errors.
-        speed_mps: greatest speed over the ground, wind included.
-        time_limit_s: when the flight ends at the latest; no outage lasts longer.
-        k: sigmas.
-        unseen_m: what is passed was seen no longer ago than this distance flown.
-        clearance_m: wanted distance from obstacles.
-        turn_radius_m: of plans.
     """
-    lasting_s = [
-        min(end_s, time_limit_s) - min(begin_s, time_limit_s) for begin_s, end_s in navigation.outages_s
-    ]
+    lasting_s = [min(end, time_limit_s) - min(begin, time_limit_s) for begin, end in navigation.outages_s]
     drift_m = navigation.drift_share * min(speed_mps * max(lasting_s, default=0.0), unseen_m)
     turned_rad = k * math.radians(navigation.heading_sigma_deg)
     turned_m = turned_rad * max(clearance_m, 4.0 * turn_radius_m * turned_rad)

@@ -37,53 +37,42 @@ class Polygon(Section):
 
     @field_validator("vertices_m")
     @classmethod
-    def _enclose_an_area(cls, vertices_m: tuple[Point, ...]) -> tuple[Point, ...]:
+    def _enclose_an_area(cls, vertices_m: Ring) -> Ring:
         return _ring(vertices_m)
 
     @field_validator("holes_m")
     @classmethod
-    def _are_rings(
-        cls, holes_m: tuple[tuple[Point, ...], ...] | None
-    ) -> tuple[tuple[Point, ...], ...] | None:
-        rings = []
-        for number, hole in enumerate(holes_m or ()):
-            try:
-                rings.append(_ring(hole))
-            except ValueError as error:
-                raise ValueError(f"hole {number} {error}") from error
-        return tuple(rings) or None
+    def _are_rings(cls, holes_m: tuple[Ring, ...] | None) -> tuple[Ring, ...] | None:
+        return tuple(_ring(hole, f"hole {number} ") for number, hole in enumerate(holes_m or ())) or None
 
     @model_validator(mode="after")
     def _has_its_holes_inside(self) -> Polygon:
         import shapely
 
-        if self.holes_m:
-            shape = shapely.Polygon(self.vertices_m, self.holes_m)
-            if not shape.is_valid:
-                what, _, where = shapely.is_valid_reason(shape).partition("[")
-                raise ValueError(
-                    f"has holes_m that lie outside of it, cross or touch ({what.lower()} at "
-                    f"({where.rstrip(']').replace(' ', ', ')})); each hole must lie inside, apart from the others"
-                )
+        if self.holes_m and not (shape := shapely.Polygon(self.vertices_m, self.holes_m)).is_valid:
+            what, _, where = shapely.is_valid_reason(shape).partition("[")
+            raise ValueError(
+                f"has holes_m that lie outside of it, cross or touch ({what.lower()} at "
+                f"({where.rstrip(']').replace(' ', ', ')})); each hole must lie inside, apart from the others"
+            )
         return self
 
 
-def _ring(points: Sequence[Point]) -> tuple[Point, ...]:
-    """A ring without repeated vertices, its first one not given again at the end."""
+def _ring(points: Sequence[Point], name: str = "") -> Ring:
+    """A ring without repeated vertices, its first one not given again at the end; `name` begins its fault."""
     import shapely
 
     ring = tuple(point for index, point in enumerate(points) if not index or point != points[index - 1])
     ring = ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
     if len(ring) < 3:
-        raise ValueError(f"has {len(ring)} distinct vertices; must be at least 3")
+        raise ValueError(f"{name}has {len(ring)} distinct vertices; must be at least 3")
     shape = shapely.Polygon(ring)
     if shape.convex_hull.area == 0:
-        raise ValueError("encloses no area: its vertices lie on one line; must be a polygon")
+        raise ValueError(f"{name}encloses no area: its vertices lie on one line; must be a polygon")
     if not shape.is_valid:
         where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")
-        raise ValueError(
-            f"crosses or touches itself at ({where}); give the vertices in order round the shape"
-        )
+        told = f"crosses or touches itself at ({where}); give the vertices in order round the shape"
+        raise ValueError(f"{name}{told}")
     return ring
 
 
