@@ -20,43 +20,15 @@ from harness.analysis.metrics import (
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
 from planner.interface import Path
 
-LIMITS = FlightLimits(
-    altitude_m=300.0,
-    clearance_m=200.0,
-    bank_limit_rad=math.radians(45),
-    turn_radius_m=110.0,
-    max_cross_track_m=20.0,
-)
+LIMITS = FlightLimits(300.0, 200.0, math.radians(45), turn_radius_m=110.0, max_cross_track_m=20.0)
 KEYS = {
-    "shield",
-    "outcome",
-    "reason",
-    "flown_length_m",
-    "planned_length_m",
-    "flight_time_s",
-    "min_clearance_m",
-    "min_altitude_above_ground_m",
-    "clearance_violation_s",
-    "cross_track_m",
-    "total_system_error_m",
-    "flight_technical_error_m",
-    "altitude_error_m",
-    "smoothness",
-    "bank_saturation_fraction",
-    "max_load_factor",
-    "trackable",
-    "trackability",
-    "findings",
-    "bank_reversals_per_min",
-    "plan_contradictions",
-    "replans",
-    "plan_delay_s",
-    "lost_returns",
-    "compute_ms",
-    "timing",
-    "digest",
+    "shield", "outcome", "reason", "flown_length_m", "planned_length_m", "flight_time_s", "min_clearance_m",
+    "min_altitude_above_ground_m", "clearance_violation_s", "cross_track_m", "total_system_error_m",
+    "flight_technical_error_m", "altitude_error_m", "smoothness", "bank_saturation_fraction",
+    "max_load_factor", "trackable", "trackability", "findings", "bank_reversals_per_min",
+    "plan_contradictions", "replans", "plan_delay_s", "lost_returns", "compute_ms", "timing", "digest",
     "error",
-}
+}  # fmt: skip
 
 
 def flight(track: Track, *plans: AcceptedPlan, outcome: Outcome = Outcome.REACHED) -> Flight:

@@ -16,7 +16,6 @@ from harness.analysis.smoothness import (
     polyline_profile,
     smoothness,
     stations_in_effect,
-    window_m,
 )
 from harness.flight.record import AcceptedPlan, Track
 from planner.interface import Path, Plan, PlanStatus
@@ -59,20 +58,6 @@ def test_line_into_arc_has_the_rate_of_the_window() -> None:
     assert figures.max_curvature_rate_1pm2 == pytest.approx(0.01 / 25.0)
     reverse = smoothness(profile((300.0, 0.01), (300.0, -0.01)), 25.0)
     assert reverse.max_curvature_rate_1pm2 == pytest.approx(0.02 / 25.0)
-
-
-def test_flown_circle(make_circle: Callable[..., Track]) -> None:
-    track = make_circle(200.0, 60.0)
-    figures = smoothness(flown_profile(track), window_m(track))
-    assert window_m(track) == 25.0
-    assert figures.heading_change_deg == pytest.approx(math.degrees(60 * 25 / 200), rel=1e-3)
-    assert figures.max_curvature_1pm == pytest.approx(1 / 200, rel=1e-3)
-    assert figures.bending_energy_1pm == pytest.approx(60 * 25 / 200**2, rel=1e-3)
-    assert figures.max_curvature_rate_1pm2 < 1e-6
-
-
-def test_flown_left_turn_is_positive(make_circle: Callable[..., Track]) -> None:
-    assert (flown_profile(make_circle(200.0, 20.0)).curvature_1pm > 0).all()
 
 
 def test_flown_course_through_north_does_not_jump(make_track: Callable[..., Track]) -> None:

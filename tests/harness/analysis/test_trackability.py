@@ -13,13 +13,7 @@ from harness.analysis.trackability import legs
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from harness.run_files.given_path import CutCorner
 
-LIMITS = FlightLimits(
-    altitude_m=300.0,
-    clearance_m=50.0,
-    bank_limit_rad=math.radians(45),
-    turn_radius_m=110.0,
-    max_cross_track_m=5.0,
-)
+LIMITS = FlightLimits(300.0, 50.0, math.radians(45), turn_radius_m=110.0, max_cross_track_m=5.0)
 OFF = np.where(np.abs(np.arange(201) - 100) < 20, 6.0, 0.0)
 
 
@@ -113,7 +107,7 @@ WIDE = replace(
         ({"load_factor": 2.1}, "load factor"),
         ({"load_factor": np.where(np.arange(601) % 20 == 0, 5.0, 1.0)}, None),
     ],
-)
+)  # fmt: skip
 def test_altitude_airspeed_and_load_factor_have_limits_too(
     make_track: Callable[..., Track], straight_plan: AcceptedPlan, columns: dict[str, Any], cause: str | None
 ) -> None:
@@ -121,10 +115,6 @@ def test_altitude_airspeed_and_load_factor_have_limits_too(
     (leg,) = legs(make_track(601, **columns), [straight_plan], WIDE)
     assert leg.cause == cause
     assert leg.trackable is (cause is None)
-
-
-def test_thresholds_can_be_given() -> None:
-    assert replace(LIMITS, max_cross_track_m=1.5).cross_track_threshold_m == 1.5
 
 
 def passed(arc_length_m: float, cut_m: float, waypoint: int) -> CutCorner:
@@ -162,11 +152,8 @@ def test_corners_end_legs_and_belong_to_the_leg_that_they_end(
     ]
     # What lies beyond a corner counts as well, however near the track is to the arcs that were made of the path.
     beyond = as_given(track, corners, np.where(track.arc_length_m > 1100.0, 51.0, 3.0), 50.0)
-    assert [leg.trackable for leg in legs(track, [straight_plan], LIMITS, given=beyond)] == [
-        True,
-        True,
-        False,
-    ]
+    tracked = [leg.trackable for leg in legs(track, [straight_plan], LIMITS, given=beyond)]
+    assert tracked == [True, True, False]
 
 
 @pytest.mark.parametrize(
@@ -196,7 +183,7 @@ def test_an_altitude_that_is_off_because_more_was_asked_for_than_the_aircraft_cl
         (-15.0, -1.0, "tracking error"),
         (-3.0, 1.0, "tracking error"),
     ],
-)
+)  # fmt: skip
 def test_cause_is_the_wind_where_the_drift_is_downwind(
     make_track: Callable[..., Track], straight_plan: AcceptedPlan, heading_deg: float, side: float, cause: str
 ) -> None:
@@ -218,15 +205,13 @@ def test_lost_control_is_on_the_last_leg(
 @pytest.mark.parametrize(
     ("believed_m", "cause"),
     [
-        (
-            np.linspace(-14.0, 0.0, 201),
-            "navigation error",
-        ),  # it flies to where its first fix says that it should be
+        # It flies to where its first fix says that it should be.
+        (np.linspace(-14.0, 0.0, 201), "navigation error"),
         (np.full(201, 14.0), "tracking error"),
         (np.linspace(0.0, 14.0, 201), "tracking error"),
         (np.full(201, np.nan), "tracking error"),
     ],
-)
+)  # fmt: skip
 def test_a_navigation_error_is_told_where_the_true_error_is_largest(
     believed_m: FloatArray, cause: str, make_track: Callable[..., Track], straight_plan: AcceptedPlan
 ) -> None:

@@ -39,24 +39,12 @@ def test_gps_is_as_large_as_what_drives_it_makes_it() -> None:
 @pytest.mark.parametrize(
     ("keys", "sentence"),
     [
-        (
-            "kind: gps",
-            "navigation.kind: is the text 'gps'; must be 'perfect', 'gnss', 'rtk' or 'dead_reckoning'",
-        ),
+        ("kind: gps", "navigation.kind: is the text 'gps'; must be 'perfect', 'gnss', 'rtk' or 'dead_reckoning'"),
         ("kind: gnss, position_sigma_m: -1", "navigation.position_sigma_m: is -1; must be at least 0"),
-        (
-            "kind: gnss, position_correlation_s: 0",
-            "navigation.position_correlation_s: is 0; must be at least 0.001",
-        ),
+        ("kind: gnss, position_correlation_s: 0", "navigation.position_correlation_s: is 0; must be at least 0.001"),
         ("kind: gnss, drift_share: 1.5", "navigation.drift_share: is 1.5; must be at most 1"),
-        (
-            "kind: gnss, heading_sigma_deg: .inf",
-            "navigation.heading_sigma_deg: is inf; must be a finite number",
-        ),
-        (
-            "kind: gnss, outages_s: [[5, 5]]",
-            "navigation.outages_s[0]: is [5, 5]; must be [from, to] with from < to",
-        ),
+        ("kind: gnss, heading_sigma_deg: .inf", "navigation.heading_sigma_deg: is inf; must be a finite number"),
+        ("kind: gnss, outages_s: [[5, 5]]", "navigation.outages_s[0]: is [5, 5]; must be [from, to] with from < to"),
         (
             "kind: gnss, outages_s: [[5, 9], [8, 20]]",
             "navigation.outages_s[1]: is [8, 20]; must be [from, to] with from < to, after the one before ends at 9 s",
@@ -66,7 +54,7 @@ def test_gps_is_as_large_as_what_drives_it_makes_it() -> None:
         ("sigma_m: 3", "navigation.sigma_m: unknown key"),
         ("kind: rtk, margin_m: -1", "navigation.margin_m: is -1; must be at least 0"),
     ],
-)
+)  # fmt: skip
 def test_faults_name_line_key_and_what_would_be_right(keys: str, sentence: str) -> None:
     with pytest.raises(InputError) as refused:
         parse_scenario(f"{LEAST}navigation: {{{keys}}}\n")
@@ -84,7 +72,7 @@ def test_faults_name_line_key_and_what_would_be_right(keys: str, sentence: str) 
         ({"kind": "gnss", "outages_s": [[960, 1060]]}, 3.0, 14.1 + 30.0),
         ({"kind": "dead_reckoning"}, 3.0, 0.01 * 25.0 * 1000.0),
     ],
-)
+)  # fmt: skip
 def test_the_margin_is_sigmas_bias_and_the_longest_outage(
     keys: dict[str, Any], k: float, margin_m: float
 ) -> None:
@@ -99,7 +87,7 @@ def test_the_margin_is_sigmas_bias_and_the_longest_outage(
         (1.0, 20.0, 187.0, 4.0 * 187.0 * 3.0 * math.radians(1.0)),  # 39 m to turn aside by 2 m
         (0.0, 300.0, 187.0, 0.0),
     ],
-)
+)  # fmt: skip
 def test_the_margin_has_what_the_heading_misplaces_an_edge_by_before_the_plan_is_mended(
     heading_deg: float, clearance_m: float, radius_m: float, along_m: float
 ) -> None:

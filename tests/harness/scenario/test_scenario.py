@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 import aircraft
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
-from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError
 from harness.run.scenario_flight import make_loop
 from harness.scenario.kinds import planner_kinds
@@ -105,7 +104,7 @@ def test_numbers_are_those_of_yaml_1_2() -> None:
         "[5000, 5000], [6000, 5000], [6000, 5000], [6000, 5000], [6000, 6000]",
         "[5000, 5000], [6000, 5000], [6000, 6000], [6000, 6000], [5000, 5000], [5000, 5000]",
     ],
-)
+)  # fmt: skip
 def test_repeated_vertices_are_dropped(ring: str) -> None:
     polygon = "obstacles: [{polygon: {vertices_m: [%s]}}]\n"
     clean = parse_scenario(LEAST + polygon % "[5000, 5000], [6000, 5000], [6000, 6000]")
@@ -144,7 +143,7 @@ def test_only_what_stays_may_not_lie_on_the_goal(own: str) -> None:
         "circle: {center_m: [%d, 1000], radius_m: 300}",
         "polygon: {vertices_m: [[%d, 0], [0, 9000], [40000, 9000]]}",
     ],
-)
+)  # fmt: skip
 def test_nobody_starts_or_ends_inside_an_obstacle_however_little_clearance_is_wanted(
     key: str, shape: str
 ) -> None:
@@ -160,14 +159,6 @@ def test_dumped_text_stays_text(name: str) -> None:
     text = dump_scenario(scenario)
     assert parse_scenario(text) == scenario
     assert yaml.safe_load(text)["name"] == name
-
-
-def test_many_obstacles_are_written_as_few_are() -> None:
-    circles = [{"circle": {"center_m": [5e3 + i, 3e4], "radius_m": 1.5}} for i in range(2100)]
-    scenario = scenario_from({**yaml.safe_load(LEAST), "obstacles": circles})
-    text = dump_scenario(scenario)
-    assert text == strict_yaml.dump(scenario.model_dump(by_alias=True, exclude_none=True))
-    assert yaml.safe_load(text)["obstacles"] == circles
 
 
 finite = st.floats(-1e6, 1e6, allow_nan=False).filter(lambda x: x == 0 or abs(x) > 1e-300)
@@ -242,10 +233,7 @@ def test_overrides_replace_keys_before_defaults_follow(tmp_path: Path) -> None:
         (("name.first", "1"), "command line: name.first: no such key"),
         (("mission.start_m[7]", "1"), "command line: mission.start_m[7]: does not exist; there are 2"),
         (("planner.kind", "other"), "command line: planner.kind: is 'other'; must be one of rolling_window"),
-        (
-            ("guidance.kind", "other"),
-            "command line: guidance.kind: is 'other'; must be one of preview, npfg, l1",
-        ),
+        (("guidance.kind", "other"), "command line: guidance.kind: is 'other'; must be one of preview, npfg, l1"),
         (
             ("guidance.rate", "1"),
             "command line: guidance.rate: unknown key; known here: kind, follow, acceptance_radius_m, bandwidth_radps",
@@ -253,7 +241,7 @@ def test_overrides_replace_keys_before_defaults_follow(tmp_path: Path) -> None:
         (("guidance.damping", "0"), "command line: guidance.damping: is 0; must be greater than 0"),
         (("planner.kind", 2000 * "x"), f"command line: planner.kind: is '{40 * 'x'}'; must be one of"),
     ],
-)
+)  # fmt: skip
 def test_a_bad_override_is_named(setting: tuple[str, str], message: str, tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         overridden(setting, text=LEAST, folder=tmp_path)
@@ -305,27 +293,6 @@ def test_the_schema_describes_every_key_with_its_unit_and_default() -> None:
         if name.endswith(("_m", "_mps", "_s", "_deg", "_hz")):
             assert key["unit"] == {"mps": "m/s", "hz": "Hz"}.get(name.rsplit("_")[-1], name.rsplit("_")[-1])
     assert schema["required"] == ["schema", "name", "area", "mission"]
-
-
-def bounded(key: dict[str, Any]) -> bool:
-    """Whether a key's schema, or that of each of its items, says what it may be."""
-    limits = {
-        "minimum",
-        "exclusiveMinimum",
-        "maximum",
-        "exclusiveMaximum",
-        "enum",
-        "const",
-        "pattern",
-        "minLength",
-    }
-    choices = [choice for choice in key.get("anyOf", [key]) if choice.get("type") != "null"]
-    inner = [item for choice in choices for item in choice.get("prefixItems", [choice.get("items", choice)])]
-    return all(limits & item.keys() or bounded_items(item) for item in inner)
-
-
-def bounded_items(key: dict[str, Any]) -> bool:
-    return ("prefixItems" in key or "items" in key) and bounded(key)
 
 
 def test_editors_find_the_schema_beside_the_scenarios() -> None:
@@ -400,7 +367,7 @@ def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
         ({1: 2}, "with_: must be given a mapping of key paths"),
         ([("seed", 2)], "with_: must be given a mapping of key paths"),
     ],
-)
+)  # fmt: skip
 def test_a_wrong_key_of_a_changed_scenario_is_told(keys: Any, said: str) -> None:
     with pytest.raises(InputError, match=f"^{re.escape(said)}"):
         load_scenario("aerosonde_forest").with_(keys)

@@ -38,10 +38,7 @@ def test_is_written_out_and_read_back() -> None:
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
-        (
-            ["simulation: {rate_hz: 75}"],
-            "5: simulation.rate_hz: is 75; must be a multiple of the guidance rate",
-        ),
+        (["simulation: {rate_hz: 75}"], "5: simulation.rate_hz: is 75; must be a multiple of the guidance rate"),
         (["simulation: {rate_hz: 20}"], "5: simulation.rate_hz: is 20; must be at least 30"),
         (["simulation: {rate_hz: 60.5}"], "5: simulation.rate_hz"),
         (["simulation: {rates_hz: 60}"], "did you mean rate_hz?"),
@@ -55,7 +52,7 @@ def test_is_written_out_and_read_back() -> None:
             "which does not divide simulation.rate_hz 60; the nearest that does is 60",
         ),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_flown_is_refused(lines: list[str], said: str) -> None:
     with pytest.raises(InputError) as refused:
         scenario(*lines)
