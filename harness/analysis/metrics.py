@@ -78,21 +78,27 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "trackable": bool(verdicts) and all(leg.trackable for leg in verdicts),
         "trackability": [dict(vars(leg)) for leg in verdicts],
         "findings": [dataclasses.asdict(each) for each in findings(flight, limits)],
-        **{metric.path: metric.of(flight, limits) for metric in METRICS if metric.of is not None},
+        **_registered(flight, limits),
         "replans": max(len(flight.plans) - 1, 0),
         "shield": flight.shield and dataclasses.asdict(flight.shield),
-        "plan_delay_s": percentiles([plan.delay_s for plan in flight.plans if math.isfinite(plan.delay_s)]),
+        "plan_delay_s": percentiles(list(filter(math.isfinite, (plan.delay_s for plan in flight.plans)))),
         "lost_returns": lost_returns(flight.lost_returns),
         "compute_ms": percentiles(flight.compute_ms),
-        "timing": {
-            "sim_s": flight.sim_s,
-            "wall_s": flight.wall_s,
-            "realtime_factor": flight.sim_s / flight.wall_s if flight.wall_s > 0 else None,
-            "planner_wall_ms": percentiles(flight.compute_wall_ms),
-        },
+        "timing": _timing(flight),
         "digest": digest(track),
         "error": flight.error,
     }
+
+
+def _registered(flight: Flight, limits: FlightLimits) -> dict[str, Any]:
+    """Figures that the registry computes."""
+    return {metric.path: metric.of(flight, limits) for metric in METRICS if metric.of is not None}
+
+
+def _timing(flight: Flight) -> dict[str, Any]:
+    factor = flight.sim_s / flight.wall_s if flight.wall_s > 0 else None
+    told = {"sim_s": flight.sim_s, "wall_s": flight.wall_s, "realtime_factor": factor}
+    return {**told, "planner_wall_ms": percentiles(flight.compute_wall_ms)}
 
 
 def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:

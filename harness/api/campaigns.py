@@ -45,24 +45,29 @@ def compare(
     from harness.scenario.given import is_source
     from harness.scenario.kinds import GUIDANCE, PLANNER
 
-    given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
-    loaded = [each if isinstance(each, Scenario) else load_scenario(each) for each in given]
+    loaded = _loaded([scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios)
+    told = [each.name for each in loaded]
     kinds = _named(planners, PLANNER, "planners")
-    laws = [] if guidance is None else _named(guidance, GUIDANCE, "guidance")
-    told = f"{[each.name for each in loaded]}, {kinds}" + (f", guidance={laws}" if laws else "")
     parts = [{"planner.kind": kind} for kind in kinds]
-    if laws:
+    command = f"wayproof.compare({told}, {kinds})"
+    if guidance is not None:
+        laws = _named(guidance, GUIDANCE, "guidance")
         parts = [{**part, "guidance.kind": law} for part in parts for law in laws]
+        command = f"wayproof.compare({told}, {kinds}, guidance={laws})"
     with as_input_errors():
         compared = fly_and_compare(
             [each.with_(keys) for each in loaded for keys in parts],
             Path(out),
             recording=recording,
             workers=workers or os.cpu_count() or 1,
-            command=in_python(f"wayproof.compare({told})"),
+            command=in_python(command),
             sources=(tuple(filter(is_source, planners)), tuple(filter(is_source, guidance or ()))),
         )
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
+
+
+def _loaded(given: Sequence[Scenario | str | Path]) -> list[Scenario]:
+    return [each if isinstance(each, Scenario) else load_scenario(each) for each in given]
 
 
 def _named(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:

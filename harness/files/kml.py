@@ -68,15 +68,20 @@ def read_kml(data: bytes, source: str, most: int) -> Kml:
     for number, each in enumerate(named(root, "Placemark"), start=1):
         name = shown(text_of(each, "name") or f"Placemark {number}")
         where = f"{source}: {name}" if source else name
-        kept = {item.get("name", ""): text_of(item, "value") for item in named(each, "Data")}
-        kept |= {item.get("name", ""): (item.text or "").strip() for item in named(each, "SimpleData")}
-        for line in (line for kind in LINES for line in named(each, kind)):
-            points = _points(line, where, "point")
-            found.lines.append(Shape(name, text_of(line, "altitudeMode"), (points,), kept))
-        for area in named(each, "Polygon"):
-            found.polygons.append(Shape(name, text_of(area, "altitudeMode"), _rings(area, where), kept))
+        _take(each, name, where, found)
     found.others["LinearRing"] -= sum(len(each.rings) for each in found.polygons)
     return found
+
+
+def _take(placemark: Element, name: str, where: str, found: Kml) -> None:
+    """Adds the lines and polygons of a Placemark to what was found."""
+    kept = {item.get("name", ""): text_of(item, "value") for item in named(placemark, "Data")}
+    kept |= {item.get("name", ""): (item.text or "").strip() for item in named(placemark, "SimpleData")}
+    for line in (line for kind in LINES for line in named(placemark, kind)):
+        points = _points(line, where, "point")
+        found.lines.append(Shape(name, text_of(line, "altitudeMode"), (points,), kept))
+    for area in named(placemark, "Polygon"):
+        found.polygons.append(Shape(name, text_of(area, "altitudeMode"), _rings(area, where), kept))
 
 
 def _rings(area: Element, where: str) -> tuple[tuple[Point, ...], ...]:

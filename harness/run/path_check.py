@@ -21,6 +21,7 @@ from harness.run.scenario_flight import flight_limits, fly_to_folder, jsbsim_air
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
 from harness.run_files.mission.vertices import corner_limit_m
 from harness.run_files.path_files import PathAsGiven
+from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of
 from harness.scenario.obstacles import WorldFile
 from harness.scenario.overrides import overridden, with_key
@@ -107,11 +108,13 @@ def asked(
         name: of the scenario.
     """
     keys = {("name",): name, **_own_keys(given, world, altitude_m)}
-    base, source = _of_the_world(world), "command line" if world is None else str(world)
-    folder = None if world is None else world.parent
+    base, folder = _of_the_world(world), None if world is None else world.parent
+
+    def validly(root: Node) -> Scenario:
+        return validated(root, "command line" if world is None else str(world), folder, ends_checked=False)
 
     root = overridden(_with(base, {**_mission_about(about(given.points_m), base), **keys}), settings)
-    scenario = validated(root, source, folder, ends_checked=False)
+    scenario = validly(root)
     field = None if scenario.ground is None else scenario.ground.field()
     plan = planned(given, scenario, altitude_m, None if field is None else field.at, corner_m)
     files: tuple[FileSpec, ...] = ()
@@ -122,9 +125,8 @@ def asked(
         keys["mission", "altitude_m"] = float(plan.profile.altitude_m[0])
         root = overridden(_with(base, {**_mission_about(plan.way.given_m[:, :2], base), **keys}), settings)
         if not plan.profile.level:
-            root, files = _without_files(root, folder)
-            root = _with(root, {("ground",): scenario.ground.model_dump()} if scenario.ground else {})
-        scenario = validated(root, source, folder, ends_checked=False)
+            root, files = _without_files(root, folder, scenario.ground)
+        scenario = validly(root)
     named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
     return PathCheck(given, scenario, plan, bool(named or world), corner_m, files)
 
@@ -186,8 +188,15 @@ def _mission_about(points_m: FloatArray, base: Node) -> dict[Loc, Any]:
     return keys
 
 
-def _without_files(root: Node, folder: FilePath | None) -> tuple[Node, tuple[FileSpec, ...]]:
-    """Keys without the files among the obstacles, for a path that is not flown at one altitude; and those files."""
+def _without_files(
+    root: Node, folder: FilePath | None, ground: GroundSpec | None
+) -> tuple[Node, tuple[FileSpec, ...]]:
+    """Keys without the files among the obstacles, for a path that is not flown at one altitude; and those files.
+
+    The ground stands in place of what they say of it.
+    """
+    if ground is not None:
+        root = _with(root, {("ground",): ground.model_dump()})
     listed = root.at(("obstacles",))
     every = listed.value if listed is not None and isinstance(listed.value, tuple) else ()
     files = [file for each in every if (file := each.at(("file",))) is not None]

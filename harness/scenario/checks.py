@@ -45,17 +45,16 @@ def check_start_and_goal(
     xmin, ymin, xmax, ymax = area.bounds_m
     ends = {"start_m": mission.start_m, "goal_m": mission.goal_m}
     for name, (east, north) in ends.items():
-        if not (xmin <= east <= xmax and ymin <= north <= ymax):
-            raise KeyFault(
-                ("mission", name), f"is {[east, north]}; must lie inside area.bounds_m {list(area.bounds_m)}"
-            )
+        if min(east - xmin, xmax - east, north - ymin, ymax - north) < 0.0:
+            told = f"is {[east, north]}; must lie inside area.bounds_m {list(area.bounds_m)}"
+            raise KeyFault(("mission", name), told)
     straight_m = math.dist(mission.start_m, mission.goal_m)
     if straight_m <= mission.goal_radius_m:
         raise KeyFault(
             ("mission", "goal_m"),
             f"is {straight_m:g} m from start_m, inside goal_radius_m {mission.goal_radius_m:g} m; must be further away",
         )
-    at_first = [each.active_s is None or each.active_s[0] <= 0 for each in obstacles]
+    at_first = [(each.active_s or (0.0,))[0] <= 0.0 for each in obstacles]
     there = {"start_m": at_first, "goal_m": [each.fixed for each in obstacles]}
     for end, point in ends.items():
         for obstacle, told, counts in zip(obstacles, names, there[end], strict=True):

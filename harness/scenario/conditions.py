@@ -192,18 +192,17 @@ def _stream(seed: int, number: int) -> np.random.Generator:
 def told(scenario: ScenarioKeys) -> str:
     """What kind of day a scenario is flown on, with its air and navigation, for the first lines of a summary."""
     air, navigation, deviation = scenario.environment, scenario.navigation, scenario.aircraft.deviation
-    wind = air.wind if air.wind and air.wind.fastest_mps else Wind()
-    at = f" at {wind.measured_at_m:g} m" if wind.measured_at_m else ""
+    wind = air.wind or Wind()
+    blows = f"wind {wind.speed_mps:.3g} m/s from {wind.from_deg:.0f} deg"
+    blows += f" at {wind.measured_at_m:g} m" if wind.measured_at_m else ""
     exact = navigation.kind == "perfect" and not navigation.latency_s
     sayings = {
-        f"wind {wind.speed_mps:.3g} m/s from {wind.from_deg:.0f} deg{at}{', changing' if wind.changes else ''}": (
-            wind.fastest_mps
-        ),
+        f"{blows}, changing" if wind.changes else blows: wind.fastest_mps,
         f"{air.gusts} turbulence": air.gusts,
         "gusts": air.vertical_gusts,
         f"{navigation.kind} navigation": not exact,
         f"state {navigation.latency_s:g} s old": navigation.latency_s,
-        "aircraft other than its model": deviation and any(deviation.model_dump().values()),
+        "aircraft other than its model": deviation and any(dict(deviation).values()),
     }
     other = [saying for saying, holds in sayings.items() if holds]
     if scenario.conditions == "ideal" and other:

@@ -10,24 +10,18 @@ from typing import TYPE_CHECKING
 from harness.scenario.environment import GroundSpec, SourceSpec
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.obstacles import Obstacle, Polygon, WorldFile
-from harness.scenario.sections import Area, Geodetic, Point
+from harness.scenario.sections import Area, Geodetic, Interval, Point
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
-    from harness.world_files.expansion import FileSpec
-
-Ring = tuple[Point, ...]
+    from harness.world_files.expansion import FileSpec, Source
 
 
 def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[ScenarioKeys, Sequence[str]]:
     """A scenario whose files are made into obstacles and ground, and what messages call each obstacle.
 
-    Args:
-        keys: its mission in metres.
-        folder: of the scenario file; paths are looked for there first.
-
-    Raises:
-        KeyFault: a file cannot be used.
+    Its mission is in metres; paths are looked for in the folder of the scenario file first. A KeyFault says why a file
+    cannot be used.
     """
     at = [index for index, each in enumerate(keys.obstacles) if each.file is not None]
     if not at:
@@ -36,7 +30,7 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     from harness.world_files.expansion import FileFault, expanded
     from harness.world_files.plane import Place
 
-    origin = keys.area.origin
+    place = Place(keys.area.origin.latitude_deg, keys.area.origin.longitude_deg)
     specs = [spec_of(file, folder) for each in keys.obstacles if (file := each.file)]
     known = None if keys.ground is None else keys.ground.field()
     every: list[Obstacle] = []
@@ -44,24 +38,21 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     told = list(keys.sources or ())
     with uncollected():
         try:
-            place = Place(origin.latitude_deg, origin.longitude_deg)
             found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
         except FileFault as fault:
             name = specs[fault.index].path.name
             raise KeyFault(("obstacles", at[fault.index], "file"), f"{name} {fault}") from fault
         sources = iter(found.sources)
         for index, each in enumerate(keys.obstacles):
-            if each.file is None:
-                every.append(each)
-                names.append(f"obstacles[{index}]")
-                continue
-            source = next(sources)
-            rows = zip(_rings_of(source.polygons), source.heights_m, strict=True)
-            parts = [_obstacle_of(rings, heights_m, each.active_s) for rings, heights_m in rows]
+            parts, name = [each], f"obstacles[{index}]"
+            if each.file is not None:
+                source = next(sources)
+                parts = _parts(source, each.active_s)
+                name = f"what {name} has of {source.spec.path.name}"
+                whence = {"path": each.file.path, "kind": source.kind, "sha256": source.sha256}
+                told.append(SourceSpec(**whence, polygons=len(parts), notes=source.notes))
             every += parts
-            names += [f"what obstacles[{index}] has of {source.spec.path.name}"] * len(parts)
-            whence = {"path": each.file.path, "kind": source.kind, "sha256": source.sha256}
-            told.append(SourceSpec(**whence, polygons=len(parts), notes=source.notes))
+            names += [name] * len(parts)
     ground = GroundSpec.of(found.ground) if found.ground else keys.ground
     return keys.updated(obstacles=tuple(every), ground=ground, sources=tuple(told)), names
 
@@ -91,28 +82,25 @@ def file_beside(text: str, folder: Path) -> Path | None:
         return None
 
 
-def _rings_of(polygons: Sequence[object]) -> list[list[Ring]]:
-    """Corners of each polygon of shapely: of its outline, then of its holes; no corner twice."""
+def _parts(source: Source, active_s: Interval | None) -> list[Obstacle]:
+    """What a file has, as obstacles: of each polygon its outline and then its holes, no corner twice."""
     import numpy as np
     import shapely
 
-    rings, of = shapely.get_rings(np.array(polygons, dtype=object), return_index=True)
+    rings, of = shapely.get_rings(np.array(source.polygons, dtype=object), return_index=True)
     corners = list(map(tuple, shapely.get_coordinates(rings).tolist()))
-    found: list[list[Ring]] = [[] for _ in polygons]
+    found: list[list[tuple[Point, ...]]] = [[] for _ in source.polygons]
     end = 0
     for index, count in zip(of.tolist(), shapely.get_num_coordinates(rings).tolist(), strict=True):
         begin, end = end, end + count
         found[index].append(tuple(corners[begin : end - 1]))
-    return found
-
-
-def _obstacle_of(
-    rings: Sequence[Ring], heights_m: tuple[float, float], active_s: tuple[float, float] | None
-) -> Obstacle:
-    """A valid polygon, its outline and then its holes, between two heights as an obstacle."""
-    polygon = Polygon.model_construct(vertices_m=rings[0], holes_m=tuple(rings[1:]) or None)
     rest = {"circle": None, "file": None, "velocity_mps": None}
-    return Obstacle.model_construct(polygon=polygon, active_s=active_s, heights_m=heights_m, **rest)
+    parts = []
+    for (outline, *holes), heights_m in zip(found, source.heights_m, strict=True):
+        polygon = Polygon.model_construct(vertices_m=outline, holes_m=tuple(holes) or None)
+        part = Obstacle.model_construct(polygon=polygon, active_s=active_s, heights_m=heights_m, **rest)
+        parts.append(part)
+    return parts
 
 
 def plane_point(place: Geodetic, area: Area) -> Point:

@@ -124,11 +124,7 @@ class ScenarioKeys(Section):
 
 
 def step_rate_hz(given_hz: int | None, sensor: Sensor) -> int:
-    """The step rate of a flight, where the scenario gives it or not.
-
-    Raises:
-        KeyFault: the sensor's rate does not divide it.
-    """
+    """The step rate of a flight, where the scenario gives it or not; a KeyFault if the sensor's does not divide it."""
     rates = RATES_HZ if given_hz is None else (given_hz,)
     for rate_hz in rates:
         steps = rate_hz / sensor.rate_hz

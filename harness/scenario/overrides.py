@@ -22,14 +22,10 @@ OWN_KEYS: Final[Mapping[Loc, type[Section]]] = {
 def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
     """A scenario's keys with some replaced, as `load_scenario` takes them.
 
-    Raises:
-        InputError: one is not a key path, has no value or leads nowhere.
+    An InputError says that one is not a key path, has no value or leads nowhere.
     """
     for name, text in overrides:
-        try:
-            loc = loc_of(name)
-        except ValueError as error:
-            raise InputError(f"command line: {error}") from error
+        loc = _loc(name, "command line")
         if not text.strip():
             raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
         root = with_key(root, loc, strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE))
@@ -39,8 +35,7 @@ def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
 def with_key(root: Node, loc: Loc, new: Node) -> Node:
     """A scenario's keys with one replaced; a new kind of planner or guidance drops the own keys of the one before.
 
-    Raises:
-        InputError: there is no such key, as far as it can be told without the scenario's types.
+    An InputError says that there is no such key, as far as it can be told without the scenario's types.
     """
     shared, section = OWN_KEYS.get(loc), root.at(loc[:1])
     if shared and section and isinstance(section.value, dict) and section.plain().get("kind") != new.value:
@@ -61,23 +56,23 @@ class Given(NamedTuple):
 def changed(given: Given, keys: Mapping[str, Any]) -> Node:
     """The keys that a scenario was given, and no default, with some changed; None takes a key away.
 
-    Raises:
-        InputError: it is no mapping, or one is not a key path, or leads nowhere.
+    An InputError says that it is no mapping, or one is not a key path, or leads nowhere.
     """
     if not isinstance(keys, Mapping) or not all(isinstance(name, str) for name in keys):
         raise InputError('with_: must be given a mapping of key paths, such as {"planner.clearance_m": 60}')
     plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}
     root = node_of(plain, IN_PYTHON)
     for name, value in keys.items():
-        try:
-            loc = loc_of(name)
-        except ValueError as error:
-            raise InputError(f"with_: {error}") from error
-        if value is None:
-            root = strict_yaml.without(root, loc)
-        else:
-            root = with_key(root, loc, node_of(_plain(value), IN_PYTHON))
+        loc, new = _loc(name, "with_"), node_of(_plain(value), IN_PYTHON)
+        root = strict_yaml.without(root, loc) if value is None else with_key(root, loc, new)
     return root
+
+
+def _loc(name: str, where: str) -> Loc:
+    try:
+        return loc_of(name)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def _plain(value: Any) -> Any:

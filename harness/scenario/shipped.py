@@ -26,8 +26,7 @@ def shipped_campaigns() -> dict[str, Path]:
 def campaign_path(text: str) -> Path:
     """The file that a command's CAMPAIGN means: a path, or the name or path of a shipped campaign.
 
-    Raises:
-        InputError: there is neither such a file nor such a shipped campaign.
+    An InputError says that there is neither.
     """
     return _named(text, shipped_campaigns(), Path("scenarios/campaigns"), "a campaign file")
 
@@ -36,10 +35,7 @@ def scenario_path(text: str) -> Path:
     """The file that a command's SCENARIO means: a path, or the name or path of a shipped scenario.
 
     `paper_circles` and, where there is no such file, `scenarios/paper_circles.yaml` name a shipped one, and
-    `barn/barn-world-006` names a benchmark world.
-
-    Raises:
-        InputError: there is neither such a file nor such a shipped scenario.
+    `barn/barn-world-006` names a benchmark world. An InputError says that there is neither.
     """
     return _named(text, shipped_scenarios(), Path("scenarios"), "a scenario file")
 
@@ -56,10 +52,10 @@ def _named(text: str, shipped: dict[str, Path], folder: Path, what: str) -> Path
         raise InputError(f"{text}: is not a file; {wanted}")
     if path.parent in (Path(), folder) and path.suffix in ("", ".yaml") and path.stem in shipped:
         return shipped[path.stem]
-    world = shipped_worlds().get(text) if folder == Path("scenarios") else None
-    if world is None:
+    worlds = shipped_worlds() if folder == Path("scenarios") else {}
+    if text not in worlds:
         raise InputError(f"{text}: no such file; {wanted}")
-    return world
+    return worlds[text]
 
 
 def summary(path: Path) -> str:
