@@ -70,10 +70,8 @@ def registered_source(source: str, part: LoopPart = PLANNER) -> str:
     place, _, name = source.rpartition(":")
     module = _imported(place, source)
     if not name.isidentifier() or not hasattr(module, name):
-        there = [each for each, value in vars(module).items() if _is_own(value, module)]
-        raise ValueError(
-            f"{place} has no {name or 'name'}; it has {', '.join(there) or 'no class or function'}"
-        )
+        there = ", ".join(each for each, value in vars(module).items() if _is_own(value, module))
+        raise ValueError(f"{place} has no {name or 'name'}; it has {there or 'no class or function'}")
     kind = replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}")
     part.register(kind)
     return kind.kind
@@ -116,23 +114,18 @@ def _maker(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], An
         parameters = inspect.signature(given).parameters
     except (TypeError, ValueError):  # made in C: it does not say
         parameters = inspect.signature(lambda told: told).parameters
-    needed = [
-        each.name
-        for each in parameters.values()
-        if each.default is each.empty and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
-    ]
+    plain = [each for each in parameters.values() if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
+    needed = [each.name for each in plain if each.default is each.empty]
     if len(needed) > 1:
-        raise ValueError(
-            f"{_name(given)} needs {', '.join(needed)}; must need the {part.told} alone, or nothing"
-        )
+        told = f"{_name(given)} needs {', '.join(needed)}; must need the {part.told} alone, or nothing"
+        raise ValueError(told)
 
     def make(_keys: Any, told: Any) -> Any:
         keys = {part.told: told} if part.told in parameters and not needed else {}
         made = given(told) if needed else given(**keys)
         if not _is_part(made, part):
-            raise TypeError(
-                f"{_name(given)} makes a {type(made).__name__}, which has no method {' and '.join(part.methods)}"
-            )
+            lacks = f"which has no method {' and '.join(part.methods)}"
+            raise TypeError(f"{_name(given)} makes a {type(made).__name__}, {lacks}")
         return made
 
     return make
@@ -148,9 +141,8 @@ def _imported(place: str, source: str) -> Any:
             return _executed(path.resolve()) if path.suffix == ".py" else importlib.import_module(place)
     except (Exception, SystemExit) as error:
         if isinstance(error, ModuleNotFoundError) and error.name in (place, place.partition(".")[0]):
-            raise ValueError(
-                f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME"
-            ) from error
+            told = f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME"
+            raise ValueError(told) from error
         told = f"{type(error).__name__}: {' '.join(str(error).split())}"
         raise ValueError(f"{place} cannot be imported: {told}") from error
 

@@ -35,10 +35,8 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
         frame = airframe_of(spec)
         frame.check_airspeed(spec.airspeed_mps)
         if wind_mps >= MAX_WIND_FRACTION * spec.airspeed_mps:
-            raise KeyFault(
-                ("environment", "wind", "speed_mps"),
-                f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s",
-            )
+            told = f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s"
+            raise KeyFault(("environment", "wind", "speed_mps"), told)
         law = card_of(scenario.guidance, spec)
         return performance(frame, spec.airspeed_mps, wind_mps, air.gusts, law=law)
     except AircraftError as error:

@@ -25,8 +25,6 @@ _UNITS: Final = {
     "m": "m", "mps": "m/s", "s": "s", "hz": "Hz", "deg": "deg", "degps": "deg/s", "1pkm2": "1/km2", "cell": "m"
 }  # fmt: skip
 """Unit of a key by the last part of its name."""
-
-
 DERIVED: Final[Any] = None
 """The default of a key that follows from others, as its docstring says; `resolving.resolve` fills it in."""
 
@@ -37,14 +35,11 @@ class Section(BaseModel):
     The docstring below a key is its description in the JSON Schema; its unit is told by its name.
     """
 
-    model_config = ConfigDict(
-        frozen=True, strict=True, extra="forbid", allow_inf_nan=False, protected_namespaces=()
-    )
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     def filled(self, **defaults: Any) -> Self:
         """The same with those keys filled in that the file leaves out."""
-        missing = {name: value for name, value in defaults.items() if getattr(self, name) is None}
-        return self.model_copy(update=missing)
+        return self.model_copy(update={k: value for k, value in defaults.items() if getattr(self, k) is None})
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: Any, handler: Any) -> Any:
@@ -67,16 +62,16 @@ class Section(BaseModel):
 def _docstrings(section: type) -> dict[str, str]:
     """The docstrings below the attributes of a section, by attribute; none of one that has no source text."""
     try:
-        (tree,) = ast.parse(inspect.getsource(section)).body
+        body = ast.walk(ast.parse(inspect.getsource(section)))
     except (OSError, TypeError):
         return {}
-    assert isinstance(tree, ast.ClassDef)
+    pairs = (
+        pair for each in body if isinstance(each, ast.ClassDef) for pair in itertools.pairwise(each.body)
+    )
     return {
-        above.target.id: " ".join(below.value.value.split())
-        for above, below in itertools.pairwise(tree.body)
-        if isinstance(above, ast.AnnAssign) and isinstance(above.target, ast.Name)
-        if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
-        if isinstance(below.value.value, str)
+        ast.unparse(above.target): " ".join(str(ast.literal_eval(below.value)).split())
+        for above, below in pairs
+        if isinstance(above, ast.AnnAssign) and isinstance(below, ast.Expr)
     }
 
 
@@ -94,13 +89,20 @@ Longitude = Annotated[float, Field(ge=-180, le=180)]
 PitchLimit = Annotated[float, Field(ge=-90, le=90)]
 
 
-class Origin(Section):
+class Geodetic(Section):
+    """A place on the WGS84 ellipsoid."""
+
+    latitude_deg: Latitude
+    """Geodetic latitude."""
+    longitude_deg: Longitude
+    """Longitude."""
+
+
+class Origin(Geodetic):
     """Where ENU (0, 0) lies on the WGS84 ellipsoid."""
 
     latitude_deg: Latitude = 47.0
-    """Geodetic latitude."""
     longitude_deg: Longitude = 8.0
-    """Longitude."""
 
 
 class Area(Section):
@@ -120,15 +122,6 @@ class Area(Section):
                 f"is {list(bounds_m)}; must be [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax"
             )
         return bounds_m
-
-
-class Geodetic(Section):
-    """A place on the WGS84 ellipsoid."""
-
-    latitude_deg: Latitude
-    """Geodetic latitude."""
-    longitude_deg: Longitude
-    """Longitude."""
 
 
 class MissionSpec(Section):
@@ -200,11 +193,9 @@ class AutopilotSpec(Section):
     @model_validator(mode="after")
     def _pitch_in_order(self) -> AutopilotSpec:
         least, most = self.pitch_limits_deg
-        if not -90.0 <= least < 0.0 < most <= 90.0:
-            raise KeyFault(
-                ("pitch_limits_deg",),
-                f"is [{least:g}, {most:g}]; must be a negative and a positive angle to 90 degrees",
-            )
+        if not least < 0.0 < most:
+            told = f"is [{least:g}, {most:g}]; must be a negative and a positive angle to 90 degrees"
+            raise KeyFault(("pitch_limits_deg",), told)
         return self
 
 
@@ -212,8 +203,6 @@ MOST_SHARE: Final = 0.5
 """A deviation that is a share is no larger, drawn or given."""
 MOST_SHIFT_M: Final = 10.0
 """The centre of gravity lies no further from that of the model."""
-
-
 Deviation = Annotated[float, Field(ge=-MOST_SHARE, le=MOST_SHARE)]
 
 

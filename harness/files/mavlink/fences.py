@@ -28,20 +28,14 @@ CIRCLE_SIDES: Final = 720
 
 @dataclass(frozen=True)
 class Fence:
-    """An area to stay inside of, or out of.
-
-    Attributes:
-        name: where in its file it stands.
-        inclusion: to stay inside of; else to stay out of.
-        rings: the outer ring and its holes, (east, north) in metres, or latitude and longitude in degrees while it
-            is being read; empty for a circle.
-        center: of a circle, likewise.
-        radius_m: of a circle.
-    """
+    """An area to stay inside of, or out of; its places are east and north in metres, or degrees while it is read."""
 
     name: str
+    """Where in its file it stands."""
     inclusion: bool
+    """To stay inside of; else to stay out of."""
     rings: tuple[tuple[Place, ...], ...] = ()
+    """The outer ring and its holes; empty for a circle."""
     center: Place | None = None
     radius_m: float = 0.0
 
@@ -79,10 +73,9 @@ class Fence:
 
 
 def plan_fences(geofence: Any, source: str) -> tuple[Fence, ...]:
-    """The geoFence of a plan: polygons and circles, in degrees. `source` begins a fault: `path: `, or nothing.
+    """The geoFence of a plan: polygons and circles, in degrees.
 
-    Raises:
-        InputError: a key of it is missing, or of another kind.
+    `source` begins an InputError, `path: ` or nothing: a key is missing, or of another kind.
     """
     if geofence is None:
         return ()
@@ -125,8 +118,7 @@ def _place(value: Any, where: str) -> Place:
 def item_fences(items: Sequence[Item], home: Place | None) -> tuple[Fence, ...]:
     """The fences among some items, in degrees.
 
-    Raises:
-        InputError: one has fewer corners than it says, or a circle has no radius or no place.
+    An InputError says that one has fewer corners than it says, or a circle has no radius or no place.
     """
     found: list[Fence] = []
     corners: list[Item] = []
@@ -148,11 +140,8 @@ def item_fences(items: Sequence[Item], home: Place | None) -> tuple[Fence, ...]:
 
 
 def _torn(corners: Sequence[Item]) -> InputError:
-    first = corners[0]
-    return InputError(
-        f"{first.place}: item {first.number} begins a fence of {first.params[0]:g} corners, of which "
-        f"{len(corners)} follow; it may be torn"
-    )
+    begun = f"{corners[0].place}: item {corners[0].number} begins a fence of {corners[0].params[0]:g} corners"
+    return InputError(f"{begun}, of which {len(corners)} follow; it may be torn")
 
 
 def _item_circle(item: Item, home: Place | None) -> Fence:

@@ -18,44 +18,34 @@ MISSION: Final = 2
 """MAV_FRAME of commands without a place. ArduPilot takes an altitude in it as above the sea; PX4 refuses it."""
 FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11: GROUND}
 """MAV_FRAME to what its altitude is above. Autopilots load no item to fly to in any other global frame."""
-MOST: Final = {"command": 65_535, "frame": 255}
-"""The largest numbers that MAVLink's message of a mission item has room for."""
 NOWHERE_DEG: Final = 1e-7
 """A position with less than this in both is none. ArduPilot writes zeros where none is meant."""
 WPL: Final = "QGC WPL"
 CELLS: Final = 12
 COMMENT: Final = "#"
-FIRST_PARAMETER: Final = 5
-"""The field, counted from 1, of the first parameter of an item."""
 
 
 @dataclass(frozen=True)
 class Item:
-    """One mission item.
-
-    Attributes:
-        place: where it stands, for faults: file, line or key.
-        number: its number in the mission.
-        command: MAV_CMD.
-        frame: MAV_FRAME.
-        params: the seven parameters; the last three are latitude, longitude, altitude. What is left to the autopilot
-            is 0.
-        autocontinue_off: the file says that the mission waits after it.
-    """
+    """One mission item."""
 
     place: str
+    """Where it stands, for faults: file, line or key."""
     number: int
+    """Its number in the mission."""
     command: int
+    """MAV_CMD."""
     frame: int
+    """MAV_FRAME."""
     params: tuple[float, ...]
+    """The seven parameters; the last three are latitude, longitude, altitude. What is left to the autopilot is 0."""
     autocontinue_off: bool = False
+    """The file says that the mission waits after it."""
 
     def __post_init__(self) -> None:
-        for name, most in MOST.items():
-            if not 0 <= getattr(self, name) <= most:
-                raise InputError(
-                    f"{self.place}: has the {name} {getattr(self, name):g}; those of MAVLink are 0 to {most}"
-                )
+        for name, value, most in (("command", self.command, 65_535), ("frame", self.frame, 255)):
+            if not 0 <= value <= most:
+                raise InputError(f"{self.place}: has the {name} {value:g}; those of MAVLink are 0 to {most}")
 
     @property
     def position(self) -> tuple[float, float] | None:
@@ -65,11 +55,7 @@ class Item:
 
     @property
     def above(self) -> str:
-        """What its altitude is above.
-
-        Raises:
-            InputError: its frame is not one of those.
-        """
+        """What its altitude is above; an InputError says that its frame is not one of those."""
         if self.frame not in FRAMES:
             raise InputError(
                 f"{self.place}: item {self.number} has the frame {self.frame}; must be one of "
@@ -83,10 +69,8 @@ def filled(
 ) -> tuple[float, ...]:
     """Seven parameters with 0 in place of None for those that are left to the autopilot.
 
-    What a fault says of one that is not there is told by its index.
-
-    Raises:
-        InputError: half of a place is there, or no altitude where one is needed.
+    An InputError says that half of a place is there, or no altitude where one is needed; what it says of the parameter
+    is told by its index.
     """
     latitude, longitude, altitude = params[4:7]
     if command in commands.FLOWN and (latitude is None) != (longitude is None):
@@ -100,11 +84,7 @@ def filled(
 
 
 def wpl_items(text: str, source: str) -> list[Item]:
-    """The items of a plain-text file, home among them; lines after # are comments. `source` begins a fault.
-
-    Raises:
-        InputError: a line is no item.
-    """
+    """The items of a plain-text file, home among them; lines after # are comments. `source` begins an InputError."""
     where = f"{source}:" if source else "line "
     rows = [(f"{where}{number}", line.split()) for number, line in enumerate(text.splitlines(), start=1)]
     return [_item(cells, place) for place, cells in rows[1:] if cells and not cells[0].startswith(COMMENT)]
@@ -114,7 +94,7 @@ def _item(cells: list[str], place: str) -> Item:
     if len(cells) != CELLS:
         raise InputError(f"{place}: has {len(cells)} fields; a mission item has {CELLS}")
     number, frame, command = (whole(cells[field], place) for field in (0, 2, 3))
-    # What is left to the autopilot is 0, or no number.
+    # What is left to the autopilot is 0, or no number; the first parameter is field 5, counted from 1.
     given = [None if cell.lower() == "nan" else finite(cell, place) for cell in cells[4:11]]
-    params = filled(given, command, frame, lambda index: f"{place}: field {FIRST_PARAMETER + index} is nan")
+    params = filled(given, command, frame, lambda index: f"{place}: field {5 + index} is nan")
     return Item(place, number, command, frame, params, finite(cells[11], place) == 0.0)
