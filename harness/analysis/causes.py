@@ -20,40 +20,28 @@ from harness.run_files.given_path import CutCorner
 
 LEAD_S = 5.0
 """The cause is looked for from this time before the error became too large up to where it is largest."""
-
 SATURATED_SHARE = 0.2
 """Share of the lead time with a signal at its limit that makes this limit the cause."""
-
 ROLL_RATE_SHARE = 0.8
 """Share of the roll rate limit from which on the aircraft rolls as fast as it may; the loop behind it lags."""
-
 WIND_SHARE = 0.1
 """Cross-wind, as a share of the airspeed, from which on a drift downwind is the wind's."""
-
 LATE_SHARE = 0.25
 """Share of the largest error there already when the plan took effect that makes the plan too late."""
-
 ROUNDING = 1.001
 """A demand larger than what is in force by no more than this factor is not larger."""
-
 ROLLED_SHARE = 0.1
 """If a plan asks for a faster roll than is in force, this share of the lead time at that rate makes it the cause."""
-
 AT_STOP = 0.995
 """A control surface deflected by this share of its travel is at its stop."""
-
 LEAST_CLIMB_MPS = 0.2
 """A path that climbs or sinks more slowly is level."""
-
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 """Throttle from which on, and down to which, it is at a stop."""
-
 NAVIGATION_ERROR = "navigation error"
 """Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
-
 PLAN_ENDED = "plan ended"
 """Cause where the aircraft flew on beyond the end of its plan by more than it may be off it."""
-
 FINDINGS: Mapping[str, str] = {
     "planner too late": "the aircraft was off the plan already when the plan took effect",
     PLAN_ENDED: "the aircraft flew on beyond the end of its plan, where nothing was planned",

@@ -20,7 +20,6 @@ from harness.run_files.given_path import CutCorner
 
 BLOCK = 256
 """Points that are measured together: numpy is then quick, and what is near them is a short part of the other line."""
-
 MOST_SAMPLES = 400_000
 """A path has no more points measured than this, however long it is."""
 

@@ -11,7 +11,6 @@ from harness.run_files.given_path import CutCorner
 
 SPEED_S = 20.0
 """Airspeed is averaged over this, so that it is what the engine can hold and not what a gust adds."""
-
 LOAD_S = 1.0
 """Load factor is averaged over this, so that it is that of the manoeuvre and not that of a gust."""
 

@@ -11,7 +11,6 @@ from harness.flight.record import Flight
 
 ERROR: Final = "error"
 """Outcome of a flight whose software failed before its end; the other outcomes are those of `metrics.json`."""
-
 SEVERITY: Final[Mapping[str, float]] = {
     **{"collision": 8.0, "lost_control": 7.0, "out_of_bounds": 6.0, "planner_failed": 5.0},
     **{ERROR: 4.0, "timeout": 3.0, "unreachable": 2.0, "reached": 0.0},

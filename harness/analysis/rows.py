@@ -16,13 +16,11 @@ DASH: Final = "\N{EN DASH}"
 
 COMPARED: Final = {metric.name: metric for metric in METRICS if metric.short or metric.derived}
 """The figures of a row, by name: those that people are shown, and those that take more than `metrics.json`."""
-
 ON_TERMINAL: Final = (
     *("outcome", "km", "ratio", "clear m"),
     *("\N{GREEK SMALL LETTER KAPPA}\N{MIDDLE DOT}R", "tracks", "tse max", "p99 ms"),
 )
 """Those that fit 80 columns, by `Metric.short`."""
-
 LATEX: Final = str.maketrans(
     {
         **{each: f"\\{each}" for each in "&%$#_{}"},

@@ -7,7 +7,6 @@ import traceback
 
 MOST_LETTERS = 2000
 """Most characters of a text from other code that stand in a sentence."""
-
 MOST_TRACE_LETTERS = 40_000
 """Most characters of a traceback that are kept, half from its beginning and half from its end."""
 

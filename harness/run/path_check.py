@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: this length, and this share of its span."""
-
 OF_THE_WORLD: Final = (
     "seed",
     "area",
@@ -44,7 +43,6 @@ OF_THE_WORLD: Final = (
     "uncertainty",
 )
 """Sections that a check takes from a scenario that it flies a path in; mission, aircraft and sensor are its own."""
-
 KEYS_OF_THE_WORLD: Final = (
     *(("mission", "altitude_m"), ("planner", "clearance_m")),
     *(("trackability", "cross_track_m"), ("trackability", "altitude_m")),

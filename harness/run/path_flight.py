@@ -37,13 +37,10 @@ from planner.interface import Path, Plan, PlanRequest, PlanStatus
 
 BEND_SHARE = 0.25
 """Altitudes of a drawn line that are straight to this share of the altitude threshold are one slope."""
-
 SAME_ALTITUDE_M = 1.0
 """A path whose altitudes differ by no more is flown at that of its first point."""
-
 SPARE_BANK_DEG = 5.0
 """Slower than where altitude is kept at less than cruise's steepest bank by this much a mission is not flown."""
-
 FREE_SHARE = 0.25
 """Share of the cross-track threshold by which a corner may be passed off only to make its arc wider."""
 

@@ -30,19 +30,14 @@ if TYPE_CHECKING:
 
 SPACING_SHARE: Final = 0.25
 """Points along the given path are measured so close together, in limits of the cross-track error."""
-
 WINDOW_RADII: Final = 4.0
 """Track and path are compared where they are no further apart than this along the path, in turn radii."""
-
 LAYER_M: Final = 10.0
 """Depth of a layer: what of a part reaches into it, and into the vertical clearance about it, is solid all through."""
-
 MOST_LAYERS: Final = 40
 """A flight through more has deeper ones."""
-
 WIDER, MOST_WIDER = 1.05, 3.0
 """The limit is made larger by this factor where it does not hold far enough, up to so many times what is needed."""
-
 MOST_TRIES: Final = 50
 """A corner limit that would be kept is looked for in so many steps; each makes it, and what it holds for, larger."""
 

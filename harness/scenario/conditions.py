@@ -32,7 +32,6 @@ CONDITIONS_STREAM: Final = 4
 """Number of the stream, of those that derive from the scenario's seed, that a day is drawn from."""
 DEVIATION_STREAM: Final = 5
 """Number of the stream that the deviations of the aircraft are drawn from."""
-
 MOST_SIGMAS: Final = 3.0
 """What is drawn from a normal distribution is at most so many sigma from its mean."""
 WIND_FROM_M: Final = 10.0

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, NamedTuple
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 
-from harness.scenario.sections import MAX_COORDINATE_M, Length, Section
+from harness.scenario.sections import MAX_COORDINATE_M, Bounds, Length, Section
 
 MAX_OBSTACLES: Final = 10_000
 """A generator that is asked for more is refused."""
@@ -26,7 +26,6 @@ AT_ONCE: Final = 10
 """Number of places that are tried at a time."""
 FULL: Final = 5000
 """After so many obstacles without a place the area is full, and nothing more is tried."""
-
 ObstacleKeys = dict[str, Any]
 """One obstacle as a scenario file has it."""
 Place = tuple[float, float]
@@ -35,7 +34,7 @@ Place = tuple[float, float]
 class GeneratedWorld(NamedTuple):
     """An area with its obstacles, as in a scenario file, and a mission through it."""
 
-    bounds_m: tuple[float, float, float, float]
+    bounds_m: Bounds
     start_m: Place
     goal_m: Place
     obstacles: tuple[ObstacleKeys, ...]
@@ -69,9 +68,8 @@ class Circles(Section):
     @model_validator(mode="after")
     def _has_room(self) -> Circles:
         if min(self.size_m) < 4 * self.room_m:
-            raise ValueError(
-                f"is {list(self.size_m)} m with room_m {self.room_m:g}; each side must be at least 4 x room_m"
-            )
+            told = f"is {list(self.size_m)} m with room_m {self.room_m:g}"
+            raise ValueError(f"{told}; each side must be at least 4 x room_m")
         asked = self.number * self.most_each
         if asked > MAX_OBSTACLES:
             raise ValueError(f"asks for {asked} obstacles; must be at most {MAX_OBSTACLES}")

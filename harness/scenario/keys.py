@@ -43,7 +43,6 @@ class TrackabilitySpec(Section):
 
 RATES_HZ: Final = (STEP_RATE_HZ, 120)
 """The step rates that are taken where none is given, the first that the sensor's rate divides."""
-
 SLOWEST_HZ: Final = 30
 """A step is then as long as the time constant of the Aerosonde's roll rate, 1/32 s; its track on 14 turns is 0.07 m
 from that with 480 steps a second."""

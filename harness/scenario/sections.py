@@ -20,7 +20,6 @@ MAX_COORDINATE_M: Final = 1e6
 ALTITUDES_M: Final = (5, 20_000)
 SHIELDED: Final = "+shield"
 """What a planner's name ends with that is flown with the shield."""
-
 _UNITS: Final = {
     "m": "m", "mps": "m/s", "s": "s", "hz": "Hz", "deg": "deg", "degps": "deg/s", "1pkm2": "1/km2", "cell": "m"
 }  # fmt: skip

@@ -15,10 +15,8 @@ if TYPE_CHECKING:
 
 MAX_FAULTS: Final = 2
 """Lines of an error."""
-
 MOST_WHOLE: Final = 2**53
 """Beyond this a number is not read as a whole one."""
-
 NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"
 """Pattern of a name that a folder may be called after."""
 

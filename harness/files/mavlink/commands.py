@@ -26,7 +26,6 @@ AT_AN_ALTITUDE: Final = (WAYPOINT, SPLINE_WAYPOINT, *TAKEOFFS)
 """Items that always have an altitude of their own."""
 FLOWN: Final = (*AT_AN_ALTITUDE, *LOITERS, RETURN_TO_LAUNCH, *LANDINGS)
 """Items that are flown to, or about."""
-
 NAMES: Final = {
     WAYPOINT: "waypoint", LOITER_UNLIMITED: "loiter without limit", LOITER_TURNS: "loiter turns",
     LOITER_TIME: "loiter time", RETURN_TO_LAUNCH: "return to launch", LAND: "land", TAKEOFF: "takeoff",
@@ -40,13 +39,11 @@ NAMES: Final = {
     214: "camera trigger interval", 2000: "take pictures", 2001: "stop taking pictures", 3000: "VTOL transition",
 }  # fmt: skip
 """Plain words for the commands of ordinary missions; MAVLink's own name stands for any other."""
-
 WITHOUT_EFFECT: Final = frozenset((
     80, 115, 181, 182, 183, 184, 187, 188, 190, 195, 196, 197, 198, 200, 201, 202, 203, 204, 205, 206, 207, 211, 212,
     214, 215, 216, 220, 223, 530, 531, 532, 534, 600, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 42600, LAND_START,
 ))  # fmt: skip
 """Cameras, servos, marks and the like: the path of an aeroplane is the same without them."""
-
 WHY_NOT: Final = {
     42702: "a script of the aircraft flies it",
     36: "an arc of a multicopter: ArduPlane goes on to the next item",
@@ -63,7 +60,6 @@ CIRCLES: Final = {5003: True, 5004: False, HOME_CIRCLE: True}
 RALLY_POINT: Final = 5100
 APART: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
 """Commands of items that are no part of a mission."""
-
 PX4: Final = 12
 """MAV_AUTOPILOT of PX4, `firmwareType` of a plan."""
 
