@@ -26,32 +26,23 @@ class PluginError(ImportError):
 
 @dataclass(eq=False)
 class LoopPart:
-    """A part of the loop that scenarios name, and that others may make.
-
-    Attributes:
-        noun: what it is called.
-        kind: the type of its kinds.
-        built_in: the kinds that come with wayproof.
-        group: of the entry points.
-        methods: what an object has to have to be such a part.
-        told: the parameter of a factory: what such a part may know.
-        registered: the kinds that this process, and no other, knows by name.
-    """
+    """A part of the loop that scenarios name, and that others may make."""
 
     noun: str
     kind: type[Any]
+    """The type of its kinds."""
     built_in: tuple[Any, ...]
     group: str
+    """Of the entry points."""
     methods: tuple[str, ...]
+    """What an object has to have to be such a part."""
     told: str
+    """The parameter of a factory: what such a part may know."""
     registered: dict[str, Any] = field(default_factory=dict)
+    """The kinds that this process, and no other, knows by name."""
 
     def installed(self) -> dict[str, Any]:
-        """The kinds that every process finds, by name, built-in ones first.
-
-        Raises:
-            PluginError: one of another distribution cannot be loaded.
-        """
+        """The kinds that every process finds, by name, built-in ones first; a PluginError says which cannot be loaded."""
         kinds = {kind.kind: kind for kind in self.built_in}
         for point in _outside(entry_points, self.group, tuple(sys.path)):
             outside = self._loaded(point)
@@ -65,8 +56,7 @@ class LoopPart:
     def register(self, kind: Any) -> None:
         """Lets this process know a kind by its name; one registered under the same name before is replaced.
 
-        Raises:
-            ValueError: a built-in kind, or one of another distribution, has the name.
+        A ValueError says that a built-in kind, or one of another distribution, has the name.
         """
         if kind.kind in self.installed():
             raise ValueError(f"there is a {self.noun} called {kind.kind} already; give this one another name")
@@ -81,11 +71,7 @@ class LoopPart:
         return None
 
     def _loaded(self, point: EntryPoint) -> Any:
-        """What an entry point of another distribution names.
-
-        Raises:
-            PluginError: it names something else, or cannot be loaded.
-        """
+        """What an entry point of another distribution names."""
         owner = f"{point.dist.name} {point.dist.version}" if point.dist else "another distribution"
         told = f"the {self.noun} of entry point {point.name!r} ({point.value}) of {owner}"
         remedy = "mend or uninstall that distribution"
@@ -107,14 +93,8 @@ def _outside(find: Callable[..., EntryPoints], group: str, path: tuple[str, ...]
 
 
 PLANNER = LoopPart("planner", PlannerKind, PLANNERS, "wayproof.planners", ("plan(request)",), "mission")
-GUIDANCE = LoopPart(
-    "guidance law",
-    GuidanceKind,
-    LAWS,
-    "wayproof.guidance",
-    ("update(state)", "follow(route, arc_length_m)"),
-    "limits",
-)
+LAW = ("update(state)", "follow(route, arc_length_m)")
+GUIDANCE = LoopPart("guidance law", GuidanceKind, LAWS, "wayproof.guidance", LAW, "limits")
 
 
 def planner_kinds() -> dict[str, PlannerKind]:
