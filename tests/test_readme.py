@@ -16,7 +16,6 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 from tests.longer import longer
 
@@ -351,12 +350,6 @@ def test_the_top_readme_is_short_and_leads_to_all_others() -> None:
     }
     assert set(READMES) - first - second - {"README.md", "scenarios/worlds/LICENCES.md"} == set()
     assert "`git clone <this repository>`" in README
-
-
-def test_readme_keeps_a_mistake_off_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["fly", "my_world.yaml"]) == 2
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow

@@ -42,7 +42,7 @@ class LoopPart:
     """The kinds that this process, and no other, knows by name."""
 
     def installed(self) -> dict[str, Any]:
-        """The kinds that every process finds, by name, built-in ones first; a PluginError says which cannot be loaded."""
+        """The kinds that every process finds, by name, built-in ones first; a PluginError says which cannot be had."""
         kinds = {kind.kind: kind for kind in self.built_in}
         for point in _outside(entry_points, self.group, tuple(sys.path)):
             outside = self._loaded(point)

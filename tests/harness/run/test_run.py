@@ -12,15 +12,12 @@ import pytest
 
 from aircraft.airframes import AircraftError
 from aircraft.interface import FlightModel
-from aircraft.start import Atmosphere, StartConditions
 from harness.run import scenario_flight as run
-from harness.run.scenario_flight import atmosphere, flight_limits, fly_to_folder, make_loop
+from harness.run.scenario_flight import atmosphere, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run
-from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario, load_scenario
 from harness.scenario.shipped import scenario_path
 from harness.scenario.start import start_conditions
-from tests.point_mass import PointMass
 
 
 def shipped(name: str, **overrides: str) -> Scenario:
@@ -34,11 +31,6 @@ def shipped(name: str, **overrides: str) -> Scenario:
 def test_wind_comes_from_where_the_scenario_says(from_deg: float, east: float, north: float) -> None:
     air = atmosphere(shipped("polygon_town", environment__wind__from_deg=str(from_deg)))
     assert (air.wind_east_mps, air.wind_north_mps) == pytest.approx((east, north), abs=1e-9)
-
-
-def test_calm_air_is_calm() -> None:
-    air = atmosphere(shipped("paper_circles"))
-    assert (air.wind_east_mps, air.wind_north_mps, air.turbulence) == (0.0, 0.0, None)
 
 
 def test_turbulence_is_that_of_the_seed() -> None:
@@ -55,24 +47,6 @@ def test_flight_starts_as_the_scenario_says() -> None:
     assert math.degrees(model.state().course_rad) == pytest.approx(80.0, abs=0.1)
     assert model.state().up_m == pytest.approx(400.0, abs=0.1)
     assert model.state().airspeed_mps == pytest.approx(26.0, abs=0.1)
-
-
-def test_parts_share_the_scenarios_figures() -> None:
-    scenario = shipped("one_of_everything")
-    made: list[tuple[StartConditions, Atmosphere]] = []
-
-    def make_model(start: StartConditions, air: Atmosphere) -> FlightModel:
-        made.append((start, air))
-        return PointMass(start)
-
-    loop = make_loop(scenario, make_model)
-    assert made == [(start_conditions(scenario), atmosphere(scenario))]
-    assert isinstance(loop.model, PointMass)
-    assert loop.vertical.command(loop.model.state(), math.nan) == (400.0, 26.0)
-    assert loop.scan_rate_hz == 4.0
-    assert loop.mission.clearance_m == flight_limits(scenario).clearance_m == 150.0
-    assert loop.mission.turn_radius_m == performance_of(scenario).turn_radius_m
-    assert len(loop.world.obstacles) == 6
 
 
 def fly_for(seconds: float, folder: Path, *, recording: bool = False, **overrides: str) -> dict[str, Any]:
