@@ -24,8 +24,6 @@ MAX_OBSTACLES: Final = 10_000
 TRIES: Final = 100
 AT_ONCE: Final = 10
 """Number of places that are tried at a time."""
-FULL: Final = 5000
-"""After so many obstacles without a place the area is full, and nothing more is tried."""
 ObstacleKeys = dict[str, Any]
 """One obstacle as a scenario file has it."""
 Place = tuple[float, float]
@@ -110,20 +108,20 @@ class Circles(Section):
         taken = np.empty((len(reach_m) + 2, 3))  # east, north, what is kept from it
         taken[:2] = [(*end, self.room_m) for end in ends_m]
         found: list[Place | None] = []
-        in_vain = 0
+        placed = len(ends_m)
         for radius in reach_m:
-            discs = taken[: len(found) - in_vain + 2]
+            discs = taken[:placed]
             found.append(None)
-            for _ in range(TRIES // AT_ONCE if in_vain < FULL else 0):
+            for _ in range(TRIES // AT_ONCE):
                 tries = rng.random((AT_ONCE, 2)) * self.size_m
                 away_2 = ((tries[:, None] - discs[:, :2]) ** 2).sum(axis=2)
                 free = (away_2 >= (discs[:, 2] + radius) ** 2).all(axis=1)
                 if free.any():
                     east, north = tries[free.argmax()].tolist()
                     found[-1] = east, north
-                    taken[len(discs)] = east, north, radius + self.gap_m
+                    taken[placed] = east, north, radius + self.gap_m
+                    placed += 1
                     break
-            in_vain += found[-1] is None
         return found
 
 
