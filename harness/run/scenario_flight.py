@@ -153,21 +153,12 @@ def fly_to_folder(
 ) -> dict[str, Any]:
     """Flies a complete scenario into a run folder and returns the content of its `metrics.json`.
 
-    Args:
-        scenario: what is flown.
-        out: the run folder, made or written anew.
-        recording: whether to write `flight.rrd`.
-        progress: told of the flight as it goes on.
-        make: makes the parts of the flight; `flown_by` flies them to an end, `measured_by` gives the figures.
-        watching: observers besides those that write the folder.
-        pilot: stands in the recording's name; default: the planner's kind.
-        identity: of the recording among others; default: its name with a hash of all settings and versions.
-        varied: keys that a campaign varied, for the recording's properties.
-        thin: whether the recording has no more than track, plans and obstacles.
-        flown_by: see `make`.
-        measured_by: see `make`.
-        command: what the manifest says was called; default: the command line.
-        profile: altitudes to be held at arc lengths along the path, for the recording; None: the mission's.
+    `make` makes the parts of the flight, `flown_by` flies them to an end, and `measured_by` gives the figures.
+    `watching` are observers besides those that write the folder. The manifest says that `command` was called, by
+    default the command line. A recording is called `identity` among others, by default its name with a hash of all
+    settings and versions; it names the `pilot` in place of the planner's kind, and the keys that a campaign `varied`. A
+    `thin` one has no more than track, plans and obstacles. `profile` gives the altitudes to be held at arc lengths
+    along a path, in place of the mission's.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
