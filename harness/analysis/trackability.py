@@ -68,12 +68,8 @@ def legs(
 ) -> tuple[Leg, ...]:
     """Judges a flight leg by leg; empty where no plan was flown.
 
-    Args:
-        track: the flown track.
-        plans: `plans[i]` is the plan of rows with `plan_index` i.
-        limits: what to judge by.
-        lost: why control was lost at the end of the flight, whose last leg is then not trackable; None: it was not.
-        given: the path as given that the only plan follows.
+    `plans[i]` is the plan of rows with `plan_index` i, and `given` the path that the only plan follows, if there was
+    one. `lost` says why control was lost at the end of the flight, whose last leg is then not trackable.
     """
     force = InForce.of(track, limits, given.airspeed_mps if given else None)
     flown = _Flown(track, plans, limits, force, given)

@@ -97,13 +97,9 @@ def asked(
 ) -> PathCheck:
     """Puts together what a path is flown with; an InputError names the key that cannot be.
 
-    Args:
-        given: the path.
-        settings: keys of a scenario, by key path, and values as YAML; `aircraft.model` among them.
-        world: a scenario file with obstacles, area, air, altitude, clearance and seed; None: nothing is there.
-        altitude_m: above mean sea level; None: the path's, else the world's, else 300 m.
-        corner_m: how far off corners may be passed; None: as `PathCheck.allowed_cut_m` has it.
-        name: of the scenario.
+    `settings` are keys of a scenario, by key path, and values as YAML, `aircraft.model` among them. `world` is a
+    scenario file with obstacles, area, air, altitude, clearance and seed; without it nothing is there. The altitude is
+    that of the path, else of the world, else 300 m, unless it is given. `corner_m` is as `PathCheck` has it.
     """
     keys = {("name",): name, **_own_keys(given, world, altitude_m)}
     base, folder = _of_the_world(world), None if world is None else world.parent
