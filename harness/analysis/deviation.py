@@ -23,25 +23,20 @@ BLOCK = 256
 MOST_SAMPLES = 400_000
 """A path has no more points measured than this, however long it is."""
 
-LEAST_M = 1e-9
-
 ABOUT = 3.0
 """A corner's limit holds this many times the limit before and behind it, along the path."""
 
 
 @dataclass(frozen=True, eq=False)
 class Deviation:
-    """Distances between a track and the path as given.
-
-    Attributes:
-        rows_m: (n,) of each row of the track from the path.
-        points_m: (k,) of points along the path from the track, as far along it as the flight came.
-        point_rows: (k,) the row of the track that is as far along as each of these.
-    """
+    """Distances between a track and the path as given."""
 
     rows_m: FloatArray
+    """(n,) of each row of the track from the path."""
     points_m: FloatArray
+    """(k,) of points along the path from the track, as far along it as the flight came."""
     point_rows: np.ndarray[tuple[int], np.dtype[np.intp]]
+    """(k,) the row of the track that is as far along as each of these."""
 
     @property
     def by_row_m(self) -> FloatArray:
@@ -54,9 +49,8 @@ class Deviation:
         """95th percentile and maximum of all of them; None where nothing was flown."""
         every = np.concatenate((self.rows_m, self.points_m))
         every = every[np.isfinite(every)]
-        if not len(every):
-            return {"p95": None, "max": None}
-        return {"p95": float(np.percentile(every, 95)), "max": float(every.max())}
+        largest = (float(np.percentile(every, 95)), float(every.max())) if len(every) else (None, None)
+        return dict(zip(("p95", "max"), largest, strict=True))
 
 
 def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: float) -> Deviation:
@@ -122,10 +116,10 @@ def _block_distances(points: FloatArray, line: FloatArray, window_m: float) -> F
     """`distances_m` of a few points from a short line. The part of an edge outside of the window is left out."""
     (east, north, along), (step_east, step_north, step) = line[:-1].T, np.diff(line, axis=0).T
     off_east, off_north = points[:, :1] - east, points[:, 1:2] - north
-    square = np.maximum(step_east**2 + step_north**2, LEAST_M * LEAST_M)
+    square = np.maximum(step_east**2 + step_north**2, 1e-18)
     share = (off_east * step_east + off_north * step_north) / square
     ahead = points[:, 2:] - along
-    length = np.maximum(step, LEAST_M)
+    length = np.maximum(step, 1e-9)
     lowest, highest = (ahead - window_m) / length, (ahead + window_m) / length
     inside = (lowest <= 1.0) & (highest >= 0.0)
     # The nearest edge counts where none is in the window: before the line's begin and beyond its end.

@@ -30,17 +30,14 @@ BANKED_DEG: Final = 10.0
 
 @dataclass(frozen=True)
 class Finding:
-    """One finding.
-
-    Attributes:
-        kind: `plan ended`, `planner slower than the scans` or `plans contradict each other`.
-        time_s: simulated time at which it was so first.
-        text: a clause with the figures.
-    """
+    """One finding."""
 
     kind: str
+    """`plan ended`, `planner slower than the scans` or `plans contradict each other`."""
     time_s: float
+    """Simulated time at which it was so first."""
     text: str
+    """A clause with the figures."""
 
 
 def findings(flight: Flight, limits: FlightLimits) -> tuple[Finding, ...]:

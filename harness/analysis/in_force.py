@@ -27,19 +27,15 @@ LEAST_WIND_MPS = 1.0
 
 @dataclass(frozen=True, eq=False)
 class InForce:
-    """What an aircraft was told and flew in, row by row of a track.
-
-    Attributes:
-        commanded_mps: (n,) true airspeed that was commanded.
-        wind_mps: (n, 2) wind towards east and north, averaged over `WIND_S`. Sideslip is taken to be zero.
-        bank_limit_rad: largest bank that guidance may command.
-        roll_rate_radps: fastest change of the bank.
-    """
+    """What an aircraft was told and flew in, row by row of a track."""
 
     commanded_mps: FloatArray
+    """(n,) true airspeed that was commanded."""
     wind_mps: FloatArray
+    """(n, 2) wind towards east and north, averaged over `WIND_S`. Sideslip is taken to be zero."""
     bank_limit_rad: float
     roll_rate_radps: float
+    """Fastest change of the bank."""
 
     @classmethod
     def of(cls, track: Track, limits: FlightLimits, commanded_mps: FloatArray | None = None) -> InForce:
@@ -56,12 +52,8 @@ class InForce:
         around = np.convolve(np.ones(len(track)), np.ones(rows), "same")
         mean = np.convolve(wind, np.ones(rows), "same") / around
         mean[(np.abs(mean) < LEAST_WIND_MPS) | limits.no_wind] = 0.0
-        return cls(
-            commanded_mps,
-            np.column_stack((mean.imag, mean.real)),
-            limits.bank_limit_rad,
-            limits.roll_rate_radps,
-        )
+        east_north = np.column_stack((mean.imag, mean.real))
+        return cls(commanded_mps, east_north, limits.bank_limit_rad, limits.roll_rate_radps)
 
     def part(self, first: int, stop: int) -> InForce:
         """Some of its rows."""
@@ -70,17 +62,14 @@ class InForce:
 
 @dataclass(frozen=True)
 class Demand:
-    """What turns of a plan ask for, over what was in force there; above 1 the aircraft cannot do it.
-
-    Attributes:
-        calm: largest lateral acceleration, in calm air, over g tan(bank limit).
-        windy: the same in the wind there.
-        roll_rate: largest roll rate over the one in force.
-    """
+    """What turns of a plan ask for, over what was in force there; above 1 the aircraft cannot do it."""
 
     calm: float
+    """Largest lateral acceleration, in calm air, over g tan(bank limit)."""
     windy: float
+    """The same in the wind there."""
     roll_rate: float
+    """Largest roll rate over the one in force."""
 
 
 def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand:
