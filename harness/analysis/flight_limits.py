@@ -17,37 +17,34 @@ LOAD_S = 1.0
 
 @dataclass(frozen=True)
 class FlightLimits:
-    """What a flight is measured against.
-
-    Attributes:
-        altitude_m: to be held, above mean sea level.
-        clearance_m: wanted distance from every obstacle edge.
-        turn_radius_m: smallest radius a plan may have, in the flight's wind and turbulence.
-        airspeed_mps: true airspeed to be held; NaN where it is not judged.
-        horizon_m: how far obstacles have to be seen, so that a turn along a wall straight ahead keeps the clearance.
-        no_wind: the air has no mean wind and no gust; then what the track seems to show of one is turbulence.
-        compute_latency_s: a plan takes effect this much later than the scan that it was made from.
-        navigation_margin_m: what the planner keeps from obstacles beyond the clearance, for the navigation error; the
-            cross-track error may be larger by so much.
-    """
+    """What a flight is measured against."""
 
     altitude_m: float
+    """To be held, above mean sea level."""
     clearance_m: float
+    """Wanted distance from every obstacle edge."""
     bank_limit_rad: float
     turn_radius_m: float
+    """Smallest radius a plan may have, in the flight's wind and turbulence."""
     airspeed_mps: float = math.nan
+    """True airspeed to be held; NaN where it is not judged."""
     roll_rate_radps: float = math.inf
     stall_angle_deg: float = math.inf
     sensor_range_m: float = math.inf
     horizon_m: float = 0.0
+    """How far obstacles have to be seen, so that a turn along a wall straight ahead keeps the clearance."""
     no_wind: bool = False
+    """The air has no mean wind and no gust; then what the track seems to show of one is turbulence."""
     scan_period_s: float = math.inf
     compute_latency_s: float = 0.0
+    """A plan takes effect this much later than the scan that it was made from."""
     max_cross_track_m: float = 10.0
     max_altitude_error_m: float = math.inf
     max_airspeed_error_mps: float = math.inf
     max_load_factor: float = math.inf
     navigation_margin_m: float = 0.0
+    """What the planner keeps from obstacles beyond the clearance, for the navigation error; the cross-track error may
+    be larger by so much."""
 
     @property
     def cross_track_threshold_m(self) -> float:
@@ -57,26 +54,23 @@ class FlightLimits:
 
 @dataclass(frozen=True, eq=False)
 class AsGiven:
-    """A path that was given and how it was flown, row by row of the track.
-
-    Attributes:
-        corners: places on the path, in order; each ends a leg. One that is no corner has no `cut_m` and no `half_m`.
-        deviation_m: (n,) distance between the track and the path as given.
-        allowed_m: (n,) what it may be.
-        altitude_m: (n,) altitude that the path has there.
-        climb_mps: (n,) climb that it asks for there, negative for a descent.
-        fastest_mps: (n, 2) fastest climb and descent of the aircraft at its airspeed there.
-        airspeed_mps: (n,) true airspeed that was commanded there.
-        unheld_mps: (n,) by how much that is beyond the airspeeds that the aircraft holds.
-        believed_off_m: (n,) distance of the believed position from the path; None where navigation is perfect.
-    """
+    """A path that was given and how it was flown, row by row of the track."""
 
     corners: Sequence[CutCorner]
+    """Places on the path, in order; each ends a leg. One that is no corner has no `cut_m` and no `half_m`."""
     deviation_m: FloatArray
+    """(n,) distance between the track and the path as given."""
     allowed_m: FloatArray
+    """(n,) what it may be."""
     altitude_m: FloatArray
+    """(n,) altitude that the path has there."""
     climb_mps: FloatArray
+    """(n,) climb that it asks for there, negative for a descent."""
     fastest_mps: FloatArray
+    """(n, 2) fastest climb and descent of the aircraft at its airspeed there."""
     airspeed_mps: FloatArray
+    """(n,) true airspeed that was commanded there."""
     unheld_mps: FloatArray | float = 0.0
+    """(n,) by how much that is beyond the airspeeds that the aircraft holds."""
     believed_off_m: FloatArray | None = None
+    """(n,) distance of the believed position from the path; None where navigation is perfect."""

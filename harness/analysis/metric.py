@@ -21,45 +21,42 @@ obstacle than was wanted, has 1."""
 
 @dataclass(frozen=True)
 class Metric:
-    """One figure of a flight.
-
-    Attributes:
-        name: as a column of a comparison and as a property of a recording, with its unit.
-        title: what people are shown, without the unit; empty for one that only programs are shown.
-        unit: after `factor`; empty without one.
-        short: the same in a few letters, for a terminal; empty for one that is in no table for people.
-        path: its place in `metrics.json`, dots between the levels, and its column in a campaign; default: `name`.
-        kind: what it is.
-        factor: from the value in the file to the one shown.
-        digits: decimals shown; None: three or four digits in all.
-        worse: whether more or less of it is worse; empty where neither is.
-        hint: what it means, where the title does not say it.
-        rare: a table for people has it only where any flight has it.
-        derived: it takes more than `metrics.json`: the world, or the aircraft.
-        timed: it depends on the machine's speed: not among the results of a campaign.
-        recorded: it is among the properties of a recording.
-        heading: of its column in the viewer's table of runs; empty where it is not shown there.
-        get: looks it up in the content of `metrics.json`; default: at `path`.
-        of: computes it from a flight and its limits; None for one that `harness.analysis.metrics` computes.
-    """
+    """One figure of a flight."""
 
     name: str
+    """As a column of a comparison and as a property of a recording, with its unit."""
     title: str = ""
+    """What people are shown, without the unit; empty for one that only programs are shown."""
     unit: str = ""
+    """After `factor`; empty without one."""
     short: str = ""
+    """The same in a few letters, for a terminal; empty for one that is in no table for people."""
     path: str = ""
+    """Its place in `metrics.json`, dots between the levels, and its column in a campaign; default: `name`."""
     kind: Literal["number", "int", "bool", "text"] = "number"
+    """What it is."""
     factor: float = 1.0
+    """From the value in the file to the one shown."""
     digits: int | None = None
+    """Decimals shown; None: three or four digits in all."""
     worse: Literal["more", "less", ""] = ""
+    """Whether more or less of it is worse; empty where neither is."""
     hint: str = ""
+    """What it means, where the title does not say it."""
     rare: bool = False
+    """A table for people has it only where any flight has it."""
     derived: bool = False
+    """It takes more than `metrics.json`: the world, or the aircraft."""
     timed: bool = False
+    """It depends on the machine's speed: not among the results of a campaign."""
     recorded: bool = False
+    """It is among the properties of a recording."""
     heading: str = ""
+    """Of its column in the viewer's table of runs; empty where it is not shown there."""
     get: Callable[[Mapping[str, Any]], Any] | None = None
+    """Looks it up in the content of `metrics.json`; default: at `path`."""
     of: Callable[[Flight, FlightLimits], Any] | None = None
+    """Computes it from a flight and its limits; None for one that `harness.analysis.metrics` computes."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "path", self.path or self.name)

@@ -22,23 +22,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FlightResult:
-    """A flight that has ended: its figures, track and plans.
-
-    Attributes:
-        scenario: the scenario as flown, every default filled in.
-        metrics: its figures, as in `metrics.json`.
-        track: the flown track, ten rows a second, with the columns of `track.parquet`.
-        plans: the accepted plans, a row each, with the columns of `plans.parquet`.
-        folder: its run folder; None if none was written.
-        manifest: versions, platform, command and start time; empty without a run folder.
-    """
+    """A flight that has ended: its figures, track and plans."""
 
     scenario: Scenario
+    """The scenario as flown, every default filled in."""
     metrics: Metrics
+    """Its figures, as in `metrics.json`."""
     track: pa.Table
+    """The flown track, ten rows a second, with the columns of `track.parquet`."""
     plans: pa.Table
+    """The accepted plans, a row each, with the columns of `plans.parquet`."""
     folder: Path | None = None
+    """Its run folder; None if none was written."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
+    """Versions, platform, command and start time; empty without a run folder."""
     _scratch: TemporaryDirectory[str] | None = None
 
     @classmethod
@@ -107,15 +104,12 @@ class FlightResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComparisonResult:
-    """Planners side by side.
-
-    Attributes:
-        table: a row a scenario and planner: outcome, reason, lengths, errors, times.
-        folder: the comparison's folder, with `report.html` and a run folder for each flight.
-    """
+    """Planners side by side."""
 
     table: pa.Table
+    """A row a scenario and planner: outcome, reason, lengths, errors, times."""
     folder: Path
+    """The comparison's folder, with `report.html` and a run folder for each flight."""
 
     @property
     def all_reached(self) -> bool:
