@@ -44,10 +44,7 @@ RECORDING = "flight.rrd"
 OVERLAY: Final = "overlay.rrd"
 """What a comparison writes for each of its scenarios: the recordings of its runs in one."""
 REPORT = "report.html"
-REPORT_FILES = (
-    *("report.html", "report.csv", "report.md"),
-    *("path.svg", "path.png", "profiles.svg", "profiles.png"),
-)
+REPORT_FILES = ("report.html", "report.csv", "path.svg", "path.png", "profiles.svg", "profiles.png")
 """What `wayproof report` adds to a run folder."""
 MAX_BYTES = 64_000_000
 """Largest size of a scenario or JSON file in the folder that is read."""
