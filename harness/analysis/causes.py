@@ -34,6 +34,8 @@ ROLLED_SHARE = 0.1
 """If a plan asks for a faster roll than is in force, this share of the lead time at that rate makes it the cause."""
 AT_STOP = 0.995
 """A control surface deflected by this share of its travel is at its stop."""
+CLIMBS_IN_S = 1.0
+"""A change of climb takes an aircraft about so long: a corner of a path's slope is cut by as much flight."""
 LEAST_CLIMB_MPS = 0.2
 """A path that climbs or sinks more slowly is level."""
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
@@ -63,9 +65,10 @@ FINDINGS: Mapping[str, str] = {
     "speed or throttle saturation": "the aircraft was off the commanded airspeed, or off its altitude with the "
     "throttle at a stop",
     "climb too steep": "the aircraft was off its altitude, airspeed or load factor, on a path that climbs faster than "
-    "its survey or its specific excess power at that height and speed allows",
+    "its survey or its specific excess power at that height and speed allows, or off its altitude at a corner of the "
+    "path's slope, whose change of climb in a second is larger than the altitude error allowed",
     "descent too steep": "the aircraft was off its altitude, airspeed or load factor, on a path that sinks faster than "
-    "its survey, or idle throttle at that height and speed, allows",
+    "its survey, or idle throttle at that height and speed, allows, or off its altitude at such a corner of it",
     NAVIGATION_ERROR: "where the true position was furthest off, the believed one was within the limits, or the "
     "larger part of the error lay between the two",
     "lost control": "the flight ended with loss of control",
@@ -126,13 +129,15 @@ def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven
     good = np.flatnonzero(np.abs(track.up_m[:peak] - wanted_m[:peak]) <= 0.5 * limits.max_altitude_error_m)
     steep = steepness_cause(track, int(good[-1]) if len(good) else 0, peak + 1, given)
     last = max(peak, 1)
-    lead = track.part(int(np.searchsorted(track.time_s, track.time_s[last] - LEAD_S)), last)
-    at_a_stop = _throttle_share(lead) >= SATURATED_SHARE
-    return (
-        steep
-        or _vertical_limit(lead, limits)
-        or ("speed or throttle saturation" if at_a_stop else "tracking error")
-    )
+    first = int(np.searchsorted(track.time_s, track.time_s[last] - LEAD_S))
+    lead = track.part(first, last)
+    limit = steep or _vertical_limit(lead, limits)
+    if limit is None and _throttle_share(lead) >= SATURATED_SHARE:
+        limit = "speed or throttle saturation"
+    asked = np.zeros(1) if given is None else given.climb_mps[first : peak + 1]
+    if limit is None and np.abs(np.diff(asked)).max(initial=0.0) * CLIMBS_IN_S > limits.max_altitude_error_m:
+        limit = "climb too steep" if asked.max() >= -asked.min() else "descent too steep"
+    return limit or "tracking error"
 
 
 def speed_cause(lead: Track, limits: FlightLimits) -> str:
@@ -176,9 +181,13 @@ def _at_a_limit(lead: Track, limits: FlightLimits, force: InForce, rolls_too_fas
     drift, blown = float(across.mean()), WIND_SHARE * lead.airspeed_mps.mean()
     lateral_servos = _servo_share(lead, lateral=True)
     load = averaged(lead.load_factor, lead, LOAD_S).max()
+    # The demand of turns of less than a second is not in their mean curvature: then the command moves at its limit.
+    slew = np.abs(np.diff(lead.roll_command_deg)) / np.maximum(np.diff(lead.time_s), 1e-9)
+    slewing = np.append(False, slew >= AT_STOP * math.degrees(force.roll_rate_radps))
+    too_fast = rolls_too_fast or (full_aileron and slewing.mean() >= SATURATED_SHARE)
     found = {
         "stall": _stalled(lead, limits),
-        "roll rate": rolls_too_fast and (full_aileron or rolled >= ROLLED_SHARE),
+        "roll rate": too_fast and (full_aileron or rolled >= ROLLED_SHARE),
         "control saturation": _stop_share(lead, SURFACES) >= SATURATED_SHARE,
         "bank limit": banked >= max(SATURATED_SHARE, rolled),
         "wind drift": abs(drift) >= blown and drift * lead.cross_track_m[-1] > 0,

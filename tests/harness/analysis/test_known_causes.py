@@ -105,6 +105,33 @@ def weaving(bank_deg: float, limit_dps: float) -> Case:
     return flown, plan(arcs), replace(LIMITS, roll_rate_radps=math.radians(limit_dps)), None, None
 
 
+def quivering(period_s: float) -> Case:
+    """A sine of 40 degrees of bank: 2 pi 40 / period is 168 to 314 deg/s; the command moves at the limit of 60.
+
+    Its mean curvature over a second is next to nothing; ailerons are at a stop.
+    """
+    assert math.tau * 40.0 / period_s > 160.0
+    time_s = np.arange(ROWS) / 10.0
+    command = 15.0 * period_s * (2.0 * np.abs(2.0 * ((time_s / period_s) % 1.0) - 1.0) - 1.0)
+    pieces = np.sin(math.tau * (np.arange(1200) + 0.5) * 0.05 / period_s)
+    bends = np.tan(np.radians(40.0)) * G / 25.0**2 * pieces
+    turned = np.append(0.0, np.cumsum(bends * 1.25))[:-1]
+    arcs = [(0, 0, -math.sin(a), math.cos(a), k, 1.25) for a, k in zip(turned, bends, strict=True)]
+    aileron = np.sign(np.gradient(command))
+    flown = track(ROWS, roll_deg=0.5 * command, roll_command_deg=command, aileron=aileron, cross_track_m=OFF)
+    return flown, plan(arcs), LIMITS, None, None
+
+
+def at_a_corner_of_slope(climb_mps: float) -> Case:
+    """Level, then a climb that the aircraft can do: it is 1.2 s of it behind after 1.2 s, and makes up for that."""
+    since = np.maximum(np.arange(ROWS) / 10.0 - 5.0, 0.0)
+    behind = climb_mps * np.minimum(since, 1.2) * np.exp(np.minimum(1.2 - since, 0.0) / 3.0)
+    asked = {"altitude_m": 300.0 + climb_mps * since, "climb_mps": np.where(since > 0.0, climb_mps, 0.0)}
+    asked |= {"fastest_mps": np.tile((60.0, 60.0), (ROWS, 1)), "airspeed_mps": np.full(ROWS, 150.0)}
+    speeds = {"airspeed_mps": 150.0, "groundspeed_mps": 150.0}
+    return flat({"up_m": 300.0 + climb_mps * since - behind, "throttle": 0.6, **speeds}, asked)
+
+
 def climbing(asked_mps: float, can_mps: float, speed_mps: float, throttle: float) -> Case:
     """The path climbs from 5 s on; with the throttle at a stop the aircraft does what it can, and falls behind."""
     time_s = np.arange(ROWS) / 10.0
@@ -179,7 +206,8 @@ CASES: dict[str, list[Case]] = {
     ],
     "bank limit": [turning(1.05 * calm_m(*each), *each) for each in SPEEDS_AND_BANKS]
     + [turning(1.02 * calm_m(1.3 * v, b), v, b, 0.3 * v) for v, b in SPEEDS_AND_BANKS],
-    "roll rate": [weaving(b, p) for b, p in product((15.0, 25.0, 35.0, 40.0), (10.0, 25.0, 60.0))],
+    "roll rate": [weaving(b, p) for b, p in product((15.0, 25.0, 35.0, 40.0), (10.0, 25.0, 60.0))]
+    + [quivering(period_s) for period_s in (0.8, 1.0, 1.25, 1.5)],
     "control saturation": [
         flat({surface: stop, **AT_LIMIT})
         for surface, stop in product(("elevator", "aileron", "rudder"), (1.0, -1.0))
@@ -207,15 +235,18 @@ CASES: dict[str, list[Case]] = {
     "climb too steep": [
         climbing(asked, asked - less, v, 1.0)
         for asked, less, v in product((2.0, 5.0, 70.0), (1.5, 0.5), (20.0, 120.0))
-    ],
+    ]
+    + [at_a_corner_of_slope(climb) for climb in (11.0, 20.0, 30.0)],
     "descent too steep": [
         climbing(-asked, less - asked, v, 0.0)
         for asked, less, v in product((2.0, 5.0, 30.0), (1.5, 0.5), (20.0, 120.0))
-    ],
+    ]
+    + [at_a_corner_of_slope(climb) for climb in (-11.0, -20.0, -30.0)],
     "navigation error": [believed(off) for off in np.linspace(6.0, 40.0, 12)],
     "lost control": [flat({"up_m": 300.0 - i}, lost="rolled over: roll 80 deg") for i in range(12)],
     "tracking error": [flat({"cross_track_m": share * OFF}) for share in (1.0, -1.0, 2.0, -2.0, 3.0, 4.0)]
-    + [flat({"up_m": up}) for up in (280.0, 289.0, 311.0, 320.0, 330.0, 350.0)],
+    + [flat({"up_m": up}) for up in (280.0, 289.0, 311.0, 320.0, 330.0, 350.0)]
+    + [at_a_corner_of_slope(climb) for climb in (9.0, -9.5)],  # 9 m of 10 in a second: followed late
 }
 
 
