@@ -13,11 +13,7 @@ if TYPE_CHECKING:
 
 
 class NearestEdge:
-    """Distances to the edge points of a map; its search tree is built anew when the map has changed.
-
-    Args:
-        seen: the map.
-    """
+    """Distances to the edge points of a map; its search tree is built anew when the map has changed."""
 
     def __init__(self, seen: MapView) -> None:
         self._seen = seen

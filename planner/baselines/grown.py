@@ -18,31 +18,22 @@ from planner.memory import ObstacleMemory
 
 SIMPLER = 0.2
 """The outline is simplified by this share of the margin."""
-
 GRAZED_M = 0.01
 """A line that goes less deep into an obstacle passes it."""
-
 TOUCH_SHARE = 0.05
 """A line that begins on a boundary and enters within this share of the kept distance leads inside."""
-
 QUARTER_CORNERS = 12
 """Corners of a quarter of a disc."""
-
 DENT_SHARE = 4.0
 """A line that touches an obstacle and meets it again within so many kept distances leads into a dent."""
-
 CELL_SHARE = 0.35
 """Points in one square of this share of the kept distance are grown as one, with what lies between them."""
 
 
 class Tangent(NamedTuple):
-    """Where a line from a place touches an obstacle.
+    """Where a line from a place touches an obstacle: a corner, and its side: 1: it lies on the left of the line.
 
-    Attributes:
-        place: the corner.
-        side: 1: it lies on the left of the line, -1: on the right.
-        seen: nothing lies before it.
-        dent: the line leads on to the same obstacle soon.
+    `seen`: nothing lies before it; `dent`: the line leads on to the same obstacle soon.
     """
 
     place: Point

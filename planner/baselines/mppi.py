@@ -30,22 +30,16 @@ from planner.keys import key, margin_key
 
 STEP_RADII = 0.5
 """Length of a step in turn radii."""
-
 NOISE_SHARE, CORRELATION = 0.6, 0.8
 """Sigma of the sampled curvature over the largest one, and its correlation from step to step."""
-
 TOO_NEAR_COST, BLOCKED_COST = 3.0, 50.0
 """Cost, in steps, of a place within the margin and of one within the clearance or outside the area."""
-
 TURN_COST = 0.05
 """Cost, in steps, of a step flown at the turn radius; it falls with the square of the curvature."""
-
 LAMBDA_STEPS = 0.3
 """Temperature lambda, in steps."""
-
 ROUNDS = 3
 """The weighted mean is taken so many times."""
-
 DRAWN = 24
 """So many of the rollouts are drawn in a recording."""
 
@@ -94,7 +88,11 @@ class Mppi(Replanner):
             f"mean of {self._config.samples} rollouts",
             np.array([request.position_m, *(row[:2] for row in rows), along(rows[-1], rows[-1][5])[:2]]),
             found,
-            partial(_picture, request.position_m, mission.goal_m, rollouts[:DRAWN]),
+            partial(
+                PlanPicture,
+                np.array([request.position_m, mission.goal_m]),
+                candidates=tuple(np.array([request.position_m, *each]) for each in rollouts[:DRAWN]),
+            ),
         )
 
     def _move_on(self, flown_m: float) -> None:
@@ -168,11 +166,3 @@ class Mppi(Replanner):
             rows.append((*pose, curvature, self._step_m))
             pose = along(rows[-1], self._step_m)
         return rows
-
-
-def _picture(
-    position_m: tuple[float, float], goal_m: tuple[float, float], rollouts: FloatArray
-) -> PlanPicture:
-    return PlanPicture(
-        np.array([position_m, goal_m]), candidates=tuple(np.array([position_m, *each]) for each in rollouts)
-    )

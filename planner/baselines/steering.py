@@ -33,11 +33,7 @@ class Start(NamedTuple):
 
 
 class Replanner(ABC):
-    """Keeps its path until something seen comes nearer to it than the clearance, or it is due.
-
-    Args:
-        mission: what stays the same for the flight.
-    """
+    """Keeps its path until something seen comes nearer to it than the clearance, or it is due."""
 
     every_s = 1.0
     """A path this old is due."""
@@ -77,7 +73,7 @@ class Steerer(Replanner):
     """A planner that chooses a direction, and has no path of its own: a turn onto it and straight on.
 
     Args:
-        mission: what stays the same for the flight.
+        mission: of the flight.
         look_m: how far the path leads.
         near_m: edge points so near to the aircraft are looked at.
         step_rad: directions are so far apart.

@@ -32,13 +32,10 @@ from planner.interface import FloatArray, Mission
 
 PROGRESS_SHARE = 0.05
 """What is to be nearer to the goal is nearer by this share of the kept distance."""
-
 LOOKS = 40.0
 """The graph is looked at anew this many times in a sensing range, and when the way is blocked."""
-
 SHORTER = 0.005
 """A way to the goal is dropped only for one that is shorter by this share."""
-
 SHORTCUTS = 16
 """So many places of a boundary are tried for a straight way to it."""
 
@@ -52,15 +49,9 @@ class Toward:
 
 @dataclass(frozen=True)
 class BoundaryFollowing:
-    """Following a boundary.
+    """Following a boundary since `hit`, the obstacle on a side (1: left), from `anchor` on, `walked_m` from the hit.
 
-    Attributes:
-        hit: where it was begun.
-        side: 1 for the obstacle on the left, -1 for on the right.
-        anchor: the place on the boundary from which it is followed on.
-        walked_m: how much of it lies before the anchor.
-        on_boundary: at the anchor, not on a straight way to it.
-        followed_m: d_followed, how near to the goal this boundary comes.
+    `on_boundary`: at the anchor, not on a straight way to it; `followed_m`: d_followed, how near to the goal it comes.
     """
 
     hit: Mark

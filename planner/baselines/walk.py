@@ -53,12 +53,7 @@ class PointConfig:
 
 @dataclass(frozen=True, eq=False)
 class WalkLeg(Generic[WalkState]):
-    """A part of a walk on which the state of the algorithm is one.
-
-    Attributes:
-        state: as it is where the leg begins.
-        way: (n, 2) corners, m; none where the algorithm ends.
-    """
+    """A part of a walk: the state of the algorithm at its beginning, (n, 2) corners, none where the algorithm ends."""
 
     state: WalkState
     way: FloatArray = field(default_factory=lambda: NOWHERE)
@@ -77,12 +72,7 @@ class Enclosed:
 
 
 class Walker(ABC, Generic[WalkState]):
-    """The frame of a planner whose vehicle is a point: when to walk anew, and from which state.
-
-    Args:
-        config: resolved keys.
-        mission: what stays the same for the flight.
-    """
+    """The frame of a planner whose vehicle is a point: when to walk anew, and from which state."""
 
     def __init__(self, config: PointConfig, mission: Mission) -> None:
         margin_m = config.resolved(mission).margin_m

@@ -8,7 +8,7 @@ keeps the clearance. What lies between the two is drawn again.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -304,9 +304,3 @@ def test_converges(seed: int) -> None:
 @pytest.mark.parametrize("seed", [seed for seed in ALL if seed not in QUICK])
 def test_converges_everywhere(seed: int) -> None:
     assert_converges(seed)
-
-
-def verdicts(seeds: range) -> Iterator[tuple[str, bool]]:
-    for seed in seeds:
-        world = drawn(seed)
-        yield world.family, world.reachable

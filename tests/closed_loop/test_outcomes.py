@@ -166,27 +166,6 @@ def test_planner_that_raises(fly: Fly, answering: Install) -> None:
     assert "ZeroDivisionError" in metrics["error"]
 
 
-@pytest.mark.parametrize(
-    ("curvature_1pm", "length_m", "fault"),
-    [
-        (0.0, -500.0, "segment 0 is -500 m long; it must be longer than 0 m"),
-        (1e308, 500.0, "it turns by inf rad up to the end of segment 0; it must turn by at most 100000 rad"),
-        (0.0, 1e308, "it is 1e+308 m long up to the end of segment 0; it must be at most 1e+07 m long"),
-    ],
-)
-def test_planner_whose_path_cannot_be_flown(
-    fly: Fly, answering: Install, curvature_1pm: float, length_m: float, fault: str
-) -> None:
-    def nowhere(mission: Mission, request: PlanRequest) -> Plan:
-        row = (*request.position_m, *request.direction, curvature_1pm, length_m)
-        return Plan(PlanStatus.FOUND, "on and on", np.array([row[:2]]), Path(np.array([row, row])))
-
-    answering(nowhere)
-    status, metrics = fly(small_world(planner={"kind": "stand_in"}))
-    assert (status, metrics["outcome"]) == (1, "planner_failed")
-    assert metrics["reason"] == f"the planner gave a path that cannot be flown: {fault}"
-
-
 class Unspeakable(BaseException):
     """As a panic of compiled code or a cancelled task: no Exception; and it cannot say what it is."""
 
