@@ -6,6 +6,7 @@ Curvature is positive for a left (counter-clockwise) turn.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -24,12 +25,22 @@ OFF_PATH = 4.0
 """The aircraft has left a path when it is this many times the tracking error away from it."""
 NOT_UNIT = 1e-6
 """A tangent is a unit vector if its length differs from 1 by less than this."""
+MOST_DRAWN = 1_000_000
+"""An array of a picture has no more rows."""
 
 
 def _frozen(array: FloatArray) -> FloatArray:
     copy = np.array(array, dtype=np.float64)
     copy.setflags(write=False)
     return copy
+
+
+def _drawn(name: str, points: FloatArray, columns: int) -> FloatArray:
+    kept = _frozen(points)
+    if kept.ndim != 2 or kept.shape[1] != columns or len(kept) > MOST_DRAWN or not np.isfinite(kept).all():
+        must = f"finite, of shape (n, {columns}), n at most {MOST_DRAWN:,}"
+        raise ValueError(f"{name} of a picture has the shape {kept.shape}; it must be {must}")
+    return kept
 
 
 class PlanStatus(Enum):
@@ -266,6 +277,9 @@ class PlanPicture:
         sectors: (k, 4) free sectors at the aircraft: unit vectors of the right and the left edge.
         candidates: polylines (m, 2) that were compared, the chosen one first.
         met_m: (j, 2) edge points of moving obstacles, at the places where the plan expects to meet them.
+
+    Raises:
+        ValueError: something has another shape, or is not finite.
     """
 
     guide_m: FloatArray
@@ -275,9 +289,14 @@ class PlanPicture:
     met_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
-        for name in ("guide_m", "sectors", "met_m"):
-            object.__setattr__(self, name, _frozen(getattr(self, name)))
-        object.__setattr__(self, "candidates", tuple(_frozen(each) for each in self.candidates))
+        drawn = {"guide_m": 2, "sectors": 4, "met_m": 2}
+        for name, columns in drawn.items():
+            object.__setattr__(self, name, _drawn(name, getattr(self, name), columns))
+        candidates = tuple(_drawn(f"candidates[{i}]", each, 2) for i, each in enumerate(self.candidates))
+        object.__setattr__(self, "candidates", candidates)
+        if len(self.guide_m) != 2 or not math.isfinite(self.window_m):
+            told = f"{len(self.guide_m)} points and {self.window_m:g} m"
+            raise ValueError(f"a picture has a guide vector of 2 points and a finite window; got {told}")
 
 
 @dataclass(frozen=True, eq=False)
