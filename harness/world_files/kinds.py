@@ -54,8 +54,6 @@ GROUPS: Final = {
 }
 """Kinds by what they hold. The name of a group may stand for any of its kinds, which is then told from the file."""
 
-PACKED: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}
-"""Kind of a ZIP archive by the ending of a file in it."""
 IMAGE: Final = "an image; give the YAML file of its ROS map"
 GAZEBO: Final = "a Gazebo world; give its footprints as GeoJSON, or its cells as a MovingAI .map"
 FLIGHT: Final = "a flight, not a world; `wayproof check` takes flown paths"
@@ -66,22 +64,36 @@ GIVEN_UP: Final = {
     ".npy": "a plain array; save it as GeoTIFF or ESRI ASCII grid",
     ".dxf": "a drawing without a place on earth; give GeoJSON",
     ".las": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
+    "rally": "a list of rally points: places to return to, no obstacles; give the fence",
+    "overpass": "JSON of Overpass; ask it for XML ([out:xml]) and give that",
 }
-"""Files that are not read, by ending, with what would do."""
+"""Files that are not read, by their ending or kind, with what would do."""
 FAMILIES: Final = (
     "terrain (GeoTIFF, ESRI ASCII, SRTM .hgt), buildings (OSM XML or PBF, CityJSON, GeoJSON), airspace (GeoJSON, KML, "
     "OpenAir, ED-269, ED-318), fences (.plan, ArduPilot), occupancy (ROS map_server, MovingAI)"
 )
-GRID_KEYS: Final = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize")
-"""Words with which an ESRI ASCII grid may begin."""
 HEAD: Final = 65_536
 """Bytes at the begin of a file by which its kind is told, but for JSON."""
-
-_XML_ROOT: Final = re.compile(r"<(?:[A-Za-z_][\w.-]*:)?([A-Za-z_][\w.-]*)[\s>/]")
-_OPEN_AIR: Final = re.compile(r"^(AC\s|AN\s(.*\n)+?(DP|DC|DA|DB|DY)\s)", re.IGNORECASE | re.MULTILINE)
-"""An airspace begins with its class, or with its name and something of a shape."""
-_PLACE: Final = re.compile(r"\s*[-+]?\d+\.\d+[\s,]+[-+]?\d+\.\d+\s*$")
-_JSON_KINDS: Final = (
+_BINARY: Final = (
+    ("geotiff", re.compile(rb"II[*+]\0|MM\0[*+]")),
+    ("osm_pbf", re.compile(rb"(?s).{0,53}OSMHeader")),
+)
+_PACKED: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}
+"""Kind of a ZIP archive by the ending of a file in it."""
+_PLACE: Final = r"[ \t]*[-+]?\d+\.\d+[ \t,]+[-+]?\d+\.\d+[ \t]*\n"
+_TEXT: Final = (
+    ("rally", r"\Arally\b"),
+    ("osm", r"\A<(?:[?!][^<]*<)*osm[\s>/]"),
+    ("kml", r"\A<(?:[?!][^<]*<)*(?:[a-z_][\w.-]*:)?kml[\s>/]"),
+    ("ascii_grid", r"\A(?:(?:nrows|[xy]ll(?:corner|center)|cellsize)\b.*\n){0,5}ncols\b"),
+    ("moving_ai", r"\Atype\b(?:.*\n){1,5}?map$"),
+    ("ros_map", r"\A(?=[^\0]*^image:)(?=[^\0]*^resolution:)"),
+    ("openair", r"^(AC\s|AN\s(.*\n)+?(DP|DC|DA|DB|DY)\s)"),
+    ("ardupilot_fence", rf"\A(?:QGC WPL.*\n.|(?:{_PLACE}){{3}})"),
+)
+"""Kind of a text, without comments, by what it has; an airspace begins with its class, or with its name and a shape."""
+_JSON: Final = (
+    ("overpass", r'"generator"\s*:\s*"Overpass'),
     ("cityjson", r'"CityObjects"\s*:'),
     ("plan_fence", r'"geoFence"\s*:|"fileType"\s*:\s*"Plan"'),
     ("ed269", r'"UASZoneList"\s*:|"horizontalProjection"\s*:'),
@@ -121,78 +133,54 @@ def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def kind_of(path: Path) -> str:
-    """The kind of a file, told from what stands in it.
-
-    Raises:
-        WorldFileError: it is of none of them; the message says what would do.
-    """
+    """The kind of a file, told from what stands in it; of none of them, a WorldFileError says what would do."""
     first, ending = bounded.read_bytes(path, first=HEAD), path.suffix.lower()
     if not first:
         raise WorldFileError("is empty; get it again")
-    found = _binary(path, first, ending) or _text(path, first)
-    if found is not None:
-        return found
-    if ending in GIVEN_UP:
-        raise WorldFileError(f"is {GIVEN_UP[ending]}")
-    raise WorldFileError(f"is of no kind that is known; give {FAMILIES}")
-
-
-def _binary(path: Path, first: bytes, ending: str) -> str | None:
-    if first[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
-        return "geotiff"
-    if ending == ".hgt" or path.name.lower().endswith(".hgt.gz"):
+    if path.name.lower().endswith((".hgt", ".hgt.gz")):
         return "srtm"
-    if b"OSMHeader" in first[:64]:
-        return "osm_pbf"
-    if first[:2] != b"PK":
-        return None
+    found = next((kind for kind, pattern in _BINARY if pattern.match(first)), None)
+    found = found or (_packed(path) if first[:2] == b"PK" else _text(path, first))
+    if found is None or found in GIVEN_UP:
+        given_up = GIVEN_UP.get(found or ending)
+        raise WorldFileError(
+            f"is {given_up}" if given_up else f"is of no kind that is known; give {FAMILIES}"
+        )
+    return found
+
+
+def _packed(path: Path) -> str:
+    """The kind of a ZIP archive."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = [name.lower() for name in archive.namelist() if not name.endswith("/")]
     except (zipfile.BadZipFile, OSError, ValueError) as error:
         raise WorldFileError("is a damaged ZIP archive; get it again") from error
-    for end, kind in PACKED.items():
-        if any(name.endswith(end) for name in names):
-            return kind
-    held = names[0].rpartition("/")[2][:40] if names else "nothing"
-    raise WorldFileError(f"is a ZIP archive with {held!r}; unpack it and give the file")
+    found = [kind for end, kind in _PACKED.items() if any(name.endswith(end) for name in names)]
+    if not found:
+        held = names[0].rpartition("/")[2][:40] if names else "nothing"
+        raise WorldFileError(f"is a ZIP archive with {held!r}; unpack it and give the file")
+    return found[0]
 
 
 def _text(path: Path, first: bytes) -> str | None:
+    """The kind of a text."""
     if b"\0" in first and not first.startswith(bounded.UTF_16):
         return None
     text = bounded.text_of(first).lstrip("\ufeff\x1e \t\r\n")
-    if text[:1] == "<":
-        root = _XML_ROOT.search(text)
-        return {"osm": "osm", "kml": "kml"}.get(root[1].lower()) if root else None
     if text[:1] in ("{", "["):
         return _json(path)
-    lines = text.splitlines()[:-1] if len(first) == HEAD else text.splitlines()
-    return _of_lines([line.strip() for line in lines if line.strip() and line.lstrip()[0] not in "*#"])
-
-
-def _of_lines(lines: list[str]) -> str | None:
-    """The kind of a text file by its lines, without comments."""
-    word = lines[0].lower().split()[0] if lines else ""
-    if word == "rally":
-        raise WorldFileError("is a list of rally points: places to return to, no obstacles; give the fence")
-    if word in GRID_KEYS and any(line.lower().startswith("ncols") for line in lines[:6]):
-        return "ascii_grid"
-    if word == "type" and "map" in lines[:6]:
-        return "moving_ai"
-    if all(any(line.startswith(key) for line in lines) for key in ("image:", "resolution:")):
-        return "ros_map"
-    if _OPEN_AIR.search("\n".join(lines)):
-        return "openair"
-    fence = len(lines) >= 2 and (lines[0].startswith("QGC WPL") or all(map(_PLACE.match, lines[:20])))
-    return "ardupilot_fence" if fence else None
+    lines = [line.strip() for line in text.splitlines()]
+    text = "\n".join(line for line in lines if line and line[0] not in "*#") + "\n"
+    return next(
+        (kind for kind, pattern in _TEXT if re.search(pattern, text, re.MULTILINE | re.IGNORECASE)), None
+    )
 
 
 def _json(path: Path) -> str | None:
+    """The kind of a JSON file."""
     text = bounded.text_of(bounded.read_bytes(path, bounded.MAX_TREE_BYTES))
-    if '"elements"' in text and "Overpass" in text:
-        raise WorldFileError("is JSON of Overpass; ask it for XML ([out:xml]) and give that")
-    found = next((kind for kind, pattern in _JSON_KINDS if re.search(pattern, text)), None)
+    found = next((kind for kind, pattern in _JSON if re.search(pattern, text)), None)
     if found is None:
         bounded.json_of(path)  # says so where it is no JSON at all
     return found

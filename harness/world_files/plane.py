@@ -19,6 +19,8 @@ from pyproj.exceptions import CRSError
 from harness.world_files.parts import WGS84, FloatArray, WorldFileError
 
 TURN_DEG: Final = 360.0
+METRES: Final = ("m", "metre", "meter", "metres", "meters", "degree")
+"""Units of heights that are metres; of a system in degrees without heights they are metres as well."""
 
 
 class Place(NamedTuple):
@@ -73,20 +75,14 @@ class Mapping:
         return Transformer.from_crs(_system(self.crs or WGS84).to_2d(), plane, always_xy=True)
 
 
-class AxisUnits(NamedTuple):
-    """Units of a coordinate reference system in metres: of heights, None without; of its plane, 1 in degrees."""
-
-    height_m: float | None
-    plane_m: float
-    plane: str
-
-
-def axis_units(name: str) -> AxisUnits:
-    """The units of a coordinate reference system."""
-    axes = _system(name).axis_info
-    height_m = next((float(axis.unit_conversion_factor) for axis in axes if axis.direction == "up"), None)
-    plane_m = 1.0 if in_degrees(name) else float(axes[0].unit_conversion_factor)
-    return AxisUnits(height_m, plane_m, str(axes[0].unit_name))
+def check_metres(crs: str, named: str = "") -> None:
+    """Raises WorldFileError unless heights are metres: by the name of their unit, the vertical system, or the plane."""
+    axes = _system(crs).axis_info
+    unit = named or next((axis.unit_name for axis in axes if axis.direction == "up"), axes[0].unit_name)
+    if unit.strip().lower() not in METRES:
+        raise WorldFileError(
+            f"has heights in {unit[:20]}; make them metres, or give a crs with heights in metres, as EPSG:2263+5703"
+        )
 
 
 def in_degrees(name: str | None) -> bool:

@@ -15,8 +15,8 @@ import numpy as np
 
 from harness.files.zip_archive import DAMAGES, member_path
 from harness.world_files.bounded import read_bytes
-from harness.world_files.parts import FOOT_M, WGS84, Contents, FloatArray, Raster, Reading, WorldFileError
-from harness.world_files.plane import axis_units
+from harness.world_files.parts import WGS84, Contents, Raster, Reading, WorldFileError
+from harness.world_files.plane import check_metres
 
 MAX_CELLS: Final = 60_000_000
 """Most cells of a raster: half a gigabyte of heights."""
@@ -28,12 +28,6 @@ VOIDS: Final = (-9999.0, -32767.0, -32768.0)
 """Values of cells without a height in files that do not say so."""
 HEIGHTS_M: Final = (-12_000.0, 9_000.0)
 """Heights of the ground on earth lie between these."""
-UNITS_M: Final = {
-    **dict.fromkeys(("m", "metre", "meter", "metres", "meters"), 1.0),
-    **dict.fromkeys(("ft", "foot", "feet", "international foot"), FOOT_M),
-    **dict.fromkeys(("us survey foot", "us-ft", "ftus", "us_survey_foot", "foot_us", "sfoot"), 1200 / 3937),
-}
-"""Lengths in metres of the units of height by the names that GDAL writes."""
 
 
 @contextmanager
@@ -51,9 +45,9 @@ def opened(path: Path | str, driver: str) -> Iterator[Any]:
             rasterio.open(path, driver=driver) as source,
         ):
             if source.height * source.width > MAX_CELLS:
+                size = f"{source.height} x {source.width}"
                 raise WorldFileError(
-                    f"has {source.height} x {source.width} cells; must have at most {MAX_CELLS:,}: cut the area of "
-                    "interest out of it"
+                    f"has {size} cells; must have at most {MAX_CELLS:,}: cut the area out of it"
                 )
             yield source
     except WorldFileError:
@@ -64,30 +58,29 @@ def opened(path: Path | str, driver: str) -> Iterator[Any]:
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads a raster of one band of heights; an SRTM tile may be packed as .zip or .gz."""
+    """Reads a raster of one band of heights in metres; an SRTM tile may be packed as .zip or .gz."""
     read_bytes(path, first=1)
-    notes: list[str] = []
+    notes: tuple[str, ...] = ()
     with opened(*_inside(path)) as source:
         _check_bands(source)
         if source.driver == "AAIGrid":
             _check_grid(path, source.height * source.width)
         band = source.read(1, masked=True)
-        values = band.data.astype(np.float64)
+        values = band.data.astype(np.float64) * source.scales[0] + source.offsets[0]
         values[np.ma.getmaskarray(band) | np.isin(band.data, VOIDS)] = np.nan
         affine = _placed(source)
-        crs = reading.crs or _crs(source, affine)
-        if crs is None and source.driver != "AAIGrid":
+        if (crs := reading.crs or _crs(source, affine)) is not None:
+            check_metres(crs, source.units[0] or "")
+        elif source.driver != "AAIGrid":
             raise WorldFileError("names no coordinate reference system; give crs, as EPSG:32632")
-        if crs is None:
-            scale = 1.0 if reading.metres_per_cell is None else reading.metres_per_cell / affine[0]
-            affine = tuple(scale * each for each in affine)  # type: ignore[assignment]
-            notes.append("names no place on earth: its metres are taken as they are (crs, metres_per_cell)")
         else:
-            notes += _to_metres(values, source, crs)
+            scale = (reading.metres_per_cell or affine[0]) / affine[0]
+            affine = tuple(scale * each for each in affine)  # type: ignore[assignment]
+            notes = ("names no place on earth: its metres are taken as they are (crs, metres_per_cell)",)
     values[(values <= HEIGHTS_M[0]) | (values >= HEIGHTS_M[1])] = np.nan
     if np.isnan(values).all():
         raise WorldFileError("has no cell with a height between -12000 and 9000 m; must be terrain")
-    return Contents("raster", crs, terrain=Raster(values, affine), notes=tuple(notes))
+    return Contents("raster", crs, terrain=Raster(values, affine), notes=notes)
 
 
 def _inside(path: Path) -> tuple[Path | str, str]:
@@ -125,9 +118,7 @@ def _check_bands(source: Any) -> None:
 
     others = [each for each in source.colorinterp[1:] if each is not ColorInterp.alpha]
     if others or source.colorinterp[0] is ColorInterp.palette:
-        raise WorldFileError(
-            f"has {source.count} bands or a palette, an image; must have one band, of heights"
-        )
+        raise WorldFileError(f"has {source.count} bands or a palette; must have one band, of heights")
 
 
 def _crs(source: Any, affine: tuple[float, ...]) -> str | None:
@@ -137,28 +128,6 @@ def _crs(source: Any, affine: tuple[float, ...]) -> str | None:
         return str(system.to_wkt())
     degrees = affine[0] < 0.1 and 0.0 < abs(affine[2]) <= 180.0 and abs(affine[5]) <= 90.0
     return WGS84 if degrees and source.driver == "AAIGrid" else None
-
-
-def _to_metres(values: FloatArray, source: Any, crs: str) -> list[str]:
-    """Makes a raster's numbers heights in metres, in place, and says what was done."""
-    named = (source.units[0] or "").strip().lower()
-    if named and named not in UNITS_M:
-        raise WorldFileError(
-            f"has heights in {named[:20]!r}, which is no unit that is known; make them metres"
-        )
-    units = axis_units(crs)
-    unit_m = UNITS_M[named] if named else units.height_m or 1.0
-    factor, offset_m = source.scales[0] * unit_m, source.offsets[0] * unit_m
-    if factor == 0.0 or not math.isfinite(factor + offset_m):
-        raise WorldFileError("has a scale or an offset of its heights that is no number")
-    if (factor, offset_m) == (1.0, 0.0):
-        unclear = not named and units.height_m is None and units.plane_m != 1.0
-        told = f"its heights name no unit: taken as metres, although its plane is in {units.plane}"
-        return [told] if unclear else []
-    values *= factor
-    values += offset_m
-    more = f" plus {offset_m:g} m" if offset_m else ""
-    return [f"its heights are its numbers times {factor:.6g}{more}, as it says"]
 
 
 def _placed(source: Any) -> tuple[float, float, float, float, float, float]:

@@ -45,27 +45,32 @@ def written(path: Path, text: str) -> Path:
 @pytest.mark.parametrize(
     ("how", "metres"),
     [
-        ({"units": ("ft",)}, 1000 * FOOT_M),
-        ({"units": ("US survey foot",)}, 1000 * 1200 / 3937),
+        ({"units": ("ft",)}, None),
         ({"units": ("metre",)}, 1000.0),
         ({"scales": (0.1,), "offsets": (-50.0,)}, 50.0),
-        ({"crs": "EPSG:26916+6360"}, 1000 * 1200 / 3937),
+        ({"crs": "EPSG:26916+6360"}, None),
+        ({"crs": "EPSG:2263"}, None),
         ({"crs": "EPSG:32632+5773"}, 1000.0),
-        ({"dtype": "float64", "units": ("ft",)}, 1000 * FOOT_M),
     ],
 )
-def test_a_geotiffs_heights_are_in_its_own_unit(how: dict[str, Any], metres: float, tmp_path: Path) -> None:
+def test_a_geotiffs_heights_are_metres_or_it_is_refused(
+    how: dict[str, Any], metres: float | None, tmp_path: Path
+) -> None:
     rasterio = pytest.importorskip("rasterio")
-    path, kind = tmp_path / "a.tif", how.get("dtype", "int16")
-    profile = {"driver": "GTiff", "height": 4, "width": 5, "count": 1, "dtype": kind, "nodata": -32768}
+    path = tmp_path / "a.tif"
+    profile = {"driver": "GTiff", "height": 4, "width": 5, "count": 1, "dtype": "int16", "nodata": -32768}
     place = rasterio.transform.from_origin(400_000.0, 5_200_000.0, 10.0, 10.0)
-    heights = np.full((4, 5), 1000, dtype=kind)
+    heights = np.full((4, 5), 1000, dtype="int16")
     heights[1, 2] = -32768
     with rasterio.open(path, "w", crs=how.get("crs", "EPSG:32632"), transform=place, **profile) as file:
         file.write(heights, 1)
         for name in ("units", "scales", "offsets"):
             if name in how:
                 setattr(file, name, how[name])
+    if metres is None:
+        with pytest.raises(WorldFileError, match="has heights in (ft|US survey foot); make them metres"):
+            read_any(path)
+        return
     terrain = read_any(path).terrain
     assert terrain is not None
     assert terrain.values[0, 0] == pytest.approx(metres)
@@ -235,7 +240,6 @@ def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_
         "a": floor(measuredHeight=12.5),
         "b": floor(),
         "c": floor("MultiLineString"),
-        "d": floor(b3_h_dak_max=21.5),
     }
     path = written(
         tmp_path / "a.city.json", json.dumps(city("urn:ogc:def:crs:EPSG::7415", objects, SQUARE_M))
@@ -244,7 +248,6 @@ def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_
     assert [(part.name, part.bottom, part.top) for part in found.parts] == [
         ("a", Limit(7.0), Limit(19.5)),
         ("b", Limit(7.0), Limit(13.0)),
-        ("d", Limit(7.0), Limit(21.5)),
     ]
     assert found.crs == "EPSG:7415"
     assert any("1 building without height" in note for note in found.notes)
@@ -372,38 +375,22 @@ def test_openstreetmap_that_osmium_would_pass_over_is_refused(
         read_any(written(tmp_path / "a.osm", f'<osm version="0.6">{body}</osm>'))
 
 
-FOOT_US_M = 1200 / 3937
-
-
-@pytest.mark.parametrize(
-    ("crs", "given", "unit_m", "note"),
-    [
-        ("EPSG::2263", None, FOOT_US_M, "its heights name no unit: taken in US survey foot, as its plane"),
-        ("EPSG::7415", None, 1.0, None),
-        ("EPSG::7415", "EPSG:2263+6360", FOOT_US_M, "its heights are its numbers times 0.304801, as it says"),
-        ("EPSG::7415", "EPSG:2263+5703", 1.0, None),
-    ],
-)
-def test_heights_of_a_city_are_in_the_unit_of_its_system(
-    crs: str, given: str | None, unit_m: float, note: str | None, tmp_path: Path
-) -> None:
+def test_a_city_is_in_metres_and_its_templates_are_told(tmp_path: Path) -> None:
     vertices = [[x, y, z] for z in (10.0, 40.0) for x, y in ((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0))]
     shape = {"type": "MultiSurface", "lod": "1", "boundaries": [[[0, 1, 2, 3]], [[4, 5, 6, 7]]]}
-    instance = {
-        "type": "GeometryInstance",
-        "template": 0,
-        "boundaries": [0],
-        "transformationMatrix": [1] * 16,
-    }
+    instance = {"type": "GeometryInstance", "template": 0, "boundaries": [0]}
     objects = {
-        "a": {"type": "Building", "geometry": [shape]},
-        "b": {"type": "Building", "geometry": [instance]},
+        name: {"type": "Building", "geometry": [each]} for name, each in (("a", shape), ("b", instance))
     }
-    text = json.dumps(city(f"urn:ogc:def:crs:{crs}", objects, vertices))
-    found = read_any(written(tmp_path / "a.json", text), crs=given)
+    path = written(tmp_path / "a.json", json.dumps(city("urn:ogc:def:crs:EPSG::2263", objects, vertices)))
+    with pytest.raises(
+        WorldFileError, match="has heights in US survey foot; make them metres, or give a crs"
+    ):
+        read_any(path)
+    found = read_any(path, crs="EPSG:2263+5703")
     (part,) = found.parts
-    assert (part.bottom.height_m, part.top.height_m) == pytest.approx((10 * unit_m, 40 * unit_m))
-    assert found.notes == (*((note,) if note else ()), "passed over: 1 GeometryInstance")
+    assert (part.bottom.height_m, part.top.height_m) == (10.0, 40.0)
+    assert found.notes == ("passed over: 1 GeometryInstance",)
 
 
 @pytest.mark.parametrize(
