@@ -85,11 +85,7 @@ def _beside(others: Mapping[str, int]) -> list[str]:
 
 
 def read_csv(text: str, source: str) -> PathAsRead:
-    """The path of a CSV file: a header, and a point a row; blank lines and comments after # are passed over.
-
-    Raises:
-        InputError: it is none.
-    """
+    """The path of a CSV file: a header, and a point a row; blank lines and comments after # are passed over."""
     (line, header), *filled = _filled(text, source) or [(1, [])]
     header = [name.strip().lower() for name in header]
     names, heights = _columns(header, f"{source}:{line}")
@@ -145,11 +141,7 @@ class _Shape(NamedTuple):
 
 
 def read_geojson(text: str, source: str) -> PathAsRead:
-    """The path of a GeoJSON file: its one LineString.
-
-    Raises:
-        InputError: it is none, or holds no LineString or several.
-    """
+    """The path of a GeoJSON file: its one LineString."""
     shapes = list(_shapes(parsed_json(text, source), source, "", None))
     lines = [shape for shape in shapes if shape.kind == "LineString"]
     if len(lines) != 1:
@@ -211,11 +203,7 @@ def _places(coordinates: Any, where: str) -> list[Point]:
 
 
 def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
-    """The path of a KML file: its one LineString or gx:Track, with the altitudes that their mode gives a meaning.
-
-    Raises:
-        InputError: it is none, or holds no line or several.
-    """
+    """The path of a KML file: its one LineString or gx:Track, with the altitudes that their mode gives a meaning."""
     found = kml.read_kml(data, source, most)
     source = found.source
     if len(found.lines) != 1:
@@ -235,11 +223,7 @@ def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
 
 
 def read_gpx(text: str, source: str) -> PathAsRead:
-    """The path of a GPX file: its one track, else its one route; waypoints are passed over.
-
-    Raises:
-        InputError: it is none, or holds no track and no route, or several.
-    """
+    """The path of a GPX file: its one track, else its one route; waypoints are passed over."""
     root = kml.parsed_xml(text.encode(), source, "gpx")
     tracks, routes = list(kml.named(root, "trk")), list(kml.named(root, "rte"))
     lines, kind, tag = (tracks, "track", "trkpt") if tracks else (routes, "route", "rtept")

@@ -59,9 +59,6 @@ def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
     """A run as a file of another tool, and what its user should know, a sentence each.
 
     In one of `FORMATS`: what was flown, or of every plan what was in effect.
-
-    Raises:
-        RunFolderError: the run has no such path.
     """
     path = _path_of(run, what)
     if len(path.degrees) < 2:

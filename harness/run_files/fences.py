@@ -48,11 +48,7 @@ class Fences:
 
 
 def in_plane(fences: Fences, plane: Callable[[Place], Place], source: str) -> Fences:
-    """Fences in the local plane, their rings without repeated and closing points.
-
-    Raises:
-        InputError: one encloses no area, or crosses itself, or several have no place in common.
-    """
+    """Fences in the local plane, their rings without repeated and closing points."""
     clean = replace(fences, every=tuple(_checked(fence.moved(plane), source) for fence in fences.every))
     if clean.allowed is not None and clean.allowed.is_empty:
         names = ", ".join(fence.name for fence in clean.inclusions)

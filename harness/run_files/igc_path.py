@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
-import math
 import re
 from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from harness.files.input_file import InputError
 from harness.run_files.drawn_lines import PathAsRead
@@ -21,6 +23,7 @@ DATE: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)
 EARTH_M: Final = 6_371_000.0
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 
+FloatArray = NDArray[np.float64]
 Fix = dict[str, Any]
 """A fix as aerofiles has it."""
 
@@ -31,44 +34,66 @@ def read_igc(text: str, source: str) -> PathAsRead:
     Where the logger has no GNSS altitude (0 or no 3-D fix), all of it is at the pressure altitude.
     """
     fixes, broken = igc_fixes(text, source)
-    placed = [fix for fix in fixes if abs(fix["lat"]) > 1e-9 or abs(fix["lon"]) > 1e-9]
-    right = _without_leaps(placed)
-    moving = [k for k in range(1, len(right)) if _speed_mps(right[k - 1], right[k]) >= FLYING_MPS]
-    flown = right[moving[0] - 1 : moving[-1] + 1] if moving else []
+    rows = np.array([_row(fix) for fix in fixes], dtype=np.float64).reshape(-1, 5)
+    placed = rows[np.abs(rows[:, :2]).max(axis=1) > 1e-9]
+    first, second = placed[:-1], placed[1:]
+    leaps, over = _leaps(first, second), _leaps(placed[:-2], placed[2:])
+    right = placed[~np.pad(leaps[:-1] & leaps[1:] & ~over, 1)] if len(placed) > 2 else placed
+    moving = np.flatnonzero(
+        _away_m(right[:-1], right[1:]) >= FLYING_MPS * np.maximum(np.diff(right[:, 4]), 1e-9)
+    )
+    flown = right[moving[0] : moving[-1] + 2] if len(moving) else right[:0]
     if len(flown) < 2:
         raise InputError(f"{source}: has {len(fixes)} fixes, none of them in flight; must be a flight")
-    known, kind, note = _with_altitude(flown)
+    altitudes, note = flown[:, 2], "GNSS altitudes of the logger taken as above the sea"
+    if (altitudes == 0).any() and (flown[:, 3] != 0).any():
+        altitudes, note = flown[:, 3], "pressure altitudes of the logger taken as above the sea"
+        known = np.full(len(flown), True)
+    else:
+        known = altitudes != 0
+    if known.sum() < 2:
+        known, altitudes, note = ~known | known, altitudes[:0], "its logger has no altitudes"
     counts = {
-        "fixes without an altitude passed over: the logger has no barometer": len(flown) - len(known),
+        "fixes without an altitude passed over: the logger has no barometer": len(flown) - int(known.sum()),
         "B records that cannot be read passed over": broken,
         "fixes too far from both neighbours passed over": len(placed) - len(right),
         "fixes on the ground not flown": len(right) - len(flown),
-        "fixes without a position passed over": len(fixes) - len(placed),
+        "fixes without a position passed over": len(rows) - len(placed),
     }
+    notes = (note, *(f"{count} {what}" for what, count in counts.items() if count))
+    places = ((latitude, longitude) for latitude, longitude in flown[known, :2].tolist())
     return PathAsRead(
-        False,
-        tuple((float(fix["lat"]), float(fix["lon"])) for fix in known),
-        tuple(float(fix[kind] or 0.0) for fix in known) if kind else (),
-        notes=(note, *(f"{count} {what}" for what, count in counts.items() if count)),
+        False, tuple(places), tuple(altitudes[known].tolist()) if len(altitudes) else (), notes=notes
     )
 
 
-def _with_altitude(flown: list[Fix]) -> tuple[list[Fix], str, str]:
-    """The fixes that have the altitude they are flown at, its key, and what is said of it."""
-    known = [fix for fix in flown if fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V"]
-    if len(known) < len(flown) and any(fix["pressure_alt"] for fix in flown):
-        return flown, "pressure_alt", "pressure altitudes of the logger taken as above the sea"
-    if len(known) < 2:
-        return flown, "", "its logger has no altitudes"
-    return known, "gps_alt", "GNSS altitudes of the logger taken as above the sea"
+def _row(fix: Fix) -> tuple[float, ...]:
+    """Latitude, longitude, GNSS altitude or 0 without a 3-D fix, pressure altitude or 0, and time (s) of a fix."""
+    height = 0.0 if fix.get("validity") == "V" else fix["gps_alt"] or 0.0
+    return fix["lat"], fix["lon"], height, fix["pressure_alt"] or 0.0, fix["datetime"].timestamp()
+
+
+def _away_m(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Distances over the ground from fixes to others."""
+    north, east = np.radians((after - before)[:, :2]).T
+    east = np.remainder(east + np.pi, 2.0 * np.pi) - np.pi
+    away: FloatArray = EARTH_M * np.hypot(north, east * np.cos(np.radians(after[:, 0])))
+    return away
+
+
+def _leaps(before: FloatArray, after: FloatArray) -> NDArray[np.bool_]:
+    """Whether no glider gets from fixes to others in the time between them."""
+    elapsed = after[:, 4] - before[:, 4]
+    rise = np.where(
+        before[:, 2] * after[:, 2] != 0, after[:, 2] - before[:, 2], 0.0
+    )  # 0: the logger has none
+    fast = (_away_m(before, after) > FASTEST_MPS * elapsed) | (np.abs(rise) > STEEPEST_MPS * elapsed)
+    found: NDArray[np.bool_] = fast & (elapsed > 0.0)
+    return found
 
 
 def igc_fixes(text: str, source: str) -> tuple[list[Fix], int]:
-    """The fixes of a file, and how many more cannot be read.
-
-    Raises:
-        InputError: it is no IGC file, most of it cannot be read, or aerofiles is not installed.
-    """
+    """The fixes of a file, and how many more cannot be read."""
     try:
         from aerofiles.igc import Reader
     except ImportError as error:
@@ -88,31 +113,3 @@ def igc_fixes(text: str, source: str) -> tuple[list[Fix], int]:
             f"most {MOST_BROKEN:.0%}"
         )
     return list(fixes), len(broken)
-
-
-def _without_leaps(fixes: list[Fix]) -> list[Fix]:
-    """The fixes without those that are too far from both their neighbours, which are not too far from each other."""
-    kept = fixes[:1]
-    for fix, after in zip(fixes[1:], [*fixes[2:], None], strict=True) if fixes else ():
-        out = after is not None and _leaps(fix, after) and not _leaps(kept[-1], after)
-        if not (out and _leaps(kept[-1], fix)):
-            kept.append(fix)
-    return kept
-
-
-def _leaps(before: Fix, after: Fix) -> bool:
-    """Whether no glider gets from one fix to another in the time between them."""
-    elapsed_s = (after["datetime"] - before["datetime"]).total_seconds()
-    ends = before["gps_alt"], after["gps_alt"]
-    rise_m = ends[1] - ends[0] if all(ends) else 0.0  # 0: the logger has none
-    steep = abs(rise_m) > STEEPEST_MPS * elapsed_s
-    return elapsed_s > 0 and (_speed_mps(before, after) > FASTEST_MPS or steep)
-
-
-def _speed_mps(before: Fix, after: Fix) -> float:
-    """Ground speed between two fixes."""
-    north = math.radians(after["lat"] - before["lat"])
-    east = math.radians(math.remainder(after["lon"] - before["lon"], 360.0))
-    elapsed_s = (after["datetime"] - before["datetime"]).total_seconds()
-    away_m = EARTH_M * math.hypot(north, east * math.cos(math.radians(after["lat"])))
-    return away_m / elapsed_s if elapsed_s > 0 else 0.0

@@ -23,8 +23,8 @@ from harness.run_files.drawn_lines import PathAsRead, read_csv, read_geojson, re
 from harness.run_files.fences import Fences, in_plane
 from harness.run_files.given_path import SAME_PLACE_M, FloatArray
 from harness.run_files.igc_path import read_igc
-from harness.run_files.mission.mission_files import MissionAsRead, read_plan, read_waypoints
-from harness.run_files.mission.program import Program, program
+from harness.run_files.mission.mission_files import read_plan, read_waypoints
+from harness.run_files.mission.program import Program
 from harness.scenario.sections import ALTITUDES_M
 
 MAX_BYTES: Final = 64_000_000
@@ -38,7 +38,7 @@ LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
 }
 """Readers of drawn lines and recorded tracks by the ending of a file's name."""
 KML: Final = (".kml", ".kmz")
-MISSIONS: Final[dict[str, Callable[[str, str], MissionAsRead]]] = {
+MISSIONS: Final[dict[str, Callable[[str, str], Program]]] = {
     ".plan": read_plan,
     ".mission": read_plan,
     ".waypoints": read_waypoints,
@@ -102,7 +102,7 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
         text = decoded(data, source, "a path")
         mission = _mission_reader(text, suffix)
         if mission is not None:
-            return _of_mission(mission(text, source), origin_deg)
+            return _of_mission(mission(text, source), source, origin_deg)
         found = LINES[suffix](text, source)
     if len(found.positions) < 2:
         raise InputError(f"{path}: has {counted(len(found.positions), 'point')}; a path has at least 2")
@@ -115,7 +115,7 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
     return PathAsGiven(source, points, origin, altitudes, found.above_ground, None, fences, found.notes)
 
 
-def _mission_reader(text: str, suffix: str) -> Callable[[str, str], MissionAsRead] | None:
+def _mission_reader(text: str, suffix: str) -> Callable[[str, str], Program] | None:
     """The reader of a mission, told by what stands in it, else by its name; None of a drawn line."""
     if text.startswith(WPL):
         return read_waypoints
@@ -124,29 +124,22 @@ def _mission_reader(text: str, suffix: str) -> Callable[[str, str], MissionAsRea
     return MISSIONS.get(suffix)
 
 
-def _of_mission(found: MissionAsRead, origin_deg: Place | None) -> PathAsGiven:
-    source, flown = found.source, program(found)
+def _of_mission(flown: Program, source: str, origin_deg: Place | None) -> PathAsGiven:
     placed = [(f"item {step.item}", step.position) for step in flown.steps if step.position is not None]
     names, positions = zip(*placed, strict=True)
     origin, place = _plane(positions, names, origin_deg, source)
     points = np.array([place(position) for position in positions])
     _check_span(points, source)
     steps = tuple(replace(step, position=step.position and place(step.position)) for step in flown.steps)
-    notes = found.notes
-    if found.home is None and any(step.height_m is not None and step.above == HOME for step in flown.steps):
+    notes, fences = flown.notes, _fences(flown.fences, origin, place, source)
+    if not flown.has_home and any(step.height_m is not None and step.above == HOME for step in flown.steps):
         notes = (*notes, "has no home: altitudes above home are counted from the sea")
-    fences = _fences(found.fences, origin, place, source)
-    return PathAsGiven(
-        source, points, origin, mission=replace(flown, steps=steps), fences=fences, notes=notes
-    )
+    mission = replace(flown, steps=steps)
+    return PathAsGiven(source, points, origin, mission=mission, fences=fences, notes=notes)
 
 
 def given_points(points: Any) -> PathAsGiven:
-    """A drawn path from points in the local plane, (n, 2) or with altitudes above the sea (n, 3), in metres.
-
-    Raises:
-        InputError: they are no such array, not finite, too far, or all in one place.
-    """
+    """A drawn path from points in the local plane, (n, 2) or with altitudes above the sea (n, 3), in metres."""
     try:
         array = np.array(points, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -207,9 +200,8 @@ def _check_span(points: FloatArray, source: str) -> None:
     with np.errstate(over="ignore"):
         reach = max(float(np.ptp(points, axis=0).max()), float(np.abs(points).max()))
     if reach > MAX_SPAN_M:
-        raise InputError(
-            f"{source}: reaches {reach / 1e3:,.6g} km; must stay within {MAX_SPAN_M / 1e3:.0f} km of its origin"
-        )
+        most = f"{MAX_SPAN_M / 1e3:.0f} km"
+        raise InputError(f"{source}: reaches {reach / 1e3:,.6g} km; must stay within {most} of its origin")
 
 
 def _fences(fences: Fences, origin: Place | None, place: Callable[[Place], Place], source: str) -> Fences:

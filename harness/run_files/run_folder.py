@@ -243,11 +243,7 @@ def _there(path: Path) -> None:
 
 
 def recording_of(path: Path) -> Path:
-    """The recording in a run folder, whose run may be incomplete.
-
-    Raises:
-        RunFolderError: there is none, or it is not the one that the run wrote.
-    """
+    """The recording in a run folder, whose run may be incomplete."""
     recording = path / RECORDING
     if not recording.is_file():
         _there(path)

@@ -34,11 +34,7 @@ def uncollected() -> Iterator[None]:
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> bytes:
-    """The bytes of a regular file of at most `most` bytes, or only the first ones.
-
-    Raises:
-        WorldFileError: it cannot be read or is too large.
-    """
+    """The bytes of a regular file of at most `most` bytes, or only the first ones."""
     try:
         with open_regular(path) as file:
             too_large = path.stat().st_size > most
@@ -54,11 +50,7 @@ def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> b
 
 
 def text_of(data: bytes) -> str:
-    """The text of some bytes: UTF-8 or UTF-16 that says so, else Latin-1.
-
-    Raises:
-        WorldFileError: they are no text.
-    """
+    """The text of some bytes: UTF-8 or UTF-16 that says so, else Latin-1."""
     if data.startswith(UTF_16):
         return data.decode("utf-16", "replace")
     if b"\0" in data:
@@ -70,12 +62,7 @@ def text_of(data: bytes) -> str:
 
 
 def json_of(path: Path, lines: bool = False) -> Any:
-    """The content of a JSON file; where `lines`, a list of JSON texts, as they may stand one a line.
-
-    Raises:
-        InputError: it is not JSON; the text names no file.
-        WorldFileError: it is too large.
-    """
+    """The content of a JSON file; where `lines`, a list of JSON texts, as they may stand one a line."""
     text = text_of(read_bytes(path, MAX_TREE_BYTES))
     first, _, more = text.lstrip().partition("\n")
     if lines and first.rstrip().endswith("}") and more.lstrip().startswith("{"):

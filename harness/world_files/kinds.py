@@ -104,11 +104,7 @@ _JSON: Final = (
 
 
 def read(path: Path, kind: str | None, reading: Reading) -> Contents:
-    """Reads a world file of a kind of `KINDS`; without one, or with one of `GROUPS`, it is told from the file.
-
-    Raises:
-        WorldFileError: it is of none of the kinds, or cannot be used.
-    """
+    """Reads a world file of a kind of `KINDS`; without one, or with one of `GROUPS`, it is told from the file."""
     try:
         found = kind if kind in KINDS else kind_of(path)
         if kind in GROUPS and found not in GROUPS[kind]:

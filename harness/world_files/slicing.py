@@ -50,11 +50,7 @@ class KnownGround:
 def sliced_parts(
     parts: Sequence[Part], mapping: Mapping, band: HeightBand, ground: KnownGround, box: Box
 ) -> list[Solid]:
-    """What of the parts of one file is solid in a band, in the plane and near a box.
-
-    Raises:
-        WorldFileError: a limit above ground decides, and the ground is not known there.
-    """
+    """What of the parts of one file is solid in a band, in the plane and near a box."""
     if not parts:
         return []
     shapes = mapping.geometries(np.array([part.footprint for part in parts], dtype=object))

@@ -6,16 +6,17 @@ The plan's format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 from harness.files.input_file import InputError
 from harness.files.mavlink import commands
 from harness.files.mavlink.fences import item_fences, plan_fences
-from harness.files.mavlink.items import COMMENT, FRAMES, MISSION, SEA, WPL, Item, filled, wpl_items
+from harness.files.mavlink.items import FRAMES, MISSION, SEA, WPL, Item, filled, wpl_items
 from harness.files.values import finite, listed, numbers, parsed_json, shown, whole
 from harness.files.wording import counted
 from harness.run_files.fences import Fences
+from harness.run_files.mission.program import Program, program
 
 LANDING_PATTERNS: Final = {"fwLandingPattern": commands.LAND, "vtolLandingPattern": commands.VTOL_LAND}
 """Complex items that are written as a place to descend at and a place to land."""
@@ -23,44 +24,17 @@ TRANSECTS: Final = "TransectStyleComplexItem"
 """The mapping in which a survey has its items."""
 RELATIVE, ABSOLUTE = 3, 0
 """MAV_FRAME of altitudes above home and above the sea."""
-RALLY: Final = "RALLY"
-"""First word of every line of a list of rally points of MAVProxy."""
 MOST_TOLD: Final = 10
 """Numbers of items that a note has at most."""
 PLACE: Final = "[latitude, longitude, altitude]"
-Keys = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class MissionAsRead:
-    """A mission as its file has it.
-
-    Attributes:
-        source: the file, for faults.
-        items: in order.
-        home: latitude and longitude; None where the file has none.
-        home_altitude_m: above mean sea level.
-        fences: that come with it.
-        notes: on what else does, a line each.
-    """
-
-    source: str
-    items: tuple[Item, ...]
-    home: tuple[float, float] | None
-    home_altitude_m: float
-    fences: Fences
-    notes: tuple[str, ...] = ()
+Home = Sequence[float | None]
+"""Latitude, longitude and altitude of home; None each where the file does not say."""
 
 
 def _mission(
-    source: str,
-    items: Sequence[Item],
-    home: Sequence[float | None],
-    fences: Fences,
-    rally: int,
-    notes: list[str],
-) -> MissionAsRead:
-    """A mission with what is to be said of items that wait and of rally points; home is a place and an altitude."""
+    source: str, items: Sequence[Item], home: Home, fences: Fences, rally: int, notes: list[str]
+) -> Program:
+    """A mission with what is to be said of items that wait and of rally points."""
     waiting = [str(each.number) for each in items if each.autocontinue_off and each.command in commands.FLOWN]
     if waiting:
         told = ", ".join(waiting[:MOST_TOLD]) + (", ..." if len(waiting) > MOST_TOLD else "")
@@ -71,48 +45,45 @@ def _mission(
     if rally:
         told = "a return to launch is flown to home, not to the nearest of them"
         notes.append(f"{counted(rally, 'rally point')} passed over: {told}")
-    latitude, longitude, altitude = home
-    place = None if latitude is None or longitude is None else (latitude, longitude)
-    return MissionAsRead(source, tuple(items), place, altitude or 0.0, fences, tuple(notes))
+    return replace(program(source, items, _place(home), home[2] or 0.0), fences=fences, notes=tuple(notes))
 
 
-def read_waypoints(text: str, source: str) -> MissionAsRead:
+def _place(home: Home) -> tuple[float, float] | None:
+    latitude, longitude, _ = home
+    return None if latitude is None or longitude is None else (latitude, longitude)
+
+
+def read_waypoints(text: str, source: str) -> Program:
     """The mission of a plain-text file; its first item is home if it is a waypoint.
 
     A waypoint above home that has another number than 0 is no home. Items of fences that stand among those of the
     mission are fences; rally points are counted.
-
-    Raises:
-        InputError: it is none.
     """
-    lines = text.splitlines()
-    if not lines or not lines[0].startswith(WPL):
-        raise InputError(f'{source}:1: {_meant(lines)}must begin with "{WPL} 110"')
-    items = wpl_items(text, source)
-    if not items:
-        raise InputError(f"{source}: has no items; the first is home, the others are the path")
+    if not text.startswith(WPL):
+        raise InputError(
+            f'{source}:1: must begin with "{WPL} 110" (of fences and rally points alone there is no mission to check)'
+        )
     notes: list[str] = []
-    items = _numbered(items, notes)
-    home: Sequence[float | None] = (None, None, None)
-    if _is_home(items[0]):
+    items = _numbered(wpl_items(text, source), notes)
+    home: Home = (None, None, None)
+    if items and _is_home(items[0]):
         first, *items = items
         home = (*(first.position or (None, None)), first.params[6])
         if FRAMES.get(first.frame, SEA) != SEA and home[2]:
             told = f"its altitude, {home[2]:g} m, is taken as above the sea"
-            notes.append(
-                f"its first item is home, as autopilots have it, though of frame {first.frame}: {told}"
-            )
+            notes.append(f"its first item is home, though of frame {first.frame}: {told}")
     flown = [item for item in items if item.command not in commands.APART]
     rally = sum(item.command == commands.RALLY_POINT for item in items)
     if not flown and items:
-        many = len(items) - rally
-        held = [f"a fence of {counted(many, 'item')}"] * bool(many) + [counted(rally, "rally point")] * bool(
-            rally
+        kinds = (len(items) - rally, "fence item"), (rally, "rally point")
+        held = " and ".join(counted(each, name) for each, name in kinds if each)
+        raise InputError(
+            f"{source}: has no items to fly to, but {held}; `wayproof world` takes fences, and `check` takes "
+            "them beside a mission"
         )
-        told = "`wayproof world` takes fences, and `check` takes them beside a mission"
-        raise InputError(f"{source}: has no items to fly to, but {' and '.join(held)}; {told}")
-    place = None if home[0] is None or home[1] is None else (home[0], home[1])
-    return _mission(source, flown, home, Fences(item_fences(items, place), inside_all=True), rally, notes)
+    return _mission(
+        source, flown, home, Fences(item_fences(items, _place(home)), inside_all=True), rally, notes
+    )
 
 
 def _is_home(first: Item) -> bool:
@@ -128,7 +99,7 @@ def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
     """
     numbers = [item.number for item in items]
     twice = len(set(numbers)) < len(numbers)
-    gaps = numbers != list(range(numbers[0], numbers[0] + len(numbers)))
+    gaps = bool(numbers) and numbers != list(range(numbers[0], numbers[0] + len(numbers)))
     if not twice and not (gaps and any(item.command == commands.JUMP for item in items)):
         return items
     told = "come twice" if twice else "are left out"
@@ -136,26 +107,11 @@ def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
     return [replace(item, number=number) for number, item in enumerate(items)]
 
 
-def _meant(lines: list[str]) -> str:
-    """What a text is that is no mission, where that can be told."""
-    words = [cells for line in lines if (cells := line.partition(COMMENT)[0].split())]
-    if words and words[0][0] == RALLY:
-        return "is a list of rally points, which no mission flies to; a mission "
-    if len(words) > 3 and all(len(cells) == 2 for cells in words):
-        return "looks like a fence, which `wayproof world` takes; a mission "
-    return ""
-
-
-def read_plan(text: str, source: str) -> MissionAsRead:
-    """The mission of a .plan, with its fences.
-
-    Raises:
-        InputError: it is none.
-    """
+def read_plan(text: str, source: str) -> Program:
+    """The mission of a .plan, with its fences; Mission Planner's has no `fileType`."""
     plan = parsed_json(text, source)
     mission = plan.get("mission") if isinstance(plan, dict) else None
-    kinds = ("Plan", None) if isinstance(mission, dict) else ("Plan",)  # Mission Planner leaves it open
-    if not isinstance(plan, dict) or plan.get("fileType") not in kinds:
+    if not isinstance(plan, dict) or plan.get("fileType") not in ("Plan", None if mission else "Plan"):
         raise InputError(f'{source}: is not a plan of QGroundControl; must have "fileType": "Plan"')
     if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
         raise InputError(f"{source}: mission.items: is missing; it is required")
@@ -167,15 +123,14 @@ def read_plan(text: str, source: str) -> MissionAsRead:
     if len({item.number for item in items}) < len(items):
         items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
         notes.append("a doJumpId is there twice: items are counted from 1 instead")
-    geofence, rally = plan.get("geoFence"), plan.get("rallyPoints")
+    geofence, rally = plan.get("geoFence") or {}, plan.get("rallyPoints") or {}
     fences = Fences(plan_fences(geofence, f"{source}: "), commands.inside_all(mission.get("firmwareType")))
-    if (geofence or {}).get("breachReturn") is not None:
+    if geofence.get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
-    points = rally.get("points") if isinstance(rally, dict) else None
-    return _mission(source, items, home, fences, len(points) if isinstance(points, list) else 0, notes)
+    return _mission(source, items, home, fences, len(rally.get("points") or ()), notes)
 
 
-def _home(home: Any, where: str, notes: list[str]) -> Sequence[float | None]:
+def _home(home: Any, where: str, notes: list[str]) -> Home:
     """Place and altitude of home; QGroundControl writes null for what it does not know."""
     if home is None or home == [None, None, None]:
         return None, None, None
@@ -189,9 +144,9 @@ def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
     """The simple items that an item of a plan stands for; what it is without any goes into the notes."""
     if not isinstance(item, dict):
         raise InputError(f"{where}: must be a mission item")
-    if item.get("type") == "SimpleItem" or (item.get("type") is None and item.get("command") is not None):
+    if item.get("type", "SimpleItem") in ("SimpleItem", None) and not item.get("complexItemType"):
         return [_simple(item, where, number)]
-    kind = shown(str(item.get("complexItemType") or item.get("type") or "without a type"))
+    kind = shown(str(item.get("complexItemType") or item.get("type")))
     if kind in LANDING_PATTERNS:
         return _landing(item, where, number, LANDING_PATTERNS[kind])
     inner, where = (item[TRANSECTS], f"{where}.{TRANSECTS}") if TRANSECTS in item else (item, where)
@@ -206,10 +161,9 @@ def _simple(item: Any, where: str, number: int) -> Item:
     if not isinstance(item, dict):
         raise InputError(f"{where}: must be a mission item")
     params, place = listed(item.get("params"), f"{where}.params", " of 7"), item.get("coordinate")
-    if isinstance(place, list) and len(place) == 3:
-        # Before version 4.0 of QGroundControl the place stood apart; some scripts write both, and zeros here.
-        apart = len(params) == 4 or (len(params) == 7 and not any(params[4:]))
-        params = [*params[:4], *place] if apart else params
+    # Before version 4.0 of QGroundControl the place stood apart; some scripts write both, and zeros here.
+    if isinstance(place, list) and len(place) == 3 and not any(params[4:]):
+        params = [*params[:4], *place]
     if len(params) != 7:
         raise InputError(f"{where}.params: must be a list of 7")
     # QGroundControl writes null where something is left to the autopilot.
@@ -221,23 +175,16 @@ def _simple(item: Any, where: str, number: int) -> Item:
     return Item(where, number, command, frame, values, item.get("autoContinue") is False)
 
 
-def _landing(item: Keys, where: str, number: int, land: int) -> list[Item]:
-    """A landing pattern: where it descends in a turn or on the way, and where it lands.
-
-    Its earlier versions have `loiterCoordinate` for the approach, and each altitude says what it is above.
-    """
-    name = "landingApproachCoordinate"
-    name = "loiterCoordinate" if name not in item and "loiterCoordinate" in item else name
+def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[Item]:
+    """A landing pattern: where it descends in a turn or on the way, and where it lands."""
     approach, landing = (
-        numbers(item.get(each), f"{where}.{each}", PLACE, (3,)) for each in (name, "landCoordinate")
+        numbers(item.get(each), f"{where}.{each}", PLACE, (3,))
+        for each in ("landingApproachCoordinate", "landCoordinate")
     )
-    frames = []
-    for each in ("loiterAltitudeRelative", "landAltitudeRelative"):
-        key = "altitudesAreRelative" if "altitudesAreRelative" in item or each not in item else each
-        relative = item.get(key, True)
-        if not isinstance(relative, bool):
-            raise InputError(f"{where}.{key}: must be true or false")
-        frames.append(RELATIVE if relative else ABSOLUTE)
+    relative = item.get("altitudesAreRelative", True)
+    if not isinstance(relative, bool):
+        raise InputError(f"{where}.altitudesAreRelative: must be true or false")
+    frame = RELATIVE if relative else ABSOLUTE
     radius = abs(finite(item.get("loiterRadius", 0.0), f"{where}.loiterRadius"))
     turning = item.get("useLoiterToAlt", True) is not False
     side = radius if item.get("loiterClockwise", True) else -radius
@@ -245,6 +192,6 @@ def _landing(item: Keys, where: str, number: int, land: int) -> list[Item]:
     command = commands.LOITER_TO_ALTITUDE if turning else commands.WAYPOINT
     return [
         Item(where, number, commands.LAND_START, MISSION, (0.0,) * 7),
-        Item(where, number + 1, command, frames[0], (*first, *approach)),
-        Item(where, number + 2, land, frames[1], (0.0, 0.0, 0.0, 0.0, *landing)),
+        Item(where, number + 1, command, frame, (*first, *approach)),
+        Item(where, number + 2, land, frame, (0.0, 0.0, 0.0, 0.0, *landing)),
     ]

@@ -6,15 +6,15 @@ https://docs.px4.io/main/en/flight_modes_fw/mission.html.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from harness.files.input_file import InputError
 from harness.files.mavlink import commands
-from harness.files.mavlink.items import FRAMES, GROUND, HOME, MISSION, Item
+from harness.files.mavlink.items import GROUND, HOME, MISSION, Item
 from harness.files.wording import counted
-from harness.run_files.mission.mission_files import MissionAsRead
+from harness.run_files.fences import Fences
 
 FLOWN, PASSED_OVER, NOT_FLOWN, NOT_REACHED = "flown", "passed over", "not flown", "not reached"
 """What becomes of an item."""
@@ -92,11 +92,17 @@ class Program:
         steps: in order.
         items: what became of every item, in the order of the file.
         home_altitude_m: above mean sea level.
+        has_home: whether home has a position.
+        fences: that come with it.
+        notes: on what else does, a line each.
     """
 
     steps: tuple[MissionStep, ...]
     items: tuple[Told, ...]
     home_altitude_m: float = 0.0
+    has_home: bool = True
+    fences: Fences = field(default_factory=Fences)
+    notes: tuple[str, ...] = ()
 
     @property
     def above_ground(self) -> tuple[int, ...]:
@@ -104,23 +110,21 @@ class Program:
         return tuple(dict.fromkeys(step.item for step in self.steps if step.above == GROUND))
 
 
-def program(mission: MissionAsRead) -> Program:
-    """Goes through a mission.
-
-    Raises:
-        InputError: a jump leads nowhere, or in a circle; a frame or a position cannot be used; or nothing is flown.
-    """
-    if not mission.items:
-        raise InputError(f"{mission.source}: has no mission items; there is nothing to fly")
-    run = _Run(mission)
+def program(
+    source: str, items: Sequence[Item], home: tuple[float, float] | None, home_altitude_m: float
+) -> Program:
+    """Goes through the items of a mission; home is latitude and longitude."""
+    if not items:
+        raise InputError(f"{source}: has no mission items; there is nothing to fly")
+    run = _Run(source, items, home)
     run.go()
     if len(run.steps) < 2:
         told = f" ({run.steps[0].name}, item {run.steps[0].item})" if run.steps else ""
-        raise InputError(
-            f"{mission.source}: has {counted(len(run.steps), 'item')} to fly to{told}; a path has at least 2"
-        )
-    items = tuple(run.told.get(item.number) or run.not_reached(item) for item in mission.items)
-    return Program(tuple(run.steps), items, mission.home_altitude_m)
+        number = counted(len(run.steps), "item")
+        raise InputError(f"{source}: has {number} to fly to{told}; a path has at least 2")
+    left = ((item.number, commands.name_of(item.command)) for item in items)
+    every = tuple(run.told.get(number) or Told(number, name, NOT_REACHED) for number, name in left)
+    return Program(tuple(run.steps), every, home_altitude_m, home is not None)
 
 
 Flown = tuple[MissionStep | None, str]
@@ -130,9 +134,8 @@ Flown = tuple[MissionStep | None, str]
 class _Run:
     """A mission while it is gone through."""
 
-    def __init__(self, mission: MissionAsRead) -> None:
-        items = mission.items
-        self.items, self.home = items, mission.home
+    def __init__(self, source: str, items: Sequence[Item], home: tuple[float, float] | None) -> None:
+        self.items, self.home = items, home
         self.steps: list[MissionStep] = []
         self.told: dict[int, Told] = {}
         self.index = {item.number: place for place, item in enumerate(items)}
@@ -142,7 +145,7 @@ class _Run:
         self._over = False
         twice = [item.number for place, item in enumerate(items) if self.index[item.number] != place]
         if twice:
-            raise InputError(f"{mission.source}: item {twice[0]} is there twice; numbers must differ")
+            raise InputError(f"{source}: item {twice[0]} is there twice; numbers must differ")
 
     def go(self) -> None:
         """Goes through it to its end."""
@@ -158,18 +161,7 @@ class _Run:
             if idle > 2 * len(self.items):
                 raise _fault(item, "jumps in a circle with nothing to fly in it")
             if len(self.steps) > MOST_STEPS:
-                raise InputError(
-                    f"{item.place}: jumps make it more than {MOST_STEPS:,} legs; give fewer repeats"
-                )
-
-    def not_reached(self, item: Item) -> Told:
-        """What is said of an item that is not reached, and why autopilots may not load a mission for it."""
-        doubt = ""
-        if item.command == commands.JUMP and item.params[0] not in self.index:
-            doubt = f"to item {item.params[0]:g}, which does not exist: {NOT_LOADED}"
-        elif item.command in commands.FLOWN and item.position is not None and item.frame not in FRAMES:
-            doubt = f"has the frame {item.frame}: autopilots load no mission with it"
-        return Told(item.number, commands.name_of(item.command), NOT_REACHED, doubt)
+                raise InputError(f"{item.place}: jumps make it more than {MOST_STEPS:,} legs; give fewer")
 
     def _jump(self, item: Item, at: int) -> int:
         """Where it goes on after a jump."""
@@ -232,10 +224,10 @@ class _Run:
             **dict.fromkeys(commands.TAKEOFFS, self._takeoff),
         }
         step, why = fly.get(item.command, self._waypoint)(item)
-        ends = item.command in (commands.RETURN_TO_LAUNCH, *commands.LANDINGS)
+        ends = item.command in (commands.LOITER_UNLIMITED, commands.RETURN_TO_LAUNCH, *commands.LANDINGS)
         if step is None:
             self._tell(item, NOT_FLOWN, why)
-            self._over = ends
+            self._over = ends and item.command != commands.LOITER_UNLIMITED
             return
         if item.frame == MISSION and step.height_m is not None:
             why += "; " if why else ""
@@ -243,15 +235,7 @@ class _Run:
         self._tell(item, FLOWN, why)
         self.steps.append(replace(step, airspeed_mps=self._airspeed_mps))
         self._airspeed_mps = None
-        ends |= item.command == commands.LOITER_UNLIMITED
-        self._over = self._closing or (ends and self._takeoff_after(item) is None)
-
-    def _takeoff_after(self, item: Item) -> Item | None:
-        """The takeoff that is the next to be flown after a landing; None where there is none."""
-        if item.command not in commands.LANDINGS:
-            return None
-        after = self._first_flown(self.index[item.number] + 1)
-        return after if after is not None and after.command in commands.TAKEOFFS else None
+        self._over = self._closing or ends
 
     def _step(self, item: Item, **more: Any) -> MissionStep:
         """A step to where an item says, at its altitude.
@@ -277,8 +261,6 @@ class _Run:
 
     def _takeoff(self, item: Item) -> Flown:
         step = self._step(item)
-        if self.steps and self.steps[-1].landing:
-            return step, "from the end of the approach before it, without a stop"
         if self.steps:
             return None, "in the air already"
         position = step.position or self.home
@@ -309,9 +291,7 @@ class _Run:
     def _land(self, item: Item) -> Flown:
         if item.position is None:
             return None, "has no position: where it lands is left to the autopilot"
-        after = self._takeoff_after(item)
-        on = "" if after is None else f"; then on with the takeoff, item {after.number}"
-        return self._step(item, landing=True), f"the approach, not the touchdown{on}"
+        return self._step(item, landing=True), "the approach, not the touchdown"
 
     def _return(self, item: Item) -> Flown:
         if self.home is None or not self.steps:

@@ -59,11 +59,7 @@ PAST_RADII: Final = 3.0
 
 
 def mission_route(mission: Program, flying: Flying, source: str) -> MissionRoute:
-    """Makes the route of a mission that lies in the plane; `source` names it in faults.
-
-    Raises:
-        InputError: all of it is in one place.
-    """
+    """Makes the route of a mission that lies in the plane; `source` names it in faults."""
     build = _Build(mission, flying)
     for number, step in enumerate(mission.steps):
         build.fly(number, step)

@@ -142,11 +142,7 @@ def _plain_names(tags: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
-    """Limits of an airspace from attributes, named in any case; a number alone is metres above mean sea level.
-
-    Raises:
-        WorldFileError: it is a facility map, whose ceilings are those up to which one may fly.
-    """
+    """Limits of an airspace from attributes, named in any case; a number alone is metres above mean sea level."""
     given = _plain_names(tags)
     if "ceiling" in given and any(key.startswith(("apt1", "mapeff")) for key in given):
         raise WorldFileError(

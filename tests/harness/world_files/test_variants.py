@@ -68,7 +68,7 @@ def test_a_geotiffs_heights_are_metres_or_it_is_refused(
             if name in how:
                 setattr(file, name, how[name])
     if metres is None:
-        with pytest.raises(WorldFileError, match="has heights in (ft|US survey foot); make them metres"):
+        with pytest.raises(WorldFileError, match=r"has heights in (ft|US survey foot); make them metres"):
             read_any(path)
         return
     terrain = read_any(path).terrain

@@ -8,8 +8,6 @@ import pytest
 
 from harness.files.input_file import InputError
 from harness.files.mavlink.items import Item
-from harness.run_files.fences import Fences
-from harness.run_files.mission.mission_files import MissionAsRead
 from harness.run_files.mission.program import Program, program
 from harness.run_files.mission.vertices import altitude_m
 
@@ -27,7 +25,7 @@ def at(number: int, command: int = 16, height: float = 100.0, first: float = 0.0
 
 
 def run(*items: Item) -> Program:
-    return program(MissionAsRead("m", items, HOME, 400.0, Fences()))
+    return program("m", items, HOME, 400.0)
 
 
 def flown(done: Program) -> list[int]:
@@ -157,14 +155,6 @@ def test_a_frame_that_says_nothing_of_altitudes_is_told() -> None:
 def test_frames_that_autopilots_do_not_load_are_refused(frame: int) -> None:
     with pytest.raises(InputError, match=f"m:2: item 2 has the frame {frame}; must be one of 0, 2, 3, 5"):
         run(at(1), item(2, 16, 0, 0, 0, 0, 47.1, 8, 100, frame=frame))
-
-
-def test_a_landing_before_a_takeoff_is_flown_on_from() -> None:
-    done = run(at(1), at(2, 85, 0.0), item(3, 189), at(4, 84, 35.0), at(5), at(6, 21, 0.0), at(7))
-    assert flown(done) == [1, 2, 4, 5, 6]
-    assert told(done)[2] == ("flown", "the approach, not the touchdown; then on with the takeoff, item 4")
-    assert told(done)[4] == ("flown", "from the end of the approach before it, without a stop")
-    assert told(done)[7][0] == "not reached"
 
 
 @pytest.mark.parametrize("radius", [1.0, -1.0])
