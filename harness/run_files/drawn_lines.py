@@ -70,7 +70,7 @@ def _of_points(
     heights = tuple(altitude for *_, altitude in points if altitude is not None)
     if heights and len(heights) != len(points):
         raise InputError(
-            f"{where}: has an altitude at {len(heights)} of {len(points)} points; give it at all or none"
+            f"{where}: has an altitude at {len(heights)} of {len(points)} points; give all or none"
         )
     positions = tuple((latitude, longitude) for latitude, longitude, _ in points)
     above_ground &= bool(heights)

@@ -52,9 +52,7 @@ def in_plane(fences: Fences, plane: Callable[[Place], Place], source: str) -> Fe
     clean = replace(fences, every=tuple(_checked(fence.moved(plane), source) for fence in fences.every))
     if clean.allowed is not None and clean.allowed.is_empty:
         names = ", ".join(fence.name for fence in clean.inclusions)
-        raise InputError(
-            f"{source}: {names}: have no place in common; an aircraft has to stay inside of all of them"
-        )
+        raise InputError(f"{source}: {names}: have no place in common; must have one to stay inside")
     return clean
 
 

@@ -143,13 +143,9 @@ def given_points(points: Any) -> PathAsGiven:
     try:
         array = np.array(points, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(
-            f"path: is no array of numbers ({error}); must be (n, 2), or (n, 3) with altitudes: metres"
-        ) from error
+        raise InputError(f"path: is no array of numbers ({error}); must be (n, 2) or (n, 3)") from error
     if array.ndim != 2 or array.shape[1] not in (2, 3) or len(array) < 2:
-        raise InputError(
-            f"path: has the shape {array.shape}; must be (n, 2), or (n, 3) with altitudes, n at least 2"
-        )
+        raise InputError(f"path: has the shape {array.shape}; must be (n, 2) or (n, 3), n at least 2")
     if not np.isfinite(array).all():
         raise InputError("path: holds a number that is not finite; must be metres")
     points, altitudes = array[:, :2].copy(), array[:, 2:].ravel()

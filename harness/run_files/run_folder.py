@@ -276,9 +276,7 @@ def _claim(path: Path) -> FolderLock:
     others = {entry.name for entry in path.iterdir()} - {MANIFEST + PARTIAL}
     if others and read_index(path / MANIFEST, SCHEMA) is None:
         lock.release()
-        raise RunFolderError(
-            f"{path} is not empty and not a run folder: choose another folder or empty it first"
-        )
+        raise RunFolderError(f"{path} is not empty and not a run folder: choose another folder")
     return lock
 
 

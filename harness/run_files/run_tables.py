@@ -80,20 +80,21 @@ def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
     """The plans of a flight, a row each."""
     import pyarrow as pa
 
-    paths = [accepted.plan.path for accepted in plans]
+    found = [accepted.plan for accepted in plans]
+    paths = [plan.path for plan in found if plan.path]
     return pa.table(
         {
             "plan_index": _numbers([accepted.plan_index for accepted in plans], np.int64),
             "time_s": _numbers([accepted.time_s for accepted in plans]),
-            "status": _texts([accepted.plan.status.value for accepted in plans]),
-            "reason": _texts([accepted.plan.reason for accepted in plans]),
+            "status": _texts([plan.status.value for plan in found]),
+            "reason": _texts([plan.reason for plan in found]),
             "compute_ms": _numbers([accepted.compute_ms for accepted in plans]),
-            "waypoints": _lists([accepted.plan.waypoints_m for accepted in plans], 2),
+            "waypoints": _lists([plan.waypoints_m for plan in found], 2),
             "path": _lists(polylines([accepted.segments for accepted in plans]), 2),
             "segments": _lists([accepted.segments for accepted in plans], 6),
             "loiter": _truths([accepted.loiter for accepted in plans]),
-            "length_m": _numbers([path.length_m for path in paths if path]),
-            "max_curvature_1pm": _numbers([path.max_curvature_1pm for path in paths if path]),
+            "length_m": _numbers([path.length_m for path in paths]),
+            "max_curvature_1pm": _numbers([path.max_curvature_1pm for path in paths]),
         }
     )
 

@@ -54,7 +54,7 @@ def text_of(data: bytes) -> str:
     if data.startswith(UTF_16):
         return data.decode("utf-16", "replace")
     if b"\0" in data:
-        raise WorldFileError("is not a text file; give a file of one of the kinds that are known")
+        raise WorldFileError("is not a text file; give one of the kinds that are known")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -84,25 +84,24 @@ def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     """
     given = shapely.orient_polygons(np.array(polygons, dtype=object))
     convex = shapely.area(shapely.convex_hull(given)) <= shapely.area(given) * (1.0 + 1e-12)
-    result = list(given[convex])
-    for polygon in given[~convex]:
-        budget = MOST_GROWTH * polygon.area / PASSES
-        rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
-        corners = sum(map(len, rings))
-        for _ in range(PASSES):
-            rings, before = [_filled(ring, tolerance_m, budget) for ring in rings], sum(map(len, rings))
-            if sum(map(len, rings)) == before:
-                break
-        if before == corners:
-            result.append(polygon)
-            continue
-        grown = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) >= 4])
-        if not grown.is_valid:
-            grown = shapely.make_valid(grown, method="structure", keep_collapsed=False)
-        if not shapely.covers(grown, polygon):  # rounding, or a notch with something in it
-            grown = shapely.union(grown, polygon)
-        result += [each for each in shapely.get_parts(grown) if each.geom_type == "Polygon" and each.area > 0]
-    return result
+    grown = [_grown(polygon, tolerance_m) for polygon in given[~convex]]
+    pieces = shapely.get_parts(np.concatenate((given[convex], np.array(grown, dtype=object))))
+    return [each for each in pieces if each.geom_type == "Polygon" and each.area > 0]
+
+
+def _grown(polygon: Any, tolerance_m: float) -> Any:
+    """A polygon with its notches filled."""
+    budget = MOST_GROWTH * polygon.area / PASSES
+    before = rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
+    for _ in range(PASSES):
+        rings = [_filled(ring, tolerance_m, budget) for ring in rings]
+    if sum(map(len, rings)) == sum(map(len, before)):
+        return polygon
+    grown = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) >= 4])
+    if not grown.is_valid:
+        grown = shapely.make_valid(grown, method="structure", keep_collapsed=False)
+    # By rounding, or for what stands in a notch, it may not cover the polygon.
+    return grown if shapely.covers(grown, polygon) else shapely.union(grown, polygon)
 
 
 def _filled(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatArray:

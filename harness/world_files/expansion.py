@@ -216,18 +216,14 @@ def _cut(
     band = HeightBand(altitude_m - spec.vertical_clearance_m, altitude_m + spec.vertical_clearance_m)
     if ground.flat_m is None and ground.field is None and any(part.rigid for part in contents.parts):
         ground = KnownGround(None, 0.0, ground.known_in)
-        notes.append(
-            "no terrain: the ground is taken as flat at 0 m, so altitude_m counts from it (ground_m)"
-        )
+        notes.append("no terrain: the ground is taken as flat at 0 m (ground_m)")
     solids = sliced_parts(contents.parts, mapping, band, ground, box)
     tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
     for raster, solid, heights_m in _solid_cells(contents, spec, band, notes):
         found, factor = placed_cells(raster, solid, mapping, box)
         solids += [Solid(shape, *heights_m) for shape in found]
         if factor > 1:
-            notes.append(
-                f"its cells were taken together {factor} by {factor}: they are too many, or too ragged"
-            )
+            notes.append(f"its cells were taken together {factor} by {factor}: they are too ragged")
         if spec.tolerance_m is None:
             rows, columns = raster.values.shape
             tolerance_m = factor * max(cell_sides(raster, mapping, columns / 2, rows / 2) or (tolerance_m,))

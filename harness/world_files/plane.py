@@ -94,9 +94,7 @@ def _system(name: str) -> Any:
     try:
         return CRS.from_user_input(name)
     except CRSError as error:
-        raise WorldFileError(
-            f"has the crs {name[:60]!r}, which is not known; give one as EPSG:32632"
-        ) from error
+        raise WorldFileError(f"has the crs {name[:60]!r}, which is not known; give EPSG:N") from error
 
 
 def short_way(longitudes_deg: FloatArray) -> FloatArray:

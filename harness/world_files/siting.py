@@ -144,9 +144,7 @@ def _read(specs: Sequence[FileSpec], tell: Callable[[str], None]) -> tuple[Conte
             contents.append(loaded_file(spec.path, spec.kind, spec.reading))
     local = [each.crs is None for each in contents]
     if any(local) and not all(local):
-        raise FileFault(
-            local.index(True), "names no place on earth, but another file does; give crs, as EPSG:28992"
-        )
+        raise FileFault(local.index(True), "names no place on earth, another file does; give crs")
     return tuple(contents)
 
 

@@ -49,8 +49,9 @@ def read(path: Path, reading: Reading) -> Contents:
             parts += _parts(name, thing if isinstance(thing, dict) else {}, vertices, reading, doubts, passed)
     if not parts:
         raise WorldFileError("has no building with a shape; must have some")
-    told = [f"{number} {kind}" for kind, number in passed.most_common() if number]
-    passing = [f"passed over: {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}"] if told else []
+    told = [f"{number} {kind}" for kind, number in (+passed).most_common()]
+    more = " and others" if len(told) > 4 else ""
+    passing = [f"passed over: {', '.join(told[:4])}{more}"] * bool(told)
     return Contents("cityjson", crs, tuple(parts), notes=(*doubts.notes(reading), *passing, *notes))
 
 
@@ -72,21 +73,17 @@ def _parts(
         return []
     instances = sum(each["type"] == INSTANCE for each in _geometries(thing))
     passed[INSTANCE] += instances
-    surfaces = [[_places(ring, vertices, name) for ring in each] for each in _best_surfaces(thing)]
-    shapes = shapely.make_valid(
-        [shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]]) for rings in surfaces],
-        method="structure",
-        keep_collapsed=False,
-    )
-    footprint = shapely.union_all([each for each in shapes if each.area > WALL * each.length**2])
+    surfaces = list(_best_surfaces(name, thing, vertices))
+    drawn = [shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]]) for rings in surfaces]
+    shapes = np.array(shapely.make_valid(drawn, method="structure", keep_collapsed=False), dtype=object)
+    footprint = shapely.union_all(shapes[shapely.area(shapes) > WALL * shapely.length(shapes) ** 2])
     if footprint.is_empty:
         passed["building without a shape"] += not (thing.get("children") or instances)
         return []
-    heights = np.concatenate([ring[:, 2] for rings in surfaces for ring in rings])
+    heights = np.concatenate([np.concatenate(rings)[:, 2] for rings in surfaces])
     low, high = float(heights.min()), float(heights.max())
     if high - low < LOW_M:
-        tags = thing.get("attributes")
-        tags = tags if isinstance(tags, dict) else {}
+        tags = thing["attributes"] if isinstance(thing.get("attributes"), dict) else {}
         high = low + limits.building(tags, footprint, reading, doubts).top.height_m
     return [Part(footprint, Limit(low), Limit(high), name=name[:40])]
 
@@ -110,15 +107,15 @@ def _geometries(thing: dict[str, Any]) -> list[dict[str, Any]]:
     return [each for each in shapes if isinstance(each, dict) and isinstance(each.get("type"), str)]
 
 
-def _best_surfaces(thing: dict[str, Any]) -> Iterator[list[list[Any]]]:
-    """Surfaces of an object at its highest level of detail, without rings of fewer than three corners."""
+def _best_surfaces(name: str, thing: dict[str, Any], vertices: FloatArray) -> Iterator[list[FloatArray]]:
+    """Surfaces of an object at its highest level of detail: rings of corners, those of fewer than three left out."""
     areal = [each for each in _geometries(thing) if each["type"].endswith(("Surface", "Solid"))]
     best = max((str(each.get("lod", "0")) for each in areal), default="")
     for geometry in areal:
         if str(geometry.get("lod", "0")) == best:
             for surface in _surfaces(geometry.get("boundaries")):
                 if surface and len(surface[0]) >= 3:
-                    yield [ring for ring in surface if len(ring) >= 3]
+                    yield [_places(ring, vertices, name) for ring in surface if len(ring) >= 3]
 
 
 def _places(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:

@@ -39,8 +39,8 @@ def read_ardupilot(path: Path, reading: Reading) -> Contents:
     text = text_of(read_bytes(path, MAX_BYTES))
     if text.startswith(WPL):
         items = wpl_items(text, "")
-        home = items[0].position if items and items[0].command == commands.WAYPOINT else None
-        rally = sum(item.command == commands.RALLY_POINT for item in items)
+        home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
+        rally = [item.command for item in items].count(commands.RALLY_POINT)
         return _contents("ardupilot_fence", item_fences(items, home), False, rally)
     rows = [row for line in text.splitlines() if (row := line.partition("#")[0].split())]
     try:

@@ -37,9 +37,7 @@ def finished(contents: Contents) -> Contents:
         off = (np.abs(bounds) > (TURN_DEG, 90.0, TURN_DEG, 90.0)).any(axis=1)
         if off.any():
             x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
-            raise WorldFileError(
-                f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs, as EPSG:32632"
-            )
+            raise WorldFileError(f"has {x:g}, {y:g} for longitude and latitude; must be degrees, or give crs")
         for index in np.flatnonzero(bounds[:, 2] - bounds[:, 0] > TURN_DEG / 2).tolist():
             shapes[index] = _short_way(shapes[index])
     if not np.isfinite(bounds[~shapely.is_empty(shapes)]).all():
@@ -70,7 +68,7 @@ def circle(center: Place, radius_m: float) -> Any:
     """A polygon round a circle on the ellipsoid."""
     if not 0.0 < radius_m <= LARGEST_M:
         raise WorldFileError(
-            f"has a circle of radius {radius_m:g} m; must be positive and at most {LARGEST_M:g} m"
+            f"has a circle of radius {radius_m:g} m; must be above 0 and at most {LARGEST_M:g}"
         )
     azimuths = np.arange(0.0, TURN_DEG, TURN_DEG / CIRCLE_POINTS)
     away = radius_m / math.cos(math.pi / CIRCLE_POINTS)
@@ -111,7 +109,5 @@ def corridor(line: Sequence[Place], width_m: float) -> Any:
 def on_earth(longitude: float, latitude: float) -> Place:
     """The place, which must be on earth."""
     if not (abs(longitude) <= TURN_DEG and abs(latitude) <= 90.0):
-        raise WorldFileError(
-            f"has a place at latitude {latitude:g}, longitude {longitude:g}; must be degrees, WGS84"
-        )
+        raise WorldFileError(f"has a place at {latitude:g}, {longitude:g}; must be degrees, WGS84")
     return longitude, latitude

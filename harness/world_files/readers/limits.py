@@ -74,9 +74,8 @@ _HEIGHT: Final = (
 _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")
 
 
-def _told(text: str) -> tuple[str | None, Datum | None]:
-    """Unit and datum that a text names; the ground goes before the sea, a flight level before other units."""
-    words = _WORD.findall(text.upper())
+def _told(words: Sequence[str]) -> tuple[str | None, Datum | None]:
+    """Unit and datum that words name; the ground goes before the sea, a flight level before other units."""
     unit = "FL" if "FL" in words else next((each for each in words if each in _UNITS), None)
     datums = [_DATUMS[each] for each in words if each in _DATUMS] + [Datum.SEA] * (unit == "FL")
     return unit, Datum.GROUND if Datum.GROUND in datums and unit != "FL" else next(iter(datums), None)
@@ -92,7 +91,7 @@ def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | N
     match = _LIMIT.fullmatch(word)
     if plain is not None or match is None:
         return plain
-    own_unit, own_datum = _told(f"{match[1]} {match[3]}")
+    own_unit, own_datum = _told(_WORD.findall(f"{match[1]} {match[3]}"))
     limit = Limit(float(match[2].replace(" ", "")) * _UNITS[own_unit or unit], own_datum or datum)
     return limit if limit.height_m >= _LOWEST_M[limit.datum] else None
 
@@ -103,17 +102,20 @@ def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | No
     The value is a number or a text; where it has none, `said` has its unit and reference, as `FT AGL`, `m AMSL`, `FL`.
     """
     text = str(value) if isinstance(value, str | int | float) else ""
-    (own_unit, own_datum), (unit, datum) = _told(text), _told(said)
+    (own_unit, own_datum), (unit, datum) = (
+        _told(_WORD.findall(text.upper())),
+        _told(re.findall("[A-Z]+", said.upper())),
+    )
     limit = limit_of(text, unit or "M", datum or Datum.SEA)
-    if limit is not None and re.search(r"[1-9]", text):  # else the surface, or nothing that is known
-        round_ = re.search("WGS|W84|HAE|ELLIPS", said.upper())
-        undated = "are above the ellipsoid" if round_ else "name no reference"
-        missing = {
-            "name no unit; taken as metres": unit or own_unit,
-            f"{undated}; taken as above mean sea level": datum or own_datum,
-        }
-        told = [f"{name or 'a part'}: its limits {what}" for what, known in missing.items() if not known]
-        notes += [each for each in told if each not in notes[-4:]]
+    if limit is None or not re.search(r"[1-9]", text):  # the surface, or nothing that is known
+        return limit
+    undated = (
+        "are above the ellipsoid" if re.search("WGS|W84|HAE|ELLIPS", said.upper()) else "name no reference"
+    )
+    missing = ["name no unit; taken as metres"] * (not (unit or own_unit))
+    missing += [f"{undated}; taken as above mean sea level"] * (not (datum or own_datum))
+    told = [f"{name or 'a part'}: its limits {what}" for what in missing]
+    notes += [each for each in told if each not in notes[-4:]]
     return limit
 
 
@@ -123,9 +125,9 @@ def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: st
     Files write an upper limit of 0 where there is none; a zone of no height would forbid nothing.
     """
     told = f"{name or 'a part'}: its"
-    if lower is None or upper is None:
-        which = "limits are" if lower is upper else f"{'lower' if lower is None else 'upper'} limit is"
-        notes.append(f"{told} {which} not known; taken as without")
+    which = {(True, True): "limits are", (True, False): "lower limit is", (False, True): "upper limit is"}
+    if unknown := which.get((lower is None, upper is None)):
+        notes.append(f"{told} {unknown} not known; taken as without")
     bottom, top = lower or NO_BOTTOM, upper or NO_TOP
     if top == NO_BOTTOM or (top.height_m == 0.0 and bottom.height_m in (0.0, -math.inf)):
         notes.append(f"{told} upper limit is 0, or the surface; taken as without")
@@ -145,9 +147,7 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     """Limits of an airspace from attributes, named in any case; a number alone is metres above mean sea level."""
     given = _plain_names(tags)
     if "ceiling" in given and any(key.startswith(("apt1", "mapeff")) for key in given):
-        raise WorldFileError(
-            "is a facility map of the FAA, up to whose ceilings one may fly; give the airspace"
-        )
+        raise WorldFileError("is a facility map: one may fly up to its ceilings; give the airspace")
     both = [str(value) for key, value in given.items() if _BOTH.fullmatch(key)]
     found: list[Limit | None] = []
     for begins, none in zip(_SIDES, (NO_BOTTOM, NO_TOP), strict=True):

@@ -33,9 +33,7 @@ def read_moving_ai(path: Path, reading: Reading) -> Contents:
         raise WorldFileError("has no height, width and `map`; must be a MovingAI map") from error
     body = [line.encode("latin-1", "replace") for line in lines[begin : begin + max(rows, 0)]]
     if len(body) != rows or any(len(line) != columns for line in body) or rows * columns == 0:
-        raise WorldFileError(
-            f"has {len(body)} rows, not all of {columns} cells; must have {rows}: it may be torn"
-        )
+        raise WorldFileError(f"has {len(body)} rows, not {rows} of {columns} cells: it may be torn")
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
     strange = set(np.unique(cells).tolist()) - set(FREE + BLOCKED)
     if strange:

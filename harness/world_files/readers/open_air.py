@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -113,16 +114,16 @@ def read(path: Path, reading: Reading) -> Contents:
     parts = [each.parts(notes) for each in spaces]
     if not any(parts):
         raise WorldFileError("has no airspace with an area; must be OpenAir with some")
+    notes += _passed_over(spaces, ignored, parts.count([]))
+    return Contents("openair", WGS84, tuple(chain.from_iterable(parts)), notes=tuple(notes))
+
+
+def _passed_over(spaces: Sequence[_Airspace], ignored: Counter[str], empty: int) -> Iterator[str]:
+    """What is said of airspaces by their classes, of lines by their commands, and of airspaces without an area."""
     classes = Counter(each.kind or "none" for each in spaces).most_common()
     told = ", ".join(f"{count} {kind[:12]}" for kind, count in classes[:6])
     told += ", and others" if len(classes) > 6 else ""
-    notes.append(f"airspaces of every class are solid ({told}): take out what may be flown in")
-    notes += _passed_over(ignored, sum(not each for each in parts))
-    return Contents("openair", WGS84, tuple(part for each in parts for part in each), notes=tuple(notes))
-
-
-def _passed_over(ignored: Counter[str], empty: int) -> Iterator[str]:
-    """What is said of lines by their commands, and of airspaces without an area."""
+    yield f"airspaces of every class are solid ({told}): take out what may be flown in"
     if timed := ignored.pop("AA", 0):
         yield f"{counted(timed, 'time')} of activation passed over: taken as always active"
     if ignored:
@@ -179,7 +180,5 @@ def _degrees(text: str, digits: int) -> float:
         numbers[-1] += f".{part or 0}"
     # Where numbers are rounded, 60 seconds are written.
     if not 1 <= len(numbers) <= 3 or any(float(each) > 60.0 for each in numbers[1:]):
-        raise WorldFileError(
-            f"has the angle {text.strip()!r}; must be degrees, and minutes and seconds of at most 60"
-        )
+        raise WorldFileError(f"has the angle {text.strip()!r}; must be degrees, minutes, seconds")
     return sum(float(number) / 60.0**k for k, number in enumerate(numbers))

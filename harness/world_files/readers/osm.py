@@ -33,13 +33,9 @@ def read_xml(path: Path, reading: Reading) -> Contents:
     """Reads an OpenStreetMap XML file."""
     data = read_bytes(path, MAX_BYTES)
     if re.search(rb"<nd [^>]*\blat=", data):
-        raise WorldFileError(
-            "has places inside its ways (`out geom`); ask Overpass for `out body; >; out skel`"
-        )
+        raise WorldFileError("has places inside its ways (`out geom`); ask for `out body; >; out skel`")
     if re.search(rb"<way id=['\"]-|action=['\"]delete", data):
-        raise WorldFileError(
-            "has ways of JOSM that are new or deleted; upload them, or give a file without them"
-        )
+        raise WorldFileError("has ways of JOSM that are new or deleted; give a file without them")
     osmium = _osmium()
     if data.rfind(b"<node ") < data.find(b"<way "):
         return read_pbf(path, reading)
@@ -59,9 +55,7 @@ def _readable() -> Iterator[None]:
     try:
         yield
     except (RuntimeError, ValueError, OSError, MemoryError) as error:
-        raise WorldFileError(
-            f"cannot be read by osmium ({' '.join(str(error).split())[:80]}); it may be torn"
-        ) from error
+        raise WorldFileError(f"cannot be read by osmium ({' '.join(str(error).split())[:60]})") from error
 
 
 def _osmium() -> Any:
@@ -100,19 +94,19 @@ class _Found:
         if each.is_area():
             name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
             if is_building(tags) and each.num_rings()[0]:
-                shape = shapely.from_wkb(self.shape_of.create_multipolygon(each))
-                self._add(tags, shape.geoms[0] if len(shape.geoms) == 1 else shape, name)
+                self._add(tags, shapely.from_wkb(self.shape_of.create_multipolygon(each)), name)
                 self.ways.pop(name, None)
             return
-        kind = "point" if each.is_node() else "way" if each.is_way() else "relation"
+        kind = {"n": "point", "w": "way"}.get(each.type_str(), "relation")
         if is_building(tags) and kind != "point":
-            nodes = each.nodes if kind == "way" else ()
+            nodes = getattr(each, "nodes", ())
             places = [(node.lon, node.lat) for node in nodes if node.location.valid()]
             self.ways[f"{kind} {each.id}"] = tags, places
         elif is_tall(tags) or limits.metres_of(tags.get("height")) is not None:
             self.told[kind] += 1
 
     def _add(self, tags: dict[str, str], shape: Any, name: str) -> None:
+        shape = shape.geoms[0] if len(getattr(shape, "geoms", ())) == 1 else shape
         self.parts.append(limits.building(tags, shape, self.reading, self.doubts, name))
 
     def contents(self) -> Contents:
@@ -121,9 +115,7 @@ class _Found:
         for name, (tags, ring) in whole.items():
             self._add(tags, shapely.Polygon(ring), name)
         if not self.parts:
-            raise WorldFileError(
-                "has no building with an outline; must be an extract of OpenStreetMap with some"
-            )
+            raise WorldFileError("has no building with an outline; must have some")
         notes = self.doubts.notes(self.reading)
         if whole:
             notes.append(f"{counted(len(whole), 'building')} with an open outline closed by a straight line")
