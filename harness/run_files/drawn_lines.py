@@ -96,15 +96,20 @@ def read_csv(text: str, source: str) -> PathAsRead:
             raise InputError(f"{source}:{number}: has {len(row)} cells, the header {len(header)}")
         cells = dict(zip(header, row, strict=True))
         found.append([finite(cells[name].strip(), f"{source}:{number}: {name}") for name in wanted])
-    others = [shown(name) or "one without a name" for name in header if name not in wanted]
-    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
     return PathAsRead(
         names in LOCAL,
         tuple((row[0], row[1]) for row in found),
         tuple(row[2] for row in found if heights),
         above_ground=heights == [ABOVE_GROUND],
-        notes=(f"columns passed over: {', '.join(others[:MOST_NAMED])}{more}",) if others else (),
+        notes=_other_columns([name for name in header if name not in wanted]),
     )
+
+
+def _other_columns(header: Sequence[str]) -> tuple[str, ...]:
+    """What is said of columns that are not read."""
+    others = [shown(name) or "one without a name" for name in header]
+    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
+    return (f"columns passed over: {', '.join(others[:MOST_NAMED])}{more}",) if others else ()
 
 
 def _filled(text: str, source: str) -> list[tuple[int, list[str]]]:
@@ -155,8 +160,8 @@ def read_geojson(text: str, source: str) -> PathAsRead:
 
 def _shapes(node: Any, source: str, key: str, meaning: str | None) -> Iterator[_Shape]:
     """All geometries of one part of a GeoJSON object."""
-    kind = str(node.get("type") or "") if isinstance(node, dict) else ""
-    before = f"{key}." if key else ""
+    node = node if isinstance(node, dict) else {}
+    kind, before = str(node.get("type") or ""), f"{key}." if key else ""
     if kind == "Feature":
         if node.get("geometry") is not None:  # else it lies nowhere
             meaning = _meaning(node.get("properties"), f"{source}: {before}properties.fence")
@@ -172,8 +177,8 @@ def _shapes(node: Any, source: str, key: str, meaning: str | None) -> Iterator[_
     elif kind in PARTS.values():
         yield _Shape(f"{before}coordinates", kind, node.get("coordinates"), meaning)
     else:
-        told = f"the type {shown(kind)}" if kind else "no type"
-        raise InputError(f"{source}: {f'{key}: ' if key else ''}has {told}; must be a GeoJSON LineString")
+        told, where = f"the type {shown(kind)}" if kind else "no type", f"{source}: {key}".removesuffix(": ")
+        raise InputError(f"{where}: has {told}; must be a GeoJSON LineString")
 
 
 def _meaning(properties: Any, where: str) -> str | None:

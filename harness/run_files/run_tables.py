@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -80,21 +81,22 @@ def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
     """The plans of a flight, a row each."""
     import pyarrow as pa
 
-    found = [accepted.plan for accepted in plans]
-    paths = [plan.path for plan in found if plan.path]
+    def get(attribute: str) -> list[Any]:
+        return list(map(attrgetter(attribute), plans))
+
     return pa.table(
         {
-            "plan_index": _numbers([accepted.plan_index for accepted in plans], np.int64),
-            "time_s": _numbers([accepted.time_s for accepted in plans]),
-            "status": _texts([plan.status.value for plan in found]),
-            "reason": _texts([plan.reason for plan in found]),
-            "compute_ms": _numbers([accepted.compute_ms for accepted in plans]),
-            "waypoints": _lists([plan.waypoints_m for plan in found], 2),
-            "path": _lists(polylines([accepted.segments for accepted in plans]), 2),
-            "segments": _lists([accepted.segments for accepted in plans], 6),
-            "loiter": _truths([accepted.loiter for accepted in plans]),
-            "length_m": _numbers([path.length_m for path in paths]),
-            "max_curvature_1pm": _numbers([path.max_curvature_1pm for path in paths]),
+            "plan_index": _numbers(get("plan_index"), np.int64),
+            "time_s": _numbers(get("time_s")),
+            "status": _texts(get("plan.status.value")),
+            "reason": _texts(get("plan.reason")),
+            "compute_ms": _numbers(get("compute_ms")),
+            "waypoints": _lists(get("plan.waypoints_m"), 2),
+            "path": _lists(polylines(get("segments")), 2),
+            "segments": _lists(get("segments"), 6),
+            "loiter": _truths(get("loiter")),
+            "length_m": _numbers(get("plan.path.length_m")),
+            "max_curvature_1pm": _numbers(get("plan.path.max_curvature_1pm")),
         }
     )
 

@@ -214,7 +214,7 @@ def _cut(
     """The polygons of one file."""
     notes = list(contents.notes)
     band = HeightBand(altitude_m - spec.vertical_clearance_m, altitude_m + spec.vertical_clearance_m)
-    if ground.flat_m is None and ground.field is None and any(part.rigid for part in contents.parts):
+    if (ground.flat_m, ground.field) == (None, None) and any(part.rigid for part in contents.parts):
         ground = KnownGround(None, 0.0, ground.known_in)
         notes.append("no terrain: the ground is taken as flat at 0 m (ground_m)")
     solids = sliced_parts(contents.parts, mapping, band, ground, box)

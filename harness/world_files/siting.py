@@ -172,9 +172,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     inside, around = _covered(files)
     pad = PAD_TURNS * craft.turn_radius_m
     if given is not None:
-        reach = max(pad, 0.25 * math.dist(*given))
-        box = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
-        yield files, _common(*inside, box) or box, []
+        yield files, _about(given, pad, inside), []
         return
     low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
     whole = _common(*inside, (*low.tolist(), *high.tolist()))
@@ -199,6 +197,13 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
             box = (*(-half).tolist(), *half.tolist())
             box = _common(box, *_covered(at)[0]) or box
         yield at, box, [f"{told} (--start and --goal choose another)"]
+
+
+def _about(given: FloatArray, pad_m: float, inside: Sequence[Box]) -> Box:
+    """Bounds about a start and a goal."""
+    reach = max(pad_m, 0.25 * math.dist(*given))
+    box = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
+    return _common(*inside, box) or box
 
 
 def _crowded(files: _Files, half: FloatArray) -> list[FloatArray]:

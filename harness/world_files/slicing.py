@@ -104,14 +104,14 @@ def _solid(part: Part, shape: Any, band: HeightBand, ground: KnownGround) -> lis
         if shape.is_empty:
             return []
     heights, corner = _ground_below(part, shape, ground) if on_ground else (np.zeros((1, 1)), (0.0, 0.0))
-    if not heights.size or not np.isfinite(heights).all():
+    if not (heights.size and np.isfinite(heights).all()):
         return None
     lows, tops = (each.height_m + heights * (each.datum is Datum.GROUND) for each in (part.bottom, part.top))
     solid = Solid(shape, float(lows.min()), float(tops.max()))
     mask = (lows <= band.high_m) & (tops >= band.low_m)
     if part.rigid:  # it stands level, as low and as high as its limits are anywhere
         mask = np.array([[solid.low_m <= band.high_m]]) & (solid.high_m >= band.low_m)
-    if mask.all() or not mask.any() or ground.field is None:
+    if ground.field is None or len(np.unique(mask)) == 1:
         return [solid] * bool(mask.all())
     spacing = ground.field.spacing_m
     placed = shapely.transform(outlines(mask)[0], lambda p: p * spacing + corner)

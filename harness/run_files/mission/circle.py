@@ -134,19 +134,3 @@ def _onto(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[Row] | N
     swept = (turn * cmath.phase(out / ahead)) % math.tau
     leave = pivot - 1j * turn * turn_m * out
     return [*line(begin, ahead, on), *arc((start, ahead), turn, turn_m, swept), *line(leave, out, straight)]
-
-
-def towards(pose: Pose, place: complex, turn_m: float) -> list[Row]:
-    """A turn from a pose after which a line leads to a place: the shorter of both sides that gets there."""
-    begin, ahead = pose
-    ways = []
-    for turn in (1, -1):
-        pivot = begin + 1j * turn * turn_m * ahead
-        leave = Circle(pivot, turn_m, turn).left_to(place)
-        if leave is not None:
-            swept = (turn * cmath.phase((leave - pivot) / (begin - pivot))) % math.tau
-            ways.append((swept * turn_m + abs(place - leave), turn, swept))
-    if not ways:  # on the circles of both sides: at the pose itself
-        return []
-    _, turn, swept = min(ways)
-    return arc(pose, turn, turn_m, swept)

@@ -12,7 +12,7 @@ from typing import Any, Final
 from harness.files.input_file import InputError
 from harness.files.mavlink import commands
 from harness.files.mavlink.fences import item_fences, plan_fences
-from harness.files.mavlink.items import FRAMES, MISSION, SEA, WPL, Item, filled, wpl_items
+from harness.files.mavlink.items import FRAMES, HOME, MISSION, SEA, WPL, Item, filled, wpl_items
 from harness.files.values import finite, listed, numbers, parsed_json, shown, whole
 from harness.files.wording import counted
 from harness.run_files.fences import Fences
@@ -65,13 +65,7 @@ def read_waypoints(text: str, source: str) -> Program:
         )
     notes: list[str] = []
     items = _numbered(wpl_items(text, source), notes)
-    home: Home = (None, None, None)
-    if items and _is_home(items[0]):
-        first, *items = items
-        home = (*(first.position or (None, None)), first.params[6])
-        if FRAMES.get(first.frame, SEA) != SEA and home[2]:
-            told = f"its altitude, {home[2]:g} m, is taken as above the sea"
-            notes.append(f"its first item is home, though of frame {first.frame}: {told}")
+    home = _home_item(items, notes)
     flown = [item for item in items if item.command not in commands.APART]
     rally = sum(item.command == commands.RALLY_POINT for item in items)
     if not flown and items:
@@ -86,9 +80,16 @@ def read_waypoints(text: str, source: str) -> Program:
     )
 
 
-def _is_home(first: Item) -> bool:
-    """Whether the first item of a file is home."""
-    return first.command == commands.WAYPOINT and (first.number == 0 or FRAMES.get(first.frame, SEA) == SEA)
+def _home_item(items: list[Item], notes: list[str]) -> Home:
+    """Home, if the first item is; it is taken out of the items."""
+    above = FRAMES.get(items[0].frame, SEA) if items else HOME
+    if not items or items[0].command != commands.WAYPOINT or (items[0].number != 0 and above != SEA):
+        return None, None, None
+    first = items.pop(0)
+    if above != SEA and first.params[6]:
+        told = f"its altitude, {first.params[6]:g} m, is taken as above the sea"
+        notes.append(f"its first item is home, though of frame {first.frame}: {told}")
+    return *(first.position or (None, None)), first.params[6]
 
 
 def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
@@ -110,19 +111,15 @@ def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
 def read_plan(text: str, source: str) -> Program:
     """The mission of a .plan, with its fences; Mission Planner's has no `fileType`."""
     plan = parsed_json(text, source)
-    mission = plan.get("mission") if isinstance(plan, dict) else None
-    if not isinstance(plan, dict) or plan.get("fileType") not in ("Plan", None if mission else "Plan"):
+    plan = plan if isinstance(plan, dict) else {}
+    mission = plan.get("mission")
+    if plan.get("fileType") not in ("Plan", None if mission else "Plan"):
         raise InputError(f'{source}: is not a plan of QGroundControl; must have "fileType": "Plan"')
     if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
         raise InputError(f"{source}: mission.items: is missing; it is required")
-    items: list[Item] = []
     notes: list[str] = []
     home = _home(mission.get("plannedHomePosition"), f"{source}: mission.plannedHomePosition", notes)
-    for number, each in enumerate(mission["items"]):
-        items += _items(each, f"{source}: mission.items[{number}]", len(items) + 1, notes)
-    if len({item.number for item in items}) < len(items):
-        items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
-        notes.append("a doJumpId is there twice: items are counted from 1 instead")
+    items = _every_item(mission["items"], f"{source}: mission.items", notes)
     geofence, rally = plan.get("geoFence") or {}, plan.get("rallyPoints") or {}
     fences = Fences(plan_fences(geofence, f"{source}: "), commands.inside_all(mission.get("firmwareType")))
     if geofence.get("breachReturn") is not None:
@@ -138,6 +135,17 @@ def _home(home: Any, where: str, notes: list[str]) -> Home:
         notes.append("its home has no altitude: altitudes above home are counted from the sea")
         home = [*home[:2], 0.0]
     return numbers(home, where, PLACE, (3,))
+
+
+def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item]:
+    """The items of a plan, numbered as there unless a number comes twice."""
+    items: list[Item] = []
+    for number, each in enumerate(given):
+        items += _items(each, f"{where}[{number}]", len(items) + 1, notes)
+    if len({item.number for item in items}) < len(items):
+        items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
+        notes.append("a doJumpId is there twice: items are counted from 1 instead")
+    return items
 
 
 def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:

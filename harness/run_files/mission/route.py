@@ -32,7 +32,6 @@ from harness.run_files.mission.circle import (
     length_of,
     onto,
     sampled,
-    towards,
 )
 from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.vertices import (
@@ -160,10 +159,7 @@ class _Build:
         entry = before if climbs else altitude
         self._altitude_m = before
         pose = self._join(item, circle, turn_m, entry)
-        if loiter.turns is not None:
-            length = loiter.turns * math.tau * circle.radius_m
-        else:
-            length = self._climbing_m(altitude) if loiter.time_s is None else loiter.time_s * self._mps
+        length = self._around_m(loiter, circle, altitude)
         target = self._target(number, circle)
         length += circle.further_m(pose[0], target, length)
         self._speeds.append((self._length_m, self._asked_mps, self._mps))
@@ -180,15 +176,21 @@ class _Build:
         self._passed.append((item, None, self._length_m))
         self._altitude_m = altitude
         if target is not None and circle.left_to(target) is None:
-            pose = self._turn(towards(pose, target, turn_m)) or pose
+            turn = onto(pose, Circle(target, 0.0, 1), turn_m)
+            pose = self._turn(turn[: len(turn) - (turn[-1][4] == 0.0)]) or pose
         self._add(Vertex(pose[0], altitude, None))
+
+    def _around_m(self, loiter: Loiter, circle: Circle, altitude: float) -> float:
+        """How far a loiter goes round its circle."""
+        if loiter.turns is not None:
+            return loiter.turns * math.tau * circle.radius_m
+        return self._climbing_m(altitude) if loiter.time_s is None else loiter.time_s * self._mps
 
     def _join(self, item: int, circle: Circle, turn_m: float, altitude: float) -> Pose:
         """Gets onto a circle."""
         here, heading = self._here(), self._heading()
         touch = circle.joined_from(here) if here is not None and self._run else None
-        if touch is not None and self._flying.heads_for_centres:
-            assert here is not None
+        if here is not None and touch is not None and self._flying.heads_for_centres:
             return self._join_from_far(item, circle, circle.edge(here), altitude)
         if touch is not None and not self._turns_to(touch) and not self._is_near(touch, turn_m):
             self._add(Vertex(touch, altitude, None))
@@ -196,8 +198,7 @@ class _Build:
         elif heading is not None:  # over the waypoint, and from there by a turn
             self.flush()
             assert self._pose is not None
-            if not circle.has(self._pose):
-                self._turn(onto(self._pose, circle, turn_m))
+            self._turn([] if circle.has(self._pose) else onto(self._pose, circle, turn_m))
         else:
             self._begin_on(circle, here)
         assert self._pose is not None
@@ -236,12 +237,12 @@ class _Build:
 
     def _target(self, number: int, circle: Circle) -> complex | None:
         """What the aircraft turns to as it leaves a circle; None where it goes on round it or straight."""
-        step = self._steps[number + 1] if number + 1 < len(self._steps) else None
-        if step is None or step.place is None:
-            return None
+        step = next(iter(self._steps[number + 1 : number + 2]), None)
+        if step is None or step.place is None or step.loiter is None:
+            return step.place if step else None
         place = step.place
-        if step.loiter is None or abs(place - circle.center) < SAME_PLACE_M:
-            return None if step.loiter is not None else place
+        if abs(place - circle.center) < SAME_PLACE_M:
+            return None
         # From circle to circle along a common tangent: both ends are found in turns.
         wide_m = step.loiter.radius_m or self._flying.turn_radius_m(self._mps)
         other = Circle(place, wide_m, -1 if step.loiter.clockwise else 1)

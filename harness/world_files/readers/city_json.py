@@ -38,7 +38,6 @@ def read(path: Path, reading: Reading) -> Contents:
     if not all(isinstance(each, dict) and isinstance(each.get("CityObjects"), dict) for each in contents):
         raise WorldFileError("has no CityObjects; must be CityJSON")
     crs = reading.crs or _crs(contents[0].get("metadata"))
-    notes = [] if crs else ["names no coordinate reference system: its metres are taken as they are (crs)"]
     if crs is not None:
         check_metres(crs)
     parts: list[Part] = []
@@ -49,10 +48,17 @@ def read(path: Path, reading: Reading) -> Contents:
             parts += _parts(name, thing if isinstance(thing, dict) else {}, vertices, reading, doubts, passed)
     if not parts:
         raise WorldFileError("has no building with a shape; must have some")
+    notes = (*doubts.notes(reading), *_told(passed, crs))
+    return Contents("cityjson", crs, tuple(parts), notes=notes)
+
+
+def _told(passed: Counter[str], crs: str | None) -> Iterator[str]:
+    """What is said of objects that are passed over by their kinds, and of a missing system."""
     told = [f"{number} {kind}" for kind, number in (+passed).most_common()]
-    more = " and others" if len(told) > 4 else ""
-    passing = [f"passed over: {', '.join(told[:4])}{more}"] * bool(told)
-    return Contents("cityjson", crs, tuple(parts), notes=(*doubts.notes(reading), *passing, *notes))
+    if told:
+        yield f"passed over: {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}"
+    if crs is None:
+        yield "names no coordinate reference system: its metres are taken as they are (crs)"
 
 
 def _parts(

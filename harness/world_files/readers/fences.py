@@ -42,7 +42,7 @@ def read_ardupilot(path: Path, reading: Reading) -> Contents:
         home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
         rally = [item.command for item in items].count(commands.RALLY_POINT)
         return _contents("ardupilot_fence", item_fences(items, home), False, rally)
-    rows = [row for line in text.splitlines() if (row := line.partition("#")[0].split())]
+    rows = filter(None, (line.partition("#")[0].split() for line in text.splitlines()))
     try:
         places = [(float(north), float(east)) for north, east in rows]
     except ValueError as error:

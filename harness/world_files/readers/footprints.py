@@ -34,10 +34,7 @@ def finished(contents: Contents) -> Contents:
     shapes = np.array([part.footprint for part in contents.parts], dtype=object)
     bounds = shapely.bounds(shapes)
     if in_degrees(contents.crs):
-        off = (np.abs(bounds) > (TURN_DEG, 90.0, TURN_DEG, 90.0)).any(axis=1)
-        if off.any():
-            x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
-            raise WorldFileError(f"has {x:g}, {y:g} for longitude and latitude; must be degrees, or give crs")
+        _check_degrees(bounds)
         for index in np.flatnonzero(bounds[:, 2] - bounds[:, 0] > TURN_DEG / 2).tolist():
             shapes[index] = _short_way(shapes[index])
     if not np.isfinite(bounds[~shapely.is_empty(shapes)]).all():
@@ -55,6 +52,13 @@ def finished(contents: Contents) -> Contents:
     flat = len(area) - len(parts)
     passed = (f"{counted(flat, 'polygon')} without an area passed over",) if flat else ()
     return replace(contents, parts=parts, notes=(*contents.notes, *passed))
+
+
+def _check_degrees(bounds: FloatArray) -> None:
+    off = (np.abs(bounds) > (TURN_DEG, 90.0, TURN_DEG, 90.0)).any(axis=1)
+    if off.any():
+        x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
+        raise WorldFileError(f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs")
 
 
 def _short_way(shape: Any) -> Any:

@@ -112,8 +112,8 @@ def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | No
     undated = (
         "are above the ellipsoid" if re.search("WGS|W84|HAE|ELLIPS", said.upper()) else "name no reference"
     )
-    missing = ["name no unit; taken as metres"] * (not (unit or own_unit))
-    missing += [f"{undated}; taken as above mean sea level"] * (not (datum or own_datum))
+    missing = ["name no unit; taken as metres"] * ((unit, own_unit) == (None, None))
+    missing += [f"{undated}; taken as above mean sea level"] * ((datum, own_datum) == (None, None))
     told = [f"{name or 'a part'}: its limits {what}" for what in missing]
     notes += [each for each in told if each not in notes[-4:]]
     return limit
@@ -149,18 +149,25 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     if "ceiling" in given and any(key.startswith(("apt1", "mapeff")) for key in given):
         raise WorldFileError("is a facility map: one may fly up to its ceilings; give the airspace")
     both = [str(value) for key, value in given.items() if _BOTH.fullmatch(key)]
-    found: list[Limit | None] = []
-    for begins, none in zip(_SIDES, (NO_BOTTOM, NO_TOP), strict=True):
-        side = {key: value for key, value in given.items() if key.startswith(begins)}
-        match = next((match for key in side if (match := _NAME.fullmatch(key))), None)
-        own = [str(value) for key, value in side.items() if _OWN.search(key)]
-        said = (
-            " ".join((*re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1]), *own, *both))
-            if match
-            else ""
+    lower, upper = (
+        _limit(
+            {key: value for key, value in given.items() if key.startswith(begins)}, both, none, notes, name
         )
-        found.append(limit_told(side[match[0]], said, notes, name) if match else none)
-    return band_of(found[0], found[1], notes, name)
+        for begins, none in zip(_SIDES, (NO_BOTTOM, NO_TOP), strict=True)
+    )
+    return band_of(lower, upper, notes, name)
+
+
+def _limit(
+    side: Mapping[str, Any], both: Sequence[str], none: Limit, notes: list[str], name: str
+) -> Limit | None:
+    """The limit that the attributes of one side give."""
+    match = next((match for key in side if (match := _NAME.fullmatch(key))), None)
+    if match is None:
+        return none
+    own = [str(value) for key, value in side.items() if _OWN.search(key)]
+    words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
+    return limit_told(side[match[0]], " ".join((*words, *own, *both)), notes, name)
 
 
 def has_limits(tags: Mapping[str, Any]) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,19 +26,16 @@ IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}
 
 def read_moving_ai(path: Path, reading: Reading) -> Contents:
     """Reads a MovingAI map; a cell is as large as `metres_per_cell` says, else one metre."""
-    lines = text_of(read_bytes(path)).splitlines()
-    head = dict(line.split(None, 1) for line in lines[:3] if len(line.split()) == 2)
-    try:
-        rows, columns = int(head["height"]), int(head["width"])
-        begin = next(i for i, line in enumerate(lines[:10]) if line.strip() == "map") + 1
-    except (KeyError, ValueError, StopIteration) as error:
-        raise WorldFileError("has no height, width and `map`; must be a MovingAI map") from error
-    body = [line.encode("latin-1", "replace") for line in lines[begin : begin + max(rows, 0)]]
-    if len(body) != rows or any(len(line) != columns for line in body) or rows * columns == 0:
+    text = text_of(read_bytes(path))
+    head = re.match(r"type.*\n\s*height\s+(\d+)\s*\n\s*width\s+(\d+)\s*\n\s*map\s*\n", text)
+    if head is None:
+        raise WorldFileError("has no height, width and `map`; must be a MovingAI map")
+    rows, columns = int(head[1]), int(head[2])
+    body = [line.encode("latin-1", "replace") for line in text[head.end() :].splitlines()[:rows]]
+    if list(map(len, body)) != [columns] * rows or rows * columns == 0:
         raise WorldFileError(f"has {len(body)} rows, not {rows} of {columns} cells: it may be torn")
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
-    strange = set(np.unique(cells).tolist()) - set(FREE + BLOCKED)
-    if strange:
+    if strange := set(np.unique(cells).tolist()) - set(FREE + BLOCKED):
         raise WorldFileError(f"has the cell {chr(min(strange))!r}; must be one of . G S @ O T W")
     occupied = np.isin(cells, list(BLOCKED)).astype(np.float64)
     size = reading.metres_per_cell or 1.0
@@ -60,23 +59,15 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     mode, size = str(keys.get("mode", "trinary")).lower(), keys.get("resolution", 0.0)
     origin = keys.get("origin", (0.0, 0.0, 0.0))
     over, under = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
-    for is_right, fault in (
-        (mode in MODES, f"the mode {mode[:20]!r}; must be one of {', '.join(MODES)}"),
-        (_is_number(size) and 0 < size < 1e6, "no positive resolution; must be a map of ROS map_server"),
-        (
-            isinstance(origin, tuple) and len(origin) in (2, 3) and all(map(_is_number, origin)),
-            "an origin that is not [x, y, yaw]",
-        ),
-        (
-            all(_is_number(each) and 0.0 <= each <= 1.0 for each in (over, under)),
-            f"the thresholds {over} and {under}; must be shares between 0 and 1",
-        ),
-    ):
-        if not is_right:
-            raise WorldFileError(f"has {fault}")
-    share = _greys(path.parent / keys["image"])
-    if not keys.get("negate", 0):
-        share = 1.0 - share
+    if mode not in MODES:
+        raise WorldFileError(f"has the mode {mode[:20]!r}; must be one of {', '.join(MODES)}")
+    if not _are_numbers((size, over, under), least=0.0) or size == 0 or max(over, under) > 1:
+        told = f"the resolution {size} and the thresholds {over}, {under}"
+        raise WorldFileError(f"has {told}; must be metres above 0, and shares between 0 and 1")
+    if not isinstance(origin, tuple) or len(origin) not in (2, 3) or not _are_numbers(origin):
+        raise WorldFileError("has an origin that is not [x, y, yaw]")
+    greys = _greys(path.parent / keys["image"])
+    share = greys if keys.get("negate", 0) else 1.0 - greys
     solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
     # The lower left corner is given, and the map is turned counter-clockwise about it by `yaw` radians.
     x, y, yaw = (*origin, 0.0)[:3]
@@ -102,5 +93,5 @@ def _greys(path: Path) -> FloatArray:
         raise WorldFileError(f"names the image {path.name}, which {said}; must be grey PGM or PNG") from error
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def _are_numbers(values: Sequence[Any], least: float = -math.inf) -> bool:
+    return all(type(value) in (int, float) and math.isfinite(value) and value >= least for value in values)

@@ -41,14 +41,18 @@ def read_ed269(path: Path, reading: Reading) -> Contents:
             raise Fault("has a zone without a list `geometry`; must be ED-269")
         if _is_passed(zone.get("restriction"), zone["geometry"], told):
             continue
-        times = zone.get("applicability") or ()
-        told["at times"] += any(
-            isinstance(each, dict) and (each.get("permanent") == "NO" or "schedule" in each)
-            for each in ((times,) if isinstance(times, dict) else times)
-        )
+        told["at times"] += _is_at_times(zone.get("applicability") or ())
         name = str(zone.get("identifier") or zone.get("name") or "")[:40]
         parts += [_ed269_part(each, name, notes) for each in zone["geometry"]]
     return _contents("ed269", parts, told, notes)
+
+
+def _is_at_times(applicability: Any) -> bool:
+    """Whether a zone of ED-269 applies at times only."""
+    times = (applicability,) if isinstance(applicability, dict) else applicability
+    return any(
+        isinstance(each, dict) and (each.get("permanent") == "NO" or "schedule" in each) for each in times
+    )
 
 
 def _ed269_part(volume: Any, name: str, notes: list[str]) -> Part:

@@ -136,14 +136,6 @@ def test_former_run_is_removed_and_nothing_else(
         load_run(tmp_path)
 
 
-def test_run_left_without_finish_stays_incomplete(tmp_path: Path) -> None:
-    with RunFolder.create(tmp_path, SCENARIO, []):
-        pass
-    with pytest.raises(RunFolderError, match="stopped before its end"):
-        load_run(tmp_path)
-    assert not (tmp_path / TRACK).exists()
-
-
 @pytest.mark.parametrize("last", [TRACK, PLANS, METRICS, "manifest.json"])
 def test_process_killed_while_finishing_leaves_no_complete_run(
     tmp_path: Path,

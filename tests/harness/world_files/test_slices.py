@@ -12,7 +12,8 @@ import pytest
 import shapely
 
 from aircraft.frames import LocalPlane
-from harness.world_files.cells import simplified
+from harness.world_files import cells
+from harness.world_files.cells import outlines, simplified
 from harness.world_files.expansion import (
     Expanded,
     FileFault,
@@ -258,6 +259,19 @@ def test_outlines_only_grow_and_by_no_more_than_they_may() -> None:
         assert shapely.difference(cells, shapely.union_all(grown)).area < 1e-9
         assert sum(each.area for each in grown) <= 1.006 * cells.area
         assert all(each.is_valid for each in grown)
+
+
+def test_a_ragged_mask_is_made_coarser_and_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    mask = np.random.default_rng(4).random((37, 53)) < 0.02
+    squares = shapely.union_all([shapely.box(x, y, x + 1, y + 1) for y, x in np.argwhere(mask).tolist()])
+    found, factor = outlines(mask)
+    assert factor == 1
+    assert shapely.union_all(found).equals(squares)
+    monkeypatch.setattr(cells, "MAX_RUNS", 15)
+    found, factor = outlines(mask)
+    assert factor > 1
+    assert shapely.covers(shapely.union_all(found), squares)
+    assert (shapely.get_coordinates(found) % factor == 0).all()
 
 
 def test_a_keep_in_fence_leaves_its_inside_free(tmp_path: Path) -> None:
