@@ -26,7 +26,6 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     at = [index for index, each in enumerate(keys.obstacles) if each.file is not None]
     if not at:
         return keys, [f"obstacles[{index}]" for index in range(len(keys.obstacles))]
-    from harness.world_files.bounded import uncollected
     from harness.world_files.expansion import FileFault, expanded
     from harness.world_files.plane import Place
 
@@ -36,23 +35,22 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     every: list[Obstacle] = []
     names: list[str] = []
     told = list(keys.sources or ())
-    with uncollected():
-        try:
-            found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
-        except FileFault as fault:
-            name = specs[fault.index].path.name
-            raise KeyFault(("obstacles", at[fault.index], "file"), f"{name} {fault}") from fault
-        sources = iter(found.sources)
-        for index, each in enumerate(keys.obstacles):
-            parts, name = [each], f"obstacles[{index}]"
-            if each.file is not None:
-                source = next(sources)
-                parts = _parts(source, each.active_s)
-                name = f"what {name} has of {source.spec.path.name}"
-                whence = {"path": each.file.path, "kind": source.kind, "sha256": source.sha256}
-                told.append(SourceSpec(**whence, polygons=len(parts), notes=source.notes))
-            every += parts
-            names += [name] * len(parts)
+    try:
+        found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
+    except FileFault as fault:
+        name = specs[fault.index].path.name
+        raise KeyFault(("obstacles", at[fault.index], "file"), f"{name} {fault}") from fault
+    sources = iter(found.sources)
+    for index, each in enumerate(keys.obstacles):
+        parts, name = [each], f"obstacles[{index}]"
+        if each.file is not None:
+            source = next(sources)
+            parts = _parts(source, each.active_s)
+            name = f"what {name} has of {source.spec.path.name}"
+            whence = {"path": each.file.path, "kind": source.kind, "sha256": source.sha256}
+            told.append(SourceSpec(**whence, polygons=len(parts), notes=source.notes))
+        every += parts
+        names += [name] * len(parts)
     ground = GroundSpec.of(found.ground) if found.ground else keys.ground
     return keys.updated(obstacles=tuple(every), ground=ground, sources=tuple(told)), names
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,18 +16,6 @@ MAX_TREE_BYTES: Final = 64_000_000
 """Largest JSON or text file that is read whole: it takes about ten times its size in memory."""
 UTF_16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 """Byte order marks of UTF-16, which editors on Windows write."""
-
-
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Switches the garbage collector off: it takes most of the time of reading a large file and finds nothing."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> bytes:

@@ -16,7 +16,6 @@ import shapely
 from harness.files.input_file import open_regular
 from harness.files.wording import counted
 from harness.world_files import kinds
-from harness.world_files.bounded import uncollected
 from harness.world_files.cells import placed_cells, simplified
 from harness.world_files.height_field import HeightField, cell_sides, height_field
 from harness.world_files.parts import Box, Contents, FloatArray, Raster, Reading, WorldFileError
@@ -160,8 +159,7 @@ def _as_it_is(path: Path) -> tuple[Path, tuple[int, int]]:
 @lru_cache(maxsize=4)
 def _loaded(path: Path, stamp: tuple[int, int], kind: str | None, reading: Reading) -> Contents:
     try:
-        with uncollected():
-            return kinds.read(path, kind, reading)
+        return kinds.read(path, kind, reading)
     except MemoryError as error:
         raise WorldFileError("needs more memory than there is; cut the area of interest out of it") from error
     except RecursionError as error:

@@ -14,14 +14,7 @@ import shapely
 from aircraft.frames import LocalPlane
 from harness.world_files import cells
 from harness.world_files.cells import outlines, simplified
-from harness.world_files.expansion import (
-    Expanded,
-    FileFault,
-    FileSpec,
-    corners_of,
-    expanded,
-    loaded_file,
-)
+from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners_of, expanded, loaded_file
 from harness.world_files.plane import Mapping, Place, geodetic
 from tests.harness.world_files.making import SHARED, SQUARE, feature, geojson, geotiff
 from tests.longer import longer

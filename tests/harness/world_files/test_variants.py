@@ -89,12 +89,7 @@ WAY = (
 
 
 @pytest.mark.parametrize(
-    "body",
-    {
-        "nodes first": nodes() + WAY,
-        "nodes last": WAY + nodes(),
-    }.items(),
-    ids=lambda item: item[0],
+    "body", {"nodes first": nodes() + WAY, "nodes last": WAY + nodes()}.items(), ids=lambda item: item[0]
 )
 def test_openstreetmap_in_any_order(body: tuple[str, str], tmp_path: Path) -> None:
     found = read_any(
@@ -233,11 +228,7 @@ SQUARE_M = [[0.0, 0.0, 7.0], [10.0, 0.0, 7.0], [10.0, 10.0, 7.0], [0.0, 10.0, 7.
 
 
 def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_path: Path) -> None:
-    objects = {
-        "a": floor(measuredHeight=12.5),
-        "b": floor(),
-        "c": floor("MultiLineString"),
-    }
+    objects = {"a": floor(measuredHeight=12.5), "b": floor(), "c": floor("MultiLineString")}
     path = written(
         tmp_path / "a.city.json", json.dumps(city("urn:ogc:def:crs:EPSG::7415", objects, SQUARE_M))
     )
