@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError
 from harness.files.mavlink import commands
-from harness.files.mavlink.items import GROUND, HOME, MISSION, Item
+from harness.files.mavlink.items import FRAMES, GROUND, HOME, MISSION, Item
 from harness.files.wording import counted
 from harness.run_files.fences import Fences
 
@@ -122,8 +122,7 @@ def program(
         told = f" ({run.steps[0].name}, item {run.steps[0].item})" if run.steps else ""
         number = counted(len(run.steps), "item")
         raise InputError(f"{source}: has {number} to fly to{told}; a path has at least 2")
-    left = ((item.number, commands.name_of(item.command)) for item in items)
-    every = tuple(run.told.get(number) or Told(number, name, NOT_REACHED) for number, name in left)
+    every = tuple(run.told.get(item.number) or run.not_reached(item) for item in items)
     return Program(tuple(run.steps), every, home_altitude_m, home is not None)
 
 
@@ -162,6 +161,15 @@ class _Run:
                 raise _fault(item, "jumps in a circle with nothing to fly in it")
             if len(self.steps) > MOST_STEPS:
                 raise InputError(f"{item.place}: jumps make it more than {MOST_STEPS:,} legs; give fewer")
+
+    def not_reached(self, item: Item) -> Told:
+        """What is said of an item that is not reached, and why autopilots may not load a mission for it."""
+        doubt = ""
+        if item.command == commands.JUMP and item.params[0] not in self.index:
+            doubt = f"to item {item.params[0]:g}, which does not exist: {NOT_LOADED}"
+        elif item.command in commands.FLOWN and item.position is not None and item.frame not in FRAMES:
+            doubt = f"has the frame {item.frame}: autopilots load no mission with it"
+        return Told(item.number, commands.name_of(item.command), NOT_REACHED, doubt)
 
     def _jump(self, item: Item, at: int) -> int:
         """Where it goes on after a jump."""
