@@ -1,4 +1,4 @@
-"""The standing table of `planner/MEASURED.md` from a campaign: `python -m tests.closed_loop.standing_table FOLDER`.
+"""The standing table of `planner/MEASURED.md` from campaigns: `python -m tests.closed_loop.standing_table FOLDER...`.
 
 A row each planner and wind, in Markdown; then every planner in pairs with `rolling_window` in the same world and wind.
 With `planner/MEASURED.md` behind it, the tables are put there. Only worlds that every planner has flown count, so that
@@ -9,6 +9,7 @@ a campaign which is still being flown compares like with like. The campaign's pa
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -37,11 +38,17 @@ HEAD: Final = (
 )
 
 
-def load(folder: Path) -> pd.DataFrame:
-    """Results and timings of a campaign, and each length over the shortest of all planners in its world and wind."""
-    rows = pd.read_parquet(folder / "results.parquet").merge(
-        pd.read_parquet(folder / "timings.parquet"), on="run"
+def load(folders: Sequence[Path]) -> pd.DataFrame:
+    """Results and timings of campaigns, and each length over the shortest of all planners in its world and wind."""
+    rows = pd.concat(
+        [
+            pd.read_parquet(each / "results.parquet").merge(
+                pd.read_parquet(each / "timings.parquet"), on="run"
+            )
+            for each in folders
+        ]
     )
+    rows["case"] = rows.world + rows[WIND].astype(str)
     planners = rows.groupby("case").planner.nunique()
     rows = rows[rows.case.map(planners) == rows.planner.nunique()].copy()
     rows["reached"] = rows.outcome == "reached"
@@ -94,9 +101,9 @@ def pairs(rows: pd.DataFrame) -> list[str]:
     return told
 
 
-def tables(folder: Path) -> str:
+def tables(folders: Sequence[Path]) -> str:
     """Both tables."""
-    rows = load(folder)
+    rows = load(folders)
     told = head(*HEAD)
     for name in rows.planner.unique():
         told += [row(name, wind, of) for wind, of in rows[rows.planner == name].groupby(WIND)]
@@ -105,7 +112,8 @@ def tables(folder: Path) -> str:
 
 
 if __name__ == "__main__":
-    text = tables(Path(sys.argv[1]))
+    pages = [Path(each) for each in sys.argv[1:] if each.endswith(".md")]
+    text = tables([Path(each) for each in sys.argv[1:] if not each.endswith(".md")])
     print(text)
-    if len(sys.argv) > 2:
-        fill("standing table", text, Path(sys.argv[2]))
+    for page in pages:
+        fill("standing table", text, page)
