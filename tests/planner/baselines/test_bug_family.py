@@ -347,23 +347,6 @@ def test_an_obstacle_that_the_line_grazes_encloses_nothing(
     assert walk(kind, ring(middle, y - 1500.0 - KEEP + depth_m, 1500.0, SPACING)).reason == "reached"
 
 
-@pytest.mark.flights
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_plan_begins_at_the_aircraft_and_is_in_one_piece(kind: str, ring: MakePoints) -> None:
-    flight = walk(
-        kind, np.concatenate([ring(9000.0, 5300.0, 1200.0, SPACING), ring(12_500.0, 4200.0, 900.0, SPACING)])
-    )
-    assert flight.reason == "reached"
-    for plan in flight.plans:
-        assert plan.path is not None
-        rows = plan.path.segments
-        assert np.hypot(*(flight.track_m - rows[0, :2]).T).min() < 1e-6
-        np.testing.assert_allclose(np.hypot(rows[:, 2], rows[:, 3]), 1.0, atol=1e-9)
-        ends = np.array([pose_at(plan.path, s)[:2] for s in np.cumsum(rows[:, 5])])
-        np.testing.assert_allclose(ends[:-1], rows[1:, :2], atol=1e-3)
-        np.testing.assert_allclose(plan.waypoints_m[-1], ends[-1], atol=1e-6)
-
-
 circles = st.lists(
     st.tuples(st.floats(4500.0, 15_500.0), st.floats(0.0, 10_000.0), st.floats(300.0, 2500.0)),
     min_size=1,
