@@ -39,12 +39,12 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """A name of the front door, imported now from the module that the lines above say."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import ast
 
     with open(__file__, encoding="utf-8") as file:
-        lines = ast.walk(ast.parse(file.read()))
-    for line in lines if name in __all__ else ():
-        if isinstance(line, ast.ImportFrom) and name in [each.name for each in line.names]:
-            globals()[name] = found = getattr(import_module(str(line.module)), name)
-            return found
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        lines = [line for line in ast.walk(ast.parse(file.read())) if isinstance(line, ast.ImportFrom)]
+    home = next(str(line.module) for line in lines if name in [each.name for each in line.names])
+    globals()[name] = found = getattr(import_module(home), name)
+    return found

@@ -70,14 +70,8 @@ class Row:
 
     def plain(self) -> dict[str, Any]:
         """All of it, column by column."""
-        names = {"scenario": self.scenario, "planner": self.planner}
-        return {
-            **names,
-            "outcome": self.outcome,
-            "reason": self.reason,
-            **self.figures,
-            "guidance": self.guidance,
-        }
+        begin = {"scenario": self.scenario, "planner": self.planner, "outcome": self.outcome}
+        return {**begin, "reason": self.reason, **self.figures, "guidance": self.guidance}
 
 
 def row_of(

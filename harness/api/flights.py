@@ -22,9 +22,15 @@ from harness.scenario.validation import KeyFault
 if TYPE_CHECKING:
     from harness.flight.observer import Progress
 
-NEEDED: Final = (
-    *("outcome", "reason", "flown_length_m", "cross_track_m", "trackable", "trackability", "digest"),
-)
+NEEDED: Final = [
+    "outcome",
+    "reason",
+    "flown_length_m",
+    "cross_track_m",
+    "trackable",
+    "trackability",
+    "digest",
+]
 """Figures of every run."""
 
 

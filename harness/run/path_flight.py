@@ -211,14 +211,14 @@ def _turn_radius_of(given: PathAsGiven, scenario: Scenario) -> Callable[[float],
 
 
 def fly_along(
-    plan: PathPlan,
-    loop: Loop,
-    observers: Sequence[Observer] = (),
-    progress: Progress | None = None,
+    plan: PathPlan, loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None
 ) -> Flight:
     """Flies a path to its end."""
-    path = Path(plan.way.segments)
-    limit_s = 2.0 * path.length_m / max(_slowest_mps(loop.model.state(), plan), 1.0) + 60.0
+    path, state = Path(plan.way.segments), loop.model.state()
+    air = state.airspeed_mps * np.exp(1j * (0.5 * math.pi - state.heading_rad))  # east + i north
+    wind_mps = abs(complex(state.velocity_east_mps, state.velocity_north_mps) - air)
+    slowest_mps = float(plan.profile.airspeed_mps.min()) - wind_mps
+    limit_s = 2.0 * path.length_m / max(slowest_mps, 1.0) + 60.0
     guidance, route = loop.guidance, Route(path.segments)
     progress_of = RouteProgress(route)
 
@@ -237,15 +237,6 @@ def fly_along(
         termination=PathEnd(where, route_length(route), loop.mission.goal_radius_m, limit_s),
     )
     return replace(fly(along, observers, progress), compute_ms=())  # nothing was searched for
-
-
-def _slowest_mps(state: AircraftState, plan: PathPlan) -> float:
-    """Slowest speed over the ground, against the wind that the aircraft starts in."""
-    wind = math.hypot(
-        state.velocity_east_mps - state.airspeed_mps * math.sin(state.heading_rad),
-        state.velocity_north_mps - state.airspeed_mps * math.cos(state.heading_rad),
-    )
-    return float(plan.profile.airspeed_mps.min()) - wind
 
 
 class GivenPath:
