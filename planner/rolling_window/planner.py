@@ -135,6 +135,7 @@ class RollingWindow:
         if plan.holds(here_m) or self._due(request, plan, here_m, newly_cut=False):
             return False
         self._local.trail.add(request.position_m)
+        self._monitor.nothing_new()
         return True
 
     def _planned(self, request: PlanRequest) -> Plan:
@@ -149,7 +150,7 @@ class RollingWindow:
             now = Situation(request, plan, on_loiter(plan.path, request.arc_length_m))
             self._loiter(now, plan)
         self._search.anew |= self._free_again(now)
-        newly_cut = self._monitor.look(plan, now.here_m, fresh_m)
+        newly_cut = self._monitor.look(plan, now.here_m, request.position_m, fresh_m)
         if not self._due(request, plan, now.here_m, newly_cut) and self._search.running is None:
             if self._nothing_waits(request.seen):
                 self._served = request.flown, request.seen.revision, request.seen.last_contradiction_s
@@ -160,7 +161,7 @@ class RollingWindow:
     def _nothing_waits(self, seen: MapView) -> bool:
         """Whether, as long as nothing is seen, only the way flown can make a search due."""
         feared = self._threats is not None or len(seen.moving) > 0
-        waits = self._search.freed or self._giving_up.waits
+        waits = self._search.freed or self._monitor.waits or self._giving_up.waits
         return self.state is PlanningState.FOLLOWING and not (feared or waits)
 
     def _take_in(self, request: PlanRequest) -> FloatArray:

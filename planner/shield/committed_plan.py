@@ -10,8 +10,11 @@ import numpy as np
 
 from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
-from planner.geometry.curves import Pose, Segment, between, moved, onward, place_on
+from planner.geometry.curves import Point, Pose, Segment, between, moved, onward, place_on
 from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest
+
+COMPARED_TOGETHER = 16
+"""Edge points that are not near the aircraft are compared with the course once in so many requests."""
 
 BROKEN_SHARE = 0.99
 """Share of the clearance: an edge point seen nearer than that to a certified turn breaks the certificate."""
@@ -100,13 +103,16 @@ class PlanMonitor:
         Args:
             mission: tells the clearance, the sensing range and the goal circle.
             keep_m: a course that comes nearer to an edge point is cut there.
-            urgent_m: what is wrong with the plan nearer to the aircraft than this is urgent.
+            urgent_m: edge points nearer to the aircraft are compared at once; what is wrong nearer to it is urgent.
             lead_m: least distance flown between two searches.
             step_m: the rolling step: distance flown between two searches where nothing is urgent.
         """
         self._mission, self._keep_m, self._urgent_m = mission, keep_m, urgent_m
         self._lead_m, self._step_m = lead_m, step_m
         self._turn_keeps_m = BROKEN_SHARE * mission.clearance_m
+        self._waiting: list[FloatArray] = []
+        self._nearest_m = math.inf
+        self._since = COMPARED_TOGETHER  # requests since edge points were compared
         self.plan: CommittedPlan | None = None
         self.proposed: CommittedPlan | None = None
         self.cut_m = math.inf
@@ -131,21 +137,39 @@ class PlanMonitor:
         """
         return first_breach(course.path, points_m[max(course.known - gone, 0) :], self._keep_m)
 
-    def look(self, plan: CommittedPlan, here_m: float, fresh_m: FloatArray) -> bool:
-        """Compares (k, 2) new edges with the plan; `here_m` is the arc length of the aircraft.
+    def look(self, plan: CommittedPlan, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
+        """Takes in (k, 2) new edges: compares them at once where one is near, else those of a few requests together.
 
-        Returns whether the course is cut anew, or nearer than before.
+        Returns whether the course is cut anew, or nearer than before; `here_m` is the arc length of the aircraft.
         """
-        if not len(fresh_m):
+        self._since += 1
+        if len(fresh_m):
+            self._waiting.append(fresh_m)
+            away_m = min(math.dist(position, edge) for edge in fresh_m.tolist())
+            self._nearest_m = min(self._nearest_m, away_m)
+        elif not self._waiting:
             return False
+        if self._since < COMPARED_TOGETHER and self._nearest_m > self._urgent_m:
+            return False
+        self._since = 0
+        edges = np.concatenate(self._waiting)
+        self._waiting, self._nearest_m = [], math.inf
         before = self.cut_m
         if not plan.holds(here_m):
-            self.cut_m = min(before, first_breach(plan.course.path, fresh_m, self._keep_m, here_m))
+            self.cut_m = min(before, first_breach(plan.course.path, edges, self._keep_m, here_m))
         self.broken |= (
-            self.cut_m < plan.loiter_entry_m
-            or first_breach(plan.turn, fresh_m, self._turn_keeps_m) < math.inf
+            self.cut_m < plan.loiter_entry_m or first_breach(plan.turn, edges, self._turn_keeps_m) < math.inf
         )
         return self.cut_m < before
+
+    @property
+    def waits(self) -> bool:
+        """Whether edges that came in have yet to be compared."""
+        return len(self._waiting) > 0
+
+    def nothing_new(self) -> None:
+        """Takes in that no edge has come in, while none waits."""
+        self._since += 1
 
     def urgent(self, plan: CommittedPlan, here_m: float) -> bool:
         """Whether the plan in effect is broken, and what is wrong with it is near."""

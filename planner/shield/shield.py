@@ -115,7 +115,7 @@ class Shield:
         effective, here_m = self._monitor.plan, request.arc_length_m
         if effective is not None:
             here_m = on_loiter(effective.path, here_m)
-            self._monitor.look(effective, here_m, fresh_m)
+            self._monitor.look(effective, here_m, request.position_m, fresh_m)
             self._monitor.broken |= meets(effective, here_m, self._mission, self._threats)
         answer = self._asked(request, here_m)
         found = self._certified(request, here_m, answer)

@@ -88,11 +88,11 @@ def test_a_new_plan_begins_on_the_one_in_effect_or_at_an_aircraft_that_is_not_ne
 def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside_its_course() -> None:
     flown, monitor = committed(3), monitoring()
     in_effect(monitor, flown, EDGES[:0])
-    assert not monitor.look(flown, 2100.0, np.array([(5000.0, 100.0)]))
+    assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(5000.0, 100.0)]))
     assert monitor.cut_m == math.inf
-    assert not monitor.look(flown, 2100.0, np.array([(2000.0, 401.0)]))
+    assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 401.0)]))
     assert not monitor.broken
-    assert not monitor.look(flown, 2100.0, np.array([(2000.0, 397.0)]))
+    assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 397.0)]))
     assert monitor.broken
 
 
@@ -110,9 +110,9 @@ def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
     assert not committed(3).over(1e6)
     monitor = monitoring()
     in_effect(monitor, flown, EDGES[:0])
-    assert not monitor.look(flown, 400.0, np.array([(1000.0, 301.0)]))
+    assert not monitor.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 301.0)]))
     assert not monitor.broken
-    monitor.look(flown, 400.0, np.array([(1000.0, 299.0)]))
+    monitor.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 299.0)]))
     assert monitor.broken
 
 
