@@ -47,14 +47,13 @@ def behind(places_m: FloatArray, eye_m: Point, edges_m: FloatArray, beside_m: fl
 
     At its edge point a shadow is `beside_m` wide to each side.
     """
-    hidden = np.zeros(len(places_m), dtype=np.bool_)
-    off = places_m - eye_m
-    for east, north in (edges_m - eye_m).tolist():
-        away_m = math.hypot(east, north)
-        along_m = (off[:, 0] * east + off[:, 1] * north) / away_m
-        aside_m = np.abs(off[:, 1] * east - off[:, 0] * north) / away_m
-        # The shadow is a fan: at twice the distance it is twice as wide.
-        hidden |= (along_m > away_m) & (aside_m < beside_m * along_m / away_m)
+    off, edges_m = places_m - eye_m, edges_m - eye_m
+    edges_m = edges_m[np.hypot(*edges_m.T) < np.hypot(*off.T).max(initial=0.0)]
+    away_m = np.hypot(*edges_m.T)
+    along_m = off @ edges_m.T / away_m
+    aside_m = np.abs(off[:, 1:] * edges_m[:, 0] - off[:, :1] * edges_m[:, 1]) / away_m
+    # The shadow is a fan: at twice the distance it is twice as wide.
+    hidden: BoolArray = ((along_m > away_m) & (aside_m < beside_m * along_m / away_m)).any(axis=1)
     return hidden
 
 

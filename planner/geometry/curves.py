@@ -89,9 +89,12 @@ def between(path: Path, start_m: float, stop_m: float) -> list[Segment]:
 
 
 def sample(path: Path, spacing_m: float, deviation_m: float = math.inf) -> FloatArray:
-    """(k, 2) points along a path, both ends included, no further apart than `spacing_m` along the path.
+    """(k, 2) points along a path, both ends included.
 
-    Nowhere is an arc further than `deviation_m` from the chord between neighbours.
+    Args:
+        path: the path.
+        spacing_m: largest distance between neighbours, along the path.
+        deviation_m: largest distance of an arc from the chord between neighbours.
     """
     pieces = [path.segments[:1, :2]]
     for x, y, tx, ty, curvature, length in path.segments.tolist():
@@ -116,7 +119,7 @@ def poses_at(path: Path, arc_lengths_m: FloatArray) -> FloatArray:
 
 def places_along(path: Path, end_m: float, pieces: int) -> FloatArray:
     """(pieces + 1, 2) places along a path, clamped to its ends, from its start to an arc length and evenly spaced."""
-    return kernel.places_along(path.segments, end_m, pieces)
+    return poses_at(path, np.linspace(0.0, end_m, pieces + 1))[:, :2]
 
 
 def turn_centres(path: Path, arc_lengths_m: FloatArray, radius_m: float, roll_m: float) -> FloatArray:
@@ -305,9 +308,12 @@ def moved(segments: Sequence[Segment], to: Pose) -> list[Segment]:
 
 
 def onward_in_turn(pose: Pose, curvature: float, to: Pose) -> list[Segment] | None:
-    """The arc of a turn of some curvature (1/m; 0: none) from one pose in it to another, with its tangent.
+    """The arc of a turn from one pose to another on it; None where that is not on it, with its tangent.
 
-    None where that is not on it.
+    Args:
+        pose: in the turn.
+        curvature: of the turn, 1/m; 0: none.
+        to: the other pose.
     """
     if not curvature:
         return None

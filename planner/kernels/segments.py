@@ -108,7 +108,7 @@ def inside_bounds(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax:
     return True
 
 
-@compiled(ROWS, ROWS, rare=True)
+@compiled(ROWS, ROWS)
 def to_nearest(places: FloatArray, points: FloatArray) -> FloatArray:
     """(k,) distance of each of (k, 2) places to the nearest of (m, 2) points, m; infinite where there is none."""
     away = np.empty(len(places))
@@ -137,23 +137,13 @@ def pose(rows: FloatArray, arc_length: float) -> tuple[float, float, float, floa
     return east, north, cx * cos - cy * sin, cy * cos + cx * sin, rows[which, 4]
 
 
-@compiled(ROWS, FLOATS, rare=True)
+@compiled(ROWS, FLOATS)
 def poses_at(rows: FloatArray, arc_lengths: FloatArray) -> FloatArray:
     """(k, 4) places and tangents at (k,) arc lengths of a path, clamped to its ends."""
     poses = np.empty((len(arc_lengths), 4))
     for i in range(len(arc_lengths)):
         poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3], _ = pose(rows, arc_lengths[i])
     return poses
-
-
-@compiled(ROWS, FLOAT, COUNT)
-def places_along(rows: FloatArray, end: float, pieces: int) -> FloatArray:
-    """(pieces + 1, 2) places along a path, evenly spaced from its start to an arc length."""
-    places = np.empty((pieces + 1, 2))
-    for i in range(pieces + 1):
-        arc_length = i * (end / pieces) if i < pieces else end
-        places[i, 0], places[i, 1], _, _, _ = pose(rows, arc_length)
-    return places
 
 
 @compiled(ROWS, FLOATS, FLOAT, FLOAT)

@@ -15,7 +15,7 @@ EIGHT = (2, 4)
 length of a way and 0.92 of it, so that what looks shortest on the grid seldom is not."""
 
 
-@compiled(BOOLS_OUT, ROWS, FLOATS, FLOAT, FLOAT, FLOAT, COUNT, COUNT, rare=True)
+@compiled(BOOLS_OUT, ROWS, FLOATS, FLOAT, FLOAT, FLOAT, COUNT, COUNT)
 def close_cells(
     open_: BoolArray,
     points: FloatArray,
@@ -39,7 +39,7 @@ def close_cells(
                     open_[(column + 1) * rows + row + 1] = False
 
 
-@compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT, rare=True)
+@compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT)
 def spread_wave(
     levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int
 ) -> None:
