@@ -37,9 +37,9 @@ ASTIR = 0.25
 PLACED_ANEW, NEARER, OFF = 8.0, 0.7, 0.01
 """Where poses err, an edge is moved that is within so many clearances, seen from this share of the least range at which
 it was seen before, and off by this share of the clearance."""
-LOOK_THROUGH_EVERY = 6
-"""Every so many scans, from the first on, the points in range are asked whether they were looked through; every
-other time only where none was the last time."""
+LOOK_THROUGH_EVERY, SOMETHING_GOES = 12, 2
+"""Every so many scans, from the first on, the points in range are asked whether they were looked through; the second
+number while some were the last time."""
 
 
 class ObstacleMap(EdgePoints):
@@ -95,8 +95,7 @@ class ObstacleMap(EdgePoints):
             if not moved < same or nearest < self._taken_nearest - 1.001 * moved or self._unconfirmed:
                 self._taken_at, self._taken_nearest = sensor, nearest
                 self._take_in(scan, nearest, ignored)
-        turn, between = divmod(self._scans, LOOK_THROUGH_EVERY)
-        if not between and self._count and (turn % 2 == 0 or not self._all_stands):
+        if not self._scans % (LOOK_THROUGH_EVERY if self._all_stands else SOMETHING_GOES) and self._count:
             self._all_stands = not self._look_through(scan)
         self._scans += 1
 
