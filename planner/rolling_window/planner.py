@@ -35,6 +35,7 @@ from planner.rolling_window.dead_ends import GivingUp
 from planner.rolling_window.local_planning import LocalPlanning, Start
 from planner.rolling_window.rolling_search import (
     WORK_WHILE_CUT,
+    WORK_WHILE_MOVING,
     WORK_WHILE_SERVING,
     WORK_WHILE_UNSAFE,
     RollingSearch,
@@ -149,13 +150,16 @@ class RollingWindow:
         if plan.holds(request.arc_length_m):
             now = Situation(request, plan, on_loiter(plan.path, request.arc_length_m))
             self._loiter(now, plan)
-        self._search.anew |= self._free_again(now)
+        if self._free_again(now):
+            self._search.stop()  # it was begun with edges that have gone
+            self._search.anew = True
         newly_cut = self._monitor.look(plan, now.here_m, request.position_m, fresh_m)
         if not self._due(request, plan, now.here_m, newly_cut) and self._search.running is None:
             if self._nothing_waits(request.seen):
                 self._served = request.flown, request.seen.revision, request.seen.last_contradiction_s
             return KEPT
-        self._monitor.searched_at_m = request.arc_length_m
+        if self._search.running is None:
+            self._monitor.searched_at_m = request.arc_length_m
         return self._roll(now)
 
     def _nothing_waits(self, seen: MapView) -> bool:
@@ -221,7 +225,9 @@ class RollingWindow:
 
     def _work(self, now: Situation, serves: bool) -> Work:
         """How much is searched before this answer."""
-        if self._unsafe(now) or now.request.seen.moving:
+        if now.request.seen.moving:
+            return WORK_WHILE_MOVING
+        if self._unsafe(now):
             return WORK_WHILE_UNSAFE
         return WORK_WHILE_SERVING if serves else WORK_WHILE_CUT
 

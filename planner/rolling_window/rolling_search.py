@@ -29,14 +29,17 @@ class Work(NamedTuple):
     more: float
 
 
-WORK_WHILE_SERVING = Work(3000.0, 1000.0)
+WORK_WHILE_SERVING = Work(2000.0, 1000.0)
 """While the plan in effect serves there is time."""
 
-WORK_WHILE_CUT = Work(5000.0, 2000.0)
+WORK_WHILE_CUT = Work(2000.0, 1500.0)
 """The course is cut somewhere ahead: what is flown leads into its turn."""
 
-WORK_WHILE_UNSAFE = Work(12_000.0, 12_000.0)
-"""No safe plan is flown, or something moves. Most searches are done within this."""
+WORK_WHILE_UNSAFE = Work(6000.0, 6000.0)
+"""No safe plan is flown."""
+
+WORK_WHILE_MOVING = Work(12_000.0, 12_000.0)
+"""Something moves: what is found late may be met on the way. Most searches are done within this."""
 
 
 class RollingStep(NamedTuple):
@@ -108,6 +111,9 @@ class RollingSearch:
         search = self.last = self.running or self._begun(step.request.position_m)
         self.running, nearest_m = search, -math.inf
         for course in search.courses(step.start, step.ahead, step.work.first if begins else step.work.more):
+            begin = course.path.segments[0, :2]
+            if tuple(begin) != tuple(step.start.prefix[0][:2]):
+                raise RuntimeError(f"a course begins at {begin}, not at {step.start.prefix[0][:2]}")
             if step.serves and course.path.length_m > self._worth_m(step.ahead):
                 search.done = True
                 break
