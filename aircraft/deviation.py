@@ -6,6 +6,7 @@ The deviations are put into the XML of a JSBSim model when it is loaded; moments
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, fields
 from typing import Final
@@ -49,21 +50,16 @@ def deviate(root: ElementTree.Element, deviation: Deviation) -> None:
     if balance is None or aerodynamics is None:
         raise ValueError("it has no <mass_balance> or no <aerodynamics>")
     _change_balance(balance, deviation)
-    shown = _texts(root)
     for name in SURFACES:
-        if not any(f"fcs/{name}" in text for text in shown):
-            continue  # a flying wing has no rudder to differ
-        positions = {
-            text for text in _texts(aerodynamics) if text.startswith("fcs/") and f"{name}-pos" in text
-        }
-        _scale_properties(aerodynamics, [aerodynamics], positions, name, 1.0 + getattr(deviation, name))
+        if any(f"fcs/{name}" in text for text in _texts(root)):  # a flying wing has no rudder to differ
+            positions = {text for text in _texts(aerodynamics) if re.match(rf"fcs/.*{name}-pos", text)}
+            _scale_properties(aerodynamics, [aerodynamics], positions, name, 1.0 + getattr(deviation, name))
     lift = [axis for axis in aerodynamics.findall("axis") if axis.get("name") in LIFT_AXES]
     places = [*lift, *_functions_for(aerodynamics, lift)]
     _scale_properties(aerodynamics, places, ALPHA, "lift slope", 1.0 + deviation.lift_slope)
-    if deviation.drag:
-        for axis in aerodynamics.findall("axis"):
-            for function in axis.findall("function") if axis.get("name") in DRAG_AXES else ():
-                _wrap(function, 1.0 + deviation.drag)
+    for axis in aerodynamics.findall("axis") if deviation.drag else ():
+        for function in axis.findall("function") if axis.get("name") in DRAG_AXES else ():
+            _wrap(function, 1.0 + deviation.drag)
     if deviation.thrust:
         _add_thrust(root, deviation.thrust)
 

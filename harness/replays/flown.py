@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -92,16 +92,7 @@ def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
     with reading(path):
         table = parquet.read_table(path) if path.suffix.lower() == ".parquet" else csv.read_csv(path)
     table = table.rename_columns([name.strip() for name in table.column_names])
-    names = table.column_names
-    place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
-    if "time_s" not in names or place is None:
-        missing = next((name for name in ("time_s", *LOCAL[1]) if name not in names), "")
-        raise InputError(
-            f"{path}: has no column {missing}; must have time_s, and east_m, north_m or latitude_deg, longitude_deg"
-        )
-    wanted = {"time_s": "time_s", "east_m": place[0], "north_m": place[1]}
-    heights = [name for name in ("up_m", *ALTITUDES) if name in names]
-    wanted |= dict(zip(("up_m",), heights, strict=False)) | {name: name for name in OPTIONAL if name in names}
+    place, wanted = _wanted(table.column_names, path)
     columns = {new: _numbers(table, name, path) for new, name in wanted.items()}
     known = np.isfinite([columns[name] for name in ("time_s", "east_m", "north_m")]).all(axis=0)
     columns = {name: each[known] for name, each in columns.items()}
@@ -111,6 +102,20 @@ def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
         placed = np.array([plane.plane(*pair) for pair in pairs]).reshape(-1, 2)
         columns["east_m"], columns["north_m"] = placed.T
     return columns
+
+
+def _wanted(names: Sequence[str], path: Path) -> tuple[tuple[str, str], dict[str, str]]:
+    """The pair of columns of a place, and the columns that are read, by what they are called here."""
+    place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
+    if "time_s" not in names or place is None:
+        missing = next((name for name in ("time_s", *LOCAL[1]) if name not in names), "")
+        raise InputError(
+            f"{path}: has no column {missing}; must have time_s, and east_m, north_m or latitude_deg, longitude_deg"
+        )
+    wanted = {"time_s": "time_s", "east_m": place[0], "north_m": place[1]}
+    heights = [name for name in ("up_m", *ALTITUDES) if name in names]
+    wanted |= dict(zip(("up_m",), heights, strict=False)) | {name: name for name in OPTIONAL if name in names}
+    return place, wanted
 
 
 def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 from pathlib import Path
 from typing import Any
 
@@ -41,14 +40,6 @@ def test_is_measured_once_and_gives_the_same_either_way(folder: Path) -> None:
     assert len(list(folder.iterdir())) == 1
 
 
-def test_another_digest_is_another_measurement(folder: Path) -> None:
-    measure = Measurement()
-    cached("a", "d" * 64, measure)
-    cached("a", "d" * 16 + "e" * 48, measure)
-    cached("a", "e" * 64, measure)
-    assert measure.times == 3
-
-
 @pytest.mark.parametrize(
     "wreck",
     ["", "{", "[]", '{"digest": 1}', '{"digest": "%s", "result": 3}', '{"digest": "%s", "result": {}}', "\0"],
@@ -80,16 +71,6 @@ def test_a_folder_that_cannot_be_written_costs_only_time(
     measure = Measurement()
     assert cached("a", "d" * 64, measure) == cached("a", "d" * 64, measure)
     assert measure.times == 2
-
-
-def test_a_full_disk_costs_only_time_and_leaves_nothing_behind(folder: Path) -> None:
-    measure, (soft, hard) = Measurement(), resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10, hard))
-    try:
-        assert cached("a", "d" * 64, measure) == {"value": 0.1 + 0.2, "list": [1, 2]}
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert list(folder.iterdir()) == []
 
 
 @pytest.mark.parametrize("home", ["", "relative/path"])

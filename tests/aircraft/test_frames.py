@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aircraft.frames import PATCH_M, LocalPlane
+from aircraft.frames import LocalPlane
 from aircraft.kernels import place_in_patch
 from tests.examples import examples
 
@@ -93,19 +93,6 @@ def test_a_patch_agrees_with_the_plane_to_a_tenth_of_a_millimetre(
     east, north, convergence = plane.project(*point)
     assert math.dist(near[:2], (east, north)) < 1e-4
     assert abs(math.degrees(near[2] - convergence)) < 1e-5
-
-
-def test_a_patch_ends_where_its_terms_no_longer_hold() -> None:
-    plane = LocalPlane(47.0, 8.0)
-    latitude, longitude = math.radians(47.3), math.radians(8.4)
-    patch = np.array(plane.patch(latitude, longitude))
-    reach_up, reach_right = patch[2:4]
-    for up, right in ((1.01, 0.0), (-1.01, 0.0), (0.0, 1.01), (0.0, -1.01), (math.nan, 0.0)):
-        place = place_in_patch(patch, latitude + up * reach_up, longitude + right * reach_right)
-        assert np.isnan(place).all()
-    middle, rim = (place_in_patch(patch, latitude + up * reach_up, longitude) for up in (0.0, 0.99))
-    assert middle == plane.project(latitude, longitude)
-    assert math.dist(rim[:2], middle[:2]) == pytest.approx(0.99 * PATCH_M, rel=0.01)
 
 
 def test_meridians_converge_to_the_nearer_pole() -> None:

@@ -96,11 +96,6 @@ def test_a_route_is_kept_row_by_row_however_it_was_given(loiter: bool) -> None:
     np.testing.assert_array_equal(kept[:3, :6], rows)
 
 
-def test_update_needs_a_route() -> None:
-    with pytest.raises(RuntimeError, match=r"follow\(\) a route"):
-        preview().update(PointMass(northwards()).state())
-
-
 @given(st.floats(-200.0, 200.0), st.sampled_from([0.0, 1 / 400.0, -1 / 400.0]), st.floats(0.1, 0.9))
 def test_cross_track_is_signed_to_the_right(offset: float, curvature: float, share: float) -> None:
     route = joined([(curvature, 600.0)])
@@ -177,25 +172,6 @@ def test_the_intercept_angle_is_bounded() -> None:
     flown = fly(joined([(0.0, 20000.0)]), northwards(2000.0), 100.0)
     steepest = max(abs(math.sin(state.course_rad)) for state, _ in flown)
     assert steepest == pytest.approx(0.7, abs=0.02)
-
-
-def test_the_command_respects_bank_and_rate() -> None:
-    flown = fly(joined([(0.0, 500.0), (1 / 60.0, 300.0), (-1 / 60.0, 300.0)]), northwards(100.0), 60.0)
-    assert max(abs(output.roll_command_rad) for _, output in flown) <= LIMITS.bank_limit_rad + 1e-12
-    assert any(output.bank_saturated for _, output in flown)
-    rolls = [state.roll_rad for state, _ in flown]
-    fastest = max(abs(b - a) * UPDATE_RATE_HZ for a, b in pairwise(rolls))
-    # A held command leads at the start of an update by more than on its average.
-    assert fastest < 1.3 * LIMITS.roll_rate_radps
-
-
-def test_a_loiter_is_flown_for_ever() -> None:
-    circle = math.tau * 150.0
-    flown = fly(joined([(0.0, 200.0), (-1 / 150.0, circle)], loiter=True), northwards(), 300.0)
-    state, output = flown[-1]
-    assert math.hypot(state.east_m - 150.0, state.north_m - 200.0) == pytest.approx(150.0, abs=0.1)
-    assert output.arc_length_m == pytest.approx(300.0 * AIRSPEED, rel=0.01)
-    assert not output.past_end
 
 
 def test_past_the_end_it_goes_straight_on() -> None:

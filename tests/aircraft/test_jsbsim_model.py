@@ -15,7 +15,7 @@ import pytest
 from aircraft.airframes import AircraftError, airframe
 from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState
-from aircraft.jsbsim_model import STATE_PROPERTIES, JsbsimModel
+from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
 
 PLANE = LocalPlane(47.0, 8.0)
@@ -164,24 +164,6 @@ def test_inner_loops_hold_what_they_are_told(name: str) -> None:
     assert state.load_factor == pytest.approx(1.0 / math.cos(0.5), rel=0.02)
 
 
-@pytest.mark.parametrize("name", VERIFIED)
-def test_roll_in_time_is_the_one_of_the_survey(name: str) -> None:
-    model = model_of(name)
-    bank = math.radians(30.0)
-    model.command(bank, 300.0, airframe(name).cruise_mps)
-    while model.state().roll_rad < 0.9 * bank:
-        model.advance(1)
-    assert model.state().time_s == pytest.approx(airframe(name).roll_in_s, rel=0.05)
-
-
-def test_disengaged_the_controls_stay_and_the_command_is_not_flown() -> None:
-    model = model_of("aerosonde")
-    model.engage(False)
-    model.command(0.6, 400.0, 25.0)
-    model.advance(2 * SECOND)
-    assert abs(model.state().roll_rad) < 0.05
-
-
 @pytest.mark.parametrize("turbulence", ["tustin", "milspec"])
 def test_turbulence_is_seeded_and_grows_with_intensity(turbulence: str) -> None:
     def rolls(intensity: str, seed: int) -> list[float]:
@@ -227,32 +209,6 @@ def test_faults_name_the_cause() -> None:
         if stalling.fault():
             break
     assert (stalling.fault() or "").startswith("stalled: ")
-
-
-@pytest.mark.parametrize(
-    ("reading", "good", "bad", "fault"),
-    [
-        ("aero/alpha-rad", 0.2, 0.6, "stalled: angle of attack 34.4 deg, limit "),
-        ("aero/alpha-rad", -0.2, -0.6, "stalled: angle of attack -34.4 deg, limit "),
-        ("position/h-sl-ft", 7.0, 6.0, "the aircraft is at the ground (1.8 m above sea level)"),
-        ("attitude/phi-rad", -1.3, -1.4, "rolled over: roll -80 deg, limit 75 deg"),
-        ("position/h-sl-ft", 1e9, math.inf, "the state is not finite"),
-        ("velocities/vtrue-fps", 1e9, math.inf, "the state is not finite"),
-        ("attitude/phi-rad", 0.0, math.nan, "the state is not finite"),
-    ],
-)
-def test_each_limit_is_a_fault_of_its_own(reading: str, good: float, bad: float, fault: str) -> None:
-    model = model_of("aerosonde")
-
-    def reads(value: float) -> None:
-        place = STATE_PROPERTIES.index(reading)
-        model._read = (*model._read[:place], lambda: value, *model._read[place + 1 :])
-        model.state()
-
-    reads(good)
-    assert model.fault() is None
-    reads(bad)
-    assert (model.fault() or "").startswith(fault)
 
 
 def test_a_state_that_is_not_finite_is_a_fault() -> None:

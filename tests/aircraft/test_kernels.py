@@ -95,10 +95,3 @@ def test_a_point_beside_a_route_is_told_with_its_distance_and_curvature(seed: in
         )
         assert point.curvature_1pm in route.segments[[int(np.searchsorted(ends, arc_length))], 4]
         assert not point.past_end
-
-
-def test_beyond_the_end_of_a_route_its_last_tangent_is_nearest() -> None:
-    progress = RouteProgress(Route(np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 100.0]])), arc_length_m=90.0)
-    point = progress.nearest(3.0, 130.0)
-    assert point.past_end
-    assert (point.arc_length_m, point.cross_track_m, point.curvature_1pm) == (130.0, 3.0, 0.0)

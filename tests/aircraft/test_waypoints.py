@@ -123,8 +123,3 @@ def test_acceptance_is_that_of_the_autopilot() -> None:
     assert of("npfg", 1000.0, 10.0) == 500.0
     assert of("preview", 25.0, 90.0) == pytest.approx(25.0**2 / (9.80665 * math.tan(math.radians(30.0))))
     assert of("l1", 25.0, 10.0, 33.0) == 33.0
-
-
-def test_needs_a_route() -> None:
-    with pytest.raises(RuntimeError, match=r"follow\(\) a route"):
-        WaypointLaw(Watched(), "preview", lambda speed, turn: 1.0).update(at(0.0, 0.0))
