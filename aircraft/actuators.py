@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 
 CONTROLS = ("aileron", "elevator", "rudder", "throttle")
 """The command of each is fcs/<control>-cmd-norm."""
-
 THROTTLE_TRAVEL_DEG = 60.0
 """Travel of the servo's arm from idle to full throttle."""
 

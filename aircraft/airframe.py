@@ -16,10 +16,8 @@ from aircraft.model_files import AircraftError, ModelFiles
 
 PITCH_LIMITS_DEG = (-30.0, 30.0)
 """Pitch that the autopilot commands at the least and at most: PX4's defaults FW_P_LIM_MIN and FW_P_LIM_MAX."""
-
 LEAST_SHARE = 0.97
 """Share of the lowest airspeed of level flight below which the autopilot lets height go for speed."""
-
 FIGURES = (
     "bank_limit_deg",
     "roll_rate_dps",

@@ -27,10 +27,8 @@ def aircraft_names() -> tuple[str, ...]:
 def airframe(name: str, actuators: Actuators | None = None, autopilot: AutopilotKeys = DERIVED) -> Airframe:
     """The airframe of a name or folder, surveyed by flying it unless that has been done before.
 
-    Args:
-        name: of `aircraft_names`, of another aircraft of the JSBSim wheel, or a folder that holds a JSBSim model.
-        actuators: its servos; None: those of the airframe table, or none.
-        autopilot: what is known of its autopilot.
+    The name is of `aircraft_names`, of another aircraft of the JSBSim wheel, or a folder that holds a JSBSim model.
+    Servos of None are those of the airframe table, or none.
 
     Raises:
         AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
@@ -46,11 +44,7 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
 
 
 def is_surveyed(name: str) -> bool:
-    """Whether an aircraft's figures are kept, so that `airframe` need not fly it for them.
-
-    Raises:
-        AircraftError: there is none.
-    """
+    """Whether an aircraft's figures are kept, so that `airframe` need not fly it; AircraftError if there is none."""
     return is_kept(*_as_flown(name, None, DERIVED)[2])
 
 

@@ -24,9 +24,7 @@ S = 1j * np.logspace(-1.0, 2.5, 4000)
 NEEDED_DEG = 45.0
 """The least phase margin that loops keep behind servos; a margin of 45 degrees is what is usually asked of aircraft
 (MIL-F-9490D, 3.1.3.6.1, for modes of less than 1 Hz and up)."""
-
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
-
 ROLL_ERROR_SHARE = 0.8
 """Share of the steady roll rate at full aileron that roll errors may ask for."""
 LEAST_AILERON_S = 0.1
@@ -119,10 +117,7 @@ def derivatives(
     alpha_rad: float,
     qbar_psf: float,
 ) -> Derivatives:
-    """Picks the derivatives from a linear model x_dot = A x + B u, propeller speeds eliminated as settled.
-
-    States and inputs have the names of JSBSim's FGLinearization ("Vt", "Alpha", "Rpm0", ...; "ThtlCmd", "DaCmd", ...).
-    """
+    """Picks them from a linear model x_dot = A x + B u with FGLinearization's names, propeller speeds as settled."""
     fast = [i for i, state in enumerate(states) if state.lower().startswith("rpm")]
     slow = [i for i in range(len(states)) if i not in fast]
     a, b = system[np.ix_(slow, slow)], control[slow]

@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 
 MAX_BYTES = 10_000_000
 """A cache file has a few thousand bytes; of one that has more no more than this is read."""
-
 Card = TypeVar("Card")
 
 
@@ -32,11 +31,8 @@ def cached(
     Both ways give the same values: JSON keeps every bit of a float. A cache that cannot be read or written, or whose
     numbers are not those that were measured (its SHA-256 tells), costs time and nothing else.
 
-    Args:
-        title: what was measured of what, for the file's name.
-        digest: of everything that the result depends on.
-        measure: measures; its result consists of what JSON has.
-        read: makes what is wanted of a result.
+    The title is for the file's name, the digest of everything that the result depends on. What `measure` gives consists
+    of what JSON has, and `read` makes what is wanted of it.
     """
     file = _file(title, digest)
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):

@@ -21,14 +21,11 @@ from aircraft.trials import KEPT_SPEED_SHARE, farthest
 
 STEEPEST = 0.4
 """Rates beyond this share of the airspeed (24 degrees) are not looked at."""
-
 SETTLING_S, JUDGED_S = 15.0, 10.0
 """A rate is flown for both together and judged over the second."""
-
 KEPT_RATE_SHARE = 0.05
 TOLERANCE = 0.02
 """A rate is found to this share of the airspeed's steepest."""
-
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 SPEEDS = 5
 FORMAT = 1

@@ -15,7 +15,6 @@ import math
 
 PATCH_M = 500.0
 """Half the width of a patch of the plane."""
-
 SEMI_MAJOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)

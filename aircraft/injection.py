@@ -26,7 +26,6 @@ ESTIMATED = {
     "position/h-sl-ft": None,
 }
 """What the autopilot reads of the state that its navigation estimates, and the gyro that tells how it changes."""
-
 LIMITED_SHARE = 0.999
 """A servo that moves by this share of the most it can in a step is at its rate limit."""
 
@@ -42,11 +41,7 @@ def with_autopilot(
 
     The other files of the model are linked, so that references from the model resolve as before.
 
-    Args:
-        model: its main file.
-        actuators: controls and their servos.
-        deviation: by how much the aircraft differs.
-        latency: age of the state that the autopilot reads, in s and in steps.
+    `latency` is the age of the state that the autopilot reads, in s and in steps.
 
     Raises:
         ValueError: the model is not well-formed XML or not a JSBSim model.

@@ -14,12 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-
 GRAVITY_MPS2 = 9.80665
 """Standard acceleration of free fall (ISO 80000-3)."""
-
 FOOT_M = 0.3048
-
 STEP_RATE_HZ = 60
 """Steps of a flight model a second, where nothing else is said. Flown on the 14-turn courses of
 `harness.bench.tracking`, the track of the Aerosonde lies within 0.03 m of that with 480 steps."""

@@ -23,21 +23,17 @@ REFERENCE_ALTITUDE_M = 300.0
 LONGITUDINAL_TRIM, FULL_TRIM = 0, 1
 RUDDER_NEEDED = "rdot doesn't appear to be trimmable"
 """What JSBSim says of an aircraft without a rudder: it is trimmed in its plane of symmetry."""
-
 SURFACES = {
     "aileron": ("fcs/left-aileron-pos-rad", "fcs/right-aileron-pos-rad"),
     "elevator": ("fcs/elevator-pos-rad",),
     "rudder": ("fcs/rudder-pos-rad",),
 }
 """Properties by which models tell where a surface is, rad."""
-
 MOST_ALPHA_DEG, ALPHA_STEP_DEG = 40.0, 0.5
 """Angles of attack that are looked at for the most lift."""
-
 MOVING_STEPS = 120
 LEAST_DEG = 0.5
 """A surface that moves by less is not moved by its command."""
-
 ROTATION = ("rate", "position")
 ADAMS_BASHFORTH_2 = 3
 """JSBSim's number of the integrator that rotation is given. Its own choice, the rectangle rule, is of first order: with
@@ -70,7 +66,6 @@ ERROR_LEVEL = 4
 """JSBSim's LogLevel::ERROR."""
 NO_NEWS = "No filename given."
 """JSBSim logs this as an error of every model."""
-
 _SILENCE = _Silence()
 """The only one: JSBSim lets go of the logger of a thread that has ended without Python's lock, and so must not be the
 last to hold it."""
@@ -117,9 +112,9 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
 
 
 def _check_properties(fdm: Any, files: ModelFiles) -> None:
-    """Raises AircraftError if a function of the model reads a property that nothing makes.
+    """Raises AircraftError if a function of the model reads a property that nothing makes, and makes it.
 
-    They are made first: the process would end with the model, whose destructor reads them.
+    The process would end with the model, whose destructor reads it.
     """
     tags = ("property", "p", "independentVar")
     functions = ElementTree.parse(files.model).getroot().iter("function")
@@ -195,11 +190,7 @@ def _why_not_trimmed(fdm: Any) -> str:
 
 
 def trimmed(files: ModelFiles, airspeed_mps: float) -> Any:
-    """A fresh jsbsim.FGFDMExec in level flight northwards, 300 m above the sea, in calm air.
-
-    Raises:
-        AircraftError: the model cannot be loaded, or not trimmed at this true airspeed.
-    """
+    """A fresh jsbsim.FGFDMExec in level flight northwards, 300 m up, in calm air; AircraftError if there is none."""
     fdm = load(files)
     start = StartConditions(0.0, 0.0, REFERENCE_ALTITUDE_M, 0.0, airspeed_mps)
     trim(fdm, files.name, LocalPlane(45.0, 0.0), start, heading_rad=0.0)
@@ -252,10 +243,7 @@ def linearised(fdm: Any) -> Derivatives:
 
 
 def surface_travel_deg(files: ModelFiles) -> dict[str, float]:
-    """Degrees that each surface moves for a command of 1, by control; 0 where the model does not show it.
-
-    The commands are given to the model at rest, its own flight controls running.
-    """
+    """Degrees that each surface moves for a command of 1, at rest, by control; 0 where the model does not show it."""
     travel = {"throttle": THROTTLE_TRAVEL_DEG}
     for control, properties in SURFACES.items():
         ends = []

@@ -40,21 +40,17 @@ WIND_PROPERTIES = ("atmosphere/wind-east-fps", "atmosphere/wind-north-fps", "atm
 """The direction that the wind blows towards."""
 TURBULENCE_TYPE = {"milspec": 3.0, "tustin": 4.0}
 TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}
-
 GROUND_FT = 2.0 / FOOT_M
 """Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
-
 MAX_ROLL_RAD = math.radians(75.0)
 ALPHA_MARGIN_DEG = 3.0
 """Pitch commands stay this far below the angle of attack that counts as stalled."""
 STEEPEST_SINK = 0.3
 """Sink over airspeed that the autopilot allows where the energy for more height is not there."""
-
 SETTLING_STEP_S = 1e-9
 TERRAIN_BELOW_FT = 10.0 / FOOT_M
 """The flight model's ground is at least so far below the aircraft, so that its wheels do not touch it: contact is
 judged by the true world."""
-
 INTEGRATOR_MEMORY = 6
 """Steps that replace every derivative an integrator of JSBSim remembers."""
 
@@ -91,7 +87,8 @@ class JsbsimModel:
         """
         self.airframe = frame
         frame.check_airspeed(start.airspeed_mps)
-        self._step_rate_hz = step_rate_hz
+        self.step_rate_hz = step_rate_hz
+        """Integration steps per simulated second."""
         self._step, self._read_at_step = 0, -1
         # Roll, airspeed, altitude and angle of attack, as read.
         self._judged = math.nan, math.nan, math.nan, math.nan
@@ -134,11 +131,6 @@ class JsbsimModel:
         self._start_gusts(atmosphere)
         self.engage()
 
-    @property
-    def step_rate_hz(self) -> int:
-        """Integration steps per simulated second."""
-        return self._step_rate_hz
-
     def state(self) -> AircraftState:
         """The state now, in the local plane."""
         # The functions that read them: to collect what they return first takes half as long again.
@@ -157,7 +149,7 @@ class JsbsimModel:
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
         cosine_m, sine_m = FOOT_M * self._cosine, FOOT_M * self._sine
         values = (
-            self._step / self._step_rate_hz,
+            self._step / self.step_rate_hz,
             east_m,
             north_m,
             up_ft * FOOT_M,
@@ -170,8 +162,8 @@ class JsbsimModel:
             airspeed_fps * FOOT_M,
             load_factor(),
             throttle(),
-            sum(read() for read in self._limited) / self._step_rate_hz if self._limited else 0.0,
-            sum(read() for read in self._vertical_limited) / self._step_rate_hz if self._limited else 0.0,
+            sum(read() for read in self._limited) / self.step_rate_hz if self._limited else 0.0,
+            sum(read() for read in self._vertical_limited) / self.step_rate_hz if self._limited else 0.0,
             elevator if -1.0 <= elevator <= 1.0 else max(-1.0, min(elevator, 1.0)),
             aileron if -1.0 <= aileron <= 1.0 else max(-1.0, min(aileron, 1.0)),
             rudder if -1.0 <= rudder <= 1.0 else max(-1.0, min(rudder, 1.0)),
@@ -250,10 +242,9 @@ class JsbsimModel:
             node(fdm, path).set_double_value(value)
 
     def _move_with_wind(self) -> None:
-        """Gives the trimmed aircraft the velocity of the wind, and then the air.
+        """Gives the trimmed aircraft the velocity of the wind, and then the air: initial conditions reset the wind.
 
-        In this order because initial conditions reset the wind. The engine must not be started again: that
-        would put the propeller to the speed of full throttle.
+        The engine must not be started again: that would put the propeller to the speed of full throttle.
         """
         fdm = self._fdm
         east_fps, north_fps = self._wind_true()
@@ -265,22 +256,18 @@ class JsbsimModel:
         self._apply_wind()
 
     def _settle(self) -> None:
-        """Takes steps of next to no duration.
-
-        Integrators, of the motion and of the autopilot, go on from derivatives that they remember, and those
-        of the last initial conditions belong to other air and other commands.
-        """
+        """Takes steps of next to no duration: integrators remember derivatives of other air and other commands."""
         self._fdm.set_dt(SETTLING_STEP_S)
         for _ in range(INTEGRATOR_MEMORY):
             self._fdm.run()
-        self._fdm.set_dt(1.0 / self._step_rate_hz)
+        self._fdm.set_dt(1.0 / self.step_rate_hz)
 
     def _wind_true(self) -> tuple[float, float]:
         """The wind towards true east and north where the aircraft is now, ft/s."""
         east, north = self._wind
         if self._air is not None:
             height_m = (self._place[2] - self._terrain_ft) * FOOT_M
-            east, north = self._air.wind_at(self._step / self._step_rate_hz, height_m)
+            east, north = self._air.wind_at(self._step / self.step_rate_hz, height_m)
             east, north = east / FOOT_M, north / FOOT_M
         return east * self._cosine + north * self._sine, north * self._cosine - east * self._sine
 
@@ -290,11 +277,11 @@ class JsbsimModel:
         east_fps, north_fps = self._wind_true()
         down_fps = 0.0
         if self._vertical_gusts is not None:
-            down_fps -= self._vertical_gusts.up_mps(self._step / self._step_rate_hz) / FOOT_M
+            down_fps -= self._vertical_gusts.up_mps(self._step / self.step_rate_hz) / FOOT_M
         if self._turbulence is not None:
             height_m = (self._place[2] - self._terrain_ft) * FOOT_M
             heading, airspeed_fps = self._read[6](), self._read[9]()
-            gusts = self._turbulence.step(height_m, airspeed_fps * FOOT_M, 1.0 / self._step_rate_hz)
+            gusts = self._turbulence.step(height_m, airspeed_fps * FOOT_M, 1.0 / self.step_rate_hz)
             ahead, right, down = (gust / FOOT_M for gust in gusts)
             east_fps += ahead * math.sin(heading) + right * math.cos(heading)
             north_fps += ahead * math.cos(heading) - right * math.sin(heading)

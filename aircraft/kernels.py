@@ -20,10 +20,8 @@ from aircraft.interface import GRAVITY_MPS2, FloatArray
 
 INTERCEPT_SINE = 0.7
 """Sine of the steepest angle to the path at which the law `preview` approaches it from far off."""
-
 CURVATURE, LENGTH, START, STOP, TURNED = 4, 5, 6, 7, 8
 """Columns of a route's rows."""
-
 PREVIEW_GAINS = np.dtype(
     [
         ("bandwidth_radps", np.float64),
@@ -38,7 +36,6 @@ PREVIEW_GAINS = np.dtype(
 )
 PREVIEW_MEMORY = np.dtype([("row", np.intp), ("along_m", np.float64), ("roll_reference_rad", np.float64)])
 """Place of the nearest point (row of the route, distance along it) and the roll that the law has asked for."""
-
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -90,11 +87,7 @@ def preview_update(
     heading_rad: float,
     airspeed_mps: float,
 ) -> tuple[float, float, float, bool, bool]:
-    """The law of `aircraft.guidance.preview`, from one update to the next.
-
-    Returns:
-        What `GuidanceOutput` consists of.
-    """
+    """The law of `aircraft.guidance.preview`, from one update to the next: what `GuidanceOutput` consists of."""
     has, kept = gains[0], memory[0]
     row, along_m, cross, tangent_east, tangent_north = nearest_on_route(
         rows, kept.row, kept.along_m, east_m, north_m
@@ -227,10 +220,7 @@ def air_direction(
 
     If the bearing can be made good, the wind triangle. If not, along sqrt(W^2 - V^2) b - w, as PX4's npfg has it
     (`CourseToAirspeedRefMapper::infeasibleAirVelRef`): this is the wind triangle where feasibility ends, and
-    straight into the wind where the bearing is against it.
-
-    Returns:
-        East and north of the heading, a unit vector.
+    straight into the wind where the bearing is against it. A unit vector.
     """
     along = wind_east_mps * bearing_east + wind_north_mps * bearing_north
     excess = wind_east_mps**2 + wind_north_mps**2 - airspeed_mps**2

@@ -52,8 +52,7 @@ def law_card(
 ) -> LawCard | None:
     """The card of a law with its keys, flown unless that has been done before; `before_flying` is called first then.
 
-    Returns:
-        The card; None for `preview` at its defaults, which the survey of the aircraft has.
+    None for `preview` at its defaults, which the survey of the aircraft has.
 
     Raises:
         AircraftError: the law does not track with this aircraft.
@@ -100,11 +99,7 @@ def _card(measured: dict[str, Any]) -> LawCard:
 def _measured(
     frame: Airframe, kind: str, speed_mps: float, make: Callable[[], GuidanceLaw], waypoints: bool
 ) -> dict[str, Any]:
-    """The law's name, and `points`: the attributes of a `WindPoint` in every wind.
-
-    Raises:
-        AircraftError: the law does not track.
-    """
+    """The law's name, and `points`, those of a `WindPoint` in every wind; AircraftError if it does not track."""
     most = WAYPOINTS_TRACKED_SHARE if waypoints else TRACKED_SHARE
     points: list[dict[str, float]] = []
     factors: tuple[float, ...] = RADIUS_FACTORS[:1] if waypoints else RADIUS_FACTORS

@@ -57,11 +57,7 @@ class ModelFiles:
         return self.model.stem
 
     def digest(self) -> str:
-        """SHA-256 over the model, what it is flown with and what flies it.
-
-        These are all files of its folder and of those of its engines and systems, JSBSim's version (it stands for
-        the files of its wheel), its actuators, and this package, with autopilot, airframe table and guidance.
-        """
+        """SHA-256 over the model, what it is flown with and what flies it: JSBSim's version stands for its wheel."""
         sha = hashlib.sha256(version("jsbsim").encode())
         sha.update(repr(self.actuators).encode() if self.actuators else b"")
         sha.update(repr(self.latency_s).encode() if self.latency_s else b"")

@@ -10,8 +10,6 @@ from aircraft.interface import Route
 
 SegmentRow = tuple[float, float, float, float, float, float]
 """One row of `Route.segments`."""
-
-
 WEAVE_DEG = (60.0, -30.0, 90.0, -60.0, -20.0, 20.0)
 """Turns of `weave`."""
 

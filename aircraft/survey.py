@@ -31,34 +31,26 @@ from aircraft.trials import not_held, roll_in_s, steepest_level_bank_deg, turn_r
 
 SLOWEST_MPS, FASTEST_MPS = 8.0, 300.0
 """Speeds outside of these are not looked at: the air is taken for incompressible enough below."""
-
 SPEED_STEP = 1.12
 SPEED_DIGITS = 1
 SPEED_TOLERANCE = 0.01
 GAIN_DIGITS = 5
 """Significant digits of derived gains: fewer than what processors and compilers agree on."""
-
 BANK_LIMIT_DEG = 45.0
 ROLL_COMMAND_SHARE = 0.5
 """Share of the steady roll rate at full aileron that the roll command may ask for."""
-
 UNSTALLED_DEG = 20.0
 """Angle of attack that counts as stalled of a model whose lift never stops rising."""
-
 BANDWIDTH_SHARE = 0.36
 """Bandwidth of the cross-track correction over that of roll: more and the two begin to work against each other."""
-
 ROLL_LIMITED_S = 0.1
 """Flying time; a cross-track error of that much flight is corrected without reaching the limit of roll rate.
 Correcting an error e at bandwidth w takes a change of g * roll of w^3 e; beyond the limit it becomes unstable."""
-
 DELAY_MARGIN_S = 0.5
 """Further delay that the cross-track loop of `preview` bears where the latency of the state is known."""
-
 REVERSALS = (30.0, -30.0, 15.0, 0.0)
 WELL_TRACKED_S = 0.01
 """Flying time; a cross-track error of that much flight is what a good autopilot stays within."""
-
 PACES = (1.0, 0.7, 0.5, 0.35)
 LAST_PACE = 0.25
 """For an aircraft that is held at no other."""
@@ -68,11 +60,7 @@ LEAST_TURN_SHARE = 0.5
 
 
 def survey(entry: AirframeEntry, files: ModelFiles) -> dict[str, Any]:
-    """Everything measured of `Airframe`, by attribute.
-
-    Raises:
-        AircraftError: it cannot be loaded, trimmed or held; the message says where it failed.
-    """
+    """Everything measured of `Airframe`, by attribute; AircraftError if it cannot be loaded, trimmed or held."""
     cruise = entry.cruise_mps or middle_of_trims(files)
     frame = _held_at_cruise(entry, files, cruise)
     low, high = _edge(frame, 1.0 / SPEED_STEP), _edge(frame, SPEED_STEP)
@@ -157,11 +145,7 @@ def _lag_s(files: ModelFiles, control: str) -> float:
 
 
 def _pitch_paces(at: Derivatives, lag_s: float, latency_s: float) -> tuple[float, float]:
-    """The fastest paces in pitch, and in climb and altitude, whose loops keep their margin; in climb else the last.
-
-    Raises:
-        ValueError: they keep it in pitch at none.
-    """
+    """The fastest paces in pitch (ValueError if none), and in climb and altitude, that keep a margin, else the last."""
     late = lag_s or latency_s
     for pace in PACES if late else PACES[:1]:
         margin_deg = pitch_margin_deg(at, gains(at, 1.0, pace), lag_s, latency_s)

@@ -13,11 +13,9 @@ from aircraft.interface import AircraftState, FloatArray
 
 LEAD_S = 1.0
 """The slope is taken from so far ahead: what the climb takes to follow its command."""
-
 CLIMBS_FROM = (0.95, 0.88)
 """Shares of the commanded airspeed: from the first on the fastest climb is commanded, below the second none:
 in a turn the engine has less left over for a climb than wings level."""
-
 SPEED_CHANGE_PER_S = 0.02
 """A commanded airspeed changes by no more than this share of itself a second."""
 

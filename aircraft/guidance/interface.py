@@ -29,12 +29,7 @@ class GuidanceLimits:
 
     @property
     def slowest_roll_s(self) -> float:
-        """Time constant of the slowest first-order roll, s.
-
-        A first-order roll to the bank limit begins at the rate bank limit / time constant. An aircraft with a lower
-        roll rate limit rolls like one with a longer time constant; a law that assumes a shorter one swings from limit
-        to limit.
-        """
+        """Time constant of roll, s, at least bank limit / roll rate: with less a law swings from limit to limit."""
         return max(self.roll_lag_s + self.roll_delay_s, self.bank_limit_rad / self.roll_rate_radps)
 
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
+from aircraft.guidance.npfg import dot
 from aircraft.guidance.progress import PathPoint
 from aircraft.guidance.route_law import RouteLaw, centre_of
 from aircraft.interface import GRAVITY_MPS2, AircraftState
@@ -116,11 +117,6 @@ class L1Output(NamedTuple):
     lateral_acceleration_mps2: float
     crosstrack_m: float  # on a leg positive to its LEFT; on a circle positive outside
     circling: bool  # the circle is held; before, it is approached
-
-
-def dot(a: complex, b: complex) -> float:
-    """Scalar product of two vectors."""
-    return a.real * b.real + a.imag * b.imag
 
 
 def right_of(a: complex, b: complex) -> float:

@@ -5,10 +5,8 @@
 with a, e positive to the right of the path (the curvature kappa is therefore taken positive to the right here), chi the
 course, psi the heading and s the share of its coordinated turn rate that the aircraft reaches. Curvature is that where
 the aircraft will be when it has rolled, averaged over the time that rolling into a turn takes, so that line and arc
-join without a bump. Clothoids in their place gained too little for what they would ask of every planner: on the 14-turn
-courses of `harness.bench.tracking`, three seeds, calm, 20 updates a second, p95/max were .049/.091 m with this and
-.074/.085 m with clothoids as long as the roll-in for the Aerosonde, .101/.182 and .063/.119 m for c172p, .101/.644 and
-.110/.417 m for T38. The roll command leads by the time constant of the roll loop, so that roll itself follows the law.
+join without a bump; clothoids in their place gained 1 cm for the Aerosonde (aircraft/MEASURED.md). The roll command
+leads by the time constant of the roll loop, so that roll itself follows the law.
 Wind enters through the ground velocity alone, except where it is stronger than the aircraft: then the wind is estimated
 as ground velocity less air velocity, and `aircraft.kernels.air_direction` says where to head.
 

@@ -15,6 +15,7 @@ from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
 from aircraft.guidance.progress import PathPoint
 from aircraft.guidance.route_law import RouteLaw
+from aircraft.guidance.vector_field import LEAST_CRAB_COSINE, SLOW_MPS
 from aircraft.interface import GRAVITY_MPS2, AircraftState
 
 LOOK_AHEAD = 2.0 * math.sqrt(2.0)
@@ -22,10 +23,6 @@ LOOK_AHEAD = 2.0 * math.sqrt(2.0)
 sqrt(2) / time and the damping 0.7: with this it is half as fast as the bandwidth."""
 GOAL_STEPS, GOAL_REACH = 16, 2.0
 """Most steps towards the goal point; it is at most so many look-ahead distances along the route away."""
-LEAST_CRAB_COSINE = 0.2
-"""Least cosine of the angle between course and heading with which bank is worked out."""
-SLOW_MPS = 1.0
-"""Ground speeds below this count as this."""
 
 
 @dataclass(frozen=True)

@@ -33,11 +33,7 @@ class GuidanceKind:
     """The law for one flight, from a resolved config and what may be asked of the aircraft."""
 
     def law(self, limits: GuidanceLimits, **keys: Any) -> GuidanceLaw:
-        """The law for one flight, its own keys given or at their defaults.
-
-        Raises:
-            ValueError: keys contradict each other.
-        """
+        """The law for one flight, its own keys given or at their defaults; ValueError if they contradict each other."""
         return self.make(self.config(**keys).resolved(limits), limits)
 
 

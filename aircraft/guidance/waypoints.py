@@ -15,38 +15,74 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits, GuidanceOutput
-from aircraft.guidance.mission_legs import MissionLeg, straight
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import GRAVITY_MPS2, AircraftState, FloatArray, Route
 from aircraft.route import SegmentRow, arc_point, route_length
 
 WP_RADIUS_M = 90.0
 """ArduPilot's WP_RADIUS: the most that `l1` accepts a waypoint from."""
-
 MAX_SWITCH_M = 500.0
 """PX4 asks npfg for its switch distance with this as the most."""
-
 CORNER_RAD = math.radians(90.0)
 """An arc that turns by more is rounded by several corners."""
-
 LEAST_TURN_RAD = math.radians(0.5)
 LEAST_LEG_M = 1.0
 """Waypoints are no closer to each other, and legs bend by no less at one that is no end."""
-
 BANK_KEPT_RAD = math.radians(15.0)
 """Bank kept back where a law has no rule of its own: it turns at each waypoint as the fillet of a plan would."""
-
 L1_CAPTURE_RADII = 3.0
 """ArduPlane follows the line to the centre of a loiter down to so many radii from it."""
-
 FAR_M = 1e5
 """Beyond the last waypoint a law that flies to points heads for one so far on."""
+HEADING_FOR_CENTRES: Final = ("l1", "npfg")
+"""Laws whose autopilots head for the centre of a loiter; all others join its circle along a tangent."""
+
+
+@dataclass(frozen=True, eq=False)
+class MissionLeg:
+    """One leg: to a waypoint, along a way, or round a circle."""
+
+    route: Route  # what the law follows
+    stations_m: tuple[float, float]  # arc lengths at its ends on the route that the mission was made into
+    end_m: tuple[float, float] | None = None  # the waypoint that it leads to; None: it is flown to its end
+    acceptance_m: float | None = (
+        0.0  # the waypoint is reached from here; None: by the law's rule; 0: when passed
+    )
+    captured_radius_m: float = (
+        0.0  # of the circle about the waypoint that is joined from far; 0: there is none
+    )
+    centre_m: tuple[float, float] | None = None  # of a circle that the leg goes round
+    swept_rad: float = 0.0  # how far round, from where the route begins
+
+    @property
+    def direction(self) -> tuple[float, float]:
+        """Unit vector at its end."""
+        row = self.route.segments[-1]
+        return arc_point(tuple(row.tolist()), float(row[5]))[2:]
+
+
+def straight(
+    ends: tuple[complex, complex],
+    stations_m: tuple[float, float],
+    acceptance_m: float | None,
+    centre: complex | None = None,
+) -> MissionLeg:
+    """A leg from one place to another, east + i north."""
+    start, end = ends
+    goal = end if centre is None else centre
+    length_m = abs(goal - start)
+    ahead = (goal - start) / length_m
+    row = (start.real, start.imag, ahead.real, ahead.imag, 0.0, length_m)
+    return MissionLeg(
+        Route(np.array([row])), stations_m, (goal.real, goal.imag), acceptance_m, abs(goal - end)
+    )
 
 
 @runtime_checkable

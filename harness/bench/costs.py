@@ -41,7 +41,6 @@ WATCHED = {
     "guidance": ("guidance", "follow", "update"),
 }
 """Parts of a loop: the block that each is booked to, and its methods."""
-
 T = TypeVar("T")
 
 

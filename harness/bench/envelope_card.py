@@ -32,7 +32,6 @@ RADIUS_TOLERANCE: Final = 0.02
 DEFAULT_WIND_SHARE: Final = 0.3
 FORMAT: Final = 2
 """Goes up with what a card consists of, so that older ones are made anew."""
-
 Report = Callable[[int, int, str], None]
 
 

@@ -84,7 +84,9 @@ CASES: Final = (
 LIMIT_FACTORS: Final = {
     "aerosonde": 1.0,
     **dict.fromkeys(("c172p", "c172x", "t6texan2"), 4.0),
-    **dict.fromkeys(("c172r", "DHC6", "OV10", "T38", "A4", "F80C", "F4N", "global5000", "737", "A320", "B747"), 8.0),
+    **dict.fromkeys(
+        ("c172r", "DHC6", "OV10", "T38", "A4", "F80C", "F4N", "global5000", "737", "A320", "B747"), 8.0
+    ),
     **dict.fromkeys(("T37", "f15", "f16", "787-8", "MD11"), 16.0),
 }
 """By how much the limits of the Aerosonde are multiplied, for the aircraft whose tracking is verified: the least of 1,

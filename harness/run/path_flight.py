@@ -13,9 +13,8 @@ import numpy as np
 from aircraft.airframe import Airframe
 from aircraft.climb import climb_rates
 from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat
-from aircraft.guidance.mission_legs import HEADING_FOR_CENTRES, MissionLeg, straight
 from aircraft.guidance.progress import PathPoint, RouteProgress
-from aircraft.guidance.waypoints import Along, WaypointLaw
+from aircraft.guidance.waypoints import HEADING_FOR_CENTRES, Along, MissionLeg, WaypointLaw, straight
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
 from harness.files.input_file import InputError

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
-from aircraft.guidance.mission_legs import MissionLeg
+from aircraft.guidance.waypoints import MissionLeg
 from aircraft.interface import Route
 from harness.files.input_file import InputError
 from harness.files.mavlink.items import GROUND

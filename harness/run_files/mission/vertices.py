@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
-from aircraft.guidance.mission_legs import MissionLeg, straight
+from aircraft.guidance.waypoints import MissionLeg, straight
 from harness.files.mavlink.items import GROUND, HOME, SEA
 from harness.run_files.given_path import SAME_PLACE_M, FloatArray, FlyBy, Tightest, fly_by
 from harness.run_files.mission.program import MissionStep
