@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-import os
 import shlex
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from harness.analysis.claims import Claim
-from harness.cli.command_line import FAILED, print_json, resumable, told_apart
+from harness.cli.command_line import FAILED, at_a_time, print_json, resumable, told_apart
 from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
@@ -65,14 +65,11 @@ def certify(
     2 bad input or usage, nothing flown
     """
     from harness.certification.certification import MOST_RUNS, Terms
-    from harness.certification.subject import DEFAULT_AIRCRAFT, Asked, days_of, distributions, is_path
+    from harness.certification.subject import DEFAULT_AIRCRAFT, Asked, days_of, is_path
     from harness.scenario.shipped import scenario_path
 
     terms = Terms(probability, confidence)
-    try:
-        drawn = distributions(vary or ())
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--vary") from error
+    drawn = _drawn(vary or ())
     if is_path(subject) and not any(key == "aircraft.model" for key, _ in given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
     asked = Asked(subject, given.keys, drawn, claim, runs or MOST_RUNS, given.sources)
@@ -88,6 +85,16 @@ def certify(
         for run in found.failing_runs[:1]:
             say(f"view: {shlex.join(['wayproof', 'view', str(folder / 'runs' / str(run))])}")
     return 0 if found.verdict == "shown" else FAILED
+
+
+def _drawn(vary: Sequence[str]) -> Mapping[str, Any]:
+    """What varies from day to day, by key."""
+    from harness.certification.subject import distributions
+
+    try:
+        return distributions(vary)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--vary") from error
 
 
 def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
@@ -110,7 +117,7 @@ def _fly(
 
     with (
         resumable(folder, INDEX),
-        local_workers(workers or os.cpu_count() or 1) as flyers,
+        local_workers(at_a_time(workers)) as flyers,
         step_bar(silent) as bar,
     ):
 

@@ -53,6 +53,11 @@ def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_TH
     return f"-{sha256(json.dumps(others).encode()).hexdigest()[:8]}" if others else ""
 
 
+def at_a_time(workers: int | None) -> int:
+    """How many flights are flown at a time: as many as were asked for, or one a processor."""
+    return workers or os.cpu_count() or 1
+
+
 def with_remedy(error: OSError) -> str:
     """What an error of the system says, and what would help where that is known."""
     if error.errno in (errno.EMFILE, errno.ENFILE):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import itertools
-import os
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from harness.cli.command_line import FAILED, interruptible, load, marked_incomplete, print_json
+from harness.cli.command_line import FAILED, at_a_time, interruptible, load, marked_incomplete, print_json
 from harness.cli.options import Json, NoRecording, Out, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, given_by, replacing, sources
 from harness.cli.standard_output import say
@@ -49,8 +48,7 @@ def compare(
     from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
     from harness.run_files.run_folder import OVERLAY
 
-    kinds = [kind.strip() for kind in planners.split(",")]
-    laws = [law.strip() for law in guidance.split(",")] if guidance is not None else [None]
+    kinds, laws = _split(planners), _split(guidance)
     variants = [[*given_by(kind, law).keys, *given.keys] for kind in kinds for law in laws]
     loaded = [load(scenario, each) for scenario in scenarios for each in variants]
     folder, over = out or Path("runs/comparison"), itertools.count(1)
@@ -60,7 +58,7 @@ def compare(
                 loaded,
                 folder,
                 recording=not no_recording,
-                workers=workers or os.cpu_count() or 1,
+                workers=at_a_time(workers),
                 sources=(sources(*kinds), sources(*laws)),
                 progress=lambda told: bar(next(over), len(loaded), told),
             )
@@ -73,6 +71,10 @@ def compare(
         say(f"report: {folder / 'report.html'}")
         _print_view([folder / each.name / OVERLAY for each in loaded])
     return 0 if comparison.all_reached else FAILED
+
+
+def _split(names: str | None) -> list[str | None]:
+    return [None] if names is None else [name.strip() for name in names.split(",")]
 
 
 def _print_view(overlays: Sequence[Path]) -> None:
@@ -90,15 +92,18 @@ def print_comparison(rows: Sequence[Row]) -> None:
     from harness.analysis.metric import ERROR
 
     for name in dict.fromkeys(row.scenario for row in rows):
-        own = [row for row in rows if row.scenario == name]
-        by_law = all(row.guidance for row in own) and len({row.planner for row in own}) == 1
-        lines = [_cells(row, by_law) for row in own]
-        heads = ("guidance" if by_law else "planner", *(figure.short for figure in _shown()))
-        print_table(f"{name}, {own[0].planner}" if by_law else name, lines, heads)
+        _print_scenario(name, [row for row in rows if row.scenario == name])
     print_line(LEGEND, style="dim")
     for row in rows:
         if row.outcome == ERROR:
             say(f"{row.label}, error: {row.reason}")
+
+
+def _print_scenario(name: str, rows: Sequence[Row]) -> None:
+    by_law = all(row.guidance for row in rows) and len({row.planner for row in rows}) == 1
+    heads = ("guidance" if by_law else "planner", *(figure.short for figure in _shown()))
+    title = f"{name}, {rows[0].planner}" if by_law else name
+    print_table(title, [_cells(row, by_law) for row in rows], heads)
 
 
 def _shown() -> list[Metric]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from harness.cli.command_line import FAILED, print_json, resumable
+from harness.cli.command_line import FAILED, at_a_time, print_json, resumable
 from harness.cli.options import Json, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, planner_kind, replacing, sources
 from harness.cli.standard_output import say
@@ -64,7 +63,7 @@ def sweep(
     named = [each.strip() for each in planners.split(",")] if planners else []
     runs = checked(campaign_path(campaign), named, given.keys, given.sources[1])
     folder = out or Path("runs") / runs.campaign.name
-    local = partial(local_workers, workers or os.cpu_count() or 1)
+    local = partial(local_workers, at_a_time(workers))
     flyers = dask_workers(scheduler, unencrypted, _warn) if scheduler else local()
     told, whole = _fly(runs, folder, flyers, resume=resume, silent=quiet)
     summary = summarise(folder)

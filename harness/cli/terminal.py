@@ -114,15 +114,7 @@ def print_table(
     )
     lines = [[*map(printable, cells)] for cells in (rows.items() if isinstance(rows, Mapping) else rows)]
     if columns:
-        table.padding = 0 if len(columns) > 4 else (0, 1)
-        between = 1 if len(columns) > 4 else 3
-        figures = zip(columns[1:], *(cells[1:] for cells in lines if len(cells) > 1), strict=True)
-        taken = sum(between + max(Text.from_markup(cell).cell_len for cell in each) for each in figures)
-        fits = taken <= width - LEAST_NAME
-        room = width - 2 - taken if fits else LEAST_NAME - 4
-        table.add_column(printable(columns[0]), overflow="fold")
-        for heading in columns[1:]:
-            table.add_column(printable(heading), justify="right", overflow="fold", no_wrap=fits)
+        room = _add_columns(table, lines, columns, width)
         for name, *cells in lines:
             table.add_row(_broken(name, room), *cells)
     else:
@@ -131,6 +123,20 @@ def print_table(
         for cells in lines:
             table.add_row(*cells)
     console.print(table, width=width)
+
+
+def _add_columns(table: Table, lines: Sequence[Sequence[str]], columns: Sequence[str], width: int) -> int:
+    """Adds a column of names, and figures that are in one line where they fit; returns the room of a name."""
+    many = len(columns) > 4
+    table.padding = 0 if many else (0, 1)
+    figures = zip(columns[1:], *(cells[1:] for cells in lines if len(cells) > 1), strict=True)
+    widths = [max(Text.from_markup(cell).cell_len for cell in each) for each in figures]
+    taken = sum(widths) + len(widths) * (1 if many else 3)
+    fits = taken <= width - LEAST_NAME
+    table.add_column(printable(columns[0]), overflow="fold")
+    for heading in columns[1:]:
+        table.add_column(printable(heading), justify="right", overflow="fold", no_wrap=fits)
+    return width - 2 - taken if fits else LEAST_NAME - 4
 
 
 def _broken(name: str, room: int) -> Text:

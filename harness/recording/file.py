@@ -10,7 +10,7 @@ import os
 import struct
 import threading
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 import rerun as rr
 
@@ -40,26 +40,6 @@ def recording_stream(recording_id: str) -> rr.RecordingStream:
     rec.set_log_time_enabled(False)
     rec.set_log_tick_enabled(False)
     return rec
-
-
-class Sink(Protocol):
-    """Where a recording goes. `end` must be called, also when the flight breaks off."""
-
-    def flush(self) -> None:
-        """Has rerun pass on what was logged.
-
-        Raises:
-            OSError: it cannot be.
-        """
-        ...
-
-    def end(self) -> None:
-        """Ends the recording; again it does nothing.
-
-        Raises:
-            OSError: some of it was lost.
-        """
-        ...
 
 
 class RunningViewer:

@@ -119,7 +119,7 @@ def _events_view() -> rrb.TextLogView:
     )
 
 
-def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:
+def plan_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial2DView:
     """The plan view, north up, framed on the area.
 
     A 2-D view counts its second axis downwards; the transform at PLAN turns it round.
@@ -138,13 +138,11 @@ def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:
             f"{PLAN}/{run}{each}": _up_to_cursor()
             for run in trails
             for each in (look.FLOWN, look.BELIEVED, look.SENSED)
-            for run in trails
-            for each in (look.FLOWN, look.BELIEVED, look.SENSED)
         },
     )
 
 
-def flight_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial3DView:
+def flight_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial3DView:
     """The 3-D view: the whole area, seen from the south-west and above."""
     xmin, ymin, xmax, ymax = frame.bounds_m
     middle = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), frame.altitude_m)
@@ -170,68 +168,65 @@ def flight_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial3DView:
     )
 
 
-def series_views(
-    frame: Frame, runs: Sequence[str], only: Sequence[str] | None = None, without: Sequence[str] = ()
-) -> list[rrb.TimeSeriesView]:
-    """The time series, one a question, each over the whole flight.
-
-    What the colours of a single flight's lines are stands in the title: a legend would cover the end of the curves.
-    """
-    wanted = max(frame.clearance_m, 1.0)
-    one, whole = len(runs) < 2, len(runs) == 1
-    believed = whole and NAVIGATION not in without
-    # Bank: a little beyond the limit; the less, the nearer the plot is to having room for numbers. The limit stands in
-    # the title: the axis of a low plot, as an overlay of many may have, has no number but 0.
-    limit, most_deg = frame.bank_limit_deg, 1.1 * (frame.bank_limit_deg or 50.0)
-    bank = f"Bank, deg; blue: command, red: limit{'' if limit is None else f' {limit:g}'}"
-    rows: list[tuple[str, str, tuple[float, float] | None]] = [
-        ("cross_track", "Cross-track, m; blue: believed" if believed else "Cross-track error, m", None),
-        (
-            "clearance",
-            f"Clearance, m; red: wanted {frame.clearance_m:g}" if one else "Clearance, m",
-            (-0.25 * wanted, 6.0 * wanted),
-        ),
-        ("altitude_error", "Altitude error, m", None),
-        (NAVIGATION, "Navigation error, m", None),
-        ("speed", "Speed, m/s; blue: over ground" if one else "Airspeed, m/s", None),
-        (look.THROTTLE, "Throttle, %", (-5.0, 105.0)),
-        ("search", "Search, ms", None),
-        (look.PLAN_DELAY, "Plan delay, s", None),
-        (
-            "bank",
-            bank + (", violet: pitch" if whole else "") if one else "Bank, deg (right +)",
-            (-most_deg, most_deg),
-        ),
-    ]
-    return [
-        rrb.TimeSeriesView(
-            origin=f"{SERIES}/{entity}",
-            name=title,
-            background=rrb.archetypes.PlotBackground(color=list(look.BACKGROUND), show_grid=True),
-            axis_x=_whole_flight(),
-            axis_y=rrb.ScalarAxis(range=limits) if limits else None,
-            plot_legend=rrb.PlotLegend(visible=False)
-            if one
-            else rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=entity == "cross_track"),
-        )
-        for entity, title, limits in rows
-        if (only is None or entity in only) and entity not in without
-    ]
-
-
 def _plots(frame: Frame, runs: Sequence[str], without: Sequence[str]) -> rrb.Vertical:
     """Three plots, the others in tabs behind them: so few that each is high enough for its axis to have numbers.
 
     rerun numbers an axis at powers of ten that are 20 pixels apart; a bank of 45 degrees to both sides needs 210.
     """
+    titles = _titles(frame, runs, NAVIGATION not in without)
+    wanted = max(frame.clearance_m, 1.0)
+    most_deg = 1.1 * (frame.bank_limit_deg or 50.0)  # the nearer to the limit, the more room for numbers
+    ranges = {
+        "clearance": (-0.25 * wanted, 6.0 * wanted),
+        look.THROTTLE: (-5.0, 105.0),
+        "bank": (-most_deg, most_deg),
+    }
     rows: list[rrb.Container | rrb.View] = []
     shares: list[int] = []
     for share, names in PLOTS:
-        views = series_views(frame, runs, names, without)
+        views = [
+            rrb.TimeSeriesView(
+                origin=f"{SERIES}/{name}",
+                name=titles[name],
+                background=rrb.archetypes.PlotBackground(color=list(look.BACKGROUND), show_grid=True),
+                axis_x=_whole_flight(),
+                axis_y=rrb.ScalarAxis(range=ranges[name]) if name in ranges else None,
+                plot_legend=rrb.PlotLegend(
+                    rrb.Corner2D.LeftTop, visible=len(runs) > 1 and name == "cross_track"
+                ),
+            )
+            for name in names
+            if name not in without
+        ]
         if views:
             rows.append(views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0))
             shares.append(share)
     return rrb.Vertical(*rows, row_shares=shares)
+
+
+def _titles(frame: Frame, runs: Sequence[str], believes: bool) -> dict[str, str]:
+    """What the time series are called.
+
+    What the colours of a single flight's lines are stands in the title: a legend would cover the end of the curves. So
+    does the limit of the bank: the axis of a low plot, as an overlay of many may have, has no number but 0.
+    """
+    same = {
+        "altitude_error": "Altitude error, m",
+        NAVIGATION: "Navigation error, m",
+        look.THROTTLE: "Throttle, %",
+        "search": "Search, ms",
+        look.PLAN_DELAY: "Plan delay, s",
+    }
+    if len(runs) > 1:
+        several = {"clearance": "Clearance, m", "speed": "Airspeed, m/s", "bank": "Bank, deg (right +)"}
+        return same | several | {"cross_track": "Cross-track error, m"}
+    limit = "" if frame.bank_limit_deg is None else f" {frame.bank_limit_deg:g}"
+    return same | {
+        "cross_track": "Cross-track, m; blue: believed" if runs and believes else "Cross-track error, m",
+        "clearance": f"Clearance, m; red: wanted {frame.clearance_m:g}",
+        "speed": "Speed, m/s; blue: over ground",
+        "bank": f"Bank, deg; blue: command, red: limit{limit}{', violet: pitch' if runs else ''}",
+    }
 
 
 def _whole_flight() -> rrb.TimeAxis:

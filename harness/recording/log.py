@@ -22,7 +22,7 @@ from harness.analysis.causes import NAVIGATION_ERROR
 from harness.flight.observer import NOMINAL, Caution, ShieldState
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 from harness.recording import blueprint as look
-from harness.recording.file import RecordingFile, RunningViewer, Sink, recording_stream
+from harness.recording.file import RecordingFile, RunningViewer, recording_stream
 from harness.recording.layout import NOT_THIN, blueprint
 from harness.recording.moving import Changing, Tracked
 from harness.recording.plans import send_plans
@@ -118,7 +118,7 @@ class RerunLog:
         log_styles(self._rec, scene, thin)
         self.flush()
 
-    def _opened(self, into: Path | str) -> Sink:
+    def _opened(self, into: Path | str) -> RecordingFile | RunningViewer:
         runs, without = ((), NOT_THIN) if self._thin else (("",), self._scene.empty_series)
         lanes = 0 if self._thin else None
         layout = blueprint(self._scene.frame, runs, without, follows=isinstance(into, str), lanes=lanes)

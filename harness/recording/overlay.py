@@ -247,13 +247,9 @@ def _metrics(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, Any]:
         whole = json.loads(found["metrics"]["json"][0])
         return {metric.name: metric.value(whole) for metric in METRICS}
     run = {name: values[0] for name, values in found.get(RUN, {}).items()}
-    return {
-        metric.name: run[metric.recorded_as] / (metric.factor if metric.unit == "%" else 1.0)
-        if metric.kind == "number"
-        else run[metric.recorded_as]
-        for metric in METRICS
-        if metric.recorded_as in run
-    }
+    factors = {each.name: each.factor for each in METRICS if (each.kind, each.unit) == ("number", "%")}
+    recorded = {each.name: run[each.recorded_as] for each in METRICS if each.recorded_as in run}
+    return {name: value / factors[name] if name in factors else value for name, value in recorded.items()}
 
 
 def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]], without: Sequence[str]) -> str:

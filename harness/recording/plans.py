@@ -45,10 +45,10 @@ def _send_pictures(
     rec: rr.RecordingStream, times: list[rr.TimeColumn], pictures: Sequence[PlanPicture | None]
 ) -> None:
     """Draws how plans came about, nothing where a planner does not show it."""
-    strips = [_strips(picture) if picture else ([], [], []) for picture in pictures]
-    for entity, rows in zip(("window", "sectors", "candidates"), zip(*strips, strict=True), strict=True):
+    for place, entity in enumerate(("window", "sectors", "candidates")):
+        rows = [_strips(picture)[place] if picture else [] for picture in pictures]
         flat = strips_2d([strip for row in rows for strip in row])
-        columns = rr.LineStrips2D.columns(strips=flat).partition([len(row) for row in rows])
+        columns = rr.LineStrips2D.columns(strips=flat).partition([*map(len, rows)])
         rec.send_columns(f"{look.PLAN}/{entity}", times, columns)
     guides = np.array([picture.guide_m for picture in pictures if picture]).reshape(-1, 2, 2)
     arrows = rr.Arrows2D.columns(origins=guides[:, 0], vectors=guides[:, 1] - guides[:, 0])

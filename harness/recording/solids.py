@@ -107,22 +107,10 @@ def log_solids(
 ) -> None:
     """Logs obstacles as solids: circles as cylinders, polygons as one mesh of prisms, terrain as its rim."""
     shapes = [(each.shape, *drawn_heights(scene, each)) for each in obstacles]
-    round_ = [(shape, low, high) for shape, low, high in shapes if isinstance(shape, Circle)]
-    if round_:
-        rec.log(
-            f"{entity}/circles",
-            rr.Cylinders3D(
-                lengths=[high - low for _, low, high in round_],
-                radii=[shape.radius_m for shape, _, _ in round_],
-                centers=[(*shape.center_m, 0.5 * (low + high)) for shape, low, high in round_],
-                colors=[colour],
-                fill_mode="solid",
-            ),
-            static=static,
-        )
-    prisms = [prism(shape, *at) for shape, *at in shapes if isinstance(shape, Polygon) and at[1] > at[0]]
-    mesh = _mesh(prisms, colour)
-    del prisms
+    cylinders = _cylinders([each for each in shapes if isinstance(each[0], Circle)], colour)
+    if cylinders is not None:
+        rec.log(f"{entity}/circles", cylinders, static=static)
+    mesh = _mesh([each for each in shapes if isinstance(each[0], Polygon) and each[2] > each[1]], colour)
     if mesh is not None:
         rec.log(f"{entity}/polygons", mesh, static=static)
     terrain = [each for each, (_, low, high) in zip(obstacles, shapes, strict=True) if high <= low]
@@ -130,17 +118,29 @@ def log_solids(
         rec.log(f"{entity}/terrain", rims(scene, terrain, colour), static=static)
 
 
-def _mesh(prisms: Sequence[Prism], colour: Colour) -> rr.Mesh3D | None:
-    """One mesh of prisms; None without any. Of 100,000 it is large: the prisms end before it is logged."""
-    if not prisms:
+def _cylinders(shapes: Sequence[tuple[Any, float, float]], colour: Colour) -> rr.Cylinders3D | None:
+    """Circles between heights; None without any."""
+    if not shapes:
         return None
-    firsts = np.cumsum([0, *(len(vertices) for vertices, _, _ in prisms)], dtype=np.uint32)
+    return rr.Cylinders3D(
+        lengths=[high - low for _, low, high in shapes],
+        radii=[shape.radius_m for shape, _, _ in shapes],
+        centers=[(*shape.center_m, 0.5 * (low + high)) for shape, low, high in shapes],
+        colors=[colour],
+        fill_mode="solid",
+    )
+
+
+def _mesh(shapes: Sequence[tuple[Any, float, float]], colour: Colour) -> rr.Mesh3D | None:
+    """One mesh of the prisms over polygons; None without any. Of 100,000 it is large: the prisms end here."""
+    if not shapes:
+        return None
+    vertices, normals, faces = zip(*(prism(*shape) for shape in shapes), strict=True)
+    firsts = np.cumsum([0, *map(len, vertices[:-1])], dtype=np.uint32)
     return rr.Mesh3D(
-        vertex_positions=np.concatenate([vertices for vertices, _, _ in prisms]),
-        vertex_normals=np.concatenate([normals for _, normals, _ in prisms]),
-        triangle_indices=np.concatenate(
-            [faces + first for (_, _, faces), first in zip(prisms, firsts[:-1], strict=True)]
-        ),
+        vertex_positions=np.concatenate(vertices),
+        vertex_normals=np.concatenate(normals),
+        triangle_indices=np.concatenate([own + first for own, first in zip(faces, firsts, strict=True)]),
         albedo_factor=colour,
     )
 

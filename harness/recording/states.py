@@ -150,17 +150,16 @@ class Nearness:
     def events(self, block: Track) -> list[tuple[float, str]]:
         """Times and texts for consecutive rows of the track."""
         found: list[tuple[float, str]] = []
-        least_m = float(block.clearance_m.min(initial=math.inf))
-        if self._least_m == math.inf and least_m >= self._wanted_m:
+        if self._least_m == math.inf and not (block.clearance_m < self._wanted_m).any():
             return found
         for time_s, clearance_m in zip(block.time_s.tolist(), block.clearance_m.tolist(), strict=True):
-            if self._least_m == math.inf and clearance_m < self._wanted_m:
-                told = f"nearer to an obstacle than the wanted {self._wanted_m:g} m"
-                found.append((time_s, Caution(told)))
-            if self._least_m < math.inf and clearance_m > CLEAR_AGAIN * self._wanted_m:
+            if clearance_m < self._wanted_m:
+                if self._least_m == math.inf:
+                    told = f"nearer to an obstacle than the wanted {self._wanted_m:g} m"
+                    found.append((time_s, Caution(told)))
+                self._least_m = min(self._least_m, clearance_m)
+            elif self._least_m < math.inf and clearance_m > CLEAR_AGAIN * self._wanted_m:
                 told = f"clear of the obstacle again, after {self._least_m:.1f} m at the least"
                 found.append((time_s, told))
                 self._least_m = math.inf
-            elif clearance_m < self._wanted_m:
-                self._least_m = min(self._least_m, clearance_m)
         return found

@@ -35,21 +35,22 @@ THIN: Final = (f"{look.PLAN}/chosen", f"{look.PLAN}/waypoints")
 def log_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
     """Logs how all entities and time series are drawn that the recording has: a layout is made by what there is."""
     for entity, archetype, colour, size, order in STYLES:
-        if thin and entity not in THIN:
-            continue
-        style = {"colors": colour and [colour], "radii": rr.Radius.ui_points(size)}
-        rec.log(
-            entity, archetype.from_fields(**style | ({"draw_order": order} if order else {})), static=True
-        )
+        if entity in THIN or not thin:
+            style = {"colors": colour and [colour], "radii": rr.Radius.ui_points(size)}
+            style |= {"draw_order": order} if order else {}
+            rec.log(entity, archetype.from_fields(**style), static=True)
+    _log_series_styles(rec, scene, thin)
+    if not thin:
+        log_colours(rec, look.BANK_LANE, {FREE: look.CALM, AT_LIMIT: look.HIT})
+
+
+def _log_series_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
+    empty = {*scene.empty_series, *(() if scene.believes else (look.BELIEVED_OFF,))}
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
         plot = entity.partition("/")[0]
         too_much = thin and (plot not in THIN_SERIES or entity in look.WHOLE_ONLY)
-        nothing = plot in scene.empty_series or (entity == look.BELIEVED_OFF and not scene.believes)
-        if not too_much and not nothing:
+        if not too_much and not empty & {plot, entity}:
             rec.log(f"{look.SERIES}/{entity}", look.series_lines(name, colour, width), static=True)
-    if thin:
-        return
-    for entity, name in ((look.SEARCH, "search"), (look.DELAYS, "plan delay")):
+    for entity, name in () if thin else ((look.SEARCH, "search"), (look.DELAYS, "plan delay")):
         points = rr.SeriesPoints(names=[name], colors=[look.CHOSEN], marker_sizes=[2.0])
         rec.log(f"{look.SERIES}/{entity}", points, static=True)
-    log_colours(rec, look.BANK_LANE, {FREE: look.CALM, AT_LIMIT: look.HIT})

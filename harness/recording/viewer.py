@@ -92,61 +92,36 @@ def _overlay_of(folder: Path) -> Path:
     return overlays[0] if overlays else folder
 
 
-def need_screen() -> None:
-    """Raises ViewerError where there is no screen to open a window on."""
-    if sys.platform == "linux" and not (os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}):
-        raise ViewerError(NO_SCREEN)
-
-
-@contextlib.contextmanager
-def web_viewer(scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
-    """Serves the viewer's page to browsers of this machine.
-
-    Returns:
-        The server, the page's address, and the address that takes recordings.
-
-    Raises:
-        ViewerError: the server does not start.
-    """
-    port, web_port, page_port = free_port(), free_port(), free_port()
-    command = [_executable(), "--serve-web", "--bind", LOCALHOST]
-    command += ["--port", str(port), "--web-viewer-port", str(web_port)]
-    with _viewer(command, scratch) as viewer:
-        for each in (port, web_port):
-            if not answers(each, viewer):
-                raise ViewerError(f"the viewer does not start: {_last_line(str(scratch))}")
-        with local_page(page_port, web_port):
-            yield viewer, f"http://{LOCALHOST}:{page_port}/", f"rerun+http://{LOCALHOST}:{port}/proxy"
-
-
 @contextlib.contextmanager
 def empty_viewer(
     web: bool = False, tell: Callable[[str], None] = lambda address: None, url: str | None = None
 ) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Opens a viewer; gives it, and the address that takes recordings.
+    """Opens a viewer, in a window or a browser; gives it, and the address that takes recordings.
 
-    Args:
-        web: in a browser instead of a window.
-        tell: is told the address for the browser.
-        url: what a browser opens in place of what the viewer is sent.
+    `tell` is told the address for the browser, which opens `url` in place of what the viewer is sent.
 
     Raises:
         ViewerError: there is no screen, or the viewer does not start.
     """
-    if not web:
-        need_screen()
+    if not web and sys.platform == "linux" and not (os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}):
+        raise ViewerError(NO_SCREEN)
+    port, web_port, page_port = free_port(), free_port(), free_port()
+    source = f"rerun+http://{LOCALHOST}:{port}/proxy"
+    arguments = ["--bind", LOCALHOST, "--port", str(port)]
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
-        if web:
-            with web_viewer(Path(scratch)) as (viewer, page, source):
-                address = f"{page}?url={quote(url or source, safe='')}"
-                tell(f"{address} (Ctrl-C ends it)")
-                webbrowser.open(address)
+        if not web:
+            with viewer_process([*arguments, "--hide-welcome-screen"], Path(scratch), port) as viewer:
                 yield viewer, source
             return
-        port = free_port()
-        arguments = ["--bind", LOCALHOST, "--port", str(port), "--hide-welcome-screen"]
-        with viewer_process(arguments, Path(scratch), port) as viewer:
-            yield viewer, f"rerun+http://{LOCALHOST}:{port}/proxy"
+        arguments += ["--serve-web", "--web-viewer-port", str(web_port)]
+        with (
+            viewer_process(arguments, Path(scratch), port, web_port) as viewer,
+            local_page(page_port, web_port),
+        ):
+            address = f"http://{LOCALHOST}:{page_port}/?url={quote(url or source, safe='')}"
+            tell(f"{address} (Ctrl-C ends it)")
+            webbrowser.open(address)
+            yield viewer, source
 
 
 def wait_for(viewer: subprocess.Popen[str]) -> None:
@@ -159,11 +134,6 @@ def wait_for(viewer: subprocess.Popen[str]) -> None:
         if viewer.wait() == 0:
             return
         raise ViewerError(f"the viewer ended with status {viewer.returncode}")
-
-
-def _last_line(scratch: str) -> str:
-    lines = (Path(scratch) / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    return lines[-1] if lines else "it gave no reason"
 
 
 def run_names(run_dirs: Sequence[Path]) -> list[str]:
@@ -190,14 +160,19 @@ def _executable() -> str:
 
 
 @contextlib.contextmanager
-def _viewer(command: list[str], scratch: Path) -> Iterator[subprocess.Popen[str]]:
-    """Runs a viewer that is ended with the block; settings that allow no statistics lie in `scratch`."""
+def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iterator[subprocess.Popen[str]]:
+    """Runs a viewer that is ended with the block; settings that allow no statistics lie in `scratch`.
+
+    Raises:
+        ViewerError: there is no viewer, or it does not come to listen on the ports.
+    """
     settings = scratch / "rerun" / "analytics.json"
     settings.parent.mkdir()
     none = {"analytics_enabled": False, "analytics_id": "", "metadata": {}}
     kept = {"config_file_path": str(settings), "data_dir_path": str(scratch)}
     settings.write_text(json.dumps(none | kept), encoding="utf-8")
     environment = {**os.environ, "XDG_CONFIG_HOME": str(scratch), "RUST_LOG": "error"}
+    command = [_executable(), *arguments]
     with (
         (scratch / LOG).open("w+", encoding="utf-8") as log,
         subprocess.Popen(
@@ -206,25 +181,17 @@ def _viewer(command: list[str], scratch: Path) -> Iterator[subprocess.Popen[str]
     ):
         try:
             with _terminated_as_interrupted():
+                if not all(answers(port, viewer) for port in ports):
+                    raise ViewerError(_why_not(scratch) if "--serve-web" in arguments else NO_DRIVER)
                 yield viewer
         finally:
             if viewer.poll() is None:
                 viewer.kill()
 
 
-@contextlib.contextmanager
-def viewer_process(
-    arguments: Sequence[str], scratch: Path, port: int | None = None
-) -> Iterator[subprocess.Popen[str]]:
-    """Runs a viewer with arguments, and ends it with the block.
-
-    Raises:
-        ViewerError: there is no viewer, or a headless one does not come to listen.
-    """
-    with _viewer([_executable(), *arguments], scratch) as viewer:
-        if port is not None and not answers(port, viewer):
-            raise ViewerError(NO_DRIVER)
-        yield viewer
+def _why_not(scratch: Path) -> str:
+    lines = (scratch / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return f"the viewer does not start: {lines[-1] if lines else 'it gave no reason'}"
 
 
 @contextlib.contextmanager

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from harness.analysis.causes import FINDINGS
-from harness.analysis.findings import CONTRADICTED
 from harness.analysis.metric import number
 from harness.analysis.rows import to_csv
-from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
@@ -19,7 +17,6 @@ from harness.report.chapters import entry, optimum_of, run_chapter
 from harness.report.page import rendered
 from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
 from harness.scenario.scenario import Scenario, parse_scenario
-from harness.world.optimum import Optimum
 
 
 def write_report(folder: Path) -> Path:
@@ -52,10 +49,7 @@ def _written(run: Run, folder: Path) -> Path:
     command = shlex.join(["wayproof", *_found_again(arguments, folder)])
     legs, given = run.metrics["trackability"], "check" in run.metrics
     lost = [leg for leg in legs if not leg["trackable"]]
-    remarks = [
-        (each["kind"], each["text"] + _beside(optimum, each["kind"]))
-        for each in run.metrics.get("findings", ())
-    ]
+    remarks = [(each["kind"], each["text"]) for each in run.metrics.get("findings", ())]
     text = rendered(
         "run.html",
         chapter=run_chapter(scenario, flight, optimum),
@@ -77,14 +71,6 @@ def _written(run: Run, folder: Path) -> Path:
     replace_text(page.with_suffix(".csv"), to_csv([flight.row]))
     replace_text(page, text)
     return page
-
-
-def _beside(optimum: Optimum, kind: str) -> str:
-    """What the clairvoyant optimum turns in all, beside a finding about what was turned for nothing."""
-    if kind != CONTRADICTED or len(optimum.points_m) < 2:
-        return ""
-    turned = smoothness(polyline_profile(optimum.points_m, 1.0), 1.0).heading_change_deg
-    return f", the clairvoyant optimum {turned:.0f} deg"
 
 
 def _exceeded(scenario: Scenario, lost: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

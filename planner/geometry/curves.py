@@ -89,12 +89,9 @@ def between(path: Path, start_m: float, stop_m: float) -> list[Segment]:
 
 
 def sample(path: Path, spacing_m: float, deviation_m: float = math.inf) -> FloatArray:
-    """(k, 2) points along a path, both ends included.
+    """(k, 2) points along a path, both ends included, no further apart than `spacing_m` along the path.
 
-    Args:
-        path: the path.
-        spacing_m: largest distance between neighbours, along the path.
-        deviation_m: largest distance of an arc from the chord between neighbours.
+    Nowhere is an arc further than `deviation_m` from the chord between neighbours.
     """
     pieces = [path.segments[:1, :2]]
     for x, y, tx, ty, curvature, length in path.segments.tolist():
@@ -308,12 +305,9 @@ def moved(segments: Sequence[Segment], to: Pose) -> list[Segment]:
 
 
 def onward_in_turn(pose: Pose, curvature: float, to: Pose) -> list[Segment] | None:
-    """The arc of a turn from one pose to another on it; None where that is not on it, with its tangent.
+    """The arc of a turn of some curvature (1/m; 0: none) from one pose in it to another, with its tangent.
 
-    Args:
-        pose: in the turn.
-        curvature: of the turn, 1/m; 0: none.
-        to: the other pose.
+    None where that is not on it.
     """
     if not curvature:
         return None

@@ -19,7 +19,7 @@ from planner.rolling_window.multi_step_search import Candidate, search_candidate
 from planner.rolling_window.pose_search import search_poses
 from planner.rolling_window.route_optimisation import FlyableRoute, optimise
 from planner.rolling_window.window import Window
-from planner.shield.room import Room
+from planner.shield.escape import Room
 
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin. Straight steps keep the first beyond the clearance, the curve through them the second;

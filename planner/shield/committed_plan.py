@@ -98,14 +98,10 @@ class PlanMonitor:
     def __init__(
         self, mission: Mission, *, keep_m: float, urgent_m: float, lead_m: float, step_m: float
     ) -> None:
-        """Distances to go by.
+        """A course that comes nearer than `keep_m` to an edge point is cut there.
 
-        Args:
-            mission: tells the clearance, the sensing range and the goal circle.
-            keep_m: a course that comes nearer to an edge point is cut there.
-            urgent_m: edge points nearer to the aircraft are compared at once; what is wrong nearer to it is urgent.
-            lead_m: least distance flown between two searches.
-            step_m: the rolling step: distance flown between two searches where nothing is urgent.
+        Edge points within `urgent_m` of the aircraft are compared at once, and what is wrong within it is urgent. At
+        least `lead_m` is flown between two searches, `step_m` (the rolling step) where nothing is urgent.
         """
         self._mission, self._keep_m, self._urgent_m = mission, keep_m, urgent_m
         self._lead_m, self._step_m = lead_m, step_m

@@ -15,16 +15,15 @@ import numpy as np
 
 from planner.geometry.clearance import behind
 from planner.geometry.course import Course
-from planner.geometry.curves import Point, Segment, onward, place_on, places_along, sample
+from planner.geometry.curves import Limits, Point, Segment, onward, place_on, places_along, sample
 from planner.geometry.joining import divert_to_loiter
-from planner.geometry.terrain import Terrain
+from planner.geometry.terrain import Terrain, WorkCount
 from planner.interface import MapView, Mission, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.plan_checks import start_tolerance_m
 from planner.shield.certificate import CertificateBroken, Certifier
 from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan
 from planner.shield.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out, step_along_m
-from planner.shield.room import Room
 
 LOITER_SHARES = (1.0, 0.5, 0.25)
 """Shares of the distance that paths keep from edge points. A turn is looked for with one share after the other."""
@@ -49,6 +48,28 @@ clearance."""
 
 NO_ROOM = "there is no room for a turn at the start"
 NOT_SEEN = "nothing ahead of the aircraft has been seen to be free"
+
+
+class Room:
+    """The space of one flight.
+
+    Attributes:
+        limits: of turns.
+        holds: of the full turns that plans end in.
+        path_keeps_m: what paths keep from every edge point where there is room.
+    """
+
+    def __init__(
+        self, mission: Mission, memory: ObstacleMemory, path_keeps_m: float, work_count: WorkCount
+    ) -> None:
+        self._mission, self._memory, self._work_count = mission, memory, work_count
+        self.path_keeps_m = path_keeps_m
+        self.limits, self.holds = Limits.of(mission), Limits.of_holds(mission)
+
+    def terrain(self, keep_m: float, standing: bool = False) -> Terrain:
+        """Where a curve may lie that keeps one distance from all edge points, or from those that were seen to stand."""
+        points = self._memory.genuine_m if standing else self._memory.points_m
+        return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m, self._work_count)
 
 
 class _Option(NamedTuple):
@@ -119,19 +140,25 @@ class Escapes:
                 raise NoWayToBegin(NOT_SEEN)
             return Escape(Plan(PlanStatus.NO_PATH, NOT_SEEN))
         first: Path | None = None
-        for share in LOITER_SHARES:
-            standing = self._standing(share)
-            turn = divert_to_loiter(ahead, 0.0, lead_m, self._room.holds, standing)
-            for way in [turn, *ways] if turn is not None else ways:
-                if self._best([_Option(way, way)], standing, None, threats, share) is None:
-                    continue
-                if not self._leads_behind(way, request):
-                    return self._away(request, way, TURNING_AWAY)
-                first = first or way
+        for way in self._turns_at_start(ahead, lead_m, ways, threats):
+            if not self._leads_behind(way, request):
+                return self._away(request, way, TURNING_AWAY)
+            first = first or way
         if first is None:
             return Escape(Plan(PlanStatus.NO_PATH, NO_ROOM))
         self._began_hidden = True
         return self._away(request, first, TURNING_AWAY)
+
+    def _turns_at_start(
+        self, ahead: Path, lead_m: float, ways: Sequence[Path], threats: Threats | None
+    ) -> Iterator[Path]:
+        """Turns that keep a share of what is wanted, those that keep more of it first."""
+        for share in LOITER_SHARES:
+            standing = self._standing(share)
+            turn = divert_to_loiter(ahead, 0.0, lead_m, self._room.holds, standing)
+            for way in [turn, *ways] if turn is not None else ways:
+                if self._best([_Option(way, way)], standing, None, threats, share) is not None:
+                    yield way
 
     def _leads_behind(self, path: Path, request: PlanRequest) -> bool:
         """Whether a path leads behind a face that is seen: what lies there may be part of the obstacle."""
@@ -153,25 +180,16 @@ class Escapes:
     ) -> Escape:
         """A turn that only keeps away from what is known, or a way that evades what moves or has appeared.
 
-        Args:
-            request: what was asked.
-            threats: what is near, if that is to be feared.
-            committed: the plan in effect, which can be flown from `here` to `until_m` (arc lengths).
-            here: where the aircraft is on it.
-            until_m: see above.
-            prefix: what of it is flown in any case.
-            certain: nothing has changed so far, nor been taken back by the sensor.
-            nearer: a certified course that would come nearer than wanted to what moves or has appeared.
+        The plan in effect can be flown from `here` to `until_m` (arc lengths); of it `prefix` is flown in any case.
+        `certain`: nothing has changed so far, nor been taken back by the sensor. `nearer` is a certified plan that
+        would come nearer than wanted to what moves or has appeared.
 
         Raises:
             CertificateBroken: there is no room for a turn, though all is certain.
         """
         left = left_of(committed, here, self._mission)
         ways: list[Path] = []  # made when they are first asked for: most plans in effect will do
-        path, from_m, to_m = committed.path, here, until_m
-        off_m = math.dist(place_on(path, here)[0][:2], request.position_m)
-        if off_m > start_tolerance_m(self._mission):  # as after a jump of the believed position
-            path, from_m, to_m = Path(np.array(prefix)), 0.0, sum(segment[5] for segment in prefix)
+        path, from_m, to_m = self._left_from(request, committed, here, until_m, prefix)
 
         def options(terrain: Terrain) -> Iterator[_Option]:
             if nearer is not None:
@@ -200,6 +218,20 @@ class Escapes:
             raise CertificateBroken(request.time_s)
         ways = ways or list(rolled_out(prefix, self._room.limits))
         return self._clearest(request, threats or self._near(request), left, ways)
+
+    def _left_from(
+        self,
+        request: PlanRequest,
+        committed: CommittedPlan,
+        here: float,
+        until_m: float,
+        prefix: Sequence[Segment],
+    ) -> tuple[Path, float, float]:
+        """What is left for a turn, between which arc lengths: `prefix` where the aircraft is off the plan in effect."""
+        off_m = math.dist(place_on(committed.path, here)[0][:2], request.position_m)
+        if off_m > start_tolerance_m(self._mission):  # as after a jump of the believed position
+            return Path(np.array(prefix)), 0.0, sum(segment[5] for segment in prefix)
+        return committed.path, here, until_m
 
     def _clearest(self, request: PlanRequest, threats: Threats, left: Path, ways: Sequence[Path]) -> Escape:
         """The way with the most room where none has enough; what is left of the plan in effect, if that has as much."""

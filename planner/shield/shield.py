@@ -43,11 +43,10 @@ from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.certificate import Certified, Certifier, hold_centre
 from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, flown_next
 from planner.shield.encounters import encounters
-from planner.shield.escape import Escapes, meets, room_m
+from planner.shield.escape import Escapes, Room, meets, room_m
 from planner.shield.evasion import Threats
 from planner.shield.intervention_log import InterventionLog, ShieldReport
 from planner.shield.refused_places import RefusedPlaces
-from planner.shield.room import Room
 from planner.shield.tracking import MOST_RADII, Tracked, can_be_flown, tracked
 
 PROGRESS = 0.25

@@ -62,14 +62,6 @@ LEAST = {
     "area": {"bounds_m": [0, 0, 8000, 6000]},
     "mission": {"start_m": [500, 3000], "goal_m": [7500, 3000]},
 }
-SHORT_CAMPAIGN = {
-    "schema": "wayproof/campaign/1",
-    "name": "short",
-    "seed": 1,
-    "worlds": [{"circles": {"size_m": [3000, 3000]}}],
-    "grid": {"sensor.range_m": [1000, 1500]},
-    "random": {"environment.wind.speed_mps": {"uniform": [0, 5]}},
-}
 LINE = [[8.0, 47.0], [8.01, 47.0], [8.02, 47.01]]
 GEOJSON = {
     "type": "FeatureCollection",
@@ -162,7 +154,6 @@ READERS = {
     "scenario": Reader("s.yaml", read_scenario, EVERYTHING, as_yaml, YAML_SNIPPETS),
     "short scenario": Reader("s.yaml", read_scenario, LEAST, as_yaml, YAML_SNIPPETS),
     "campaign": Reader("c.yaml", read_campaign, CAMPAIGN, as_yaml, CAMPAIGN_SNIPPETS),
-    "short campaign": Reader("c.yaml", read_campaign, SHORT_CAMPAIGN, as_yaml, CAMPAIGN_SNIPPETS),
     "geojson": Reader("p.geojson", read_given_path, GEOJSON, as_json, JSON_SNIPPETS),
     "plan": Reader("p.plan", read_given_path, PLAN, as_json, JSON_SNIPPETS),
     "csv": Reader("p.csv", read_given_path, CSV, rows(","), CELLS),

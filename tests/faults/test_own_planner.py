@@ -14,7 +14,7 @@ import pytest
 
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
-from tests.faults.command import ROOT, TIMEOUT_S, wait_until
+from tests.faults.command import CAMPAIGN_FILES, ROOT, TIMEOUT_S, wait_until
 from tests.longer import longer
 
 PLUGIN = '''
@@ -95,14 +95,6 @@ class Bug:
         return Plan(PlanStatus.NO_PATH, "not yet")
 """
 KINDS = ("talks", "hangs", "exits", "gone", "unresolved")
-SCENARIO = """\
-schema: wayproof/scenario/1
-name: short
-area: {bounds_m: [0, 0, 2000, 2000]}
-mission: {start_m: [500, 500], goal_m: [1500, 1500], goal_radius_m: 60}
-sensor: {range_m: 900, rays: 360}
-planner: {clearance_m: 40}
-"""
 CAMPAIGN = """\
 schema: wayproof/campaign/1
 name: short
@@ -121,7 +113,7 @@ def place(tmp_path: Path) -> Path:
     points = (f"{kind} = own_plugin:{kind.upper()}\n" for kind in KINDS)
     (info / "entry_points.txt").write_text("[wayproof.planners]\n" + "".join(points))
     (tmp_path / "site" / "own_plugin.py").write_text(PLUGIN)
-    (tmp_path / "short.yaml").write_text(SCENARIO)
+    (tmp_path / "short.yaml").write_text(CAMPAIGN_FILES["short.yaml"])
     (tmp_path / "campaign.yaml").write_text(CAMPAIGN)
     return tmp_path
 

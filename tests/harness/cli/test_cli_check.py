@@ -12,7 +12,6 @@ import pytest
 from rerun.chunk import RrdReader
 
 from harness.cli.app import main
-from harness.cli.flight_rows import flight_rows, verdict_rows
 from harness.files.input_file import InputError
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import parse_scenario
@@ -101,14 +100,6 @@ def test_an_end_that_is_passed_far_off_is_not_reached(
     assert off_m > 1000.0
     assert (said["outcome"], said["trackable"]) == ("timeout", False)
     assert "the end of the path" in said["reason"]
-
-
-def test_the_same_check_gives_the_same_digest(strip: Path, tmp_path: Path) -> None:
-    options = ["--aircraft", "aerosonde", "--turbulence", "milspec:moderate", "--no-recording", "--quiet"]
-    for folder, seed in (("a", "5"), ("b", "5"), ("c", "6")):
-        main(["check", str(strip), *options, "--seed", seed, "--out", str(tmp_path / folder)])
-    first, again, other = (load_run(tmp_path / name).metrics["digest"] for name in "abc")
-    assert first == again != other
 
 
 @pytest.mark.parametrize(
@@ -349,20 +340,6 @@ def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:
     assert not strip.ok
     with pytest.raises(InputError, match=r"path: has the shape \(2,\); must be \(n, 2\)"):
         check([1.0, 2.0])  # type: ignore[list-item]
-
-
-def test_errors_have_their_unit_where_those_of_a_flight_have_it(
-    straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Once, behind the last figure; and no power of ten in a length."""
-    _, metrics = flown(straight, tmp_path / "run", capsys=capsys)
-    of_a_flight = flight_rows(metrics)
-    rows = verdict_rows(metrics | {"deviation_from_given_m": {"p95": 987.4, "max": 1234.5}})
-    for row in ("total system error", "altitude error"):
-        assert rows[row] == of_a_flight[row]
-        figures = rows[row].partition(",")[0]
-        assert figures.count(" m") == 1 + figures.count(" max")
-    assert rows["off the path given"].startswith("p95 987 / max 1,234 m, allowed ")
 
 
 @pytest.mark.flights

@@ -9,8 +9,6 @@ from typing import Any
 import pytest
 
 from harness.cli.app import main
-from harness.files.input_file import InputError
-from harness.run_files.path_files import read_path
 from harness.run_files.run_folder import load_run
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real"
@@ -203,25 +201,6 @@ def test_a_mutilated_mission_is_refused_in_a_line(
     assert (said.out, len(said.err.splitlines())) == ("", 1)
     assert said.err.startswith(str(path))
     assert not (tmp_path / "run").exists()
-
-
-@needs_missions
-@pytest.mark.parametrize("path", MISSIONS or [REAL / "missions"], ids=lambda path: path.name)
-@pytest.mark.parametrize("keep", [0.15, 0.4, 0.7, 0.95])
-def test_a_real_mission_cut_off_is_refused_in_a_line_or_flown_so_far(
-    path: Path, keep: float, tmp_path: Path
-) -> None:
-    """JSON that is cut off is none; of plain text whole lines are left, and a torn one is named."""
-    text = path.read_text()
-    cut = tmp_path / path.name
-    cut.write_text(text[: int(keep * len(text))].rstrip())
-    try:
-        read_path(cut)
-        told = ""
-    except InputError as fault:
-        told = str(fault)
-    assert not told or (told.startswith(str(cut)) and len(told.splitlines()) == 1)
-    assert told or path.suffix == ".txt"
 
 
 @pytest.mark.flights

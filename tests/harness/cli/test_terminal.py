@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from harness.cli.app import main
-from harness.cli.bench import bench_rows
 from harness.cli.command_line import print_json
 from harness.cli.flight_rows import flight_rows
 from harness.cli.standard_output import say
@@ -182,21 +181,3 @@ def test_progress_on_a_terminal_shows_time_and_distance_to_go(
     with progress_bar(1000.0) as report:
         report(180.0, -1.2, "at the end")
     assert " 0 m to go  at the end" in capsys.readouterr().err
-
-
-def test_the_table_of_a_bench_has_every_block() -> None:
-    rows = bench_rows(
-        {
-            "step_rate_hz": 60,
-            "bare_rate_hz": 60,
-            "closed_loop_ratio": 1.4321,
-            "closed_loop_recording_ratio": 1.7,
-            "planner_ms": {"p50": 0.1, "p99": 2.5, "max": 9.0},
-            "blocks": {"dynamics": 0.75, "planner": 0.05},
-        }
-    )
-    assert rows["closed loop"] == "1.432 x bare JSBSim at the same step rate"
-    assert rows["planner, processor time"] == "p50 0.10 ms, p99 2.50 ms, max 9.00 ms"
-    assert rows["step rate"] == "60 Hz"
-    assert rows["  dynamics"] == "75.0%"
-    assert rows["  planner"] == "5.0%"

@@ -5,14 +5,13 @@ import math
 import shutil
 import subprocess
 import sys
-import urllib.request
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -520,20 +519,6 @@ def test_view_says_that_there_is_no_screen(
     monkeypatch.setattr(sys, "platform", "linux")
     with pytest.raises(ViewerError, match=r"no screen.*wayproof view --web"):
         open_viewer([recording[0].parent])
-
-
-def test_a_browser_is_served_on_this_machine_only_until_the_viewer_ends(
-    recording: tuple[Path, Flight], tmp_path: Path
-) -> None:
-    with served(recording[0]) as (viewer, address):
-        assert address.startswith("http://127.0.0.1:")
-        assert "rerun%2Bhttp%3A%2F%2F127.0.0.1" in address
-        with urllib.request.urlopen(address, timeout=10) as answer:
-            assert b"re_viewer" in answer.read()
-        command = [str(part) for part in cast(list[str], viewer.args)]
-        assert command[command.index("--bind") + 1] == "127.0.0.1"
-        assert viewer.poll() is None
-    assert viewer.poll() is not None
 
 
 @pytest.mark.flights

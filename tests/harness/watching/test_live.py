@@ -26,7 +26,7 @@ from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop,
 from harness.watching import live
 from harness.watching.live import LiveLog
 from harness.watching.relay import Call, Opening, RelayProcess
-from harness.watching.watched_flight import Onlookers, Pace, fly_watched
+from harness.watching.watched_flight import Onlookers, fly_watched
 from tests.closed_loop.small import small_world as world
 from tests.point_mass import PointMass
 
@@ -141,27 +141,6 @@ def test_what_is_handed_over_is_the_flight(tmp_path: Path, monkeypatch: pytest.M
         if str(chunk.entity_path) == "/series/cross_track/flown" and not chunk.is_static
     ]
     assert sum(chunk.num_rows for chunk in chunks) == len(flight.track)
-
-
-def test_what_nobody_looks_at_is_not_kept() -> None:
-    relay = Kept()
-    relay.given_up = True
-    scenario = world(TREE, **NEAR)
-    loop, log = make_loop(scenario, PointMass), LiveLog(relay, "")
-    log.begin(loop, scene_of(scenario, loop, ""), "")
-    fly(loop, [log])
-    assert relay.handed == []
-
-
-def test_a_flight_that_is_paced_is_handed_over_five_times_a_second() -> None:
-    scenario, relay = world(mission={"time_limit_s": 4.0}), Kept()
-    loop, log = make_loop(scenario, PointMass), LiveLog(relay, "")
-    log.begin(loop, scene_of(scenario, loop, ""), "")
-    begun_s = time.monotonic()
-    fly(loop, [log, Pace(2.0)])
-    took_s = time.monotonic() - begun_s
-    assert took_s >= 2.0
-    assert len(relay.handed) >= 10
 
 
 @pytest.mark.parametrize(
