@@ -82,6 +82,8 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
         "corner 1: is 'far'; must be a finite number"),
     "entities": (text("a.osm", BOMB), "cannot be read by osmium .XML entities are not supported"),
     "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "cannot be read by osmium .Can not read file"),
+    "a place that is no number": (text("a.osm", "<osm version='0.6'><node id='1' lat='47x' lon='8'/></osm>"),
+        "cannot be read by osmium .characters after coordinate"),
     "no building": (_no_building, "has no building"),
     "a ZIP bomb": (_zip_bomb, "unpacks to more than"),
     "a ZIP of something": (lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
