@@ -16,8 +16,7 @@ from harness.scenario.scenario import Scenario, load_scenario
 if TYPE_CHECKING:
     from harness.analysis.claims import Claim
     from harness.campaign.flight import Answer
-    from harness.certification.certificate import Certificate
-    from harness.certification.certification import Tally
+    from harness.certification.certification import Certificate, Tally
     from harness.scenario.kinds import LoopPart
 
 
@@ -110,8 +109,8 @@ def sweep(
     """
     from harness.campaign.campaign_file import load_campaign as read_campaign
     from harness.campaign.folder import CampaignFolder
-    from harness.campaign.report import write_summary
     from harness.campaign.runs import CampaignRuns
+    from harness.campaign.summary import write_summary
     from harness.campaign.sweep import fly_missing, told_left
     from harness.campaign.workers import dask_workers, local_workers
     from harness.scenario.shipped import campaign_path
@@ -193,7 +192,7 @@ def certify(
     from harness.campaign.workers import local_workers
     from harness.certification.certification import Terms
     from harness.certification.certification import certify as fly_days
-    from harness.certification.subject import Asked, days_of, distributions
+    from harness.certification.days import days_of, distributions
     from harness.scenario.shipped import scenario_path
 
     given = {"aircraft.model": aircraft, "conditions": conditions}
@@ -204,10 +203,8 @@ def certify(
         raise InputError(f"wayproof: vary: {error}") from error
     with as_input_errors():
         terms = Terms(probability, confidence)
-        days = days_of(
-            Asked(subject, [*keys, *(settings or {}).items()], drawn, claim, runs),
-            None if scenario is None else scenario_path(str(scenario)),
-        )
+        world = None if scenario is None else scenario_path(str(scenario))
+        days = days_of(subject, [*keys, *(settings or {}).items()], drawn, claim, world, most=runs)
         days.check()
         folder = Path(out) if out is not None else Path("runs") / days.campaign.name / f"certify-{days.claim}"
         with local_workers(workers or os.cpu_count() or 1) as flyers:

@@ -132,7 +132,7 @@ class CampaignResult:
     @cached_property
     def table(self) -> pa.Table:
         """One row a run, with the columns of `results.parquet`."""
-        from harness.campaign.table import results_of
+        from harness.campaign.results import results_of
 
         return results_of(self.folder)
 
@@ -146,7 +146,7 @@ class CampaignResult:
     @property
     def recordings(self) -> dict[int, Path]:
         """The recordings that the campaign kept, by the number of the run."""
-        from harness.campaign.table import recordings_of
+        from harness.campaign.results import recordings_of
 
         return {int(path.parent.name): path for path in recordings_of(self.folder)}
 

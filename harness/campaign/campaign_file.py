@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -34,7 +34,6 @@ OTHERWISE: Final[dict[Loc, str]] = {
 }
 """Keys of a scenario that a campaign gives in another way."""
 
-Keys = dict[str, Any]
 Values = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 
 
@@ -69,7 +68,7 @@ class Campaign(Section):
     """Kinds, or a kind with keys of `planner`. Default: the scenario's own planner."""
     aircraft: Annotated[tuple[Annotated[AircraftSpec, _bare(AircraftSpec, "model")], ...], Strict(False)] = ()
     """Models, or a model with keys of `aircraft`. Default: the scenario's own."""
-    set_: Keys = Field(default_factory=dict, alias="set")
+    set_: dict[str, Any] = Field(default_factory=dict, alias="set")
     """Values by key path of a scenario, for every run."""
     grid: dict[str, Values] = Field(default_factory=dict)
     """Lists of values by key path of a scenario; every combination is flown."""
@@ -88,21 +87,14 @@ class Campaign(Section):
         if not (self.scenarios or self.worlds):
             raise KeyFault((), "has neither scenarios nor worlds; must have at least one of them")
         labels = [world.name for world in self.worlds]
-        for index, label in enumerate(labels):
-            if label in labels[:index]:
-                raise KeyFault(("worlds", index), f"is called {label} as another; give each a label")
+        if index := _repeated(labels):
+            raise KeyFault(("worlds", index), f"is called {labels[index]} as another; give each a label")
         taken: dict[Loc, str] = {}
         for section, keys in (("set", self.set_), ("grid", self.grid), ("random", self.random)):
             for name in keys:
                 self._check_key((section, name), taken)
-        lists: dict[str, Sequence[Section]] = {"planners": self.planners, "aircraft": self.aircraft}
-        for section, index, entry in ((s, i, each) for s in lists for i, each in enumerate(lists[s])):
-            if entry in lists[section][:index]:
-                raise KeyFault((section, index), "is there already; leave it out or give it another key")
-            for name in entry.model_fields_set | (entry.model_extra or {}).keys():
-                named = taken.get((section.removesuffix("s"), name), "set")
-                if not named.startswith("set"):
-                    raise KeyFault((section, index, name), f"is given under {named} too; keep one of them")
+        _check_entries("planners", self.planners, taken)
+        _check_entries("aircraft", self.aircraft, taken)
         return self
 
     def _check_key(self, where: tuple[str, str], taken: dict[Loc, str]) -> None:
@@ -120,14 +112,25 @@ class Campaign(Section):
         taken[loc] = strict_yaml.key_path(where)
 
 
+def _check_entries(section: str, entries: Sequence[Section], taken: Mapping[Loc, str]) -> None:
+    """Refuses an entry that is there twice, and one with a key that is given under `grid` or `random` too."""
+    if index := _repeated(entries):
+        raise KeyFault((section, index), "is there already; leave it out or give it another key")
+    for index, entry in enumerate(entries):
+        for name in entry.model_fields_set | (entry.model_extra or {}).keys():
+            named = taken.get((section.removesuffix("s"), name), "set")
+            if not named.startswith("set"):
+                raise KeyFault((section, index, name), f"is given under {named} too; keep one of them")
+
+
+def _repeated(values: Sequence[Any]) -> int | None:
+    """Index of the first value that was there before; None where all differ."""
+    return next((index for index, each in enumerate(values) if each in values[:index]), None)
+
+
 @dataclass(frozen=True)
 class Base:
-    """A scenario that a campaign starts from.
-
-    Attributes:
-        file: name of its file; of the campaign itself, if that names no scenarios.
-        source: what its faults name it.
-    """
+    """A scenario that a campaign starts from: the name of its file, what its faults name it, and its keys."""
 
     file: str
     source: str
@@ -136,23 +139,17 @@ class Base:
     @property
     def name(self) -> str:
         """Name of the scenario."""
-        return self.word(("name",), Path(self.file).stem)
+        return self.text(("name",), Path(self.file).stem)
 
-    def word(self, loc: Loc, default: str) -> str:
-        """The text at `loc`, or what stands for it where there is none."""
+    def text(self, loc: Loc, default: str) -> str:
+        """The text at `loc`, or a default where there is none."""
         node = self.root.at(loc)
         return node.value if node and isinstance(node.value, str) else default
 
 
 @dataclass(frozen=True)
 class CampaignFile:
-    """A campaign file as it was read.
-
-    Attributes:
-        source: what its faults name it.
-        root: its keys, with their lines.
-        bases: the scenarios that it names, in order; at least one.
-    """
+    """A campaign file as it was read: what its faults name it, its keys with their lines, at least one scenario."""
 
     campaign: Campaign
     source: str
@@ -168,32 +165,25 @@ class CampaignFile:
 
     @classmethod
     def from_plain(cls, plain: dict[str, Any], source: str) -> CampaignFile:
-        """What `plain` gave.
-
-        Raises:
-            InputError: it is something else.
-        """
+        """What `plain` gave; an InputError where it is something else."""
         try:
             root = node_of(plain["campaign"], 1)
             given = [(Path(each["file"]).name, dict(each["keys"])) for each in plain["scenarios"]]
+            first, *more = (Base(name, f"{name} in {source}", node_of(keys, 1)) for name, keys in given)
         except (KeyError, TypeError, ValueError):
-            given = []
-        if not given:
-            raise InputError(f"{source}: holds no campaign, or only a part of it; give another copy")
-        bases = tuple(Base(name, f"{name} in {source}", node_of(keys, 1)) for name, keys in given)
-        return cls(_validated(root, source), source, root, bases)
+            raise InputError(
+                f"{source}: holds no campaign, or only a part of it; give another copy"
+            ) from None
+        return cls(validated(root, source), source, root, (first, *more))
 
 
 def load_campaign(
     path: Path, planners: Sequence[str] = (), settings: Sequence[tuple[str, str]] = ()
 ) -> CampaignFile:
-    """Reads a campaign file and the scenario files that it names; the scenarios themselves are not checked.
+    """Reads a campaign file and the scenario files that it names, unchecked; an InputError where a file is none.
 
     `planners`: kinds that fly in place of those that the file names.
     `settings`: keys that are added to `set`, and their values as YAML; `seed` replaces that of the campaign.
-
-    Raises:
-        InputError: a file cannot be read or is not a campaign; a line of its text names file, line and key.
     """
     source, root = str(path), strict_yaml.read(path)
     if planners:
@@ -201,8 +191,8 @@ def load_campaign(
     for name, text in settings:
         value = strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE)
         root = strict_yaml.replaced(root, ("seed",) if name == "seed" else ("set", name), value)
-    root = _with_folders(_with_world_files(root, path.parent), path.parent)
-    campaign = _validated(root, source)
+    root = absolute_paths(root, path.parent)
+    campaign = validated(root, source)
 
     def fault(loc: Loc, sentence: str) -> InputError:
         return InputError(fault_line(source, root.line_of(loc), loc, sentence))
@@ -212,41 +202,43 @@ def load_campaign(
             name = each.kind[:80]
             told = f"is {name!r}, which no file may name: give `wayproof sweep` --planners {name},..."
             raise fault(("planners", index), f"{told}, which replaces all of `planners`")
-    if not campaign.scenarios:
-        line = root.line_of(("worlds",))
-        node = Node({"schema": Node("wayproof/scenario/1", line), "name": Node(campaign.name, line)}, line)
-        return CampaignFile(campaign, source, root, (Base(campaign.name, source, node),))
     bases: dict[str, Base] = {}
     for index, name in enumerate(campaign.scenarios):
         loc: Loc = ("scenarios", index)
         for file in _files(name, path.parent, partial(fault, loc)):
-            found = strict_yaml.read(file)
-            if not isinstance(found.value, dict):
-                raise InputError(f"{file}:{found.line}: must be a mapping that begins with `schema:`")
-            base = Base(file.name, str(file), absolute_paths(found, file.parent))
+            base = _base(file)
             if base.name in bases:
                 raise fault(loc, f"is a second scenario called {base.name}; rename one")
             bases[base.name] = base
+    if not bases:
+        node = node_of({"schema": "wayproof/scenario/1", "name": campaign.name}, root.line_of(("worlds",)))
+        bases[""] = Base(campaign.name, source, node)
     return CampaignFile(campaign, source, root, tuple(bases.values()))
+
+
+def _base(file: Path) -> Base:
+    root = strict_yaml.read(file)
+    if not isinstance(root.value, dict):
+        raise InputError(f"{file}:{root.line}: must be a mapping that begins with `schema:`")
+    return Base(file.name, str(file), absolute_paths(root, file.parent))
 
 
 def is_campaign(path: Path) -> bool:
     """Whether a file says that it is a campaign."""
-    return _schema_of(path).startswith("wayproof/campaign/")
+    return _says(path, "wayproof/campaign/")
 
 
 def is_scenario(path: Path) -> bool:
     """Whether a file says that it is a scenario."""
-    return _schema_of(path).startswith("wayproof/scenario/")
+    return _says(path, "wayproof/scenario/")
 
 
-def _schema_of(path: Path) -> str:
-    """What a file says that it is; empty where it cannot be read or says nothing."""
+def _says(path: Path, schema: str) -> bool:
     try:
-        schema = strict_yaml.read(path).at(("schema",))
+        said = strict_yaml.read(path).at(("schema",))
     except InputError:
-        return ""
-    return "" if schema is None else str(schema.value)
+        return False
+    return said is not None and str(said.value).startswith(schema)
 
 
 def campaign_schema() -> dict[str, Any]:
@@ -254,16 +246,8 @@ def campaign_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Campaign.model_json_schema()}
 
 
-def _with_folders(root: Node, folder: Path) -> Node:
-    """The campaign's keys with every aircraft that is a folder given from the root of the file system on."""
-    entries = root.at(("aircraft",))
-    for index, entry in enumerate(entries.value if entries and isinstance(entries.value, tuple) else ()):
-        inside = ("model",) if isinstance(entry.value, dict) else ()
-        root = _with_folder(root, ("aircraft", index, *inside), folder)
-    return root
-
-
-def _validated(root: Node, source: str) -> Campaign:
+def validated(root: Node, source: str) -> Campaign:
+    """The campaign of some keys; an InputError where they are none."""
     try:
         return Campaign.model_validate(root.plain())
     except ValidationError as error:
@@ -292,35 +276,19 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
     )
 
 
-def absolute_paths(root: Node, folder: Path) -> Node:
-    """A scenario's keys with what lies beside its file given from the root of the file system on."""
-    return _with_folder(_with_world_files(root, folder), ("aircraft", "model"), folder)
+def absolute_paths(node: Node, folder: Path, keys: str = "") -> Node:
+    """The keys of a scenario or a campaign with aircraft, and files of obstacles, from the root of the file system on.
 
-
-def _with_folder(root: Node, loc: Loc, folder: Path) -> Node:
-    node = root.at(loc)
-    if node is None or not isinstance(node.value, str):
-        return root
-    return strict_yaml.replaced(root, loc, Node(model_or_folder(node.value, folder), node.line))
-
-
-def _with_world_files(node: Node, folder: Path, keys: str = "") -> Node:
-    """Keys with every `file.path` of an obstacle that lies beside their file given from the root of the file system on.
-
-    Circles and polygons are passed over: there may be thousands of them, and they have no file.
-
-    Args:
-        node: the keys of a scenario or a campaign, or a part of them.
-        folder: of their file.
-        keys: the key path of `node`.
+    Circles and polygons are passed over: there may be thousands, without a file. `keys` is the key path of a part.
     """
     value = node.value
-    if isinstance(value, str) and ".file.path." in f"{keys}.":
-        beside = file_beside(value, folder)
-        return node if beside is None else Node(str(beside.absolute()), node.line)
     if isinstance(value, tuple):
-        return Node(tuple(_with_world_files(each, folder, keys) for each in value), node.line)
+        return Node(tuple(absolute_paths(each, folder, keys) for each in value), node.line)
     if isinstance(value, dict) and not {"circle", "polygon"} & value.keys():
-        inner = {key: _with_world_files(each, folder, f"{keys}.{key}") for key, each in value.items()}
+        inner = {key: absolute_paths(each, folder, f"{keys}.{key}") for key, each in value.items()}
         return Node(inner, node.line)
+    if isinstance(value, str) and keys in (".aircraft", ".aircraft.model"):
+        return Node(model_or_folder(value, folder), node.line)
+    if isinstance(value, str) and ".file.path." in f"{keys}." and (beside := file_beside(value, folder)):
+        return Node(str(beside.absolute()), node.line)
     return node

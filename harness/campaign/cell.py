@@ -1,8 +1,13 @@
-"""What a group of runs comes to, and what people are shown of it: one entry of `QUESTIONS` a figure."""
+"""Runs in groups by a varied key, what a group comes to, and what people are shown of it: an entry of `QUESTIONS` each.
+
+A key's groups are its values, quantiles of drawn numbers, or quarters of the compass for directions.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -11,7 +16,8 @@ from numpy.typing import NDArray
 
 from harness.analysis.metric import number
 from harness.analysis.rows import DASH
-from harness.campaign.table import Runs
+from harness.campaign.results import IntArray, Runs
+from harness.files.strict_yaml import Scalar
 from harness.flight.record import FloatArray
 
 CONFIDENCE: Final = 0.95
@@ -39,14 +45,11 @@ class Share:
 
 @dataclass(frozen=True)
 class Cell:
-    """The figures of a group of runs. One that no run has is None.
+    """The figures of a group of runs; one that no run has is None.
 
-    Attributes:
-        success: their share. A goal proved unreachable, and a run whose software failed, did not reach it.
-        length_median: flown length over the clairvoyant optimum where the goal was reached, median.
-        below_wanted: share of the runs flown that were below the wanted clearance at any time.
-        trackable: share of the runs flown in which every leg was tracked.
-        planner_p99_ms: largest 99th percentile of a run; of all searches together it is no larger.
+    `success` counts a goal proved unreachable, and a failure of the software, as not reached. Lengths are over the
+    clairvoyant optimum, of the runs that reached the goal; the other shares are of the runs that were flown to an end.
+    `planner_p99_ms` is the largest 99th percentile of a run; of all searches together it is no larger.
     """
 
     runs: int
@@ -99,30 +102,28 @@ def wilson(successes: int, trials: int) -> Share:
 
 @dataclass(frozen=True)
 class Question:
-    """A figure, or two, of a cell.
+    """What people are shown of a cell: one figure of it or two, by name.
 
-    Attributes:
-        short: heading of its column on a terminal, and in a table for a paper.
-        bad: how bad it is, from 0 to 1.
+    `short` heads its column on a terminal; `bad` says how bad it is, from 0 to 1, where the first figure is known.
     """
 
     title: str
     note: str
     short: str
-    first: Callable[[Cell], Any]
-    bad: Callable[[Cell], float]
+    figures: tuple[str, ...]
+    bad: Callable[[Any], float]
     form: Callable[[Any], str] = str
-    second: Callable[[Cell], Any] | None = None
 
     def text(self, cell: Cell) -> str:
         """The answer; a dash where there is none."""
-        figures = [self.first(cell), *([self.second(cell)] if self.second else [])]
-        texts = [DASH if each is None else self.form(each) for each in figures]
+        values = [getattr(cell, name) for name in self.figures]
+        texts = [DASH if each is None else self.form(each) for each in values]
         return DASH if {*texts} == {DASH} else "/".join(texts)
 
     def shade(self, cell: Cell) -> str:
         """How bad it is, as a number for a style sheet; empty where there is no answer."""
-        return "" if self.first(cell) is None else f"{min(max(self.bad(cell), 0.0), 1.0):.3f}"
+        known = getattr(cell, self.figures[0]) is not None
+        return f"{min(max(self.bad(cell), 0.0), 1.0):.3f}" if known else ""
 
 
 def _below(cell: Cell) -> float:
@@ -134,47 +135,24 @@ def _digits(value: float) -> str:
 
 
 INTERVAL: Final = "per cent of the runs, with Wilson's 95 % interval"
+LENGTH: Final = "Median/95th percentile where the goal was reached; full shade at twice the optimum"
+NEAREST: Final = "Least distance to an obstacle edge in any run, in m"
+TRACKED: Final = f"The aircraft tracked every leg; {INTERVAL}"
+TIME: Final = "Milliseconds: largest p99 of a run/longest search; full shade at 20 ms of p99"
+LENGTHS: Final = ("length_median", "length_p95")
+TIMES: Final = ("planner_p99_ms", "planner_max_ms")
+BELOW: Final = "Below the wanted clearance"
 
 QUESTIONS: Final = (
+    Question("Goal reached", INTERVAL, "reached %", ("success",), lambda cell: 1.0 - cell.success.value),
     Question(
-        *("Goal reached", INTERVAL, "reached %"),
-        first=lambda cell: cell.success,
-        bad=lambda cell: 1.0 - cell.reached / cell.runs,
+        *("Length over the clairvoyant optimum", LENGTH, "length", LENGTHS),
+        *(lambda cell: cell.length_median - 1.0, "{:.2f}".format),
     ),
-    Question(
-        "Length over the clairvoyant optimum",
-        "Median/95th percentile where the goal was reached; full shade at twice the optimum",
-        "length",
-        first=lambda cell: cell.length_median,
-        bad=lambda cell: (cell.length_median or 1.0) - 1.0,
-        form="{:.2f}".format,
-        second=lambda cell: cell.length_p95,
-    ),
-    Question(
-        *("Least clearance", "Least distance to an obstacle edge in any run, in m", "clear m"),
-        first=lambda cell: cell.least_clearance_m,
-        bad=_below,
-        form=number,
-    ),
-    Question(
-        *("Below the wanted clearance", f"At any time; {INTERVAL}", "below %"),
-        first=lambda cell: cell.below_wanted,
-        bad=_below,
-    ),
-    Question(
-        *("Trackable", f"The aircraft tracked every leg; {INTERVAL}", "tracks %"),
-        first=lambda cell: cell.trackable,
-        bad=lambda cell: 1.0 - (cell.trackable.value if cell.trackable else 0.0),
-    ),
-    Question(
-        "Planner time",
-        "Milliseconds: largest p99 of a run/longest search; full shade at 20 ms of p99",
-        "plan ms",
-        first=lambda cell: cell.planner_p99_ms,
-        bad=lambda cell: (cell.planner_p99_ms or 0.0) / 20.0,
-        form=_digits,
-        second=lambda cell: cell.planner_max_ms,
-    ),
+    Question("Least clearance", NEAREST, "clear m", ("least_clearance_m",), _below, number),
+    Question(BELOW, f"At any time; {INTERVAL}", "below %", ("below_wanted",), _below),
+    Question("Trackable", TRACKED, "tracks %", ("trackable",), lambda cell: 1.0 - cell.trackable.value),
+    Question("Planner time", TIME, "plan ms", TIMES, lambda cell: cell.planner_p99_ms / 20.0, _digits),
 )
 """In the order in which they are shown."""
 
@@ -182,3 +160,88 @@ QUESTIONS: Final = (
 def legend() -> list[str]:
     """What each column of a table for a paper is."""
     return [f"{each.short}: {each.title} ({each.note.partition('; full shade')[0]})." for each in QUESTIONS]
+
+
+MAX_NUMBERS: Final = 8
+"""A key with more different numbers than this is taken as drawn at random."""
+BINS: Final = 4
+"""Numbers drawn at random are grouped into this many quantiles, directions into as many sectors."""
+MAX_NAMES: Final = 12
+"""At most this many names have a group of their own; the rarest of more share one."""
+NONE: Final = "not set"
+DIRECTIONS: Final = ("from_deg", "course_deg", "heading_deg")
+"""Ends of the paths of keys that are directions: 359 degrees is beside 0."""
+SECTORS: Final = tuple(
+    f"{name}, {low:g} to {low + 90:g}" for name, low in zip("NESW", (-45, 45, 135, 225), strict=True)
+)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The values of a key in groups; of quantiles also their limits, each inner one belongs to the group above it."""
+
+    key: str
+    labels: tuple[str, ...]
+    edges: tuple[float, ...] = ()
+
+
+def is_direction(key: str) -> bool:
+    """Whether a key is a direction."""
+    return key.endswith(DIRECTIONS)
+
+
+def are_numbers(values: Sequence[Scalar]) -> bool:
+    """Whether values are numbers, but for those that are missing."""
+    given = [value for value in values if value is not None]
+    return bool(given) and all(type(value) in (int, float) for value in given)
+
+
+def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis, IntArray]:
+    """The groups of a key's values, and each value's group: numbers rising, names as they first appear, then `NONE`.
+
+    `drawn`: they were drawn at random: numbers are grouped where there are more than `BINS`.
+    """
+    counts = Counter(value for value in values if value is not None)
+    if not are_numbers(values):
+        names = _names(counts)
+    elif len(counts) > (BINS if drawn else MAX_NUMBERS):
+        return _binned(key, values)
+    else:
+        names = dict(zip(sorted(counts), _told_apart(sorted(counts)), strict=True))
+    labels = [*dict.fromkeys(names.values()), *([NONE] if None in values else [])]
+    index = [labels.index(NONE if value is None else names[value]) for value in values]
+    return Axis(key, tuple(labels)), np.array(index, dtype=np.int64)
+
+
+def _names(counts: Counter[Any]) -> dict[Any, str]:
+    """A label for each value that is not a number."""
+    common = dict(counts.most_common(MAX_NAMES - 1 if len(counts) > MAX_NAMES else MAX_NAMES))
+    others = f"{len(counts) - len(common)} others"
+    first = {
+        value: str(value).lower() if value is True or value is False else str(value)
+        for value in counts
+        if value in common
+    }
+    return first | {value: others for value in counts if value not in common}
+
+
+def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
+    """Quantiles of numbers, or quarters of the compass, each about one of its points."""
+    numbers = np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+    missing = np.isnan(numbers)
+    if is_direction(key):
+        labels, edges = SECTORS, ()
+        index = np.floor(np.nan_to_num((numbers + 45.0) % 360.0) / 90.0)
+    else:
+        limits = np.unique(np.quantile(numbers[~missing], np.linspace(0.0, 1.0, BINS + 1)))
+        edges = tuple(limits.tolist())
+        labels = tuple(f"{low} to {high}" for low, high in itertools.pairwise(_told_apart(edges, 4)))
+        index = np.searchsorted(limits[1:-1], numbers, side="right")
+    group: IntArray = np.where(missing, len(labels), index).astype(np.int64)
+    return Axis(key, (*labels, NONE) if missing.any() else labels, edges), group
+
+
+def _told_apart(values: Sequence[float], digits: int = 6) -> list[str]:
+    """Different numbers with as many digits as tell them apart."""
+    each = ([f"{value:.{count}g}" for value in values] for count in range(digits, 18))
+    return next((texts for texts in each if len(set(texts)) == len(texts)), list(map(str, values)))

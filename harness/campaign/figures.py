@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from harness.campaign.groups import are_numbers, is_direction
-from harness.campaign.table import Runs
+from harness.campaign.cell import are_numbers, is_direction
+from harness.campaign.results import Runs
 from harness.flight.record import FloatArray
 from harness.report.figure_style import colour, styled
 
@@ -33,21 +33,19 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
     Runs that did not reach the goal are crosses. A figure's axis ends at its 1st and 99th percentile where others lie
     far beyond them; those are triangles at its edge.
     """
-    columns_of = {key: runs.values(key) for key in keys}
-    varied = [
-        key for key, values in columns_of.items() if are_numbers(values) and len({*values} - {None}) > 1
-    ]
-    varied = varied[:MAX_KEYS]
-    figures: Mapping[str, FloatArray] = {
+    varied = [key for key in keys if are_numbers(runs.values(key)) and _differ(runs.numbers(key))][:MAX_KEYS]
+    every: Mapping[str, FloatArray] = {
         "clearance / wanted": runs.clearance_ratio,
         "cross-track max, m": runs.numbers("cross_track_m.max"),
         "length / optimum": runs.numbers("length_ratio"),
     }
-    figures = {label: values for label, values in figures.items() if len({*values[np.isfinite(values)]}) > 1}
-    if not varied or not figures:
-        return None
-    rows, columns = len(figures), len(varied)
-    names = [_below(key) for key in varied]
+    figures = {label: values for label, values in every.items() if _differ(values)}
+    return _drawn(runs, varied, figures) if varied and figures else None
+
+
+def _drawn(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray]) -> Figure:
+    """A row of panels a figure, a column a key."""
+    rows, columns, names = len(figures), len(varied), [_below(key) for key in varied]
     dots = rows * columns * len(runs) > MAX_OUTLINES
     with styled(0.5 + PANEL_IN * rows + ROW_IN * max(name.count("\n") for name in names)) as figure:
         grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -60,6 +58,11 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
         for name, axes in zip(names, grid[-1], strict=True):
             axes.set_xlabel(name)
     return figure
+
+
+def _differ(values: FloatArray) -> bool:
+    """Whether there is more than one value."""
+    return len({*values[np.isfinite(values)]}) > 1
 
 
 def _panel(axes: Any, numbers: FloatArray, values: FloatArray, reached: Any, dots: bool) -> None:

@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from harness.analysis.claims import Claim, holds
-from harness.campaign.results import ERROR, metric_cells, time_cells
+from harness.analysis.metric import ERROR
+from harness.campaign.results import metric_cells, time_cells
 from harness.files.crash import PlannerError, sentence, trace
 from harness.files.errors import RunFolderError, WriteError
+from harness.report.chapters import optimum_of
 from harness.scenario.given import registered_source
 from harness.scenario.kinds import GUIDANCE, PLANNER
 from harness.scenario.scenario import Scenario, unpacked
@@ -31,12 +33,12 @@ class Job:
 
     Attributes:
         packed: the scenario to fly (`harness.scenario.scenario.packed`).
-        recordings: when it is kept; `folders`: always, without recordings.
+        recordings: when the run folder is kept; `folders`: always, without recordings.
+        again: the command that flies it again.
         varied: the keys that the campaign varies and their values in this run, for the recording's properties.
         claim: a run is a failure where this does not hold of it.
         path: a check, if a given path is flown in place of what a planner finds; `packed` is empty then.
-        planners: planners that the process has to import, as FILE.py:NAME or MODULE:NAME.
-        laws: guidance laws that it has to import, likewise.
+        planners: planners that the process has to import, as FILE.py:NAME or MODULE:NAME; `laws`: likewise.
         identity: of the recording among others; empty: as `fly_to_folder` has it.
     """
 
@@ -56,11 +58,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of a job.
-
-    Attributes:
-        row: cells of `results.parquet`, by column; those of the job itself are left out.
-    """
+    """What came of a run: cells of its row and of its times, and whether the claim of the campaign holds of it."""
 
     run: int
     row: dict[str, Any]
@@ -86,40 +84,39 @@ def fly_job(job: Job) -> Answer:
                 _imported(source, part)
         scenario = unpacked(job.packed) if job.path is None else job.path.scenario
         metrics = _flown(job, scenario)
-        optimum_m = _optimum_m(scenario) if job.optimum else None
+        optimum_m = optimum_of(scenario).length_m if job.optimum else None
         cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
     except (WriteError, RunFolderError):
         raise
     except Exception as error:
-        if isinstance(error, MemoryError) or isinstance(error.__cause__, MemoryError):
-            raise NoMemoryError from None
-        # Whatever the constructor of a planner raised is its own, a full disk too.
-        if not isinstance(error, PlannerError) and (full := _full(error)) is not None:
-            raise full from None
+        _blame_machine(error)
         row = {"outcome": ERROR, "reason": sentence(error), "error": trace(error)}
         return Answer(job.run, row, {})
     return Answer(job.run, cells, time_cells(metrics), holds(job.claim, metrics))
+
+
+def _blame_machine(error: Exception) -> None:
+    """Raises what the machine did, if that made an error: no memory, or a full disk."""
+    for cause in (error, error.__cause__):
+        if isinstance(cause, MemoryError):
+            raise NoMemoryError from None
+        # Whatever the constructor of a planner raised is its own, a full disk too.
+        if isinstance(cause, OSError) and cause.errno in FULL and not isinstance(error, PlannerError):
+            raise cause from None
 
 
 _imported = cache(registered_source)
 """Imports a planner or a law once in this process."""
 
 
-def _full(error: Exception) -> OSError | None:
-    """What the disk said, if it takes no more."""
-    cause = error if isinstance(error, OSError) else error.__cause__
-    return cause if isinstance(cause, OSError) and cause.errno in FULL else None
-
-
 def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
     """The metrics of a flight, its run folder kept as the job says."""
-    if job.recordings in ("all", "thin", "folders"):
-        return _kept(job, scenario)
-    found = _measured(job, scenario)
-    if job.recordings == "failures" and not holds(job.claim, found):
+    if job.recordings in ("failures", "none"):
+        found = _measured(job, scenario)
+        if job.recordings == "none" or holds(job.claim, found):
+            return found
         # Failures are few: to fly them again costs less than to record every flight.
-        _kept(job, scenario)
-    return found
+    return _kept(job, scenario)
 
 
 def _measured(job: Job, scenario: Scenario) -> dict[str, Any]:
@@ -159,18 +156,3 @@ def _kept(job: Job, scenario: Scenario) -> dict[str, Any]:
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
         if recording and trim is not None:
             trim(0)
-
-
-def _optimum_m(scenario: Scenario) -> float | None:
-    from harness.world.optimum import shortest_path
-    from harness.world.world import World
-
-    world, mission = World.from_scenario(scenario), scenario.mission
-    return shortest_path(
-        world.obstacles,
-        world.bounds_m,
-        mission.start_m,
-        mission.goal_m,
-        scenario.planner.clearance_m,
-        mission.goal_radius_m,
-    ).length_m

@@ -1,11 +1,14 @@
 """The folder of a campaign: `campaign.json` says what is flown, the journal what has been, two tables the results.
 
-The tables are made from the journal, and replaced whole. Whoever writes holds a lock on the file `lock` (flock),
-which ends with the process.
+The journal has a line for every run that is over, flushed to the disk before the next. A process killed in the middle
+of a line leaves a torn last one, which is left out; any other line that is not as it was written is damage, and nothing
+more is made of the folder then. The tables are made from the journal, and replaced whole. Whoever writes holds a lock
+on the file `lock` (flock), which ends with the process.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import textwrap
@@ -16,42 +19,38 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 from aircraft.airframes import airframe
-from harness.campaign.journal import JOURNAL, read_journal, sealed
+from harness.campaign.flight import Answer
 from harness.campaign.results import INDEX, METRICS, RESULTS, RUN, TIMES, TIMINGS, table
 from harness.campaign.runs import CampaignRuns
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
-from harness.files.input_file import MAX_JSON_BYTES, read_index
+from harness.files.input_file import read_index
 from harness.files.versions import versions
 from harness.files.whole_file import PARTIAL, append_to, replace_text, replacing
 from harness.files.wording import counted
 from harness.scenario.kinds import PLANNER
 
 LOCK: Final = "lock"
-FOLDER_SCHEMA: Final = "wayproof/campaign-folder/1"
+JOURNAL: Final = "journal.jsonl"
+SEAL: Final = "sha256"
+"""Key of the SHA-256 of what a line of the journal tells."""
+FOLDER_SCHEMA: Final = "wayproof/campaign-folder/2"
 MAX_INDEX_BYTES: Final = 10**9
 
 MAX_TOLD: Final = 3
 
 
-def claim_folder(
-    path: Path, what: str, index: str, schema: str, lock: str | None = None, most_bytes: int = MAX_JSON_BYTES
-) -> FolderLock:
-    """Holds the folder that a command writes, made where missing.
+def claim_folder(path: Path, what: str, index: str, schema: str, lock: str | None = None) -> FolderLock:
+    """Holds the folder that a command writes (`what`), made where missing; a RunFolderError where that cannot be.
 
-    `what`: the noun for what is written there.
     `lock`: name of a file to lock in place of the folder.
-    `most_bytes`: the largest index that is read.
-
-    Raises:
-        RunFolderError: it is a file, holds something else, another process writes to it, or it cannot be made.
     """
     if path.exists() and not path.is_dir():
         raise RunFolderError(f"{path} is a file, not a folder for a {what}")
     try:
         path.mkdir(parents=True, exist_ok=True)
         others = {each.name for each in path.iterdir() if not each.name.endswith(PARTIAL)} - {lock}
-        if others and read_index(path / index, schema, most_bytes) is None:
+        if others and read_index(path / index, schema, MAX_INDEX_BYTES) is None:
             raise RunFolderError(
                 f"{path} is not empty and not a {what}: choose another folder or empty it first"
             )
@@ -64,24 +63,26 @@ class CampaignFolder:
     """The folder of a campaign that is being flown. Use as a context manager; the lock ends with it.
 
     Attributes:
-        done: numbers of the runs that are over.
+        over: the runs that are over, by number.
+        grown: whether the campaign was begun with fewer draws.
     """
 
     def __init__(self, path: Path, runs: CampaignRuns, *, resume: bool) -> None:
-        """Claims the folder: makes it, or goes on with it.
-
-        `resume`: whether what the folder has of this campaign is kept and gone on with.
+        """Claims the folder: makes it, or with `resume` goes on with what it has of this campaign, or of fewer draws.
 
         Raises:
-            RunFolderError: the folder holds something else, results without `resume` or those of another
-                campaign, a damaged journal, another process is flying into it, or it cannot be written.
+            RunFolderError: the folder holds something else, results without `resume` or of another campaign, or damage;
+                another process is flying into it, or it cannot be written.
         """
         self.path, self._runs = path, runs
         with ExitStack() as stack:
-            held = claim_folder(path, "campaign", INDEX, FOLDER_SCHEMA, LOCK, MAX_INDEX_BYTES)
+            held = claim_folder(path, "campaign", INDEX, FOLDER_SCHEMA, LOCK)
             stack.callback(held.release)
             try:
-                self.done = self._begin(resume)
+                self.over, end = _read_journal(path / JOURNAL)
+                self._begin(resume)
+                if (path / JOURNAL).exists():
+                    os.truncate(path / JOURNAL, end)
                 self._journal: IO[bytes] = stack.enter_context(append_to(path / JOURNAL))
             except OSError as error:
                 raise RunFolderError(
@@ -89,35 +90,30 @@ class CampaignFolder:
                 ) from error
             self._stack = stack.pop_all()
 
-    def append(self, run: int, row: Mapping[str, Any], times: Mapping[str, Any], held: bool = False) -> None:
+    def append(self, over: Answer) -> None:
         """Puts a run that is over on the disk."""
-        self._journal.write(sealed({"run": run, "row": row, "times": times, "held": held}))
+        self._journal.write(sealed(vars(over)))
         self._journal.flush()
         os.fsync(self._journal.fileno())
-        self.done.add(run)
+        self.over[over.run] = over
 
     def write_tables(self, first: int | None = None) -> None:
-        """Makes `results.parquet` and `timings.parquet` from the journal.
-
-        Args:
-            first: of so many runs, by their number; default: of all that are over.
-        """
+        """Makes `results.parquet` and `timings.parquet` of the first runs by number; default: of all that are over."""
         import pyarrow.parquet as pq
 
-        over = read_journal(self.path).runs.items()
-        kept = [(run, each) for run, each in over if first is None or run < first]
+        kept = [self.over[run] for run in sorted(self.over) if first is None or run < first]
         about = {"runs": len(self._runs), **self._runs.plain()}
-        for name, columns, rows in (
-            (RESULTS, RUN | self._runs.varied | METRICS, [{**each.row, "run": run} for run, each in kept]),
-            (TIMINGS, TIMES, [{**each.times, "run": run} for run, each in kept]),
+        columns = RUN | dict.fromkeys(self._runs.varied, "") | METRICS
+        for name, content in (
+            (RESULTS, table([{**each.row, "run": each.run} for each in kept], columns, about)),
+            (TIMINGS, table([{**each.times, "run": each.run} for each in kept], TIMES, about)),
         ):
             with replacing(self.path / name) as file:
-                pq.write_table(table(rows, columns, about), file, compression="zstd")
+                pq.write_table(content, file, compression="zstd")
 
     def outcomes(self) -> dict[str, int]:
         """How many of the runs that are over ended how, the most frequent first."""
-        over = read_journal(self.path).runs.values()
-        return dict(Counter(each.row["outcome"] for each in over).most_common())
+        return dict(Counter(each.row["outcome"] for each in self.over.values()).most_common())
 
     def __enter__(self) -> CampaignFolder:
         return self
@@ -125,66 +121,86 @@ class CampaignFolder:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def _begin(self, resume: bool) -> set[int]:
-        """Checks and writes the index; returns the runs that are over."""
+    def _begin(self, resume: bool) -> None:
+        """Checks what the folder holds, and writes the index."""
+        campaign = self._runs.campaign
         about = {
             "schema": FOLDER_SCHEMA,
+            "grown": False,
             "versions": versions(),
             "planners": {kind: PLANNER.distribution_of(kind) for kind in self._runs.planners},
             "aircraft": {model: airframe(model).files.digest() for model in self._runs.aircraft},
+            # What a run flies follows from the order of these keys, too.
+            "order": {"grid": list(campaign.grid), "random": list(campaign.random)},
             **self._runs.plain(),
         }
         now = json.loads(json.dumps(about))
         before = read_index(self.path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES)
-        journal = read_journal(self.path)
-        if journal.runs or _has_rows(self.path / RESULTS):
-            held = counted(len(journal.runs), "run") if journal.runs else RESULTS
+        if self.over or (self.path / RESULTS).exists():
+            held = counted(len(self.over), "run") if self.over else RESULTS
             if not resume:
                 raise RunFolderError(
                     f"{self.path} holds {held}: go on with --resume, or choose another folder"
                 )
-            if changes := list(_changes(before or now, now)):
-                told = "; ".join(changes[:MAX_TOLD]) + ("; and more" if len(changes) > MAX_TOLD else "")
-                raise RunFolderError(
-                    f"{self.path} is of another campaign: {told}; change it back or choose another folder"
-                )
-        if beyond := [run for run in journal.runs if run >= len(self._runs)]:
+            now["grown"] = self._check_same(before or now, now)
+        self.grown: bool = now["grown"]
+        if beyond := [run for run in self.over if run >= len(self._runs)]:
             raise RunFolderError(
-                f"{journal.path}: tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
+                f"{self.path / JOURNAL}: tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
             )
         if before != now:
             replace_text(self.path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
-        if journal.path.exists():
-            os.truncate(journal.path, journal.end)
-        return set(journal.runs)
 
-
-def _has_rows(results: Path) -> bool:
-    """Whether a table holds runs; one that cannot be read may."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        return bool(pq.read_metadata(results).num_rows > 0)
-    except FileNotFoundError:
-        return False
-    except (OSError, pa.ArrowException):
-        return True
-
-
-def _changes(before: dict[str, Any], now: dict[str, Any]) -> Iterator[str]:
-    """What differs between two indices, a sentence each; what a run flies follows from the order of some keys, too."""
-    was, is_now = dict(_leaves(before)), dict(_leaves(now))
-    for name in {**was, **is_now}:
-        if was.get(name) != is_now.get(name):
-            texts = (
-                textwrap.shorten(each.get(name, "not there"), 60, placeholder="...") for each in (was, is_now)
+    def _check_same(self, before: dict[str, Any], now: dict[str, Any]) -> bool:
+        """Whether a campaign was begun with fewer draws; refuses one that differs otherwise: its runs are others."""
+        was, draws = (each["campaign"].get("draws", 1) for each in (before, now))
+        grows = self._runs.can_grow and was < draws
+        then, today = dict(_leaves(before)), dict(_leaves(now))
+        same = {"grown", *(["campaign.draws"] if grows else [])}
+        told = []
+        for name in dict.fromkeys([*then, *today]):
+            if then.get(name) != today.get(name) and name not in same:
+                texts = (each.get(name, "not there") for each in (then, today))
+                shorter = (textwrap.shorten(each, 60, placeholder="...") for each in texts)
+                told.append("{} was {}, is {}".format(name, *shorter))
+        if told:
+            more = "; and more" if len(told) > MAX_TOLD else ""
+            raise RunFolderError(
+                f"{self.path} is of another campaign: {'; '.join(told[:MAX_TOLD])}{more}; change it back or choose "
+                "another folder"
             )
-            yield "{} was {}, is {}".format(name, *texts)
-    for name in ("grid", "random"):
-        orders = [list(each["campaign"].get(name, ())) for each in (before, now)]
-        if orders[0] != orders[1] and sorted(orders[0]) == sorted(orders[1]):
-            yield "campaign.{} had its keys in the order {}, has {}".format(name, *map(", ".join, orders))
+        return grows or bool(before["grown"])
+
+
+def _read_journal(path: Path) -> tuple[dict[int, Answer], int]:
+    """The runs that are over, and the byte at which the last whole line ends; a RunFolderError at damage."""
+    *lines, torn = path.read_bytes().split(b"\n") if path.exists() else (b"",)
+    if lines and not torn and not lines[-1].endswith(b"}"):
+        lines.pop()
+    runs: dict[int, Answer] = {}
+    for number, text in enumerate(lines, start=1):
+        try:
+            line = json.loads(text)
+            run, over = line["run"], Answer(line["run"], line["row"], line["times"], line["held"])
+            told = "" if type(run) is int else "no run"
+            if sealed(line) != text + b"\n":
+                told = "something else than was written: its sha256 is another"
+            elif runs.setdefault(run, over) != over:
+                told = f"run {run} otherwise than a line before it"
+        except (ValueError, RecursionError, KeyError, TypeError):
+            told = "no run"
+        if told:
+            raise RunFolderError(
+                f"{path}:{number}: is damaged: it tells of {told}; delete that line, and what it told of is flown again"
+            )
+    return runs, sum(len(each) + 1 for each in lines)
+
+
+def sealed(told: Mapping[str, Any]) -> bytes:
+    """A line of the journal: `run`, `row`, `times` and `held`, with the SHA-256 of all that."""
+    text = json.dumps({key: value for key, value in told.items() if key != SEAL}, allow_nan=False)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return f'{text[:-1]}, "{SEAL}": "{digest}"}}\n'.encode()
 
 
 def _leaves(content: Any, where: str = "") -> Iterator[tuple[str, str]]:

@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.analysis.metric import Metric, number
 from harness.analysis.registry import METRICS
-from harness.campaign.table import IntArray
+from harness.campaign.results import IntArray
 from harness.flight.record import FloatArray
 
 CONFIDENCE: Final = 0.95
@@ -25,15 +24,10 @@ MIN_CASES: Final = 4
 """Below this many cases there is no interval: more than a fortieth of all resamples would hold one case only."""
 SEED: Final = 1
 """Seed of the resampling: the same runs give the same interval."""
-RATIO: Final = "ratio"
-"""Name of the length over the optimum, which counts only where both planners reached the goal."""
-
 TESTED: Final[tuple[Metric, ...]] = tuple(
     each for each in METRICS if each.title and each.short and each.worse and not each.rare
 )
 """The figures of the registry that are compared: those that people are shown and of which more, or less, is worse."""
-
-RATIO_LABEL: Final = next(each.label for each in TESTED if each.name == RATIO)
 
 
 @dataclass(frozen=True)
@@ -55,11 +49,9 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Tested:
-    """One figure of two planners on the cases of which both have it.
+    """One figure of two planners on the pairs of which both have it: their means, in the unit of the label.
 
     Attributes:
-        pairs: cases of which both have it.
-        first: mean of the first planner, in the unit of the label.
         difference: mean of the first less the second, with its bootstrap interval over the cases.
         p: of Wilcoxon's signed-rank test over the cases (two-sided), corrected by Holm's method for all figures of the
             two planners; None where all pairs agree or there are fewer than `MIN_CASES`.
@@ -75,12 +67,9 @@ class Tested:
 
 @dataclass(frozen=True)
 class Duel:
-    """Two planners on the cases that both flew.
+    """Two planners on the pairs (cases, times aircraft) that both flew, counted by who reached the goal.
 
-    Attributes:
-        pairs: cases, times aircraft, that both flew.
-        only_first: of them, those where only the first reached its goal.
-        figures: the share of goals reached, in percent, then each figure of `TESTED` that both have.
+    `figures`: the share of goals reached, in percent, then each figure of `TESTED` that both have.
     """
 
     first: str
@@ -104,44 +93,40 @@ def duels(
     for row, (planner, case) in enumerate(zip(planners, cases, strict=True)):
         flown.setdefault(planner, {})[case] = row
     every = {"goals reached, %": 100.0 * np.array(reached, dtype=np.float64)}
-    for metric in TESTED:
-        if metric.name in figures:
-            is_share = metric.kind == "bool"
-            label = f"{metric.label}, %" if is_share else metric.label
-            every[label] = figures[metric.name] * metric.factor * (100.0 if is_share else 1.0)
-    held = np.array(reached, dtype=bool)
-    return tuple(_duel(*pair, flown, held, every) for pair in itertools.combinations(flown, 2))
+    every |= {_label(each): figures[each.name] * _factor(each) for each in TESTED if each.name in figures}
+    held, found = np.array(reached, dtype=bool), []
+    for first, second in itertools.combinations(flown, 2):
+        common = [case for case in flown[first] if case in flown[second]]
+        rows = np.array([[flown[name][case] for case in common] for name in (first, second)], dtype=int)
+        won, lost = held[rows]
+        _, numbers = np.unique([str(case[0]) for case in common], return_inverse=True)
+        tested = [_tested(label, values[rows], numbers) for label, values in every.items()]
+        counts = (len(common), int((won & ~lost).sum()), int((lost & ~won).sum()), int((won & lost).sum()))
+        found.append(Duel(first, second, *counts, _corrected([*filter(None, tested)])))
+    return tuple(found)
 
 
-def _duel(
-    first: str,
-    second: str,
-    flown: Mapping[str, Mapping[Any, int]],
-    reached: NDArray[np.bool_],
-    figures: Mapping[str, FloatArray],
-) -> Duel:
-    common = [case for case in flown[first] if case in flown[second]]
-    ours, theirs = (np.array([flown[name][case] for case in common], int) for name in (first, second))
-    _, numbers = np.unique([str(case[0]) for case in common], return_inverse=True)
-    won, lost = reached[ours], reached[theirs]
-    tested = []
-    for label, values in figures.items():
-        among = np.isfinite(values[ours]) & np.isfinite(values[theirs])
-        among &= won & lost if label == RATIO_LABEL else True
-        if among.any():
-            tested.append(_tested(label, values[ours][among], values[theirs][among], numbers[among]))
-    counts = (len(common), int((won & ~lost).sum()), int((lost & ~won).sum()), int((won & lost).sum()))
-    return Duel(first, second, *counts, _corrected(tested))
+def _label(metric: Metric) -> str:
+    return f"{metric.label}, %" if metric.kind == "bool" else metric.label
 
 
-def _tested(label: str, ours: FloatArray, theirs: FloatArray, cases: IntArray) -> Tested:
+def _factor(metric: Metric) -> float:
+    return metric.factor * (100.0 if metric.kind == "bool" else 1.0)
+
+
+def _tested(label: str, halves: FloatArray, cases: IntArray) -> Tested | None:
+    """One figure of both planners (2, n) on the cases (n,); None where no pair has it."""
     from scipy import stats
 
-    _, index = np.unique(cases, return_inverse=True)
+    known = np.isfinite(halves).all(axis=0)
+    if not known.any():
+        return None
+    ours, theirs = halves[:, known]
+    _, index = np.unique(cases[known], return_inverse=True)
     means = np.bincount(index, ours - theirs) / np.bincount(index)
     tells = len(means) >= MIN_CASES and bool(np.any(means != 0.0))
     p = float(stats.wilcoxon(means).pvalue) if tells else None
-    estimate = mean_estimate(ours - theirs, cases)
+    estimate = mean_estimate(ours - theirs, index)
     return Tested(label, len(ours), float(ours.mean()), float(theirs.mean()), estimate, p)
 
 
@@ -154,12 +139,10 @@ def _corrected(tested: Sequence[Tested]) -> tuple[Tested, ...]:
 
 
 def mean_estimate(differences: FloatArray, cases: IntArray) -> Estimate:
-    """The mean of paired differences with the percentile bootstrap interval over the cases.
+    """The mean of paired differences (n,), all finite, with the percentile bootstrap interval over the cases.
 
     All pairs of a case, one an aircraft, are drawn together: they share its world, weather and seed. Efron and
     Tibshirani, An Introduction to the Bootstrap (1993), chapters 8 and 13.
-
-    `differences`: (n,) one a pair, all finite.
     """
     mean = float(differences.mean())
     different, index = np.unique(cases, return_inverse=True)

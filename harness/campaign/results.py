@@ -1,4 +1,4 @@
-"""The results of a campaign as rows: their columns, and the tables of a journal's lines.
+"""The results of a campaign: the columns of `results.parquet` and `timings.parquet`, written and read back.
 
 `results.parquet` has one row a run, sorted by run, and nothing that depends on the machine's speed or on who
 flew what when, so that its bytes are the same whatever flew it; times are in `timings.parquet`.
@@ -6,16 +6,23 @@ flew what when, so that its bytes are the same whatever flew it; times are in `t
 
 from __future__ import annotations
 
+import itertools
 import json
 import shlex
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from harness.analysis.metric import ERROR as ERROR  # the same word for the same thing
+import numpy as np
+from numpy.typing import NDArray
+
 from harness.analysis.registry import METRICS as FIGURES
 from harness.files.strict_yaml import InputError
+from harness.flight.record import FloatArray
+from harness.run_files.run_folder import RECORDING
 from harness.scenario.given import own_words
 
 if TYPE_CHECKING:
@@ -28,25 +35,19 @@ RUNS: Final = "runs"
 RESULTS: Final = "results.parquet"
 TIMINGS: Final = "timings.parquet"
 SCHEMA: Final = "wayproof/results/1"
-RUN: Final = {
-    "run": "int",
-    "case": "int",
-    "scenario": "text",
-    "world": "text",
-    "planner": "text",
-    "aircraft": "text",
-    "seed": "int",
-}
+NAMED: Final = ("planner", "aircraft", "world", "scenario")
+"""Columns of names: varied keys where they have more than one value."""
+RUN: Final = {name: "int" if name in ("run", "case", "seed") else "text" for name in (
+    "run", "case", "scenario", "world", "planner", "aircraft", "seed",
+)}  # fmt: skip
 """Columns before those of the varied keys, and what they hold."""
+LAW: Final = "guidance.kind"
+"""Key of a scenario that names the guidance law."""
 
 WITHOUT_TIMES: Final = tuple(each for each in FIGURES if not each.timed and not each.derived)
-
-METRICS: Final = {
-    **{each.path: each.kind for each in WITHOUT_TIMES},
-    "wanted_clearance_m": "number",
-    "optimum_m": "number",
-    "length_ratio": "number",
-}
+METRICS: Final = {each.path: each.kind for each in WITHOUT_TIMES} | dict.fromkeys(
+    ("wanted_clearance_m", "optimum_m", "length_ratio"), "number"
+)
 """Columns after them: what `metrics.json` has, dots between its levels, times left out, and more.
 
 Of what is there only with terrain, with navigation errors or of a given path the other runs have nothing.
@@ -55,21 +56,18 @@ Of the legs of `trackability` there are their number, that of those not trackabl
 world and keeps the clearance, `length_ratio` the flown length over it where the goal was reached; `error` is a
 traceback.
 """
-
 TIMES: Final = {"run": "int"} | {
     each.path.removeprefix("timing."): each.kind for each in FIGURES if each.timed
 }
 """Columns of `timings.parquet`."""
 
+IntArray: TypeAlias = NDArray[np.int64]
+
 
 def metric_cells(
     metrics: Mapping[str, Any], wanted_clearance_m: float | None, optimum_m: float | None
 ) -> dict[str, Any]:
-    """The content of `metrics.json` as cells of a row, by column.
-
-    `wanted_clearance_m`: distance from obstacles that the planner was to keep.
-    `optimum_m`: length of the shortest path; None where there is none or it is not wanted.
-    """
+    """The content of `metrics.json` as cells of a row, with the clearance that was wanted and the shortest path."""
     reached = metrics["outcome"] == "reached"
     return {
         **{each.path: each.value(metrics) for each in WITHOUT_TIMES},
@@ -84,23 +82,33 @@ def time_cells(metrics: Mapping[str, Any]) -> dict[str, Any]:
     return {each.path.removeprefix("timing."): each.value(metrics) for each in FIGURES if each.timed}
 
 
+def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:
+    """The command line that flies a run of a campaign again; a planner or a law that is code of one's own is named."""
+    words = ["wayproof", "fly", "--from", str(results), "--run", str(run)]
+    return shlex.join([*words, *own_words(planner, law)])
+
+
 def table(
     rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], about: Mapping[str, Any]
 ) -> pa.Table:
-    """Rows as a table, by the number of the run.
+    """Rows as a table.
 
     Args:
         rows: cells by column; those that are missing are null.
-        columns: what each column holds: int, number, bool, text or json.
+        columns: what each column holds: int, number, bool, text; or empty, for what stands there, JSON where mixed.
         about: what goes with it of its campaign, as JSON has it.
     """
     import pyarrow as pa
 
-    types = {"int": pa.int64(), "number": pa.float64(), "bool": pa.bool_()}
-    schema = pa.schema([(name, types.get(kind, pa.string())) for name, kind in columns.items()])
-    ordered = sorted(rows, key=lambda row: row["run"])
-    arrays = [pa.array([row.get(field.name) for row in ordered], field.type) for field in schema]
-    return sealed(pa.Table.from_arrays(arrays, schema=schema), about)
+    types = {"int": pa.int64(), "number": pa.float64(), "bool": pa.bool_(), "text": pa.string()}
+    arrays = []
+    for name, kind in columns.items():
+        cells = [row.get(name) for row in rows]
+        try:
+            arrays.append(pa.array(cells, types.get(kind)))
+        except pa.ArrowException:
+            arrays.append(pa.array([None if cell is None else json.dumps(cell) for cell in cells]))
+    return sealed(pa.Table.from_arrays(arrays, list(columns)), about)
 
 
 def sealed(content: pa.Table, about: Mapping[str, Any]) -> pa.Table:
@@ -116,16 +124,8 @@ def _sha256(content: pa.Table, about: Mapping[str, Any]) -> str:
     return digest.hexdigest()
 
 
-LAW: Final = "guidance.kind"
-"""Key of a scenario that names the guidance law."""
-
-
 def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
-    """Reads `results.parquet` or `timings.parquet`, and what it says of its campaign.
-
-    Raises:
-        InputError: it is something else, damaged, or other than it was written.
-    """
+    """A table of a campaign and what it says of it; an InputError at something else, damage or a changed table."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -134,19 +134,10 @@ def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     try:
         about = json.loads((pq.read_schema(path).metadata or {})[b"wayproof"])
         digest = about.pop("sha256") if about["schema"] == SCHEMA else None
-        campaign = about["campaign"]
-        if not isinstance(digest, str) or not isinstance(campaign, dict):
+        if not isinstance(digest, str) or not isinstance(about["campaign"], dict):
             raise ValueError("of something else")
-    except (
-        OSError,
-        pa.ArrowException,
-        KeyError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        RecursionError,
-    ) as error:
-        raise InputError(f"{path}: is not the {RESULTS} of a campaign; give one") from error
+    except (OSError, pa.ArrowException, LookupError, TypeError, ValueError, AttributeError, RecursionError):
+        raise InputError(f"{path}: is not the {RESULTS} of a campaign; give one") from None
     try:
         content = pq.read_table(path)
     except (OSError, pa.ArrowException, ValueError) as error:
@@ -159,7 +150,105 @@ def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     return content, about
 
 
-def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:
-    """The command line that flies a run of a campaign again; a planner or a law that is code of one's own is named."""
-    words = ["wayproof", "fly", "--from", str(results), "--run", str(run)]
-    return shlex.join([*words, *own_words(planner, law)])
+def results_of(folder: Path) -> pa.Table:
+    """The results of the campaign in a folder; an InputError where there are none, or they cannot be read."""
+    if not (folder / RESULTS).is_file():
+        raise InputError(f"wayproof: {folder} has no {RESULTS}: it is not the folder of a campaign")
+    return read_table(folder / RESULTS)[0]
+
+
+def recordings_of(folder: Path) -> list[Path]:
+    """The recordings that a campaign's folder keeps, by the number of the run."""
+    kept = [path for path in (folder / RUNS).glob(f"*/{RECORDING}") if path.parent.name.isdecimal()]
+    return sorted(kept, key=lambda path: int(path.parent.name))
+
+
+class Runs:
+    """The runs of a campaign as its tables have them, a column a figure.
+
+    A planner or an aircraft that is named more than once is told apart by the keys that each entry gives.
+
+    Attributes:
+        planned: how many runs the campaign has, flown or not; None where the results do not say so.
+        varied: columns that say what was varied: names with more than one value, and the varied key paths.
+        reached: whether each run reached its goal.
+    """
+
+    def __init__(self, results: pa.Table, timings: pa.Table | None = None) -> None:
+        about = json.loads((results.schema.metadata or {}).get(b"wayproof", b"{}"))
+        self.campaign: Mapping[str, Any] = about.get("campaign", {})
+        self.planned: int | None = about.get("runs")
+        self._count = results.num_rows
+        self._columns = {name: _without_nan(results[name]) for name in results.column_names}
+        self._tell_apart("planner", self.campaign.get("planners", ()), "kind")
+        self._tell_apart("aircraft", self.campaign.get("aircraft", ()), "model")
+        before = itertools.takewhile(lambda name: name != "outcome", self._columns)
+        names = [name for name in NAMED if len(set(self.texts(name))) > 1]
+        self.varied = names + [name for name in before if name not in RUN]
+        self.reached = np.array(self.texts("outcome")) == "reached"
+        columns = {} if timings is None else timings.to_pydict()
+        for name, cells in columns.items():
+            times = dict(zip(columns["run"], cells, strict=True))
+            self._columns.setdefault(name, [times.get(run) for run in self.values("run")])
+
+    @classmethod
+    def of(cls, folder: Path) -> Runs:
+        """Those in the folder of a campaign; an InputError where it holds none, or a file cannot be read."""
+        timings = folder / TIMINGS
+        return cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)
+
+    def __len__(self) -> int:
+        return int(self._count)
+
+    def check_columns(self, names: Sequence[str]) -> None:
+        """Raises InputError where there is no such column."""
+        for name in names:
+            if name not in self._columns:
+                known = ", ".join(self.varied) or "none"
+                raise InputError(f"wayproof: {RESULTS} has no column {name!r}; varied there: {known}")
+
+    def values(self, name: str) -> Sequence[Any]:
+        """A column of any kind, None where there is nothing."""
+        return self._columns.get(name) or (None,) * len(self)
+
+    def texts(self, name: str) -> list[str]:
+        """A column of text, empty where there is nothing."""
+        return ["" if value is None else str(value) for value in self.values(name)]
+
+    def numbers(self, name: str) -> FloatArray:
+        """A figure of every run, (n,): a column of the results or of the timings, NaN where there is none."""
+        return np.array([np.nan if value is None else value for value in self.values(name)], dtype=np.float64)
+
+    @property
+    def clearance_ratio(self) -> FloatArray:
+        """Least clearance over the wanted one; NaN where one of them is not known."""
+        wanted_m = self.numbers("wanted_clearance_m")
+        ratio: FloatArray = self.numbers("min_clearance_m") / np.where(wanted_m > 0.0, wanted_m, np.nan)
+        return ratio
+
+    @cached_property
+    def are_crossed(self) -> bool:
+        """Whether one world was flown with several scenarios: else it stands for its scenario."""
+        worlds = self.texts("world")
+        return len(set(zip(worlds, self.texts("scenario"), strict=True))) > len(set(worlds))
+
+    def name(self, row: int) -> str:
+        """World, planner and aircraft of a run."""
+        planner, aircraft, world, scenario = (self.values(name)[row] for name in NAMED)
+        place = (scenario, world) if world and self.are_crossed else (world or scenario,)
+        return ", ".join(filter(None, (*place, planner, aircraft)))
+
+    def _tell_apart(self, name: str, entries: Sequence[Any], first: str) -> None:
+        """Gives entries of one planner, or aircraft, names with the keys that they give."""
+        given = [entry if isinstance(entry, Mapping) else {first: entry} for entry in entries]
+        named = Counter(each.get(first) for each in given)
+        keys = [key for key in dict.fromkeys(itertools.chain(*given)) if key != first]
+        columns = {key: self.values(f"{name}.{key}") for key in keys}
+        for row, value in enumerate(self._columns[name]):
+            if named[value] > 1:
+                told = [f"{key} {cells[row]}" for key, cells in columns.items() if cells[row] is not None]
+                self._columns[name][row] = ", ".join((value, *told))
+
+
+def _without_nan(column: pa.ChunkedArray) -> list[Any]:
+    return [None if value != value else value for value in column.to_pylist()]

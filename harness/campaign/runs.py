@@ -7,32 +7,24 @@ planner and aircraft `r % pairs`. A case's streams are children of the campaign'
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
+from harness.analysis.claims import Claim
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.flight import Job
-from harness.campaign.planned_run import PlannedRun, cell_of, kind_of
-from harness.campaign.results import LAW, RESULTS, RUNS, fly_again, read_table
+from harness.campaign.results import LAW, RESULTS, RUN, RUNS, fly_again, read_table
 from harness.campaign.sampling import takes_whole_numbers
-from harness.files.strict_yaml import (
-    InputError,
-    Loc,
-    Node,
-    Scalar,
-    as_spelt,
-    fault_line,
-    key_path,
-    loc_of,
-    node_of,
-    without,
-)
+from harness.files import strict_yaml
+from harness.files.strict_yaml import InputError, Loc, Node, Scalar, fault_line, key_path, loc_of, node_of
 from harness.scenario.generators import generated
 from harness.scenario.overrides import overridden, with_key
 from harness.scenario.scenario import Scenario, packed, scenario_from, unpacked
@@ -44,11 +36,34 @@ SEED, WORLD, DRAW = range(3)
 MOST_KEPT: Final = 100_000_000
 """Bytes of scenarios that are kept from the check on: to make one takes some six times as long as to unpack it."""
 
-ENTRIES: Final = (
-    ("planners", "planner", "kind", "rolling_window"),
-    ("aircraft", "aircraft", "model", "aerosonde"),
-)
-"""Lists of a campaign, the section of a scenario that an entry replaces, its key of a bare entry, and its default."""
+KIND, MODEL = ("planner", "kind"), ("aircraft", "model")
+"""The section of a scenario that an entry of a list replaces, and its key that a bare entry gives."""
+LISTED: Final = {"planner": "planners", "aircraft": "aircraft"}
+"""The list of a campaign, by section."""
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run of a campaign, before it is flown; its fields are the first columns of `results.parquet`.
+
+    Attributes:
+        case: runs of one case fly the same world with the same seed and draws.
+        world: name of its file, or of the generator.
+        varied: grid and drawn values, and those of its entries, by key path; lists and mappings as JSON text.
+    """
+
+    run: int
+    case: int
+    scenario: str
+    world: str
+    planner: str
+    aircraft: str
+    seed: int
+    varied: dict[str, Scalar]
+
+    def cells(self) -> dict[str, Any]:
+        """Its first columns in `results.parquet`."""
+        return {**{name: getattr(self, name) for name in RUN}, **self.varied}
 
 
 class _Change(NamedTuple):
@@ -59,33 +74,47 @@ class _Change(NamedTuple):
     origin: Loc
 
 
+_Axis: TypeAlias = list[list[_Change]]
+"""What each value of a key of the grid, or each entry of `planners` or `aircraft`, replaces in a scenario."""
+
+
 class _Place(NamedTuple):
-    """Where in the campaign a run lies: indices."""
+    """Where in the campaign a run lies: indices of its case, scenario, world, grid values and entries."""
 
     case: int
     base: int
     world: int
-    grid: tuple[int, ...]
-    entries: dict[str, int]
+    grid: list[int]
+    entries: list[int]
 
 
 class CampaignRuns:
     """All runs of a campaign.
 
-    Args:
-        planners: planners that who flies has to import, as FILE.py:NAME or MODULE:NAME.
-        laws: guidance laws, likewise.
+    Attributes:
+        planners: the kinds of planners that fly; `aircraft`: the models.
+        can_grow: whether a campaign with more draws may go on with the runs of one with fewer.
+        claim: a run is a failure where this does not hold of it.
     """
+
+    can_grow: bool = True
+    claim: Claim = "reached"
 
     def __init__(
         self, file: CampaignFile, planners: tuple[str, ...] = (), laws: tuple[str, ...] = ()
     ) -> None:
+        """`planners` and `laws`: what who flies has to import, as FILE.py:NAME or MODULE:NAME."""
         self._sources = planners, laws
         self.file, self.campaign = file, file.campaign
-        campaign = file.campaign
-        grids = [len(values) for values in campaign.grid.values()]
-        self._sizes = [len(file.bases), len(campaign.worlds) or 1, *grids]
-        self._entry_sizes = [len(getattr(campaign, listed)) or 1 for listed, *_ in ENTRIES]
+        campaign, bases = file.campaign, file.bases
+        self._grid = [self._grid_axis(name) for name in campaign.grid]
+        self._entries = [self._entry_axis(*each) for each in (KIND, MODEL)]
+        self._pairs = [len(axis) for axis in self._entries]
+        self._sizes = [len(bases), len(campaign.worlds) or 1, *(len(axis) for axis in self._grid)]
+        own = [(base.text(KIND, "rolling_window"), base.text(MODEL, "aerosonde")) for base in bases]
+        planners_of, models_of = map(list, zip(*own, strict=True))
+        self.planners = [each.label for each in campaign.planners] or planners_of
+        self.aircraft = [each.model for each in campaign.aircraft] or models_of
         self._made: dict[int, bytes] = {}  # by `check`
         self._world = lru_cache(maxsize=1)(self._generated)  # runs of one case follow each other
         self.cases = campaign.draws * math.prod(self._sizes)
@@ -94,115 +123,62 @@ class CampaignRuns:
             raise InputError(self._line(("draws",) if campaign.draws > 1 else ("grid",), sentence))
 
     def __len__(self) -> int:
-        return self.cases * math.prod(self._entry_sizes)
-
-    @property
-    def planners(self) -> list[str]:
-        """The kinds of planners that fly."""
-        return self._names["planners"]
-
-    @property
-    def aircraft(self) -> list[str]:
-        """The models of aircraft that fly."""
-        return self._names["aircraft"]
+        return self.cases * math.prod(self._pairs)
 
     @cached_property
-    def _names(self) -> dict[str, list[str]]:
-        """Names of the entries of each list of `ENTRIES`; of one without entries, those of the scenarios."""
-        campaign = self.campaign
-        named = {
-            "planners": [each.label for each in campaign.planners],
-            "aircraft": [each.model for each in campaign.aircraft],
-        }
-        own = {
-            listed: [base.word((section, first), default) for base in self.file.bases]
-            for listed, section, first, default in ENTRIES
-        }
-        return {listed: named[listed] or own[listed] for listed in named}
+    def varied(self) -> list[str]:
+        """Key paths that differ between runs: of the grid, of what is drawn, and of the entries."""
+        entries = [change.loc for axis in self._entries for entry in axis for change in entry]
+        own = [key_path(loc) for loc in entries if loc not in (KIND, MODEL)]
+        return [
+            *dict.fromkeys([*map(strict_yaml.as_spelt, (*self.campaign.grid, *self.campaign.random)), *own])
+        ]
 
     @cached_property
-    def varied(self) -> dict[str, str]:
-        """Columns of `results.parquet` for the varied keys: number, int, bool, text or json by key path."""
-        grid = {as_spelt(name): kind_of(values) for name, values in self.campaign.grid.items()}
-        drawn = {
-            as_spelt(name): kind_of(each.choice)
-            if each.choice
-            else "int"
-            if name in self._whole
-            else "number"
-            for name, each in self.campaign.random.items()
-        }
-        return grid | drawn | {name: kind for name, (_, kind, _) in self._of_entries.items()}
-
-    @cached_property
-    def _of_entries(self) -> dict[str, tuple[str, str, list[Scalar]]]:
-        """The list, its column's kind and each entry's cell for a key that any of them gives, by key path."""
-        columns = {}
-        for listed, section, first, _ in ENTRIES:
-            plain = self.file.root.plain().get(listed, ())
-            given = [each if isinstance(each, dict) else {} for each in plain]
-            for name in dict.fromkeys(name for each in given for name in each if name != first):
-                kind = kind_of(values := [each.get(name) for each in given])
-                columns[f"{section}.{name}"] = (
-                    listed,
-                    kind,
-                    [None if value is None else cell_of(value, kind) for value in values],
-                )
-        return columns
-
-    @cached_property
-    def _whole(self) -> set[str]:
-        """Keys drawn at random that take whole numbers alone; an InputError where a range of theirs ends elsewhere."""
+    def _whole(self) -> list[str]:
+        """Keys drawn at random that take whole numbers alone, from ranges that end at such."""
         drawn = {name: each for name, each in self.campaign.random.items() if not each.choice}
-        middle = [_Change(loc_of(name), Node(each.middle(), 0), ()) for name, each in drawn.items()]
-        whole: set[str] = set()
-        if drawn:
-            with suppress(InputError, KeyFaults):  # the check of the runs tells of their faults
-                scenario = scenario_from(self._root(0, middle)[0].plain())
-                whole = {name for name in drawn if takes_whole_numbers(scenario, loc_of(name))}
-        for name in sorted(whole):
-            for within, end in drawn[name].ends().items():
-                if not end.is_integer():
-                    sentence = f"is {end:g}; must be a whole number, as {name} is"
-                    raise InputError(self._line(("random", name, *within), sentence))
-        return whole
+        middle = {
+            name: each.whole_number(0.5) if each.is_whole else each.number(0.5)
+            for name, each in drawn.items()
+        }
+        with suppress(InputError, KeyFaults):  # the check of the runs tells of their faults
+            root, _ = self._root(
+                0, [_Change(loc_of(name), Node(each, 0), ()) for name, each in middle.items()]
+            )
+            scenario = scenario_from(root.plain()) if drawn else None
+            return [
+                name
+                for name, each in drawn.items()
+                if scenario and each.is_whole and takes_whole_numbers(scenario, loc_of(name))
+            ]
+        return []
 
     def run(self, number: int) -> PlannedRun:
         """Run `number`, from 0."""
         place = self._place(number)
-        base = self.file.bases[place.base]
-        changes = [*self._grid(place), *self._drawn(place)]
-        given = {key_path(each.loc): each.node.plain() for each in changes}
-        varied = {name: cell_of(given[name], kind) for name, kind in self.varied.items() if name in given}
-        varied |= {
-            name: cells[place.entries[listed]] for name, (listed, _, cells) in self._of_entries.items()
-        }
-        planner, model = (
-            names[place.entries[listed] if getattr(self.campaign, listed) else place.base]
-            for listed, names in self._names.items()
-        )
+        base, campaign = self.file.bases[place.base], self.campaign
+        changes = [*_chosen(self._entries, place.entries), *_chosen(self._grid, place.grid)]
+        given = {key_path(each.loc): _cell(each.node) for each in [*changes, *self._drawn(place.case)]}
         return PlannedRun(
             number,
             place.case,
             base.name,
-            self.campaign.worlds[place.world].name if self.campaign.worlds else base.file,
-            planner,
-            model,
+            campaign.worlds[place.world].name if campaign.worlds else base.file,
+            self.planners[place.entries[0] if campaign.planners else place.base],
+            self.aircraft[place.entries[1] if campaign.aircraft else place.base],
             self._seed(place.case),
-            varied,
+            {name: given.get(name) for name in self.varied},
         )
 
     def scenario(self, number: int, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-        """What run `number` flies, complete.
+        """What run `number` flies, complete; an InputError that names what in the campaign makes it no scenario.
 
         `overrides`: keys to replace besides, as `load_scenario` takes them.
-
-        Raises:
-            InputError: it is not a scenario; the faults name what in the campaign makes it so.
         """
         if number in self._made and not overrides:
             return unpacked(self._made[number])
-        root, changes = self._root(number, self._drawn(self._place(number)))
+        root, changes = self._root(number, self._drawn(self._place(number).case))
         root = overridden(root, overrides)
         try:
             return scenario_from(root.plain())
@@ -211,13 +187,19 @@ class CampaignRuns:
             raise in_lines(lines, self.file.source) from error
 
     def _root(self, number: int, drawn: Sequence[_Change]) -> tuple[Node, list[_Change]]:
-        """The keys of a run's scenario, and what was replaced in them."""
-        place = self._place(number)
+        """The keys of a run's scenario, and what was replaced in them, in order."""
+        place, root = self._place(number), self.file.bases[self._place(number).base].root
         seed = Node(self._seed(place.case), self.file.root.line_of(("seed",)))
-        changes = [*self._changes(place), *drawn, _Change(("seed",), seed, ("seed",))]
-        root = self.file.bases[place.base].root
+        changes = [
+            *(self._change(loc_of(name), ("set", name)) for name in self.campaign.set_),
+            *_chosen(self._entries[::-1], place.entries[::-1]),
+            *_chosen(self._grid, place.grid),
+            *drawn,
+            _Change(("seed",), seed, ("seed",)),
+        ]
         if self.campaign.worlds:  # the course at the start is towards the goal of the generated world
-            root = without(root, ("mission", "course_deg"))
+            root = strict_yaml.without(root, ("mission", "course_deg"))
+            changes = [*self._world(place.case, place.world), *changes]
         for loc, node, origin in changes:
             try:
                 root = with_key(root, loc, node)
@@ -240,6 +222,7 @@ class CampaignRuns:
             self.campaign.optimum,
             self.again(number, folder),
             {name: value for name, value in self.run(number).varied.items() if value is not None},
+            claim=self.claim,
             planners=self._sources[0],
             laws=self._sources[1],
             identity=f"run {number}",
@@ -255,11 +238,7 @@ class CampaignRuns:
         return self.file.plain()
 
     def check(self, progress: Callable[[int], None] | None = None) -> None:
-        """Makes every scenario of the campaign once; the first ones are kept for when they are flown.
-
-        Raises:
-            InputError: one is not a scenario.
-        """
+        """Makes every scenario of the campaign once, or raises InputError; the first ones are kept to be flown."""
         room = MOST_KEPT
         for number in range(len(self)):
             scenario = self.scenario(number)
@@ -270,11 +249,9 @@ class CampaignRuns:
                 progress(number + 1)
 
     def _place(self, number: int) -> _Place:
-        case, pair = divmod(number, math.prod(self._entry_sizes))
-        combination = case % math.prod(self._sizes)
-        base, world, *grid = (int(index) for index in np.unravel_index(combination, self._sizes))
-        indices = map(int, np.unravel_index(pair, self._entry_sizes))
-        return _Place(case, base, world, tuple(grid), dict(zip(self._names, indices, strict=True)))
+        case, pair = divmod(number, math.prod(self._pairs))
+        base, world, *grid = map(int, np.unravel_index(case % math.prod(self._sizes), self._sizes))
+        return _Place(case, base, world, grid, [*map(int, np.unravel_index(pair, self._pairs))])
 
     def _stream(self, case: int, stream: int) -> np.random.SeedSequence:
         return np.random.SeedSequence(self.campaign.seed, spawn_key=(case, stream))
@@ -283,66 +260,53 @@ class CampaignRuns:
         """A whole number of 53 bits, which every reader of JSON and YAML keeps."""
         return int(self._stream(case, stream).generate_state(1, np.uint64)[0] >> np.uint64(11))
 
-    def _changes(self, place: _Place) -> list[_Change]:
-        """What a run replaces in its scenario, in order, before what is drawn at random."""
-        return [
-            *(self._world(place.case, place.world) if self.campaign.worlds else ()),
-            *(_Change(loc_of(name), self._at(("set", name)), ("set", name)) for name in self.campaign.set_),
-            *(
-                change
-                for listed, section, first, _ in reversed(ENTRIES)
-                for change in self._entry((listed, place.entries[listed]), section, first)
-            ),
-            *self._grid(place),
-        ]
-
     def _generated(self, case: int, index: int) -> list[_Change]:
         """The generated world of a case."""
         spec = self.campaign.worlds[index]
         world = generated(spec, self._seed(case, WORLD))
         origin: Loc = ("worlds", index, spec.generator)
+        line = self.file.root.line_of(origin)
         made: Mapping[Loc, Any] = {
             ("area", "bounds_m"): world.bounds_m,
             ("obstacles",): world.obstacles,
             ("mission", "start_m"): world.start_m,
             ("mission", "goal_m"): world.goal_m,
         }
-        line = self.file.root.line_of(origin)
         return [_Change(loc, node_of(plain, line), origin) for loc, plain in made.items()]
 
-    def _entry(self, origin: Loc, section: str, first: str) -> list[_Change]:
-        """An entry of `planners` or `aircraft`: bare text, or keys of that section of a scenario."""
-        entry = self.file.root.at(origin)
-        if entry is None:
-            return []
-        if not isinstance(entry.value, dict):
-            return [_Change((section, first), entry, origin)]
-        ordered = sorted(entry.value.items(), key=lambda pair: pair[0] != first)
-        return [_Change((section, key), node, (*origin, key)) for key, node in ordered]
+    def _grid_axis(self, name: str) -> _Axis:
+        """The values of a key of the grid."""
+        origins: list[Loc] = [("grid", name, index) for index in range(len(self.campaign.grid[name]))]
+        return [[self._change(loc_of(name), origin)] for origin in origins]
 
-    def _grid(self, place: _Place) -> list[_Change]:
-        pairs = zip(self.campaign.grid, place.grid, strict=True)
-        origins: list[Loc] = [("grid", name, index) for name, index in pairs]
-        return [_Change(loc_of(str(origin[1])), self._at(origin), origin) for origin in origins]
+    def _entry_axis(self, section: str, first: str) -> _Axis:
+        """The entries of `planners` or `aircraft`: bare text, or keys of that section of a scenario."""
+        listed = LISTED[section]
+        entries = self.file.root.plain().get(listed, ())
+        axis = []
+        for index, each in enumerate(entries):
+            keys = sorted(each, key=lambda key: key != first) if isinstance(each, dict) else ()
+            changes = [self._change((section, key), (listed, index, key)) for key in keys]
+            axis.append(changes or [self._change((section, first), (listed, index))])
+        return axis or [[]]
 
-    def _drawn(self, place: _Place) -> list[_Change]:
+    def _drawn(self, case: int) -> list[_Change]:
         """What is drawn for a case: each key by a number in [0, 1) of its stream."""
-        shares = np.random.default_rng(self._stream(place.case, DRAW)).random(len(self.campaign.random))
+        shares = np.random.default_rng(self._stream(case, DRAW)).random(len(self.campaign.random))
         changes = []
         for (name, each), share in zip(self.campaign.random.items(), shares.tolist(), strict=True):
             origin: Loc = ("random", name)
             if each.choice:
-                node = self._at((*origin, "choice", each.chosen(share)))
-            else:
-                number = each.whole_number(share) if name in self._whole else each.number(share)
-                node = Node(number, self.file.root.line_of(origin))
-            changes.append(_Change(loc_of(name), node, origin))
+                changes.append(self._change(loc_of(name), (*origin, "choice", each.chosen(share))))
+                continue
+            number = each.whole_number(share) if name in self._whole else each.number(share)
+            changes.append(_Change(loc_of(name), Node(number, self.file.root.line_of(origin)), origin))
         return changes
 
-    def _at(self, loc: Loc) -> Node:
-        node = self.file.root.at(loc)
+    def _change(self, loc: Loc, origin: Loc) -> _Change:
+        node = self.file.root.at(origin)
         assert node is not None
-        return node
+        return _Change(loc, node, origin)
 
     def _fault(self, number: int, root: Node, changes: Sequence[_Change], loc: Loc, sentence: str) -> str:
         """The fault at `loc` of a run's scenario as a person reads it, and which line it comes from."""
@@ -361,28 +325,29 @@ class CampaignRuns:
         return fault_line(self.file.source, self.file.root.line_of(origin), origin, sentence)
 
 
+def _chosen(axes: Sequence[_Axis], indices: Sequence[int]) -> list[_Change]:
+    return [change for axis, index in zip(axes, indices, strict=True) for change in axis[index]]
+
+
+def _cell(node: Node) -> Scalar:
+    """A value as its column of `results.parquet` has it: lists and mappings as JSON text."""
+    return json.dumps(node.plain()) if isinstance(node.value, tuple | dict) else node.value
+
+
 def flown_run(
     results: Path, run: int, overrides: Sequence[tuple[str, str]] = ()
 ) -> tuple[Scenario, str | None]:
-    """What a run of a campaign flew, and the digest of its row.
+    """What a run of a campaign flew, and the digest of its row, by `results.parquet` alone; or an InputError.
 
-    Args:
-        results: a campaign's `results.parquet`; it holds the campaign, no other file is needed.
-        run: number of the run; it may still be missing in the table.
-        overrides: keys to replace besides, as `load_scenario` takes them; where they change what is flown, there is
-            no digest.
-
-    Raises:
-        InputError: the file is something else, or the campaign has no such run.
+    `overrides`: keys to replace besides; where they change what is flown, or the row is missing, there is no digest.
     """
     table, about = read_table(results)
     runs = CampaignRuns(CampaignFile.from_plain(about, str(results)))
     if not 0 <= run < len(runs):
         raise InputError(f"{results}: has no run {run}; must be 0 to {len(runs) - 1}")
     asked = runs.scenario(run, overrides)
+    digests = dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True))
     with suppress(InputError):  # a planner that is not here: another one was given
         if not overrides or packed(runs.scenario(run)) == packed(asked):
-            return asked, dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True)).get(
-                run
-            )
+            return asked, digests.get(run)
     return asked, None

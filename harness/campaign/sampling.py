@@ -5,18 +5,19 @@ Every value comes from a number in [0, 1) through the inverse of its distributio
 
 from __future__ import annotations
 
-import math
 from statistics import NormalDist
 from typing import Annotated, Any, Final
 
-from pydantic import ConfigDict, Field, Strict, field_validator, model_validator
+from pydantic import ConfigDict, Field, Strict, model_validator
 
 from harness.files.strict_yaml import Loc, node_of
 from harness.scenario.scenario import Scenario
 from harness.scenario.sections import Section
+from harness.scenario.validation import KeyFault
 
 LEAST: Final = 1e-12
 """Nearest to 0 and 1 that a normal distribution is asked for its inverse: 7 standard deviations off."""
+FORMS: Final = ("uniform", "normal", "choice")
 
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
 
@@ -51,9 +52,7 @@ class Normal(Section):
 class Distribution(Section):
     """What a key is drawn from: exactly one of the forms."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"oneOf": [{"required": [name]} for name in ("uniform", "normal", "choice")]}
-    )
+    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": [name]} for name in FORMS]})
 
     uniform: Annotated[tuple[Number, Number], Strict(False)] | None = None
     """Evenly between two numbers; of a key that takes whole ones alone, both ends are drawn as often as the others."""
@@ -62,19 +61,14 @@ class Distribution(Section):
     choice: Annotated[tuple[Any, ...] | None, Strict(False), Field(min_length=1)] = None
     """One of these values, of any kind, each as likely as the others."""
 
-    @field_validator("uniform")
-    @classmethod
-    def _in_order(cls, uniform: tuple[float, float] | None) -> tuple[float, float] | None:
-        if uniform and not uniform[0] < uniform[1]:
-            raise ValueError(f"is {list(uniform)}; must be [least, most] with least < most")
-        return uniform
-
     @model_validator(mode="after")
     def _has_one_form(self) -> Distribution:
-        given = [name for name in ("uniform", "normal", "choice") if getattr(self, name) is not None]
+        given = [name for name in FORMS if getattr(self, name) is not None]
         if len(given) != 1:
             have = " and ".join(given) if given else "none"
             raise ValueError(f"has {have} of uniform, normal, choice; must have exactly one")
+        if self.uniform and not self.uniform[0] < self.uniform[1]:
+            raise KeyFault(("uniform",), f"is {list(self.uniform)}; must be [least, most] with least < most")
         return self
 
     def number(self, share: float) -> float:
@@ -90,24 +84,17 @@ class Distribution(Section):
         return min(max(drawn, drawn if least is None else least), drawn if most is None else most)
 
     def whole_number(self, share: float) -> int:
-        """The same for a key that takes whole numbers alone."""
+        """The same for a key that takes whole numbers alone, and a range that ends at whole numbers."""
         if not self.uniform:
             return round(self.number(share))
-        low, high = math.ceil(self.uniform[0]), math.floor(self.uniform[1])
+        low, high = map(int, self.uniform)
         return low + min(int((high - low + 1) * share), high - low)
 
-    def ends(self) -> dict[Loc, float]:
-        """Where it begins and ends, as far as that is given, by the keys that say so."""
-        if self.uniform:
-            return {("uniform", index): end for index, end in enumerate(self.uniform)}
-        limits = {"least": self.normal.least, "most": self.normal.most} if self.normal else {}
-        return {("normal", name): end for name, end in limits.items() if end is not None}
-
-    def middle(self) -> float:
-        """A number that can be drawn: a whole one where there is one."""
-        whole = self.whole_number(0.5)
-        ends = [*self.ends().values()]
-        return whole if not ends or min(ends) <= whole <= max(ends) or len(ends) < 2 else self.number(0.5)
+    @property
+    def is_whole(self) -> bool:
+        """Whether its range ends at whole numbers, as far as it has ends."""
+        normal = (self.normal.least, self.normal.most) if self.normal else ()
+        return all(end is None or end.is_integer() for end in self.uniform or normal)
 
     def chosen(self, share: float) -> int:
         """Index of the choice that a number in [0, 1) stands for."""

@@ -1,26 +1,35 @@
-"""The answers of a campaign: what its runs say by two varied keys, which ran worst, which planner did better."""
+"""The answers of a campaign: what its runs say by two varied keys, which ran worst, which planner did better.
+
+They are written as `summary.html`, a page that needs nothing but itself, as `summary.json`, and as a table for papers.
+"""
 
 from __future__ import annotations
 
 import itertools
+import json
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from harness.analysis.metric import severity
-from harness.campaign.cell import CONFIDENCE, Cell, cell_of
-from harness.campaign.groups import Axis, grouped
-from harness.campaign.paired import RATIO, TESTED, Duel, duels
-from harness.campaign.results import LAW, RESULTS, RUNS, fly_again
-from harness.campaign.table import NAMED, Runs
+from harness.analysis.causes import FINDINGS
+from harness.analysis.metric import number, severity
+from harness.campaign.cell import CONFIDENCE, QUESTIONS, Axis, Cell, cell_of, grouped
+from harness.campaign.paired import TESTED, Duel, duels
+from harness.campaign.results import LAW, NAMED, RESULTS, RUNS, Runs, fly_again
+from harness.files.errors import WriteError
 from harness.files.strict_yaml import InputError
+from harness.files.whole_file import replace_text
+from harness.report.page import Picture, rendered
 from harness.run_files.run_folder import RECORDING
 
+PAGE: Final = "summary.html"
+PLAIN: Final = "summary.json"
+SCHEMA: Final = "wayproof/campaign-summary/5"
 BY_DEFAULT: Final = 3
 """Without a choice, tables are made of every two of the first this many varied keys."""
 WORST_OUTCOMES: Final = ("collision", "lost_control", "out_of_bounds")
@@ -33,12 +42,7 @@ CLOSEST: Final = 3
 
 @dataclass(frozen=True)
 class Table:
-    """The runs by two keys.
-
-    Attributes:
-        columns: the second key; None for all runs in one column.
-        cells: one a row and column; empty groups have no runs.
-    """
+    """The runs by two keys, a cell a row and column; by one key all stand in one column, which has no axis."""
 
     rows: Axis
     columns: Axis | None
@@ -51,9 +55,8 @@ class WorstRun:
 
     Attributes:
         name: scenario or world, planner and aircraft.
-        clearance_ratio: the same over the wanted one, where that is known.
-        folder: its run folder relative to the campaign's, empty where none was kept.
-        view: the command that shows the recording, empty without one.
+        clearance_ratio: its least clearance over the wanted one, where that is known.
+        folder: its run folder relative to the campaign's, and `view` the command that shows its recording; or empty.
     """
 
     run: int
@@ -110,40 +113,33 @@ class Summary:
 
 
 def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summary:
-    """The answers of the campaign in a folder.
+    """The answers of the campaign in a folder; an InputError where there is none, or no column of a key.
 
     `by`: one or two keys for each table; default: every two of the first varied keys.
-
-    Raises:
-        InputError: the folder holds no campaign, or a key is no column of it.
     """
     runs = Runs.of(folder)
     for each in by or ():
         if len(each) not in (1, 2) or len(set(each)) < len(each):
             raise InputError(f"wayproof: --by {','.join(each)}: must be one key, or two different ones")
         runs.check_columns(each)
-    chosen = by if by is not None else _default_choice(runs)
+    why = zip(runs.texts("trackability.causes"), runs.values("trackable"), strict=True)
+    untracked = Counter(causes or "no plan" for causes, tracked in why if tracked is False)
+    figures = {
+        each.name: runs.numbers("length_ratio" if each.name == "ratio" else each.path) for each in TESTED
+    }
     return Summary(
         name=folder.resolve().name,
         varied=tuple(runs.varied),
         outcomes=dict(Counter(runs.texts("outcome")).most_common()),
         total=cell_of(runs, np.ones(len(runs), dtype=bool)),
-        tables=tuple(_table(runs, *each) for each in chosen),
+        tables=tuple(_table(runs, *each) for each in (_default_choice(runs) if by is None else by)),
         worst=_worst(runs, folder),
-        untracked=dict(
-            Counter(
-                causes or "no plan"
-                for causes, tracked in zip(
-                    runs.texts("trackability.causes"), runs.values("trackable"), strict=True
-                )
-                if tracked is False
-            ).most_common()
-        ),
+        untracked=dict(untracked.most_common()),
         duels=duels(
             runs.texts("planner"),
             list(zip(runs.values("case"), runs.texts("aircraft"), strict=True)),
             runs.reached.tolist(),
-            {each.name: runs.numbers("length_ratio" if each.name == RATIO else each.path) for each in TESTED},
+            figures,
         ),
         planned=runs.planned,
     )
@@ -185,27 +181,81 @@ def _worst(runs: Runs, folder: Path) -> tuple[WorstRun, ...]:
     numbers = runs.values("run")
     order = sorted(range(len(runs)), key=lambda row: (-severity(outcomes[row]), near[row], numbers[row]))
     failed = int((~runs.reached).sum())
-    varied = {key: runs.values(key) for key in runs.varied if key not in NAMED}
+    return tuple(_worst_run(runs, row, folder) for row in order[: min(failed, WORST) if failed else CLOSEST])
+
+
+def _worst_run(runs: Runs, row: int, folder: Path) -> WorstRun:
+    def cell(name: str) -> Any:
+        return runs.values(name)[row]
+
+    inner = Path(RUNS) / str(cell("run"))
+    kept, planner = folder / inner, str(cell("planner")).partition(", ")[0]
     law = (runs.campaign.get("set") or {}).get(LAW, "")
-    found = []
-    for row in order[: min(failed, WORST) if failed else CLOSEST]:
-        number, inner = int(numbers[row]), Path(RUNS) / str(numbers[row])
-        kept = folder / inner
-        found.append(
-            WorstRun(
-                number,
-                runs.name(row),
-                int(runs.values("seed")[row]),
-                outcomes[row],
-                runs.texts("reason")[row],
-                float(clearance_m[row]) if np.isfinite(clearance_m[row]) else None,
-                float(ratio[row]) if np.isfinite(ratio[row]) else None,
-                {key: values[row] for key, values in varied.items()},
-                folder=str(inner) if kept.is_dir() else "",
-                view=shlex.join(["wayproof", "view", str(kept)]) if (kept / RECORDING).is_file() else "",
-                command=fly_again(
-                    folder / RESULTS, number, runs.texts("planner")[row].partition(", ")[0], law
-                ),
-            )
+    ratio = float(runs.clearance_ratio[row])
+    return WorstRun(
+        cell("run"),
+        runs.name(row),
+        cell("seed"),
+        runs.texts("outcome")[row],
+        runs.texts("reason")[row],
+        cell("min_clearance_m"),
+        ratio if np.isfinite(ratio) else None,
+        {key: cell(key) for key in runs.varied if key not in NAMED},
+        folder=str(inner) if kept.is_dir() else "",
+        view=shlex.join(["wayproof", "view", str(kept)]) if (kept / RECORDING).is_file() else "",
+        command=fly_again(folder / RESULTS, cell("run"), planner, law),
+    )
+
+
+def write_summary(summary: Summary, folder: Path) -> Path:
+    """Writes the page, whose path it returns, and the answers as JSON into a campaign's folder; or a WriteError."""
+    try:
+        plain = {"schema": SCHEMA, **asdict(summary)}
+        replace_text(folder / PLAIN, json.dumps(plain, indent=2, allow_nan=False) + "\n")
+        text = rendered(
+            "campaign.html",
+            summary=summary,
+            questions=QUESTIONS,
+            pictures=_pictures(folder, summary.varied) if summary.total.runs else [],
+            findings=FINDINGS,
+            number=number,
         )
-    return tuple(found)
+        replace_text(folder / PAGE, text)
+    except OSError as error:
+        again = shlex.join(["wayproof", "report", str(folder)])
+        raise WriteError(
+            f"cannot write the summary in {folder}: {error.strerror or error}; the results are whole, and "
+            f"`{again}` makes it from them"
+        ) from error
+    return folder / PAGE
+
+
+def _pictures(folder: Path, varied: Sequence[str]) -> list[Picture]:
+    """Every run against what was varied, where numbers were."""
+    from harness.campaign.figures import scatter
+    from harness.report.figure_style import svg
+
+    figure = scatter(Runs.of(folder), varied)
+    title = "Figures of every run against each number that was varied"
+    caption = (
+        "Every run: clearance over the wanted one, largest cross-track error and length over the optimum, against each "
+        "number that was varied. Crosses: the goal was not reached. Triangles at an edge: beyond it."
+    )
+    return [] if figure is None else [Picture(svg(figure), title, caption)]
+
+
+def rows_for_paper(summary: Summary) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of the table for a paper: the groups of the first table, and all runs."""
+    keys, found = [""], []
+    for table in summary.tables[:1]:
+        columns = table.columns.labels if table.columns else None
+        keys = [axis.key for axis in (table.rows, table.columns) if axis]
+        for label, cells in zip(table.rows.labels, table.cells, strict=True):
+            names = [[label]] if columns is None else [[label, name] for name in columns]
+            found += [[*named, *_answers(cell)] for named, cell in zip(names, cells, strict=True)]
+    found.append(["all runs", *("" for _ in keys[1:]), *_answers(summary.total)])
+    return [*keys, "runs", *(each.short for each in QUESTIONS)], found
+
+
+def _answers(cell: Cell) -> list[str]:
+    return [str(cell.runs), *(each.text(cell) if cell.runs else "" for each in QUESTIONS)]

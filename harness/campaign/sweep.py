@@ -5,11 +5,13 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
+from harness.analysis.metric import ERROR
 from harness.campaign.flight import Answer, Job
 from harness.campaign.folder import CampaignFolder
-from harness.campaign.results import ERROR, RUNS
+from harness.campaign.results import RUNS
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import Workers
 from harness.files.wording import counted
@@ -25,28 +27,21 @@ INTERRUPT_S: Final = 0.1
 FIRST_LEFT: Final = 5
 """Runs that are named of those that the machine kept from their ends."""
 
-Progress = Callable[[Answer], None]
-
 
 def fly_missing(
     runs: CampaignRuns,
     folder: CampaignFolder,
     workers: Workers,
-    progress: Progress | None = None,
+    progress: Callable[[Answer], None] | None = None,
     enough: Callable[[], bool] = lambda: False,
 ) -> list[int]:
     """Flies what is missing; whatever ends it, what is done is in the folder's tables.
 
-    A run that the machine kept from its end, since its process was killed or there was no memory, is no result: it is
-    left out, and flown when the campaign is gone on with.
-
     `enough`: asked before every look whether what is over answers the question; what still flies is given up then.
 
     Returns:
-        Numbers of the runs that the machine kept from their ends.
-
-    Raises:
-        OSError: the folder, or a run folder in it, cannot be written; or who flies has gone.
+        Numbers of the runs that the machine kept from their ends, as their process was killed or there was no memory.
+        They are no results, and flown when the campaign is gone on with.
     """
     left: list[int] = []
     tables_due = time.monotonic()
@@ -58,23 +53,23 @@ def fly_missing(
         if answer is None:
             left.append(run)
             return
-        folder.append(run, {**runs.run(run).cells(), **answer.row}, answer.times, answer.held)
+        folder.append(replace(answer, row={**runs.run(run).cells(), **answer.row}))
         if progress is not None:
             progress(answer)
 
     def write_at_times() -> None:
         nonlocal tables_due
-        if time.monotonic() >= tables_due:
-            begun = time.monotonic()
+        begun = time.monotonic()
+        if folder.over and begun >= tables_due:
             folder.write_tables()
-            took_s = time.monotonic() - begun
-            tables_due = time.monotonic() + max(TABLES_EVERY_S, took_s / TABLES_SHARE)
+            tables_due = time.monotonic() + max(TABLES_EVERY_S, (time.monotonic() - begun) / TABLES_SHARE)
 
     try:
-        missing = (runs.job(run, folder.path) for run in range(len(runs)) if run not in folder.done)
+        missing = (runs.job(run, folder.path) for run in range(len(runs)) if run not in folder.over)
         fly_jobs(missing, workers, over, write_at_times, enough)
     finally:
-        folder.write_tables()
+        if folder.over or left:
+            folder.write_tables()
     return sorted(left)
 
 
@@ -85,13 +80,9 @@ def fly_jobs(
     between: Callable[[], None] = lambda: None,
     enough: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Hands out jobs until none is left.
+    """Hands out jobs until none is left; an OSError where a run folder cannot be written, or who flies has gone.
 
     `over`: told of every job that is over, by its number; None where the machine kept it from its end.
-    `enough`: asked before every look; what still flies is given up then.
-
-    Raises:
-        OSError: a run folder cannot be written; or who flies has gone.
     """
     ahead, flying = next(jobs, None), 0
     # An interrupt that is raised inside `concurrent.futures` leaves a future locked, and who ends the workers waits for

@@ -13,11 +13,11 @@ import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from typing import Any, Final, Protocol, TypeAlias
+from typing import Any, Final, TypeAlias
 
 from harness.campaign.flight import Answer, Job, NoMemoryError, fly_job
 from harness.files.errors import RunFolderError
@@ -33,42 +33,42 @@ ONE_THREAD: Final = dict.fromkeys(
 
 CONNECT_S: Final = 10.0
 SCHEDULER_PORT: Final = 8786
+GONE: Final = "the Dask scheduler has gone"
 JOBS_EACH: Final = 2
 """Jobs handed out for each that can be flown at a time: nobody waits for the next while an answer is written down."""
 
-
-TRIES: Final = 2
-"""A run whose process dies is tried this often."""
 
 Flown: TypeAlias = tuple[int, Answer | None]
 """Number of a run that is over, and what came of it; None where the machine kept it from its end."""
 
 
-class SchedulerGoneError(OSError):
-    """Nobody hands out jobs any more."""
+class Workers:
+    """Who flies: an executor of `concurrent.futures`, and the jobs that it was handed."""
 
-    def __init__(self) -> None:
-        super().__init__("the Dask scheduler has gone")
-
-
-class Workers(Protocol):
-    """Who flies."""
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self._flying: dict[Future[Answer], Job] = {}
 
     def free(self) -> int:
         """How many jobs more may be handed out now; 0 or less for none."""
-        ...
+        raise NotImplementedError
 
     def start(self, job: Job) -> None:
         """Hands out a job."""
-        ...
+        self._flying[self._executor.submit(fly_job, job)] = job
 
-    def over(self, timeout_s: float) -> Sequence[Flown]:
-        """The jobs that have come to an end since, waited for at most so long.
+    def over(self, timeout_s: float) -> list[Flown]:
+        """The jobs that have come to an end since, waited for at most so long; an OSError as `fly_jobs` has it."""
+        done = [(self._flying.pop(each).run, each) for each in finished(self._flying, timeout_s)]
+        return [(run, self._answer(each)) for run, each in done]
 
-        Raises:
-            OSError: a run folder cannot be written, or who flies has gone.
-        """
-        ...
+    def _answer(self, future: Future[Answer]) -> Answer | None:
+        try:
+            return future.result()
+        except NoMemoryError:
+            return None
+        except RunFolderError as error:
+            raise OSError(str(error)) from error
 
 
 def finished(futures: Collection[Future[Answer]], timeout_s: float) -> set[Future[Answer]]:
@@ -78,103 +78,80 @@ def finished(futures: Collection[Future[Answer]], timeout_s: float) -> set[Futur
     return wait(futures, timeout_s, FIRST_COMPLETED).done
 
 
-def _answer(future: Future[Answer]) -> Answer | None:
-    try:
-        return future.result()
-    except NoMemoryError:
-        return None
-    except RunFolderError as error:
-        raise OSError(str(error)) from error
+class LocalWorkers(Workers):
+    """Processes of this machine.
 
-
-class _Process:
-    """One process and the jobs that it was handed, the first of which it flies: when it dies, it is known of what."""
-
-    def __init__(self) -> None:
-        self.jobs: deque[tuple[Job, Future[Answer]]] = deque()
-        self._pool: ProcessPoolExecutor | None = None
-        self._tries = TRIES
-
-    def start(self, job: Job) -> None:
-        with without_main():
-            try:
-                flown = self._begun().submit(fly_job, job)
-            except BrokenProcessPool:  # it died while it had nothing to do
-                self.end()
-                flown = self._begun().submit(fly_job, job)
-        self.jobs.append((job, flown))
-
-    def over(self) -> list[Flown]:
-        """What came of the first job, which is done; nothing where it is tried once more."""
-        job, flown = self.jobs[0]
-        try:
-            found = [(job.run, _answer(flown))]
-        except BrokenProcessPool:
-            self.end()
-            self._tries -= 1
-            found = [] if self._tries else [(job.run, None)]
-            again = [each for each, _ in self.jobs]
-            self.jobs.clear()
-            for each in again[len(found) :]:
-                self.start(each)
-        else:
-            self.jobs.popleft()
-        if found:
-            self._tries = TRIES
-        return found
-
-    def end(self) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
-            self._pool = None
-
-    def _begun(self) -> ProcessPoolExecutor:
-        if self._pool is None:
-            spawn = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin)
-        return self._pool
-
-
-class LocalWorkers:
-    """Processes of this machine."""
+    When one dies the pool ends, and all jobs that were handed out are lost. They are flown again, one at a time: a job
+    whose process dies once more is given up.
+    """
 
     def __init__(self, number: int) -> None:
-        self._processes = [_Process() for _ in range(number)]
+        super().__init__(_pool(number))
+        self._number = number
+        self._again: deque[Job] = deque()
 
     def free(self) -> int:
         """Room for a job that flies and one that waits for each process."""
-        return sum(JOBS_EACH - len(each.jobs) for each in self._processes)
+        return 0 if self._again else JOBS_EACH * self._number - len(self._flying)
 
     def start(self, job: Job) -> None:
-        """Hands a job to the process that has the fewest."""
-        min(self._processes, key=lambda each: len(each.jobs)).start(job)
+        """Hands a job to the pool; to a new one where a process died while it had nothing to do."""
+        with without_main():
+            try:
+                super().start(job)
+            except BrokenProcessPool:
+                self._renew()
+                super().start(job)
 
     def over(self, timeout_s: float) -> list[Flown]:
         """The jobs that have come to an end."""
-        flying = {each.jobs[0][1]: each for each in self._processes if each.jobs}
-        return [flown for future in finished(flying, timeout_s) for flown in flying[future].over()]
+        done = finished(self._flying, timeout_s)
+        if any(map(_died, done)):
+            done = wait(self._flying).done  # the pool has ended: so do they all, at once
+        lost = [self._flying.pop(each) for each in done if _died(each)]
+        found = [(self._flying.pop(each).run, self._answer(each)) for each in done if not _died(each)]
+        if lost:
+            self._renew()
+        if not self._again:
+            self._again.extend(lost)
+        elif done:  # the first of them, which flew alone
+            job = self._again.popleft()
+            found += [(each.run, None) for each in lost if each is job]
+        if self._again and not self._flying:
+            self.start(self._again[0])
+        return found
 
     def end(self) -> None:
         """Waits for what handed out jobs, once the processes have ended: at its end Python wakes it without a lock."""
-        for each in self._processes:
-            each.end()
+        self._executor.shutdown(cancel_futures=True)
+
+    def _renew(self) -> None:
+        self.end()
+        self._executor = _pool(self._number)
+
+
+def _pool(number: int) -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(number, multiprocessing.get_context("spawn"), _begin)
+
+
+def _died(future: Future[Answer]) -> bool:
+    return isinstance(future.exception(), BrokenProcessPool)
 
 
 @contextmanager
-def local_workers(number: int) -> Iterator[Workers]:
+def local_workers(number: int) -> Iterator[LocalWorkers]:
     """So many processes of this machine; they end with the context, in mid-flight if need be."""
     open_standard_files()
     before = set(multiprocessing.active_children())
-    kept = {name: os.environ.get(name) for name in ONE_THREAD}
+    kept = {name: os.environ[name] for name in ONE_THREAD if name in os.environ}
     os.environ.update(ONE_THREAD)
     workers = LocalWorkers(number)
     try:
         yield workers
     finally:
-        for name, value in kept.items():
+        for name in ONE_THREAD:
             os.environ.pop(name)
-            if value is not None:
-                os.environ[name] = value
+        os.environ.update(kept)
         for child in set(multiprocessing.active_children()) - before:
             child.terminate()
             child.join()
@@ -185,19 +162,26 @@ def local_workers(number: int) -> Iterator[Workers]:
 def dask_workers(
     address: str, unencrypted: bool = False, tell: Callable[[str], None] = warnings.warn
 ) -> Iterator[Workers]:
-    """The workers of a Dask cluster, as many as there are at any time.
+    """The workers of a Dask cluster, as many as there are at any time; an InputError where there are none like us.
 
     A job whose worker dies is flown again by another one; after the scheduler's `allowed-failures` it is given
     up. Scheduler and workers are trusted: Dask sends pickles, which run code, in both directions.
 
-    `address`: of the scheduler, as tcp://127.0.0.1:8786 or tls://host:8786.
     `unencrypted`: whether an address beyond this machine may lead there without TLS, where whoever can change
     what is sent can run code on both ends.
-
-    Raises:
-        InputError: the address leads beyond this machine without TLS and may not, Dask is not installed, no
-            scheduler answers, or a worker has other versions than we.
     """
+    with _client(address, unencrypted) as client:
+        ours = versions()
+        if not client.nthreads():
+            raise InputError(f"wayproof: {address} has no workers; start some, as `dask worker {address}`")
+        for worker, theirs in client.run(versions).items():
+            if theirs != ours:
+                raise InputError(f"wayproof: the worker {worker} has {theirs}; must have {ours}")
+        yield DaskWorkers(client, tell)
+
+
+def _client(address: str, unencrypted: bool) -> Any:
+    """A connection to a scheduler."""
     if not re.fullmatch(r"[a-z]+://.+", address):
         raise InputError(
             f"wayproof: --scheduler {address}: is no address; give it as tcp://HOST:PORT, or beyond this machine as "
@@ -213,42 +197,28 @@ def dask_workers(
     try:
         scheme, place = parse_address(address)
         host, port = parse_host_port(place, SCHEDULER_PORT)
-        if scheme not in ("tls", "wss", "inproc") and not unencrypted and not _is_here(host):
+        with suppress(ValueError):  # a name, which may lead anywhere
+            unencrypted = unencrypted or host == "localhost" or ipaddress.ip_address(host).is_loopback
+        if scheme not in ("tls", "wss") and not unencrypted:
             raise InputError(
                 f"wayproof: {address} leads beyond this machine without encryption: whoever can change what is sent "
                 "can run code here; give tls://HOST:PORT, or --unencrypted in a network that is trusted"
             )
-        if scheme != "inproc":  # a Client that finds nobody prints a traceback when it is thrown away
-            socket.create_connection((host, port), CONNECT_S).close()
-        client: Any = Client(address, timeout=CONNECT_S, set_as_default=False)
+        # A Client that finds nobody prints a traceback when it is thrown away.
+        socket.create_connection((host, port), CONNECT_S).close()
+        return Client(address, timeout=CONNECT_S, set_as_default=False)
     except InputError:
         raise
     except (OSError, ValueError) as error:
         raise InputError(f"wayproof: no Dask scheduler answers at {address}; start one there") from error
-    with client:
-        ours = versions()
-        if not client.nthreads():
-            raise InputError(f"wayproof: {address} has no workers; start some, as `dask worker {address}`")
-        for worker, theirs in client.run(versions).items():
-            if theirs != ours:
-                raise InputError(f"wayproof: the worker {worker} has {theirs}; must have {ours}")
-        yield DaskWorkers(client, tell)
 
 
-def _is_here(host: str) -> bool:
-    """Whether a host is this machine, as far as its address says; a name may lead anywhere."""
-    with suppress(ValueError):
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    return False
-
-
-class DaskWorkers:
+class DaskWorkers(Workers):
     """The workers of a Dask cluster."""
 
     def __init__(self, client: Any, tell: Callable[[str], None]) -> None:
+        super().__init__(client.get_executor(pure=False))
         self._client, self._tell = client, tell
-        self._executor = client.get_executor(pure=False)
-        self._flying: dict[Future[Answer], int] = {}
         self._known = set(client.nthreads())
 
     def free(self) -> int:
@@ -256,28 +226,19 @@ class DaskWorkers:
         try:
             threads_of = self._client.nthreads()
         except OSError as error:
-            raise SchedulerGoneError from error
+            raise OSError(GONE) from error
         for gone in sorted(self._known - set(threads_of)):
             self._tell(f"the Dask worker {gone} has gone; others fly its runs again")
         self._known = set(threads_of)
         threads: int = sum(threads_of.values())
         return JOBS_EACH * threads - len(self._flying)
 
-    def start(self, job: Job) -> None:
-        """Hands a job to the scheduler."""
-        self._flying[self._executor.submit(fly_job, job)] = job.run
-
-    def over(self, timeout_s: float) -> list[Flown]:
-        """The jobs that have come to an end."""
+    def _answer(self, future: Future[Answer]) -> Answer | None:
         from distributed import KilledWorker
 
-        found: list[Flown] = []
-        for future in finished(self._flying, timeout_s):
-            run = self._flying.pop(future)
-            if future.cancelled():
-                raise SchedulerGoneError
-            found.append((run, None if isinstance(future.exception(), KilledWorker) else _answer(future)))
-        return found
+        if future.cancelled():
+            raise OSError(GONE)
+        return None if isinstance(future.exception(), KilledWorker) else super()._answer(future)
 
 
 def _begin() -> None:
@@ -287,12 +248,11 @@ def _begin() -> None:
     # Standard output is the parent's alone: what a planner prints goes to standard error.
     os.dup2(2, 1)
     own_this_process()
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.join,), daemon=True).start()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def _end_with(joined: Callable[[], None]) -> None:
+def _end_with_parent() -> None:
     """A parent that is killed takes its processes along."""
-    joined()
-    os._exit(1)
+    if parent := multiprocessing.parent_process():
+        parent.join()
+        os._exit(1)

@@ -20,13 +20,7 @@ Verdict: TypeAlias = Literal["shown", "refuted", "undecided"]
 
 
 def clopper_pearson(held: int, runs: int, confidence: float) -> tuple[float, float]:
-    """Lower and upper bound of the probability that something holds, each at `confidence`.
-
-    Args:
-        held: how often it held.
-        runs: how often it was tried, a number fixed beforehand; at least 1.
-        confidence: of each bound, between 0 and 1.
-    """
+    """Lower and upper bound, each by itself, of the probability of what held in so many of a fixed number of runs."""
     from scipy import special
 
     doubt = 1.0 - confidence
@@ -36,13 +30,7 @@ def clopper_pearson(held: int, runs: int, confidence: float) -> tuple[float, flo
 
 
 def sequential_bounds(held: int, runs: int, confidence: float) -> tuple[float, float]:
-    """The same, valid at every number of runs at once.
-
-    Args:
-        held: how often it held.
-        runs: how often it was tried so far.
-        confidence: of each bound, between 0 and 1.
-    """
+    """The same, valid at every number of runs at once."""
     if not runs:
         return 0.0, 1.0
     failed, wanted = runs - held, math.log(1.0 / (1.0 - confidence))
@@ -63,11 +51,7 @@ def sequential_bounds(held: int, runs: int, confidence: float) -> tuple[float, f
 def verdict(held: int, runs: int, probability: float, confidence: float) -> Verdict:
     """What the runs so far say of the claim that something holds with at least `probability`.
 
-    Args:
-        held: how often it held.
-        runs: how often it was tried so far.
-        probability: what is claimed, between 0 and 1.
-        confidence: with which a claim is shown or refuted, over all looks together.
+    `confidence`: with which a claim is shown or refuted, over all looks together.
     """
     rate, failed, wanted = 1.0 - probability, runs - held, math.log(1.0 / (1.0 - confidence))
     if _evidence(rate, failed, runs, above=False) >= wanted:

@@ -7,33 +7,112 @@ the answer is the same for any number of workers.
 
 from __future__ import annotations
 
+import json
 import shlex
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.analysis.band import BAND, write_band
+from harness.analysis.claims import Claim
+from harness.campaign.cell import grouped
 from harness.campaign.flight import Answer
 from harness.campaign.folder import CampaignFolder
-from harness.campaign.journal import read_journal
 from harness.campaign.results import RUNS
 from harness.campaign.sweep import fly_missing, told_left
 from harness.campaign.workers import Workers
-from harness.certification.bounds import clopper_pearson, sequential_bounds, verdict
-from harness.certification.certificate import Certificate, failures
+from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
 from harness.certification.days import Days, PathDays
-from harness.certification.explained import differing, explained
 from harness.files.input_file import InputError
 from harness.files.versions import versions
+from harness.files.whole_file import replace_text
 from harness.run_files.run_folder import TRACK
 
+CERTIFICATE: Final = "certificate.json"
+SCHEMA: Final = "wayproof/certificate/1"
+FIRST_FAILURES: Final = 5
+"""Runs that are named of those that failed in the same way."""
+SECTIONS: Final = ("environment", "navigation", "uncertainty", "sensor", "aircraft")
+"""Sections of a scenario whose numbers may differ between days without being varied by name: conditions draw them."""
 MOST_RUNS: Final = 1000
 CONFIDENCE: Final = 0.95
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Days that failed and ended alike: how many, and the first of them.
+
+    `cause`: why legs were not tracked, or what the check of a given path found; may be empty.
+    """
+
+    outcome: str
+    cause: str
+    count: int
+    runs: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Explained:
+    """The share, from 0 to 1, of the variance of failing that is due to the group that a varied quantity falls in.
+
+    `worst`: the group with the largest share of failures; `failed` of its `runs` did.
+    """
+
+    key: str
+    share: float
+    worst: str
+    failed: int
+    runs: int
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """On how many of the days that count the claim held, and what follows from it.
+
+    Attributes:
+        probability_lower: bound, each by itself at `confidence`, of the probability that the claim holds on a day.
+        probability: the verdict is that the claim holds with at least this; None where nothing was claimed.
+        method: how the bounds were derived.
+        most_runs: number of days that were allowed.
+        planner: its kind; `given` for a path.
+        failures: days on which it did not hold, by how they ended, the most frequent first; `failing_runs` has all.
+    """
+
+    claim: Claim
+    runs: int
+    held: int
+    probability_lower: float
+    probability_upper: float
+    confidence: float
+    verdict: Verdict
+    probability: float | None
+    method: str
+    most_runs: int
+    subject: str
+    planner: str
+    aircraft: str
+    conditions: str | None
+    seed: int
+    varied: Mapping[str, Any]
+    failures: tuple[Failure, ...]
+    explained: tuple[Explained, ...]
+    failing_runs: tuple[int, ...]
+    command: str
+    versions: Mapping[str, str | None]
+
+    def plain(self) -> dict[str, Any]:
+        """The content of `certificate.json`."""
+        return {"schema": SCHEMA, **asdict(self)}
+
+    def write(self, folder: Path) -> None:
+        """Writes `certificate.json` into a folder."""
+        replace_text(folder / CERTIFICATE, json.dumps(self.plain(), indent=2, allow_nan=False) + "\n")
 
 
 @dataclass(frozen=True)
@@ -51,12 +130,9 @@ class Terms:
 
 
 class Tally:
-    """Days in the order of their numbers, as far as they are over without a gap.
+    """Days in the order of their numbers, as far as they are over without a gap, or up to the day that decided.
 
-    Attributes:
-        runs: how many count: all before the first gap, or up to the day that decided.
-        held: on how many of them the claim held.
-        decided: whether they show or refute the claim.
+    Of `runs` days that count, the claim `held` on so many; `decided` is whether they show or refute it.
     """
 
     def __init__(self, terms: Terms) -> None:
@@ -85,16 +161,10 @@ def certify(
     progress: Callable[[Tally], None] | None = None,
     command: str | None = None,
 ) -> Certificate:
-    """Flies days and writes the folder.
+    """Flies days and writes the folder; `progress` is told after every day that is over.
 
-    Args:
-        days: what is flown, at most.
-        out: the folder.
-        workers: who flies.
-        terms: what is to be shown.
-        resume: whether to go on with what the folder has of these days.
-        progress: told after every day that is over.
-        command: what the certificate says was called; default: the command line.
+    `resume`: whether to go on with what the folder has of these days, or of fewer.
+    `command`: what the certificate says was called; default: the command line.
 
     Raises:
         RunFolderError: the folder holds something else, or days already without `resume`.
@@ -102,7 +172,7 @@ def certify(
     """
     tally = Tally(terms)
     with CampaignFolder(out, days, resume=resume) as folder:
-        for run, over in sorted(read_journal(out).runs.items()):
+        for run, over in folder.over.items():
             tally.add(run, over.held)
 
         def count(answer: Answer) -> None:
@@ -114,7 +184,7 @@ def certify(
         if left and not tally.decided:
             raise OSError(told_left(left))
         folder.write_tables(tally.runs)
-        certificate = _certificate(days, out, tally, terms, command)
+        certificate = _certificate(days, folder, tally, terms, command)
         if days.band and not (out / BAND).exists():
             kept = (out / RUNS / str(run) for run in range(tally.runs))
             write_band(out, [each for each in kept if (each / TRACK).is_file()])
@@ -130,13 +200,15 @@ def _leave_only(runs: Path, kept: set[int]) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _certificate(days: Days, out: Path, tally: Tally, terms: Terms, command: str | None) -> Certificate:
-    over = [(run, each) for run, each in sorted(read_journal(out).runs.items()) if run < tally.runs]
+def _certificate(
+    days: Days, folder: CampaignFolder, tally: Tally, terms: Terms, command: str | None
+) -> Certificate:
+    over = [(run, folder.over[run]) for run in range(tally.runs)]
     failing = [{**each.row, "run": run} for run, each in over if not each.held]
-    first = days.flown(0)
+    first = days.scenario(0)
     quantities: dict[str, list[Any]] = {}
     if failing:
-        quantities = differing([days.flown(run).model_dump(by_alias=True) for run, _ in over])
+        quantities = differing([days.scenario(run).model_dump(by_alias=True) for run, _ in over])
         quantities |= {key: [each.row[key] for _, each in over] for key in days.varied}
     return Certificate(
         claim=days.claim,
@@ -144,12 +216,12 @@ def _certificate(days: Days, out: Path, tally: Tally, terms: Terms, command: str
         held=tally.held,
         confidence=terms.confidence,
         probability=terms.probability,
-        **_sure(tally, terms),
+        **_sure(tally, terms, folder.grown),
         most_runs=len(days),
         subject=days.campaign.name,
         planner="given" if isinstance(days, PathDays) else first.planner.label,
         aircraft=Path(first.aircraft.model).name,
-        conditions=getattr(first, "conditions", None),
+        conditions=first.conditions,
         seed=days.campaign.seed,
         varied=dict(days.vary),
         failures=failures(failing),
@@ -160,14 +232,73 @@ def _certificate(days: Days, out: Path, tally: Tally, terms: Terms, command: str
     )
 
 
-def _sure(tally: Tally, terms: Terms) -> dict[str, Any]:
-    """Verdict, bounds and method of a certificate."""
+def _sure(tally: Tally, terms: Terms, grown: bool) -> dict[str, Any]:
+    """Verdict, bounds and method of a certificate.
+
+    A number of days that was raised once some had been flown is not fixed beforehand: whoever raises it knows what came
+    out. Its bounds are those that hold at every look.
+    """
     counted, said = (tally.held, tally.runs), "undecided"
-    if terms.probability is None:
-        method = "Clopper-Pearson, number of runs fixed beforehand"
-        low, high = clopper_pearson(*counted, terms.confidence) if tally.runs else (0.0, 1.0)
+    if terms.probability is None and not grown:
+        method, bounds = "Clopper-Pearson, number of runs fixed beforehand", clopper_pearson
     else:
-        method = "sequential mixture test, valid at every look"
-        low, high = sequential_bounds(*counted, terms.confidence)
+        method, bounds = "sequential mixture test, valid at every look", sequential_bounds
+    if terms.probability is not None:
         said = verdict(*counted, terms.probability, terms.confidence)
+    elif grown:
+        method += ", as --resume raised the number of runs"
+    low, high = bounds(*counted, terms.confidence)
     return {"verdict": said, "method": method, "probability_lower": low, "probability_upper": high}
+
+
+def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
+    """Rows of days that failed, by outcome and cause, the most frequent first."""
+    alike: dict[tuple[str, str], list[int]] = {}
+    for row in rows:
+        cause = row.get("trackability.causes") or row.get("check.verdict") or ""
+        alike.setdefault((str(row["outcome"]), str(cause)), []).append(int(row["run"]))
+    ordered = sorted(alike.items(), key=lambda each: -len(each[1]))
+    return tuple(Failure(*key, len(runs), tuple(runs[:FIRST_FAILURES])) for key, runs in ordered)
+
+
+def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]) -> tuple[Explained, ...]:
+    """The quantities that explain most of the failures first; nothing where none or all failed.
+
+    The share is epsilon squared (Kelley, Proceedings of the National Academy of Sciences 21, 1935): the correlation
+    ratio of failing (n,) over the groups of a quantity (n,), less what one without influence would show.
+    """
+    if failed.all() or not failed.any():
+        return ()
+    found = [_of(key, values, failed) for key, values in quantities.items()]
+    return tuple(sorted((each for each in found if each), key=lambda each: -each.share))
+
+
+def _of(key: str, values: Sequence[Any], failed: NDArray[np.bool_]) -> Explained | None:
+    axis, group = grouped(key, values, drawn=True)
+    used, index = np.unique(group, return_inverse=True)
+    sizes, sums = np.bincount(index), np.bincount(index, failed)
+    count, groups = len(failed), len(used)
+    if groups < 2 or count <= groups:
+        return None
+    rates, overall = sums / sizes, failed.mean()
+    between = float((sizes * (rates - overall) ** 2).sum())
+    total = float(count * overall * (1.0 - overall))
+    within = (total - between) / (count - groups)
+    worst = int(rates.argmax())
+    share = max(0.0, (between - (groups - 1) * within) / total)
+    return Explained(key, share, axis.labels[used[worst]], int(sums[worst]), int(sizes[worst]))
+
+
+def differing(days: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """The numbers and names that are not the same on all days, by key path, of each day's plain scenario."""
+    flat = [dict(leaf for name in SECTIONS for leaf in _leaves(day.get(name), name)) for day in days]
+    columns = {
+        key: [each.get(key) for each in flat] for key in dict.fromkeys(key for each in flat for key in each)
+    }
+    return {key: values for key, values in columns.items() if len({*map(json.dumps, values)}) > 1}
+
+
+def _leaves(content: Any, key: str) -> list[tuple[str, Any]]:
+    if not isinstance(content, Mapping):
+        return [] if content is None or isinstance(content, list | tuple) else [(key, content)]
+    return [leaf for name, value in content.items() for leaf in _leaves(value, f"{key}.{name}")]

@@ -18,8 +18,7 @@ from harness.cli.standard_output import say
 from harness.cli.terminal import plain, print_table, step_bar
 
 if TYPE_CHECKING:
-    from harness.certification.certificate import Certificate
-    from harness.certification.certification import Tally, Terms
+    from harness.certification.certification import Certificate, Tally, Terms
     from harness.certification.days import Days
 
 SHOWN: Final = 5
@@ -65,15 +64,16 @@ def certify(
     2 bad input or usage, nothing flown
     """
     from harness.certification.certification import MOST_RUNS, Terms
-    from harness.certification.subject import DEFAULT_AIRCRAFT, Asked, days_of, is_path
+    from harness.certification.days import DEFAULT_AIRCRAFT, days_of, is_path
     from harness.scenario.shipped import scenario_path
 
     terms = Terms(probability, confidence)
     drawn = _drawn(vary or ())
     if is_path(subject) and not any(key == "aircraft.model" for key, _ in given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
-    asked = Asked(subject, given.keys, drawn, claim, runs or MOST_RUNS, given.sources)
-    days = days_of(asked, None if world is None else scenario_path(world))
+    place = None if world is None else scenario_path(world)
+    most = runs or MOST_RUNS
+    days = days_of(subject, given.keys, drawn, claim, place, most=most, sources=given.sources)
     days.check()
     apart = told_apart([*given.keys, *((key, str(each)) for key, each in drawn.items())], named=())
     folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{apart}"
@@ -89,7 +89,7 @@ def certify(
 
 def _drawn(vary: Sequence[str]) -> Mapping[str, Any]:
     """What varies from day to day, by key."""
-    from harness.certification.subject import distributions
+    from harness.certification.days import distributions
 
     try:
         return distributions(vary)

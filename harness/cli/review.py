@@ -111,8 +111,7 @@ def _need_run(folder: Path) -> None:
 
 def _summary(folder: Path, keys: Sequence[Sequence[str]] | None) -> None:
     """The answers of a campaign once more, by other keys perhaps."""
-    from harness.campaign.report import write_summary
-    from harness.campaign.summary import summarise
+    from harness.campaign.summary import summarise, write_summary
     from harness.cli.summary_table import print_summary
 
     summary = summarise(folder, keys)
@@ -124,14 +123,14 @@ def _summary(folder: Path, keys: Sequence[Sequence[str]] | None) -> None:
 def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str, out: Path | None) -> None:
     """The table of a campaign or a comparison for a paper."""
     from harness.analysis import rows as compared
-    from harness.campaign import cell, report
+    from harness.campaign import cell
     from harness.campaign.results import RESULTS
-    from harness.campaign.summary import summarise
+    from harness.campaign.summary import rows_for_paper, summarise
     from harness.comparison.comparison import read_rows
     from harness.files.whole_file import replace_text
 
     if (folder / RESULTS).is_file():
-        heads, lines, told = *report.rows_for_paper(summarise(folder, keys)), cell.legend()
+        heads, lines, told = *rows_for_paper(summarise(folder, keys)), cell.legend()
     else:
         heads, lines, told = compared.rows_for_paper(read_rows(folder))
     text = compared.csv_table([heads, *lines]) if table == "csv" else compared.latex(heads, lines, told)
@@ -164,7 +163,7 @@ def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
 
 def open_campaign(folder: Path, web: bool = False) -> bool:
     """The same with the recordings of a campaign as a table."""
-    from harness.campaign.table import recordings_of
+    from harness.campaign.results import recordings_of
     from harness.recording.catalog import open_table
     from harness.recording.properties import NO_RECORDINGS
 

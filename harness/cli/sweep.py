@@ -54,8 +54,7 @@ def sweep(
     130 interrupted; --resume goes on
     """
     _check_usage(scheduler, workers, unencrypted)
-    from harness.campaign.report import write_summary
-    from harness.campaign.summary import summarise
+    from harness.campaign.summary import summarise, write_summary
     from harness.campaign.workers import dask_workers, local_workers
     from harness.cli.summary_table import print_summary
     from harness.scenario.shipped import campaign_path
@@ -126,7 +125,7 @@ def _fly(
         CampaignFolder(path, runs, resume=resume) as folder,
         step_bar(silent) as bar,
     ):
-        over, not_reached = len(folder.done), 0
+        over, not_reached = len(folder.over), 0
 
         def report(answer: Answer) -> None:
             nonlocal over, not_reached

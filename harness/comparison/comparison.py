@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,12 +41,7 @@ INDEX, CSV = "comparison.json", "comparison.csv"
 
 @dataclass(frozen=True)
 class Comparison:
-    """What was compared.
-
-    Attributes:
-        started_utc: date and time, ISO 8601.
-        versions: what flew, by name; empty where nothing came to an end.
-    """
+    """What was compared: the command, when it began (UTC, ISO 8601), versions of what flew by name, a row a flight."""
 
     command: str
     started_utc: str
@@ -64,8 +59,7 @@ class Comparison:
         return {"schema": SCHEMA, "complete": complete, **vars(self), "rows": rows}
 
 
-@dataclass(frozen=True)
-class _Flight:
+class _Flight(NamedTuple):
     """One planner, under one law, on one scenario; `law` is empty where all fly under the same one."""
 
     scenario: Scenario
@@ -87,13 +81,11 @@ def fly_and_compare(
     """Flies scenarios that differ in name or planner and writes the folder of the comparison.
 
     `scenarios`: one a flight, those of one name together; each names its planner.
-    `workers`: flights at the same time; they change nothing but the time it takes.
     `command`: what the report says was called; default: the command line.
     `sources`: planners, and guidance laws, that are given as FILE.py:NAME or MODULE:NAME.
 
     Raises:
-        InputError: a scenario is there twice with the same planner and guidance, or is called as a file of the
-            comparison is.
+        InputError: two flights, or a flight and a file of the comparison, would have one name.
         RunFolderError: the folder holds something else or cannot be written.
     """
     how = Job(0, b"", out, "all" if recording else "folders", optimum=False, again=command or "")
@@ -117,13 +109,11 @@ def fly_and_compare(
 def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
     """The flights; an InputError where two have one name, or a scenario is called as a file of the comparison."""
     by_law = len({each.guidance.kind for each in scenarios}) > 1
-    flights: list[_Flight] = []
-    taken: set[Path] = set()
+    flights: dict[Path, _Flight] = {}
     for number, each in enumerate(scenarios):
-        planner = each.planner.label
-        law = each.guidance.kind if by_law else ""
+        planner, law = each.planner.label, each.guidance.kind if by_law else ""
         folder = (how.folder / each.name / (f"{planner}-{law}" if law else planner)).resolve()
-        if folder in taken:
+        if folder in flights:
             raise InputError(
                 f"wayproof: {planner} is to fly {each.name} twice{law and f' under {law}'}; leave one out or "
                 "rename the scenario"
@@ -132,10 +122,9 @@ def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
             raise InputError(
                 f"wayproof: a scenario is called {each.name}, as a file of the comparison; rename it"
             )
-        taken.add(folder)
         job = replace(how, run=number, packed=packed(each), folder=folder)
-        flights.append(_Flight(each, planner, law, job))
-    return flights
+        flights[folder] = _Flight(each, planner, law, job)
+    return [*flights.values()]
 
 
 def _fly(flights: Sequence[_Flight], workers: int, progress: Callable[[str], None] | None) -> dict[int, str]:
@@ -160,22 +149,22 @@ def _written(
     flights: Sequence[_Flight], crashes: Mapping[int, str], out: Path, begun: Comparison
 ) -> Comparison:
     """Writes everything that is made of the run folders."""
-    first = {each.scenario.name: each.scenario for each in reversed(flights)}
-    names = list(dict.fromkeys(each.scenario.name for each in flights))
-    optima = {name: optimum_of(first[name]) for name in names}
-    entries = [_entry(each, crashes.get(each.job.run), optima[each.scenario.name]) for each in flights]
-    runs = [each.run for each in entries if each.run]
-    named = runs[0].manifest["versions"] if runs else {}
-    versions = {name: version for name, version in named.items() if version}
-    done = replace(begun, versions=versions, rows=tuple(each.row for each in entries))
-    chapters = []
-    for name in names:
-        own = [each for each in entries if each.row.scenario == name]
-        if (out / name).is_symlink():  # of a folder that somebody sent
-            (out / name).unlink()
-        (out / name).mkdir(exist_ok=True)
-        _overlay(out / name, own)
-        chapters.append(chapter(out / name, first[name], own, optima[name]))
+    by_name: dict[str, list[_Flight]] = {}
+    for flight in flights:
+        by_name.setdefault(flight.scenario.name, []).append(flight)
+    every, chapters = [], []
+    for name, own in by_name.items():
+        scenario, optimum, folder = own[0].scenario, optimum_of(own[0].scenario), out / name
+        entries = [_entry(each, crashes.get(each.job.run), optimum) for each in own]
+        if folder.is_symlink():  # of a folder that somebody sent
+            folder.unlink()
+        folder.mkdir(exist_ok=True)
+        _overlay(folder, entries)
+        chapters.append(chapter(folder, scenario, entries, optimum))
+        every += entries
+    flown: Mapping[str, str] = next((each.run.manifest["versions"] for each in every if each.run), {})
+    versions = {name: version for name, version in flown.items() if version}
+    done = replace(begun, versions=versions, rows=tuple(each.row for each in every))
     replace_text(out / CSV, to_csv(done.rows))
     page = report_html(chapters, done.command, done.versions, done.started_utc, _duels(done.rows))
     replace_text(out / REPORT, page)
@@ -183,31 +172,24 @@ def _written(
     return done
 
 
-def read_rows(folder: Path) -> list[Row]:
-    """The rows of a comparison that is complete.
-
-    Raises:
-        InputError: the folder holds none.
-    """
-    index = read_index(folder / INDEX, SCHEMA)
-    if index is None or not index.get("complete"):
-        raise InputError(f"{folder}: is not the folder of a campaign or of a complete comparison")
-    own = ("scenario", "planner", "outcome", "reason", "guidance")
-    known = [{key: row[key] for key in (*own, *COMPARED) if key in row} for row in index["rows"]]
-    return [Row(**row) for row in known]
-
-
 def _write_index(out: Path, comparison: Comparison, *, complete: bool) -> None:
     replace_text(out / INDEX, json.dumps(comparison.plain(complete), indent=2, allow_nan=False) + "\n")
 
 
+def read_rows(folder: Path) -> list[Row]:
+    """The rows of a comparison that is complete; an InputError where the folder holds none."""
+    index = read_index(folder / INDEX, SCHEMA)
+    if index is None or not index.get("complete"):
+        raise InputError(f"{folder}: is not the folder of a campaign or of a complete comparison")
+    own = ("scenario", "planner", "outcome", "reason", "guidance")
+    return [Row(**{key: row[key] for key in (*own, *COMPARED) if key in row}) for row in index["rows"]]
+
+
 def _entry(flight: _Flight, crash: str | None, optimum: Optimum) -> ReportedFlight:
-    scenario, planner, law = flight.scenario, flight.planner, flight.law
+    scenario, planner, law, job = flight
     if crash is not None:
         return ReportedFlight(Row(scenario.name, planner, ERROR, crash, law, optimum_m=optimum.length_m))
-    found = entry(scenario, load_run(flight.job.folder), optimum, law)
-    row = found.row
-    return replace(found, row=Row(row.scenario, planner, reason=row.reason, guidance=law, **row.figures))
+    return entry(scenario, load_run(job.folder), optimum, law)
 
 
 def _overlay(folder: Path, entries: Sequence[ReportedFlight]) -> None:

@@ -1,5 +1,9 @@
 """The breaking point: flies a scenario under ever harder conditions until the mildest is known that makes it fail.
 
+All keys get harder together, in equal steps from their mild ends, until the first condition fails; bisection narrows
+that step down. With several keys each key is then taken back towards its mild end while the condition still fails. A
+failing range below the answer that is narrower than a step may have been missed.
+
 The folder holds `falsify.json`, the result and every flight; and, where something failed, `falsified.yaml`, the whole
 scenario that does. They are written when the search ends.
 """
@@ -11,16 +15,15 @@ import json
 import math
 import shlex
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
 from harness.analysis.claims import Claim, holds
 from harness.campaign.folder import claim_folder
 from harness.campaign.sampling import takes_whole_numbers
-from harness.falsify.search import Search, Values, Vary
 from harness.files.crash import sentence
 from harness.files.errors import WriteError
 from harness.files.strict_yaml import InputError, as_spelt, loc_of
@@ -41,16 +44,147 @@ Load: TypeAlias = Callable[[Sequence[tuple[str, str]]], Scenario]
 """Makes the scenario with keys replaced, as `harness.scenario.scenario.load_scenario` takes them."""
 Flown: TypeAlias = Callable[[Scenario], Mapping[str, Any]]
 """Flies a scenario and gives the content of its `metrics.json`."""
+Values: TypeAlias = tuple[float, ...]
+"""A condition: the value of each key."""
+
+
+@dataclass(frozen=True)
+class Vary:
+    """A key to be varied from its mild end to its hard one, which lies below where smaller is harder.
+
+    A value between the ends is rounded to so many places after the point before it is flown.
+    """
+
+    key: str
+    mild: float
+    hard: float
+    whole: bool = False
+    decimals: int = 15
+
+    def value(self, displacement: float) -> float:
+        """Its value at a displacement from 0 (mild) to 1 (hard)."""
+        if displacement in (0.0, 1.0):
+            return self.hard if displacement else self.mild
+        return round(
+            self.mild + displacement * (self.hard - self.mild), None if self.whole else self.decimals
+        )
+
+    def displacement(self, value: float) -> float:
+        """How far a value is on the way from the mild end to the hard one."""
+        return (value - self.mild) / (self.hard - self.mild)
+
+
+@dataclass
+class Search:
+    """Conditions tried, each once.
+
+    Attributes:
+        judge: whether a condition fails; an InputError, where there is none, passes while a key is taken back.
+        left: how many more may be tried, at least 2 at the beginning.
+        tolerance: a displacement is narrowed down to this.
+        steps: number of equal steps of the scan.
+        settled: whether the conditions sufficed to narrow the answer down.
+    """
+
+    vary: Sequence[Vary]
+    judge: Callable[[Values], bool]
+    left: int
+    tolerance: float
+    steps: int = 1
+    settled: bool = True
+    verdicts: dict[Values, bool] = field(default_factory=dict)
+
+    def run(self) -> Search:
+        """Looks for the mildest condition that fails; a ValueError where too few are allowed, or no such tolerance."""
+        if self.left < 2 or not 0.0 < self.tolerance < 1.0:
+            told = f"{self.left}, {self.tolerance}"
+            raise ValueError(f"needs 2 conditions or more and a tolerance between 0 and 1: {told}")
+        steps = self.steps = self._affordable(self.left if len(self.vary) == 1 else self.left // 2)
+        failing = next((step for step in range(steps + 1) if self._fails(self.at(step / steps))), None)
+        if failing:
+            self._narrowed(self.at, (failing - 1) / steps, failing / steps)
+            found = self.mildest
+            assert found is not None
+            order = sorted(range(len(self.vary)), key=self.hardness(found).__getitem__, reverse=True)
+            for key in order if len(order) > 1 else ():
+                found = self._taken_back(found, key)
+        return self
+
+    def at(self, displacement: float) -> Values:
+        """The condition with all keys at a displacement."""
+        return tuple(each.value(displacement) for each in self.vary)
+
+    def hardness(self, values: Values) -> tuple[float, ...]:
+        """Displacement of each key, from 0 (mild) to 1 (hard)."""
+        return tuple(each.displacement(value) for each, value in zip(self.vary, values, strict=True))
+
+    @property
+    def mildest(self) -> Values | None:
+        """The failing condition whose largest displacement is least; of equal ones, that with the smallest sum."""
+        failed = [values for values, failed in self.verdicts.items() if failed]
+        return min(
+            failed, key=lambda each: (max(self.hardness(each)), sum(self.hardness(each))), default=None
+        )
+
+    @property
+    def passed_below(self) -> Values | None:
+        """The hardest condition that passed and is no harder than the mildest failure in any key."""
+        if (found := self.mildest) is None:
+            return None
+        limits = self.hardness(found)
+        passed = [values for values, failed in self.verdicts.items() if not failed]
+        below = [
+            each for each in passed if all(a <= b for a, b in zip(self.hardness(each), limits, strict=True))
+        ]
+        return max(below, key=lambda each: sum(self.hardness(each)), default=None)
+
+    def _affordable(self, conditions: int) -> int:
+        """The most equal steps of the scan for which the conditions suffice, the bisection of one step included."""
+        most = min(conditions - 1, math.ceil(1.0 / self.tolerance))
+        halved = {steps: math.ceil(-math.log2(steps * self.tolerance)) for steps in range(1, most + 1)}
+        return max((steps for steps in halved if steps + 1 + max(0, halved[steps]) <= conditions), default=1)
+
+    def _fails(self, values: Values) -> bool:
+        """Whether a condition fails; one that can no longer be tried counts as passing, and nothing is settled."""
+        if values not in self.verdicts:
+            if not self.left:
+                self.settled = False
+                return False
+            self.left -= 1
+            self.verdicts[values] = self.judge(values)
+        return self.verdicts[values]
+
+    def _narrowed(self, at: Callable[[float], Values], passes: float, fails: float) -> Values:
+        """The mildest failing condition on a way, between a displacement that passes and one that fails."""
+        while fails - passes > self.tolerance and self.settled:
+            middle = 0.5 * (passes + fails)
+            if at(middle) in (at(passes), at(fails)):
+                break
+            passes, fails = (passes, middle) if self._fails_if_any(at(middle)) else (middle, fails)
+        return at(fails)
+
+    def _taken_back(self, values: Values, key: int) -> Values:
+        """A condition that fails, one of its keys as near to its mild end as that goes."""
+
+        def at(displacement: float) -> Values:
+            return (*values[:key], self.vary[key].value(displacement), *values[key + 1 :])
+
+        hardness = self.hardness(values)[key]
+        if hardness == 0.0 or self._fails_if_any(at(0.0)):
+            return at(0.0)
+        return self._narrowed(at, 0.0, hardness)
+
+    def _fails_if_any(self, values: Values) -> bool:
+        """Whether there is such a condition and it fails."""
+        try:
+            return self._fails(values)
+        except InputError:
+            return False
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One flight.
-
-    Attributes:
-        displacement: of each key, from 0 (mild) to 1 (hard).
-        figures: those of `FIGURES`; the outcome is `error` where the software failed.
-    """
+    """One flight: the displacement of each key from 0 (mild) to 1 (hard), and `FIGURES`; `error` is a crash."""
 
     displacement: tuple[float, ...]
     values: Values
@@ -64,8 +198,7 @@ class Breaking:
 
     Attributes:
         claim: a flight fails where this does not hold of it.
-        steps: number of equal steps of the scan; a failing range narrower than one may have been missed.
-        settled: whether the answer was narrowed down to the tolerance within the flights that were allowed.
+        steps, settled: as `Search` has them; a failing range narrower than a step may have been missed.
         passes: values of the hardest condition that passed and is no harder in any key.
     """
 
@@ -93,26 +226,28 @@ class Breaking:
 def vary_of(
     load: Load, given: Sequence[tuple[str, float, float]], fixed: Sequence[str] = (), tolerance: float = 0.01
 ) -> tuple[Vary, ...]:
-    """The keys to vary, once every combination of their ends has been found to be a scenario.
+    """The keys to vary, once every combination of their ends has been found to be a scenario; or an InputError.
 
     `given`: key path, mild end and hard end of each.
+    `fixed`: keys that are given a value.
     `tolerance`: a displacement is narrowed down to this share of its range; values are flown rounded to a
     hundredth of that, so that what is printed is what was flown.
-
-    Raises:
-        InputError: too many keys, one twice, with a value or without a range, or an end that makes no scenario.
     """
     if len(given) > MAX_KEYS:
         raise InputError(
             f"command line: --vary is given {len(given)} times; at most {MAX_KEYS} keys are varied"
         )
-    given = [(_spelt("--vary", key), mild, hard) for key, mild, hard in given]
-    valued = {_spelt("--set", key) for key in fixed}
-    _check_ranges(given, valued)
-    base = load([(key, number_text(mild)) for key, mild, _ in given])
+    ranges: dict[str, tuple[float, float]] = {}
+    for name, mild, hard in given:
+        key = _spelt("--vary", name)
+        valued = key in [_spelt("--set", each) for each in fixed]
+        if fault := _fault(key, mild, hard, twice=key in ranges, valued=valued):
+            raise InputError(f"command line: --vary {key}: {fault}")
+        ranges[key] = mild, hard
+    base = load([(key, number_text(mild)) for key, (mild, _) in ranges.items()])
     vary = tuple(
         Vary(key, mild, hard, takes_whole_numbers(base, loc_of(key)), _decimals(abs(hard - mild) * tolerance))
-        for key, mild, hard in given
+        for key, (mild, hard) in ranges.items()
     )
     ends = itertools.product(*((each.mild, each.hard) for each in vary))
     diagonal = (tuple(each.value(step / 8) for each in vary) for step in range(9))
@@ -121,21 +256,15 @@ def vary_of(
     return vary
 
 
-def _check_ranges(given: Sequence[tuple[str, float, float]], valued: Collection[str]) -> None:
-    """Refuses a key that is varied twice, has a value or no range, and the seed."""
-    for number, (key, mild, hard) in enumerate(given):
-        if key == "seed":
-            raise InputError("command line: --vary seed: a seed is no condition; --seed gives another")
-        if key in [other for other, _, _ in given[:number]]:
-            raise InputError(f"command line: --vary {key}: is given twice; give one range")
-        if key in valued:
-            raise InputError(
-                f"command line: {key} is given a value, and a range with --vary; give one of them"
-            )
-        if mild == hard:
-            raise InputError(
-                f"command line: --vary {key}: both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}"
-            )
+def _fault(key: str, mild: float, hard: float, *, twice: bool, valued: bool) -> str:
+    """What is wrong with a range; empty if nothing is."""
+    if key == "seed":
+        return "a seed is no condition; --seed gives another"
+    if twice:
+        return "is given twice; give one range"
+    if valued:
+        return "is given a value too, with --set; give one of them"
+    return f"both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}" if mild == hard else ""
 
 
 def scenario_at(load: Load, vary: Sequence[Vary], values: Values) -> Scenario:
@@ -171,11 +300,7 @@ def falsify(
     tolerance: float = 0.01,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Breaking:
-    """Searches, and writes the folder.
-
-    `claim`: a flight fails where this does not hold of it.
-    `tolerance`: a displacement is narrowed down to this share of its range.
-    `progress`: told after each flight how many there were, of how many, and what became of it.
+    """Searches, and writes the folder; `progress` is told after each flight how many of how many, and its end.
 
     Raises:
         InputError: a condition is no scenario, or cannot be flown; the folder is as it was.
@@ -186,13 +311,12 @@ def falsify(
 
     def judge(values: Values) -> bool:
         figures = _flown(flown, scenario_at(load, vary, values))
-        failed = not holds(claim, figures)
         kept = {name: figures.get(name) for name in FIGURES}
-        trials[values] = Trial(search.hardness(values), values, failed, kept)
+        trials[values] = trial = Trial(search.hardness(values), values, not holds(claim, figures), kept)
         if progress is not None:
             told = ", ".join(f"{value:.4g}" for value in values)
             progress(len(trials), conditions, f"{told}: {figures['outcome']}")
-        return failed
+        return trial.failed
 
     search = Search(vary, judge, conditions, tolerance)
     base = scenario_at(load, vary, search.at(0.0))

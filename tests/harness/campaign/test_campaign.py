@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,7 @@ from hypothesis import strategies as st
 
 from harness.campaign import runs as campaign_runs
 from harness.campaign.campaign_file import CampaignFile, campaign_schema, is_campaign, load_campaign
-from harness.campaign.planned_run import PlannedRun
-from harness.campaign.runs import CampaignRuns
+from harness.campaign.runs import CampaignRuns, PlannedRun
 from harness.cli.app import main
 from harness.files.strict_yaml import InputError, dump
 from harness.scenario.scenario import load_scenario
@@ -90,20 +88,20 @@ def test_every_combination_is_drawn_and_flown_by_every_pair(place: Path) -> None
     }
     assert len(cells) == 16
     assert {run.varied["environment.turbulence"] for run in every} == {
-        "null",
+        None,
         '{"model": "tustin", "intensity": "light"}',
     }
     assert {run.world for run in every} == {"ring.yaml"}
     assert {run.scenario for run in every} == {"ring"}
-    assert runs.varied == {
-        "environment.wind.speed_mps": "number",
-        "environment.turbulence": "json",
-        "environment.wind.from_deg": "number",
-        "sensor.rays": "int",
-        "sensor.dropout": "number",
-        "planner.clearance_m": "int",
-        "aircraft.airspeed_mps": "int",
-    }
+    assert runs.varied == [
+        "environment.wind.speed_mps",
+        "environment.turbulence",
+        "environment.wind.from_deg",
+        "sensor.rays",
+        "sensor.dropout",
+        "planner.clearance_m",
+        "aircraft.airspeed_mps",
+    ]
 
 
 def test_a_list_of_one_entry_is_text_and_nothing_in_the_others(place: Path) -> None:
@@ -143,7 +141,6 @@ def test_whole_numbers_are_drawn_where_a_key_takes_no_others(place: Path) -> Non
     runs = runs_of(
         place, text.replace("{kind: bug2, clearance_m: 50}", "{kind: rolling_window, clearance_m: 50}")
     )
-    assert (runs.varied["sensor.rays"], runs.varied["planner.steps"]) == ("int", "int")
     run, scenario = runs.run(5), runs.scenario(5)
     assert scenario.sensor.rays == run.varied["sensor.rays"]
     assert scenario.planner.own["steps"] == run.varied["planner.steps"]
@@ -152,32 +149,13 @@ def test_whole_numbers_are_drawn_where_a_key_takes_no_others(place: Path) -> Non
     assert len(drawn) > 6
 
 
-@pytest.mark.parametrize(
-    ("drawn", "where"),
-    [
-        ("{uniform: [3.5, 9]}", "uniform[0]: is 3.5"),
-        ("{normal: {mean: 9, sigma: 3, most: 9.2}}", "normal.most: is 9.2"),
-    ],
-)
-def test_ranges_of_whole_numbers_end_at_whole_numbers(place: Path, drawn: str, where: str) -> None:
+@pytest.mark.parametrize("drawn", ["{uniform: [3.5, 9]}", "{normal: {mean: 9, sigma: 3, most: 9.2}}"])
+def test_ranges_of_whole_numbers_end_at_whole_numbers(place: Path, drawn: str) -> None:
     text = CAMPAIGN.replace("random:\n", f"random:\n  sensor.rays: {drawn}\n").replace(
         "sensor.rays: {choice", "trackability.altitude_m: {choice"
     )
-    with pytest.raises(InputError, match=re.escape(f"random.sensor.rays.{where}; must be a whole number")):
+    with pytest.raises(InputError, match=r"yaml:15: random.sensor.rays: is \d\.\d+; must be a whole number"):
         runs_of(place, text).check()
-
-
-def test_hidden_files_of_a_folder_are_no_scenarios(place: Path) -> None:
-    (place / "more" / "._a.yaml").write_bytes(b"\x00\x05\x16\x07")
-    (place / "more" / ".#b.yaml").symlink_to("somebody@somewhere.1234")
-    runs = runs_of(place, CAMPAIGN.replace("ring.yaml", "more"))
-    assert {run.scenario for run in all_of(runs)} == {"a", "b"}
-
-
-def test_scenarios_of_a_folder_may_end_in_yml(place: Path) -> None:
-    (place / "more" / "c.yml").write_text(SCENARIO.format(name="c"))
-    runs = runs_of(place, CAMPAIGN.replace("ring.yaml", "more"))
-    assert {run.scenario for run in all_of(runs)} == {"a", "b", "c"}
 
 
 def test_a_scenario_has_what_its_run_says(place: Path) -> None:
@@ -192,7 +170,7 @@ def test_a_scenario_has_what_its_run_says(place: Path) -> None:
         assert scenario.sensor.rays == run.varied["sensor.rays"]
         assert scenario.environment.wind
         assert scenario.environment.wind.speed_mps == run.varied["environment.wind.speed_mps"]
-        assert (scenario.environment.turbulence is None) == (run.varied["environment.turbulence"] == "null")
+        assert (scenario.environment.turbulence is None) == (run.varied["environment.turbulence"] is None)
 
 
 @pytest.mark.parametrize("room", [0, 1500, 10**8])
@@ -270,10 +248,13 @@ def test_results_of_a_campaign_of_worlds_do_not_depend_on_its_files_name(place: 
 
 
 def test_scenarios_are_files_folders_and_shipped_names(place: Path) -> None:
+    (place / "more" / "._a.yaml").write_bytes(b"\x00\x05\x16\x07")
+    (place / "more" / ".#b.yaml").symlink_to("somebody@somewhere.1234")
+    (place / "more" / "c.yml").write_text(SCENARIO.format(name="c"))
     text = "schema: wayproof/campaign/1\nname: small\nseed: 5\nscenarios: [ring.yaml, more, paper_circles]\n"
-    runs = runs_of(place, text)
-    assert [run.scenario for run in all_of(runs)] == ["ring", "a", "b", "paper_circles"]
-    assert [run.world for run in all_of(runs)] == ["ring.yaml", "a.yaml", "b.yaml", "paper_circles.yaml"]
+    every = all_of(runs_of(place, text))
+    assert [run.scenario for run in every] == ["ring", "a", "b", "c", "paper_circles"]
+    assert [run.world for run in every] == ["ring.yaml", "a.yaml", "b.yaml", "c.yml", "paper_circles.yaml"]
 
 
 def test_the_plain_form_flies_the_same_without_a_file(place: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from harness.campaign.figures import scatter
-from harness.campaign.table import Runs
+from harness.campaign.results import Runs
 from harness.report.figure_style import svg
 
 

@@ -12,8 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from harness.campaign.campaign_file import load_campaign
-from harness.campaign.folder import CampaignFolder
-from harness.campaign.journal import JOURNAL, sealed
+from harness.campaign.flight import Answer
+from harness.campaign.folder import JOURNAL, CampaignFolder, sealed
 from harness.campaign.results import RESULTS
 from harness.campaign.runs import CampaignRuns
 from harness.cli.app import main
@@ -31,7 +31,7 @@ def place(tmp_path: Path) -> Path:
     with CampaignFolder(tmp_path / "out", runs, resume=False) as folder:
         for number in range(len(runs)):
             flown = {"outcome": "reached", "flown_length_m": 1000.0 + number, "digest": "0"}
-            folder.append(number, {**runs.run(number).cells(), **flown}, {"wall_s": 1.0})
+            folder.append(Answer(number, {**runs.run(number).cells(), **flown}, {"wall_s": 1.0}))
         folder.write_tables()
     return tmp_path
 

@@ -91,12 +91,12 @@ def test_an_interrupt_leaves_no_future_locked(delay_s: float, tmp_path: Path) ->
     runs: Any = Runs()
     tables: list[float] = []
     folder: Any = SimpleNamespace(
-        done={},
+        over={0: None},
         path=tmp_path,
         append=lambda *row: None,
         write_tables=lambda: tables.append(time.monotonic()),
     )
-    crowd = Crowd()
+    crowd: Any = Crowd()
 
     def interrupt() -> None:
         while len(crowd.given) < FLYING:

@@ -20,7 +20,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from harness.campaign.campaign_file import load_campaign
-from harness.campaign.flight import Job
+from harness.campaign.flight import Answer, Job
 from harness.campaign.folder import CampaignFolder
 from harness.campaign.results import METRICS, RUN, TIMES, metric_cells, read_table, sealed
 from harness.campaign.runs import CampaignRuns
@@ -348,8 +348,8 @@ def test_resume_drops_a_torn_line(place: Path, unbroken: Path, torn: bytes) -> N
     out = place / "out"
     whole = after_six_runs(place, unbroken, torn)
     with CampaignFolder(out, CampaignRuns(load_campaign(place / "campaign.yaml")), resume=True) as folder:
-        assert folder.done == set(range(6))
-        folder.append(6, {"outcome": "reached"}, {})
+        assert folder.over.keys() == set(range(6))
+        folder.append(Answer(6, {"outcome": "reached"}, {}))
     *lines, last = (out / "journal.jsonl").read_bytes().splitlines(keepends=True)
     assert lines == whole[:6]
     assert json.loads(last)["run"] == 6
@@ -360,7 +360,7 @@ def test_resume_drops_a_torn_line(place: Path, unbroken: Path, torn: bytes) -> N
     ("file", "old", "new", "said"),
     [
         ("campaign.yaml", "seed: 5", "seed: 6", "campaign.seed was 5, is 6"),
-        ("campaign.yaml", "draws: 2", "draws: 3", "campaign.draws was 2, is 3"),
+        ("campaign.yaml", "draws: 2", "draws: 1", "campaign.draws was 2, is 1"),
         (
             "campaign.yaml",
             "[0, 5]",
@@ -372,13 +372,7 @@ def test_resume_drops_a_torn_line(place: Path, unbroken: Path, torn: bytes) -> N
     ],
 )
 def test_resume_refuses_a_changed_campaign_and_says_what_changed(
-    place: Path,
-    unbroken: Path,
-    capsys: pytest.CaptureFixture[str],
-    file: str,
-    old: str,
-    new: str,
-    said: str,
+    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str], file: str, old: str, new: str, said: str
 ) -> None:
     out = place / "out"
     out.mkdir()
@@ -394,7 +388,16 @@ def test_resume_refuses_a_changed_campaign_and_says_what_changed(
     (place / file).write_text(f"# a comment is no change\n{(place / file).read_text()}")
     runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
     with CampaignFolder(out, runs, resume=True) as folder:
-        assert folder.done == set(range(8))
+        assert folder.over.keys() == set(range(8))
+
+
+@pytest.mark.flights
+def test_more_draws_go_on_with_the_runs_there_are(place: Path, unbroken: Path) -> None:
+    shutil.copytree(unbroken, place / "out")
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 3"))
+    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+    with CampaignFolder(place / "out", runs, resume=True) as folder:
+        assert (set(folder.over), len(runs), folder.grown) == (set(range(8)), 12, True)
 
 
 def test_resume_refuses_an_added_null_and_another_order_of_keys(
@@ -409,11 +412,11 @@ def test_resume_refuses_an_added_null_and_another_order_of_keys(
     with CampaignFolder(
         place / "out", CampaignRuns(load_campaign(place / "campaign.yaml")), resume=False
     ) as folder:
-        folder.append(0, {"outcome": "reached"}, {})
+        folder.append(Answer(0, {"outcome": "reached"}, {}))
     other = two.replace(grid, "").replace("  sensor.rays: [360, 720]\n", f"  sensor.rays: [360, 720]\n{grid}")
     (place / "campaign.yaml").write_text(other)
     assert sweep(place, "--resume") == 2
-    assert "campaign.grid had its keys in the order environment.wind.speed_mps, sensor.rays, has" in (
+    assert 'order.grid was ["environment.wind.speed_mps", "sensor.rays"], is ["sensor.rays"' in (
         capsys.readouterr().err
     )
     (place / "campaign.yaml").write_text(
@@ -432,7 +435,7 @@ def test_resume_refuses_another_aircraft_or_planner_of_the_same_name(
     (place / "campaign.yaml").write_text(text)
     runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
     with CampaignFolder(place / "out", runs, resume=False) as folder:
-        folder.append(0, {"outcome": "reached"}, {})
+        folder.append(Answer(0, {"outcome": "reached"}, {}))
     model = place / "mine" / "aerosonde.xml"
     model.write_text(model.read_text() + "<!-- other -->\n")
     assert sweep(place, "--resume") == 2
@@ -575,23 +578,16 @@ def test_recordings_are_kept_of_all_of_failures_or_of_none(place: Path, which: s
     )
     # In the second case there is no time to get there.
     text = text.replace("  environment.wind.speed_mps: [0, 5]", "  mission.time_limit_s: [900, 5]")
-    (place / "campaign.yaml").write_text(f"{text}recordings: {which}\n")
+    (place / "campaign.yaml").write_text(f"{text}recordings: {which}\noptimum: false\n")
     assert sweep(place, "--workers", "1") == 0
     rows = rows_of(place / "out")
+    assert {(row["optimum_m"], row["length_ratio"]) for row in rows} == {(None, None)}
     assert [row["outcome"] for row in rows] == ["reached", "timeout"], "no failure of the sweep"
     folders = {int(path.name): path for path in (place / "out").glob("runs/*")}
     assert set(folders) == kept
     for number, folder in folders.items():
         assert load_run(folder).metrics["digest"] == rows[number]["digest"]
         assert (folder / "flight.rrd").stat().st_size > 10_000
-
-
-@pytest.mark.flights
-def test_the_optimum_can_be_left_out(place: Path) -> None:
-    text = CAMPAIGN.replace("draws: 2", "draws: 1\noptimum: false").replace("[0, 5]", "[5]")
-    (place / "campaign.yaml").write_text(text)
-    assert sweep(place, "--workers", "1") == 0
-    assert {(row["optimum_m"], row["length_ratio"]) for row in rows_of(place / "out")} == {(None, None)}
 
 
 FLIGHTS_IN_ONE_PROCESS = """

@@ -91,6 +91,26 @@ def test_a_claim_is_shown_and_a_second_certificate_needs_resume(
     assert {**again, "command": ""} == {**first, "command": ""}
 
 
+def test_more_days_go_on_with_those_that_were_flown_and_have_bounds_that_allow_it(
+    flown: dict[str, Any], place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whoever raises the number has seen what came out: no bound for a number that was fixed beforehand holds then."""
+    words = ("--vary", LIMITS_S, "--workers", "2", "--runs")
+    assert certify(place, *words, "4", out="grown")[1]["runs"] == 4
+    _, grown = certify(place, *words, "10", "--resume", out="grown")
+    tables = [(place / out / "results.parquet").read_bytes() for out in ("out", "grown")]
+    assert tables[0] == tables[1]
+    assert (grown["runs"], grown["failing_runs"]) == (10, flown["failing_runs"])
+    assert "--resume raised the number of runs" in grown["method"]
+    assert grown["probability_lower"] < flown["probability_lower"]
+    assert flown["probability_upper"] < grown["probability_upper"]
+    assert certify(place, *words, "10", "--resume", out="grown")[1]["method"] == grown["method"], (
+        "it stays so"
+    )
+    assert certify(place, *words, "4", "--resume", out="grown")[0] == 2
+    assert "campaign.draws was 10, is 4" in capsys.readouterr().err
+
+
 def test_a_given_path_is_certified_as_given(tmp_path: Path) -> None:
     found = wayproof.certify(
         [(0, 0), (2000, 0), (2000, 1500)],

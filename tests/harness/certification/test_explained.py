@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from harness.certification.explained import differing, explained
+from harness.certification.certification import differing, explained
 
 RATES = np.array([0.05, 0.1, 0.3, 0.55])
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.falsify.search import Search, Values, Vary
+from harness.falsify.breaking_point import Search, Values, Vary
 from harness.files.strict_yaml import InputError
 from tests.examples import examples
 

@@ -15,7 +15,7 @@ import rerun as rr
 from rerun.experimental import ViewerClient
 
 from harness.analysis.metrics import metrics
-from harness.campaign.table import recordings_of
+from harness.campaign.results import recordings_of
 from harness.cli.app import main
 from harness.flight.record import Flight, Outcome
 from harness.recording.catalog import catalog
