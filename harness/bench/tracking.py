@@ -112,12 +112,7 @@ def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
 def fly_course(
     frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Route, guidance: str = DEFAULT_KIND
 ) -> Tracking:
-    """Flies a route from its start to its end, at a true airspeed under a guidance law at its defaults.
-
-    Raises:
-        AircraftError: the aircraft cannot start in this air.
-        ArithmeticError: control is lost on the way; the message says how.
-    """
+    """Flies a route at a true airspeed under a law at its defaults; ArithmeticError says how control is lost."""
     from aircraft import trials  # loads JSBSim
 
     law = guidance_kinds()[guidance].law(frame.guidance_limits(airspeed_mps))
@@ -157,15 +152,12 @@ def bench_tracking(
     progress: Callable[[int, int, str], None] | None = None,
     guidance: str = DEFAULT_KIND,
 ) -> dict[str, Any]:
-    """Flies every case.
+    """Flies every case; AircraftError if the aircraft cannot be flown in one of them.
 
     Returns:
         `aircraft`, `guidance`, `airspeed_mps`, `seeds`, and `cases`: for each its name, the figures of `Tracking`,
         worst over the seeds, its `limits` likewise (None where nothing is promised), whether they are `kept`, and how
         control was `lost` (None where it was not): then the figures are None.
-
-    Raises:
-        AircraftError: the aircraft cannot be flown in one of the cases.
     """
     factor = LIMIT_FACTORS.get(name) if guidance == DEFAULT_KIND else None
     rows = []

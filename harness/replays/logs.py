@@ -44,11 +44,7 @@ class Series(NamedTuple):
 
 
 def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list[str]]:
-    """Columns of `harness.replays.flown` from a log whose ending is in `READERS`, in a plane, and notes on it.
-
-    Raises:
-        InputError: the file cannot be read, or holds no track; or a package is missing.
-    """
+    """Columns of `flown` from a log, in a plane, and notes on it; InputError if it has no track or cannot be read."""
     notes: list[str] = []
     with reading(path):
         found = READERS[path.suffix.lower()](path, notes)
@@ -69,11 +65,7 @@ class Command(NamedTuple):
 
 
 def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
-    """The mission that an ArduPilot log has (CMD), the last of each number, and the parameters (PARM).
-
-    Raises:
-        InputError: the log cannot be read, or a package is missing.
-    """
+    """The mission that an ArduPilot log has (CMD), the last of each number, and the parameters (PARM)."""
     commands: dict[int, Command] = {}
     parameters: dict[str, float] = {}
     with reading(path):

@@ -72,11 +72,7 @@ class FlownMission:
 
 
 def read_mission(path: Path) -> FlownMission:
-    """Reads a mission: a JSON with `mission.corners_east_north_m`, or a file that `wayproof check` takes.
-
-    Raises:
-        InputError: it is neither, or a value is not of its kind.
-    """
+    """Reads a JSON with `mission.corners_east_north_m`, or a file that `wayproof check` takes; else InputError."""
     if path.suffix.lower() == ".json":
         text = read_text(path, MAX_JSON_BYTES, "a mission, in JSON")
         if '"mission"' in text and '"Plan"' not in text:
