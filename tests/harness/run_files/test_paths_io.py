@@ -234,7 +234,8 @@ def test_says_where_and_what_is_wrong(name: str, text: str, sentence: str, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("name", "sentence"), [("missing.csv", "no such file; give"), ("folder.csv", "cannot be read")]
+    ("name", "sentence"),
+    [("missing.csv", "no such file; give"), ("folder.csv", "is a folder, not a file; give")],
 )
 def test_says_what_cannot_be_read(name: str, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
