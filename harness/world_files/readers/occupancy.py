@@ -67,7 +67,7 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     if not isinstance(origin, tuple) or len(origin) not in (2, 3) or not _are_numbers(origin):
         raise WorldFileError("has an origin that is not [x, y, yaw]")
     greys = _greys(path.parent / keys["image"])
-    share = greys if keys.get("negate", 0) else 1.0 - greys
+    share = np.abs(greys - (not keys.get("negate", 0)))
     solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
     # The lower left corner is given, and the map is turned counter-clockwise about it by `yaw` radians.
     x, y, yaw = (*origin, 0.0)[:3]
