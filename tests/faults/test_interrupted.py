@@ -99,7 +99,7 @@ def test_a_flight_whose_planner_hangs_can_be_broken_off_and_leaves_what_was_flow
     ("shell", "told"),
     [
         (
-            "ulimit -n 24; exec {} sweep {campaign} --workers 2 --out out",
+            "ulimit -n 14; exec {} sweep {campaign} --workers 2 --out out",
             "raise the limit with `ulimit -n 1024`",
         ),
         (
