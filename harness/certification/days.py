@@ -94,7 +94,7 @@ class PathDays(Days):
         `ask`: puts together what the path is flown with, some keys of its scenario replaced.
         `content`: all that the path consists of, as text; a change of it makes other days.
         `command`: words of the command that flies the path, without those that differ between days.
-        `terms`: as `Days` takes them.
+        `terms`: as `Days` takes them, but for the root seed: that is the scenario's.
         """
         self._ask, self._command = ask, command
         self._digest = sha256(content.encode()).hexdigest()
@@ -105,7 +105,12 @@ class PathDays(Days):
             "aircraft": {"model": scenario.aircraft.model},
             "planner": {"kind": "given"},
         }
-        super().__init__(Base(scenario.name, "command line", node_of(keys, COMMAND_LINE)), vary, **terms)
+        super().__init__(
+            Base(scenario.name, "command line", node_of(keys, COMMAND_LINE)),
+            vary,
+            seed=scenario.seed,
+            **terms,
+        )
 
     def _settings(self, number: int) -> list[tuple[str, str]]:
         """The keys that day `number` replaces, and their values as YAML."""
@@ -232,7 +237,8 @@ def _path_days(
     terms: Mapping[str, Any],
 ) -> Days:
     given, others = dict(settings), [each for each in settings if each[0] != "aircraft.model"]
-    model = json.loads(given["aircraft.model"]) if "aircraft.model" in given else DEFAULT_AIRCRAFT
+    named = given.get("aircraft.model", DEFAULT_AIRCRAFT)
+    model = strict_yaml.parse(named, "command line: aircraft.model").plain()
     if "planner.kind" in given:
         raise InputError("wayproof: a planner goes with a scenario; a path is flown as given")
     if isinstance(subject, str | Path):
@@ -252,4 +258,4 @@ def _path_days(
     words = ["wayproof", "check", str(subject), "--aircraft", model]
     words += ["--scenario", str(world)] if world else []
     words += [word for pair in others for word in ("--set", "=".join(pair))]
-    return PathDays(ask, content, words, vary, seed=int(given.get("seed", DEFAULT_SEED)), **terms)
+    return PathDays(ask, content, words, vary, **terms)

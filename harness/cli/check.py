@@ -116,8 +116,7 @@ def check(
 
         content = f"{path.read_bytes().hex()} {differs} {replaced} {world and world.read_text()}"
         again = ["wayproof", "check", str(path), "--aircraft", aircraft]
-        seed = check.scenario.seed
-        drawn = PathDays(on_day, content, again, {}, claim="as-given", seed=seed, most=days, band=True)
+        drawn = PathDays(on_day, content, again, {}, claim="as-given", most=days, band=True)
         _fly_days(drawn, folder, silent=quiet or as_json)
     return 0 if metrics["check"]["ok"] else FAILED
 

@@ -159,6 +159,21 @@ def test_who_flies_a_path_is_told_where_nobody_was_named(
     assert "no --aircraft: the path is flown by the aerosonde" in capsys.readouterr().err
 
 
+def test_keys_of_a_path_are_read_as_those_of_a_scenario(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "path.csv").write_text("east_m,north_m\n0,0\n400,0\n")
+    words = ["certify", str(tmp_path / "path.csv"), "--runs", "1", "--workers", "1", "--quiet"]
+    for key, told in (("seed=abc", "seed: is the text 'abc'"), ("aircraft.model=[1]", "aircraft.model: ")):
+        assert main([*words, "--set", key, "--out", str(tmp_path / "none")]) == 2
+        assert told in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
+    keys = ["--set", "aircraft.model=ultrastick25e", "--set", "seed=7"]
+    assert main([*words, *keys, "--out", str(tmp_path / "out")]) == 1
+    certificate = json.loads((tmp_path / "out" / "certificate.json").read_text())
+    assert (certificate["aircraft"], certificate["seed"]) == ("ultrastick25e", 7)
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
