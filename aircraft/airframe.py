@@ -73,9 +73,9 @@ class AirframeEntry:
     cruise_mps: float | None = None  # default true airspeed; None: from the speeds that the model trims at
     verified: bool = False  # flown against the tracking figures of the tests
     figures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
-    """Of `FIGURES`, in place of what the survey makes of the model."""
+    """Values of some `FIGURES`, by name; they replace what the survey measures."""
     gains: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
-    """In place of derived ones, by field of `Gains`."""
+    """Gains that replace derived ones, by field of `Gains`."""
     actuators: Actuators = field(default_factory=Actuators)
     autopilot: AutopilotKeys = DERIVED
 
@@ -107,7 +107,7 @@ class Airframe:
 
     @staticmethod
     def of(entry: AirframeEntry, files: ModelFiles, measured: Mapping[str, Any]) -> Airframe:
-        """The airframe of an entry and what was measured of its model: by attribute, as JSON has it."""
+        """The airframe of an entry; `measured` holds, by attribute, what the survey found, as JSON keeps it."""
         low, high = measured["airspeed_range_mps"]
         given = {
             "airspeed_range_mps": (low, high),

@@ -117,7 +117,7 @@ def derivatives(
     alpha_rad: float,
     qbar_psf: float,
 ) -> Derivatives:
-    """Picks them from a linear model x_dot = A x + B u with FGLinearization's names, propeller speeds as settled."""
+    """Takes the derivatives from a linear model x_dot = A x + B u with FGLinearization's names, propellers settled."""
     fast = [i for i, state in enumerate(states) if state.lower().startswith("rpm")]
     slow = [i for i in range(len(states)) if i not in fast]
     a, b = system[np.ix_(slow, slow)], control[slow]

@@ -34,10 +34,10 @@ STATE_PROPERTIES = (
     "fcs/yaw-trim-cmd-norm",
     "aero/alpha-rad",
 )
-"""Read for `AircraftState`, in this order. JSBSim writes the unit into the name: fps is ft/s."""
+"""Properties of JSBSim that `AircraftState` is made of, in this order. The names end in the unit: fps is ft/s."""
 COMMAND_PROPERTIES = ("wayproof/roll-cmd-rad", "wayproof/altitude-cmd-ft", "wayproof/airspeed-cmd-fps")
 WIND_PROPERTIES = ("atmosphere/wind-east-fps", "atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
-"""The direction that the wind blows towards."""
+"""Velocity of the wind, by the direction that it blows towards."""
 TURBULENCE_TYPE = {"milspec": 3.0, "tustin": 4.0}
 TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}
 GROUND_FT = 2.0 / FOOT_M

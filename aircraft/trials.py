@@ -208,7 +208,10 @@ def steepest_level_bank_deg(frame: Airframe, speed: float) -> float:
 
 
 def farthest(keeps: Callable[[float], bool], good: float, end: float, tolerance: float) -> float:
-    """The last value that is kept on the way from one that is to an end, by halving, to a tolerance."""
+    """The value furthest from `good` towards `end` that `keeps` accepts, by bisection, to a tolerance.
+
+    `good` is known to be accepted.
+    """
     if keeps(end):
         return end
     while abs(end - good) > tolerance:

@@ -25,19 +25,19 @@ FEW_CONTRADICTIONS: Final = 2
 CONTRADICTED: Final = "plans contradict each other"
 """Kind of the finding that `contradictions_s` are many."""
 BANKED_DEG: Final = 10.0
-"""A bank command counts as to one side from this angle on."""
+"""A bank command of at least this angle counts as a bank to one side."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One finding."""
+    """One thing that happened in a flight and that its outcome does not say."""
 
     kind: str
     """`plan ended`, `planner slower than the scans` or `plans contradict each other`."""
     time_s: float
-    """Simulated time at which it was so first."""
+    """Simulated time at which it happened for the first time."""
     text: str
-    """A clause with the figures."""
+    """What happened, in one clause with its figures."""
 
 
 def findings(flight: Flight, limits: FlightLimits) -> tuple[Finding, ...]:

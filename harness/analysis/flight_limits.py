@@ -10,9 +10,9 @@ from harness.flight.record import FloatArray
 from harness.run_files.given_path import CutCorner
 
 SPEED_S = 20.0
-"""Airspeed is averaged over this, so that it is what the engine can hold and not what a gust adds."""
+"""The airspeed error is averaged over this time, so that a gust does not count."""
 LOAD_S = 1.0
-"""Load factor is averaged over this, so that it is that of the manoeuvre and not that of a gust."""
+"""The load factor is averaged over this time, so that a gust does not count."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class FlightLimits:
     """What a flight is measured against."""
 
     altitude_m: float
-    """To be held, above mean sea level."""
+    """Altitude to be held, above mean sea level."""
     clearance_m: float
     """Wanted distance from every obstacle edge."""
     bank_limit_rad: float
@@ -34,7 +34,7 @@ class FlightLimits:
     horizon_m: float = 0.0
     """How far obstacles have to be seen, so that a turn along a wall straight ahead keeps the clearance."""
     no_wind: bool = False
-    """The air has no mean wind and no gust; then what the track seems to show of one is turbulence."""
+    """True if the air has neither mean wind nor gusts: a wind that is estimated from the track is then turbulence."""
     scan_period_s: float = math.inf
     compute_latency_s: float = 0.0
     """A plan takes effect this much later than the scan that it was made from."""
@@ -43,12 +43,12 @@ class FlightLimits:
     max_airspeed_error_mps: float = math.inf
     max_load_factor: float = math.inf
     navigation_margin_m: float = 0.0
-    """What the planner keeps from obstacles beyond the clearance, for the navigation error; the cross-track error may
-    be larger by so much."""
+    """Distance that plans keep from obstacles beyond the clearance, for the navigation error. The limit of the
+    cross-track error is larger by it."""
 
     @property
     def cross_track_threshold_m(self) -> float:
-        """What the cross-track error may be."""
+        """Largest cross-track error of a trackable leg."""
         return self.max_cross_track_m + self.navigation_margin_m
 
 
@@ -61,16 +61,16 @@ class AsGiven:
     deviation_m: FloatArray
     """(n,) distance between the track and the path as given."""
     allowed_m: FloatArray
-    """(n,) what it may be."""
+    """(n,) largest deviation that is allowed there."""
     altitude_m: FloatArray
-    """(n,) altitude that the path has there."""
+    """(n,) altitude of the path there."""
     climb_mps: FloatArray
-    """(n,) climb that it asks for there, negative for a descent."""
+    """(n,) climb rate of the path there at the commanded airspeed, negative for a descent."""
     fastest_mps: FloatArray
     """(n, 2) fastest climb and descent of the aircraft at its airspeed there."""
     airspeed_mps: FloatArray
     """(n,) true airspeed that was commanded there."""
     unheld_mps: FloatArray | float = 0.0
-    """(n,) by how much that is beyond the airspeeds that the aircraft holds."""
+    """(n,) how far the commanded airspeed lies outside the range of level flight."""
     believed_off_m: FloatArray | None = None
     """(n,) distance of the believed position from the path; None where navigation is perfect."""

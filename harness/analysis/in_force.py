@@ -32,10 +32,10 @@ class InForce:
     commanded_mps: FloatArray
     """(n,) true airspeed that was commanded."""
     wind_mps: FloatArray
-    """(n, 2) wind towards east and north, averaged over `WIND_S`. Sideslip is taken to be zero."""
+    """(n, 2) velocity of the wind, east and north, averaged over `WIND_S`; sideslip is taken to be zero."""
     bank_limit_rad: float
     roll_rate_radps: float
-    """Fastest change of the bank."""
+    """Fastest change of the bank that may be commanded."""
 
     @classmethod
     def of(cls, track: Track, limits: FlightLimits, commanded_mps: FloatArray | None = None) -> InForce:
@@ -67,9 +67,9 @@ class Demand:
     calm: float
     """Largest lateral acceleration, in calm air, over g tan(bank limit)."""
     windy: float
-    """The same in the wind there."""
+    """Largest lateral acceleration, in the wind there, over g tan(bank limit)."""
     roll_rate: float
-    """Largest roll rate over the one in force."""
+    """Largest roll rate over the roll rate limit."""
 
 
 def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand:

@@ -24,39 +24,39 @@ class Metric:
     """One figure of a flight."""
 
     name: str
-    """As a column of a comparison and as a property of a recording, with its unit."""
+    """Its column in a comparison and its property in a recording; ends in its unit."""
     title: str = ""
-    """What people are shown, without the unit; empty for one that only programs are shown."""
+    """Its name for people, without the unit; empty for a figure that only programs read."""
     unit: str = ""
-    """After `factor`; empty without one."""
+    """Unit of the value shown, that is after `factor`; empty for a figure without a unit."""
     short: str = ""
-    """The same in a few letters, for a terminal; empty for one that is in no table for people."""
+    """Heading of its column on a terminal, a few letters; empty for a figure that stands in no table for people."""
     path: str = ""
     """Its place in `metrics.json`, dots between the levels, and its column in a campaign; default: `name`."""
     kind: Literal["number", "int", "bool", "text"] = "number"
-    """What it is."""
+    """Type of the value."""
     factor: float = 1.0
-    """From the value in the file to the one shown."""
+    """The value in the file times this is the value shown."""
     digits: int | None = None
-    """Decimals shown; None: three or four digits in all."""
+    """Decimals of the value shown; None: three or four significant digits."""
     worse: Literal["more", "less", ""] = ""
-    """Whether more or less of it is worse; empty where neither is."""
+    """Whether a larger or a smaller value is worse; empty where neither is."""
     hint: str = ""
-    """What it means, where the title does not say it."""
+    """What the figure means, where the title does not say it."""
     rare: bool = False
-    """A table for people has it only where any flight has it."""
+    """A table for people has this column only if at least one flight has a value."""
     derived: bool = False
-    """It takes more than `metrics.json`: the world, or the aircraft."""
+    """The figure is computed from the world or the aircraft too, not from `metrics.json` alone."""
     timed: bool = False
-    """It depends on the machine's speed: not among the results of a campaign."""
+    """The figure depends on the speed of the machine, and so is not among the results of a campaign."""
     recorded: bool = False
-    """It is among the properties of a recording."""
+    """The figure is a property of recordings."""
     heading: str = ""
-    """Of its column in the viewer's table of runs; empty where it is not shown there."""
+    """Heading of its column in the viewer's table of runs; empty for a figure that is not shown there."""
     get: Callable[[Mapping[str, Any]], Any] | None = None
-    """Looks it up in the content of `metrics.json`; default: at `path`."""
+    """Takes the value from the content of `metrics.json`; None: the value at `path`."""
     of: Callable[[Flight, FlightLimits], Any] | None = None
-    """Computes it from a flight and its limits; None for one that `harness.analysis.metrics` computes."""
+    """Computes the value from a flight and its limits; None for a figure that `harness.analysis.metrics` computes."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "path", self.path or self.name)

@@ -25,21 +25,26 @@ SUPPORT = 0.5
 """Where returns may be false, one is believed only if a ray beside it met something as far, but for this share of
 the clearance: a false return beside a wall seldom lies so near to its range."""
 DETAIL = ((5.0, 4), (2.0, 16))
-"""Outlines are kept in detail up to so many clearances away, in so many cells to one along a side."""
-SAME_PLACE = 1.0 / 4.0
-"""Hits that are seen from where others were seen, but for this share of the least range, tell little more,"""
-SAME_VIEW = 1.0 / 64.0
-"""nor further away, but for this share of the sensing range;"""
-FOLLOWED = 0.75
-"""this share of both where somebody has followed the rays already, and"""
-ASTIR = 0.25
-"""this one while something moves, comes or goes."""
-PLACED_ANEW, NEARER, OFF = 8.0, 0.7, 0.01
-"""Where poses err, an edge is moved that is within so many clearances, seen from this share of the least range at which
-it was seen before, and off by this share of the clearance."""
-LOOK_THROUGH_EVERY, SOMETHING_GOES = 12, 2
-"""Every so many scans, from the first on, the points in range are asked whether they were looked through; the second
-number while some were the last time."""
+"""Pairs (reach in clearances, number): within the reach of the aircraft, the ends of outlines are kept in finer cells,
+this number of them along the side of a usual cell."""
+MOVED_OF_LEAST_RANGE = 1.0 / 4.0
+"""A scan is counted once the aircraft has moved by this share of the least range since the last counted scan."""
+MOVED_OF_SENSING_RANGE = 1.0 / 64.0
+"""A scan is counted once the aircraft has moved by this share of the sensing range, however far away obstacles are."""
+RANGES_READ = 0.75
+"""The way between two counted scans is shorter by this factor if the map of free space has read the scan's ranges."""
+SOMETHING_MOVES = 0.25
+"""The way between two counted scans is shorter by this factor while something moves, appears or vanishes."""
+PLACED_ANEW = 8.0
+"""If the poses of scans err, edges within this many clearances of the aircraft are moved to where they are seen now."""
+NEARER = 0.7
+"""An edge is moved only if it is seen from less than this share of the least range at which it was seen before."""
+OFF = 0.01
+"""An edge is moved only if it is off by more than this share of the clearance."""
+LOOK_THROUGH_EVERY = 12
+"""Every so many scans the map looks for points that the beams went past."""
+LOOK_THROUGH_AGAIN = 2
+"""Every so many scans the map looks for such points while it found some the last time."""
 
 
 class ObstacleMap(EdgePoints):
@@ -78,7 +83,7 @@ class ObstacleMap(EdgePoints):
         self._scans = 0
         self._all_stands = True  # no point was looked through the last time
         self._unconfirmed = False  # a cell was hit in the last scan taken in, and has yet to be believed
-        self._same_view = max(SAME_VIEW * range_m, self._cell)
+        self._same_view = max(MOVED_OF_SENSING_RANGE * range_m, self._cell)
         self._taken_at, self._taken_nearest = complex(math.inf, math.inf), math.inf
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
@@ -87,15 +92,16 @@ class ObstacleMap(EdgePoints):
         if nearest < math.inf:
             sensor = complex(scan.east_m, scan.north_m)
             moved = abs(sensor - self._taken_at)
-            same = min(SAME_PLACE * nearest, self._same_view)
-            same *= (
-                ASTIR if ignored is not None or not self._all_stands else FOLLOWED if scan.followed else 1.0
-            )
+            same = min(MOVED_OF_LEAST_RANGE * nearest, self._same_view)
+            if ignored is not None or not self._all_stands:
+                same *= SOMETHING_MOVES
+            elif scan.followed:
+                same *= RANGES_READ
             # What is nearer than the way flown explains has only just appeared.
             if not moved < same or nearest < self._taken_nearest - 1.001 * moved or self._unconfirmed:
                 self._taken_at, self._taken_nearest = sensor, nearest
                 self._take_in(scan, nearest, ignored)
-        if not self._scans % (LOOK_THROUGH_EVERY if self._all_stands else SOMETHING_GOES) and self._count:
+        if not self._scans % (LOOK_THROUGH_EVERY if self._all_stands else LOOK_THROUGH_AGAIN) and self._count:
             self._all_stands = not self._look_through(scan)
         self._scans += 1
 

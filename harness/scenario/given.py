@@ -117,11 +117,11 @@ def _maker(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], An
     plain = [each for each in parameters.values() if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
     needed = [each.name for each in plain if each.default is each.empty]
     if len(needed) > 1:
-        told = f"{_name(given)} needs {', '.join(needed)}; must need the {part.told} alone, or nothing"
+        told = f"{_name(given)} needs {', '.join(needed)}; must need the {part.factory_parameter} alone, or nothing"
         raise ValueError(told)
 
     def make(_keys: Any, told: Any) -> Any:
-        keys = {part.told: told} if part.told in parameters and not needed else {}
+        keys = {part.factory_parameter: told} if part.factory_parameter in parameters and not needed else {}
         made = given(told) if needed else given(**keys)
         if not _is_part(made, part):
             lacks = f"which has no method {' and '.join(part.methods)}"

@@ -30,14 +30,14 @@ class LoopPart:
 
     noun: str
     kind: type[Any]
-    """The type of its kinds."""
+    """Class of the entries under which its implementations are registered."""
     built_in: tuple[Any, ...]
     group: str
-    """Of the entry points."""
+    """Group of the entry points by which other distributions add kinds."""
     methods: tuple[str, ...]
-    """What an object has to have to be such a part."""
-    told: str
-    """The parameter of a factory: what such a part may know."""
+    """Methods that an object must have to be such a part."""
+    factory_parameter: str
+    """Name of the one parameter that a function which makes such a part may have."""
     registered: dict[str, Any] = field(default_factory=dict)
     """The kinds that this process, and no other, knows by name."""
 
