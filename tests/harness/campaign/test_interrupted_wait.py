@@ -21,10 +21,10 @@ FLYING = 3000
 
 
 class Runs:
-    """A campaign of so many runs."""
+    """A campaign of so many runs beside the first, which is over."""
 
     def __len__(self) -> int:
-        return FLYING
+        return FLYING + 1
 
     def job(self, number: int, folder: Path) -> SimpleNamespace:
         return SimpleNamespace(run=number)
