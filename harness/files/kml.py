@@ -33,13 +33,13 @@ class Shape(NamedTuple):
     """A line or a polygon of KML."""
 
     name: str
-    """Of its Placemark, or the Placemark's number."""
+    """Name of its Placemark, or the Placemark's number."""
     mode: str
     """Its altitudeMode; empty where there is none."""
     rings: tuple[tuple[Point, ...], ...]
     """Points of the line; of a polygon those of its outer boundary, then of the inner ones."""
     data: Mapping[str, str]
-    """ExtendedData of its Placemark."""
+    """Names and values of the ExtendedData of its Placemark."""
 
 
 class Kml(NamedTuple):

@@ -30,7 +30,7 @@ TABLES: Final = (".parquet", ".csv")
 
 @dataclass(frozen=True, eq=False)
 class FlownFlight:
-    """What was flown, one row an instant."""
+    """A flown flight, one row for each instant."""
 
     source: Path
     columns: Mapping[str, FloatArray]

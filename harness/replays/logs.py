@@ -19,21 +19,23 @@ from harness.run_files.igc_path import NEEDS_LOGS
 
 MAX_BYTES: Final = 1_000_000_000
 LONGEST_S: Final = 1e7
-"""No flight is longer; where a clock was set meanwhile, times are."""
+"""A log whose times span more than this is damaged or had its clock set in flight."""
 LEAST_ROWS: Final = 2
 FIX_3D: Final = 3
 """`Status` of a receiver with a three-dimensional fix, in DataFlash."""
 ULOG_HEADER: Final = 16
+"""Bytes of a ULog before its first message."""
 ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")
-"""Bytes before the messages of a ULog, and the kinds of those."""
+"""Letters of the kinds of messages in a ULog."""
 DATAFLASH: Final = b"\xa3\x95\x80"
 """What a DataFlash log begins with: a message that describes formats."""
 LAST_PAGE: Final = 528
 """Bytes at the end of a DataFlash log that may hold anything: it is written in pages."""
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
 AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")
+"""Topics of PX4 that have the true airspeed, the better one first."""
 TRUE_AIRSPEED: Final = "true_airspeed_m_s"
-"""Field of these topics of PX4, the better one first."""
+"""Field of these topics that has the true airspeed."""
 
 
 class Series(NamedTuple):

@@ -19,10 +19,11 @@ from harness.replays.logs import Command, logged_mission
 from harness.run_files.path_files import read_path
 
 CRUISE: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}
+"""Parameters of ArduPlane for the cruise airspeed, today's name first, and their units in m/s."""
 BANK: Final = {"ROLL_LIMIT_DEG": 1.0, "LIM_ROLL_CD": 0.01}
-"""Parameters of ArduPlane, today's name before the earlier one, and their units in m/s and degrees."""
+"""Parameters of ArduPlane for the bank limit, today's name first, and their units in degrees."""
 TARGET_RADIUS_M: Final = 10.0
-"""A corner that only `target_index` tells of counts as reached from here: the table does not tell its radius."""
+"""Acceptance radius of corners that are known from a table's `target_index` alone, which has no radius."""
 CORNERS: Final = "two or more pairs [east, north] of numbers in m"
 
 
@@ -61,7 +62,7 @@ class MissionFile(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class FlownMission:
-    """What was to be flown, again and again; None: not known."""
+    """The course that was to be flown lap by lap; a value of None is not known."""
 
     corners_m: FloatArray  # (k, 2) east and north; after the last comes the first
     acceptance_m: float | None = None  # a corner counts as reached from here; None: by the rule of the law

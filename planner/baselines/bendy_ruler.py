@@ -82,7 +82,7 @@ class BendyRuler(Steerer):
         super().__init__(mission, config.lookahead_m, near_m, BEARING_STEP)
 
     def direction(self, pose: Pose, points_m: FloatArray) -> float:
-        """Steps 1 to 4."""
+        """The bearing that steps 1 to 4 of the method choose; without a clear one, that with the largest margin."""
         here, goal = pose[:2], self.mission.goal_m
         to_goal = math.atan2(goal[1] - here[1], goal[0] - here[0])
         first_m = min(self.look_m, math.dist(here, goal))

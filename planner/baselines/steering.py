@@ -1,4 +1,4 @@
-"""The frame of planners that plan anew from what they have seen, and of those whose plan is a direction."""
+"""Base classes of the baselines: `Replanner` keeps or replaces a path, `Steerer` flies a chosen direction."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class Start(NamedTuple):
     """Where a new path leaves the one in effect.
 
     Attributes:
-        pose: there.
-        before: the stretch of the path in effect up to there.
-        left_m: what is left of the path in effect; 0 of none, and of a turn to hold in.
-        cut: something seen has come too near to it.
+        pose: place and direction at which the new path leaves.
+        before: segments of the path in effect up to that place.
+        left_m: length that is left of the path in effect; 0 without one, and in a turn to hold in.
+        cut: whether an edge point lies nearer to the path in effect than the clearance.
     """
 
     pose: Pose
@@ -33,10 +33,10 @@ class Start(NamedTuple):
 
 
 class Replanner(ABC):
-    """Keeps its path until something seen comes nearer to it than the clearance, or it is due."""
+    """A planner that keeps its path until an edge point comes nearer to it than the clearance, or a new one is due."""
 
     every_s = 1.0
-    """A path this old is due."""
+    """A new path is due when the one in effect is this old."""
 
     def __init__(self, mission: Mission) -> None:
         self.mission = mission
@@ -44,7 +44,7 @@ class Replanner(ABC):
         self._planned_s = -math.inf
 
     def plan(self, request: PlanRequest) -> Plan:
-        """The path in effect, or a new one."""
+        """Keeps the path in effect, or plans a new one."""
         self.memory.take_in(request.seen)
         path, at_m = request.flown.path if request.flown else None, request.arc_length_m
         left_m, cut = 0.0, False
@@ -57,15 +57,15 @@ class Replanner(ABC):
         return self.replanned(request, Start(*branch_off(request, self.mission), left_m, cut))
 
     def due(self, path: Path, left_m: float, age_s: float) -> bool:
-        """Whether to plan anew although nothing cuts the path in effect."""
+        """Whether a new path is planned although no edge point cuts the one in effect."""
         return age_s >= self.every_s
 
     @abstractmethod
     def replanned(self, request: PlanRequest, start: Start) -> Plan:
-        """The answer where a new path is wanted."""
+        """Plans a new path that begins at `start`."""
 
     def stuck(self, why: str, request: PlanRequest) -> Plan:
-        """The answer where there is none: a turn to hold in."""
+        """The answer if no new path is found: a turn to hold in."""
         return stuck(why, request, self.mission, self.memory.points_m)
 
 
@@ -73,10 +73,10 @@ class Steerer(Replanner):
     """A planner that chooses a direction, and has no path of its own: a turn onto it and straight on.
 
     Args:
-        mission: of the flight.
-        look_m: how far the path leads.
-        near_m: edge points so near to the aircraft are looked at.
-        step_rad: directions are so far apart.
+        mission: the mission of the flight.
+        look_m: length of the path in the chosen direction.
+        near_m: only edge points within this distance of the aircraft count.
+        step_rad: angle between two neighbouring directions.
     """
 
     def __init__(self, mission: Mission, look_m: float, near_m: float, step_rad: float) -> None:
@@ -87,14 +87,14 @@ class Steerer(Replanner):
 
     @abstractmethod
     def direction(self, pose: Pose, points_m: FloatArray) -> float | None:
-        """The best direction among (m, 2) edge points; None where none is free."""
+        """The direction to fly, rad counter-clockwise from east, among (m, 2) edge points; None if none is free."""
 
     def picture(self, request: PlanRequest) -> PlanPicture:
-        """The guide vector and how far is looked."""
+        """The guide vector and the length of the path."""
         return PlanPicture(np.array([request.position_m, self.mission.goal_m]), self.look_m)
 
     def replanned(self, request: PlanRequest, start: Start) -> Plan:
-        """A new path where the direction is another one, or the path in effect is cut or short."""
+        """A new path if another direction is chosen, or if the path in effect is cut or short."""
         points = self.memory.points_m
         near = points[np.hypot(*(points - start.pose[:2]).T) < self._near_m]
         last, self.chosen = self.chosen, self.direction(start.pose, near)
@@ -108,7 +108,7 @@ class Steerer(Replanner):
         return self._steered(request, start, ahead(start.pose[:2], self.chosen, look_m))
 
     def _steered(self, request: PlanRequest, start: Start, target: Point) -> Plan:
-        """The turn towards a place at the turn radius and straight on, as far as the area goes."""
+        """A turn at the turn radius towards a place, then straight on, up to the border of the area at most."""
         turn = turn_onto(start.pose, target, self.mission.turn_radius_m)
         if turn is None:
             return Plan(PlanStatus.NO_PATH, "the goal is nearer than a turn")
@@ -139,7 +139,7 @@ def off(a: ArrayLike, b: ArrayLike) -> FloatArray:
 
 
 def _to_border_m(straight: Segment, bounds_m: tuple[float, float, float, float]) -> float:
-    """How far a straight line stays inside the area; negative where it begins outside."""
+    """Length of a straight line inside the area; negative if it begins outside."""
     x, y, ux, uy, _, _ = straight
     xmin, ymin, xmax, ymax = bounds_m
     room = [math.inf]

@@ -89,12 +89,12 @@ class VfhPlus(Steerer):
         self._masked = self._blocked
 
     def direction(self, pose: Pose, points_m: FloatArray) -> float | None:
-        """Steps 1 to 4."""
+        """The candidate direction with the least cost, steps 1 to 4 of the method; None if all are blocked."""
         self._masked = self._mask(pose, points_m, self._binary(pose, points_m))
         return self._best(pose, self._masked)
 
     def picture(self, request: PlanRequest) -> PlanPicture:
-        """The free sectors as well."""
+        """The guide vector, the window, and the free sectors."""
         edges = self._bearings[~self._masked, None] + 0.5 * self._width_rad * np.array((-1.0, 1.0))
         sectors = np.stack((np.cos(edges), np.sin(edges)), axis=2).reshape(-1, 4)
         return replace(super().picture(request), sectors=sectors)

@@ -31,9 +31,9 @@ class Fence:
     """An area to stay inside of, or out of; its places are east and north in metres, or degrees while it is read."""
 
     name: str
-    """Where in its file it stands."""
+    """Its place in its file, for messages."""
     inclusion: bool
-    """To stay inside of; else to stay out of."""
+    """Whether the aircraft must stay inside; else it must stay out."""
     rings: tuple[tuple[Place, ...], ...] = ()
     """The outer ring and its holes; empty for a circle."""
     center: Place | None = None
@@ -52,7 +52,7 @@ class Fence:
 
     @cached_property
     def area(self) -> Geometry:
-        """What it encloses."""
+        """The polygon or disc that it encloses."""
         import shapely
 
         if self.center is not None:

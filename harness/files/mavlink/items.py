@@ -30,17 +30,17 @@ class Item:
     """One mission item."""
 
     place: str
-    """Where it stands, for faults: file, line or key."""
+    """Its place for messages: file, and line or key."""
     number: int
     """Its number in the mission."""
     command: int
-    """MAV_CMD."""
+    """Its command, a number of MAV_CMD."""
     frame: int
-    """MAV_FRAME."""
+    """Its frame, a number of MAV_FRAME."""
     params: tuple[float, ...]
-    """The seven parameters; the last three are latitude, longitude, altitude. What is left to the autopilot is 0."""
+    """Its seven parameters, the last three latitude, longitude, altitude; 0 for one that is left to the autopilot."""
     autocontinue_off: bool = False
-    """The file says that the mission waits after it."""
+    """Whether the autopilot waits after this item to be told to go on."""
 
     def __post_init__(self) -> None:
         for name, value, most in (("command", self.command, 65_535), ("frame", self.frame, 255)):
@@ -55,7 +55,7 @@ class Item:
 
     @property
     def above(self) -> str:
-        """What its altitude is above; an InputError says that its frame is not one of those."""
+        """The datum of its altitude; an InputError says that its frame has none."""
         if self.frame not in FRAMES:
             raise InputError(
                 f"{self.place}: item {self.number} has the frame {self.frame}; must be one of "
