@@ -232,6 +232,8 @@ def fly_along(
         guidance=guidance,
         sensor=None,
         planner=GivenPath(plan.way.waypoints_m, path),
+        # A given path begins where it does, however far from there the aircraft believes to be.
+        mission=replace(loop.mission, tracking_error_m=math.inf),
         vertical=AltitudeGuidance(plan.profile, plan.frame.gains.altitude, plan.climb_mps),
         termination=PathEnd(where, route_length(route), loop.mission.goal_radius_m, limit_s),
     )

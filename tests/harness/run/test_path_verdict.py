@@ -71,6 +71,15 @@ def test_a_corner_that_is_cut_is_not_called_a_navigation_error() -> None:
     assert metrics["check"]["worst"]["off_m"] == pytest.approx((math.sqrt(2.0) - 1.0) * LEAST_M, abs=4.0)
 
 
+def test_a_path_is_flown_beside_where_it_is_by_a_position_that_is_wrong_from_the_start() -> None:
+    """The believed position is 60 m north of the true one: so far south of the path it is flown, right to 1 m."""
+    settings = {"navigation": "{kind: rtk, position_bias_m: [0, 60]}"}
+    metrics, track = flown([(0.0, 0.0), (1500.0, 0.0)], settings=settings)
+    assert np.median(track[:, 1]) == pytest.approx(-60.0, abs=1.0)
+    assert (metrics["outcome"], metrics["trackability"][0]["cause"]) == ("reached", "navigation error")
+    assert metrics["total_system_error_m"]["max"] == pytest.approx(float(-track[:, 1].min()), abs=0.01)
+
+
 def test_a_circle_tighter_than_the_bank_limit_gives_is_no_and_a_near_yes_can_be_seen() -> None:
     """60 m at 25 m/s, where the bank limit of 45 deg gives 63.7 m."""
     angle = np.linspace(0.0, math.tau, 200)
