@@ -42,6 +42,8 @@ FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 """Throttle from which on, and down to which, it is at a stop."""
 NAVIGATION_ERROR = "navigation error"
 """Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
+SURE_SIGMAS = 3.0
+"""An airspeed that is off by no more sigmas of its measurement, the throttle at no stop, is believed to be right."""
 PLAN_ENDED = "plan ended"
 """Cause where the aircraft flew on beyond the end of its plan by more than it may be off it."""
 FINDINGS: Mapping[str, str] = {
@@ -70,7 +72,8 @@ FINDINGS: Mapping[str, str] = {
     "descent too steep": "the aircraft was off its altitude, airspeed or load factor, on a path that sinks faster than "
     "its survey, or idle throttle at that height and speed, allows, or off its altitude at such a corner of it",
     NAVIGATION_ERROR: "where the true position was furthest off, the believed one was within the limits, or the "
-    "larger part of the error lay between the two",
+    "larger part of the error lay between the two; or the airspeed was off by no more than 3 "
+    "`navigation.airspeed_sigma_mps`, with the throttle at no stop",
     "lost control": "the flight ended with loss of control",
     "tracking error": "none of the other causes",
 }
@@ -105,8 +108,9 @@ def cross_track_cause(
         seen_late = limits.sensor_range_m < limits.horizon_m
         near = lead.clearance_m.min() <= limits.sensor_range_m
         return "sensor horizon" if seen_late and near else "turn radius too tight"
-    if abs(float((lead.airspeed_mps - force.commanded_mps).mean())) > limits.max_airspeed_error_mps:
-        return speed_cause(lead, limits)
+    fast_mps = float((lead.airspeed_mps - force.commanded_mps).mean())
+    if abs(fast_mps) > limits.max_airspeed_error_mps:
+        return speed_cause(lead, fast_mps, limits)
     if asked.windy > ROUNDING:
         return "wind drift"
     return _at_a_limit(lead, limits, force, asked.roll_rate > ROUNDING)
@@ -140,9 +144,12 @@ def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven
     return limit or "tracking error"
 
 
-def speed_cause(lead: Track, limits: FlightLimits) -> str:
-    """Why the airspeed is off, over the rows of which it is the mean."""
-    return _vertical_limit(lead, limits) or "speed or throttle saturation"
+def speed_cause(lead: Track, fast_mps: float, limits: FlightLimits) -> str:
+    """Why the airspeed is too high by this (negative: too low), over the rows of which it is the mean."""
+    limit = _vertical_limit(lead, limits)
+    if limit is None and abs(fast_mps) <= SURE_SIGMAS * limits.airspeed_sigma_mps:
+        limit = NAVIGATION_ERROR if _throttle_share(lead) < SATURATED_SHARE else None
+    return limit or "speed or throttle saturation"
 
 
 def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) -> str | None:

@@ -42,6 +42,8 @@ class FlightLimits:
     max_altitude_error_m: float = math.inf
     max_airspeed_error_mps: float = math.inf
     max_load_factor: float = math.inf
+    airspeed_sigma_mps: float = 0.0
+    """1 sigma of the error with which the aircraft knows its airspeed."""
     navigation_margin_m: float = 0.0
     """Distance that plans keep from obstacles beyond the clearance, for the navigation error. The limit of the
     cross-track error is larger by it."""

@@ -127,7 +127,8 @@ class _Flown:
         rows = slice(first, last + 1)
         high = leg.up_m - (given.altitude_m[rows] if given else limits.altitude_m)
         fast = leg.airspeed_mps - (given.airspeed_mps[rows] if given else limits.airspeed_mps)
-        off, slow = np.nan_to_num(np.abs(leg.cross_track_m)), np.abs(averaged(fast, leg, SPEED_S))
+        mean_fast = averaged(fast, leg, SPEED_S)
+        off, slow = np.nan_to_num(np.abs(leg.cross_track_m)), np.abs(mean_fast)
         loads = averaged(leg.load_factor, leg, LOAD_S)
         cause = None
         if given is None and off.max() > limits.cross_track_threshold_m:
@@ -135,8 +136,8 @@ class _Flown:
         elif loads.max() > limits.max_load_factor:
             cause = self._steep(first + int(loads.argmax()), len(leg) - len(loads) + 1) or "load factor"
         elif slow.max() > limits.max_airspeed_error_mps:
-            begins = first + int(slow.argmax())
-            cause = self._speed_cause(begins, len(leg) - len(slow) + 1)
+            at = int(slow.argmax())
+            cause = self._speed_cause(first + at, len(leg) - len(slow) + 1, float(mean_fast[at]))
         elif np.abs(high).max() > limits.max_altitude_error_m:
             cause = self._altitude_cause(leg, high, first)
         return Leg(
@@ -169,15 +170,15 @@ class _Flown:
             return NAVIGATION_ERROR
         return altitude_cause(self.track, first + row, self.limits, self.given)
 
-    def _speed_cause(self, first: int, rows: int) -> str:
-        """Why the airspeed is off, over the rows of which it is the mean."""
+    def _speed_cause(self, first: int, rows: int, fast_mps: float) -> str:
+        """Why the airspeed is too high by this, over the rows of which it is the mean."""
         steep = self._steep(first, rows)
         if steep is not None:
             return steep
         unheld_mps = np.broadcast_to(self.given.unheld_mps if self.given else 0.0, len(self.track))
         if unheld_mps[first : first + rows].mean() > self.limits.max_airspeed_error_mps:
             return "speed or throttle saturation"
-        return speed_cause(self.track.part(first, first + rows), self.limits)
+        return speed_cause(self.track.part(first, first + rows), fast_mps, self.limits)
 
     def _steep(self, first: int, rows: int) -> str | None:
         """Whether the path was too steep over the rows of a mean, or shortly before."""

@@ -130,6 +130,7 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
         max_altitude_error_m=limits.altitude_m,
         max_airspeed_error_mps=limits.airspeed_mps,
         max_load_factor=limits.load_factor,
+        airspeed_sigma_mps=scenario.navigation.airspeed_sigma_mps,
         navigation_margin_m=margin_m if planned else 0.0,
     )
 

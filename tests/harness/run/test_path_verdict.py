@@ -80,6 +80,17 @@ def test_a_path_is_flown_beside_where_it_is_by_a_position_that_is_wrong_from_the
     assert metrics["total_system_error_m"]["max"] == pytest.approx(float(-track[:, 1].min()), abs=0.01)
 
 
+def test_an_airspeed_that_is_measured_wrong_is_an_error_of_navigation() -> None:
+    """Level, with the throttle between its stops, an aircraft keeps the airspeed that it measures at 25 m/s."""
+    settings = {"navigation": "{kind: rtk, airspeed_sigma_mps: 1.5}", "seed": "3"}
+    run = wayproof.check([(0.0, 0.0), (2500.0, 0.0)], airspeed_mps=25.0, settings=settings)
+    throttle, airspeed = (run.track[name].to_numpy()[-200:] for name in ("throttle", "airspeed_mps"))
+    assert 0.05 < throttle.min() < throttle.max() < 0.95
+    assert 2.0 < airspeed.mean() - 25.0 < 4.5  # the limit, and three sigmas
+    leg = run.metrics.to_dict()["trackability"][0]
+    assert (leg["trackable"], leg["cause"]) == (False, "navigation error")
+
+
 def test_a_circle_tighter_than_the_bank_limit_gives_is_no_and_a_near_yes_can_be_seen() -> None:
     """60 m at 25 m/s, where the bank limit of 45 deg gives 63.7 m."""
     angle = np.linspace(0.0, math.tau, 200)
