@@ -19,27 +19,27 @@ from planner.shield.escape import room_m
 from planner.shield.evasion import Threats
 
 BETTER = 0.005
-"""A course that still serves is dropped only for one that is shorter by this share of what is left to fly."""
+"""A course that can still be flown is replaced only by one that is shorter by this share of the length that is left."""
 
 
 class Work(NamedTuple):
-    """How much is searched when a search begins, and each further time that the planner is asked; about us."""
+    """Counted work of a search when it begins, and each further time that the planner is asked; a unit is some 1 us."""
 
     first: float
     more: float
 
 
 WORK_WHILE_SERVING = Work(2000.0, 1000.0)
-"""While the plan in effect serves there is time."""
+"""Work while the plan in effect can still be flown: there is time."""
 
 WORK_WHILE_CUT = Work(2000.0, 1500.0)
-"""The course is cut somewhere ahead: what is flown leads into its turn."""
+"""Work while an edge cuts the course ahead: the plan in effect leads into its turn."""
 
 WORK_WHILE_UNSAFE = Work(6000.0, 6000.0)
-"""No safe plan is flown."""
+"""Work while no safe plan is flown."""
 
 WORK_WHILE_MOVING = Work(12_000.0, 12_000.0)
-"""Something moves: what is found late may be met on the way. Most searches are done within this."""
+"""Work while something moves, when a late plan may meet it. Most searches end within it."""
 
 
 class RollingStep(NamedTuple):

@@ -37,27 +37,34 @@ from planner.geometry.curves import (
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, MapView, Path
 
-DISC, BEYOND = 1.04, 0.5
-"""The certified disc is so many times as large as the turn, for tracking error and rolling in, and reaches beyond it
-by this share of the clearance at the least. With all of the clearance forests become ways round: trees hide each other
-until one is among them."""
+DISC = 1.04
+"""Radius of the certified disc over that of the turn in it, at least: for tracking error and rolling in."""
+
+BEYOND = 0.5
+"""The certified disc reaches beyond its turn by at least this share of the clearance. With all of the clearance the
+aircraft flies round forests: trees hide each other until it is among them."""
 
 MOST_ARC_LENGTHS = 32
+"""A safe turn is looked for at this many arc lengths of a path at most."""
 
 ARC_LENGTHS_AT_ONCE = 4
-"""So many arc lengths are looked at together: mostly one of the first serves."""
+"""Turns at this many arc lengths are tested together: mostly one of the first is free."""
 
-AHEAD_STEP, ASIDE = 0.25, (0.0, 0.5)
-"""Turns about places ahead are looked for at every such share of the turn radius along a path, this share aside."""
+AHEAD_STEP = 0.25
+"""Turns about places ahead are looked for along a path in steps of this share of the turn radius."""
+
+ASIDE = (0.0, 0.5)
+"""Centres of turns about places ahead lie beside the path by these shares of the turn radius."""
 
 STRAIGHT_ON = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
-"""A path is left straight on for so many turn radii: where it bends behind something the view goes straight on."""
+"""A path may be left straight on for so many turn radii: where it bends behind an obstacle, only the space straight
+ahead is in sight."""
 
 SPARSE = 16
-"""One in so many places of a disc is looked at first."""
+"""One in so many places of a disc is tested first: most discs that are not free fail there."""
 
 SIDES = (1.0, -1.0)
-"""Left, right: the sign of the curvature."""
+"""Signs of the curvature of a turn: left, right."""
 
 
 class CertificateBroken(RuntimeError):
@@ -87,9 +94,9 @@ class _Exit(NamedTuple):
     """How a path is left for a full turn: by an arc to the other side, about a place ahead, or straight on.
 
     Attributes:
-        side: of the full turn, 1: left.
-        angle_rad: of the arc, 0: straight on.
-        ahead_m, aside_m: where the centre of the turn lies, seen from where the path is left.
+        side: side of the full turn, 1: left.
+        angle_rad: angle of the arc, 0: straight on.
+        ahead_m, aside_m: centre of the turn, ahead of the place where the path is left and to its left.
     """
 
     side: float
@@ -99,7 +106,7 @@ class _Exit(NamedTuple):
 
     @classmethod
     def about_place_ahead(cls, side: float, share: float, limits: Limits) -> _Exit:
-        """The one whose centre lies aside by a share of the radius: 2 R cos(a) - roll sin(a) = (1 + share) R."""
+        """The exit whose turn centre lies aside by a share of the radius: 2 R cos(a) - roll sin(a) = (1 + share) R."""
         radius, roll = limits.radius_m, 2.0 * limits.roll_m
         angle = math.acos((1.0 + share) * radius / math.hypot(2.0 * radius, roll)) - math.atan2(
             roll, 2.0 * radius
@@ -130,7 +137,7 @@ class Certifier:
         self._disc = _disc(disc_radius_m(radius_m, clearance_m), spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: MapView) -> float:
-        """Arc length up to which a path lies in space seen to be free: that of the first place that does not."""
+        """Arc length up to which a path lies in space that was seen to be free."""
         end = min(path.length_m, self._horizon)
         pieces = max(math.ceil(end / self._spacing), 1)
         free = seen.seen_free(places_along(path, end, pieces))
