@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 INDEX: Final = "campaign.json"
-"""In the folder of a campaign: what is flown."""
+"""File in the folder of a campaign that says what is flown."""
 RUNS: Final = "runs"
-"""Below that: run folders, each called by the number of its run."""
+"""Folder in the folder of a campaign that holds run folders, each named by the number of its run."""
 RESULTS: Final = "results.parquet"
 TIMINGS: Final = "timings.parquet"
 SCHEMA: Final = "wayproof/results/1"
@@ -40,7 +40,7 @@ NAMED: Final = ("planner", "aircraft", "world", "scenario")
 RUN: Final = {name: "int" if name in ("run", "case", "seed") else "text" for name in (
     "run", "case", "scenario", "world", "planner", "aircraft", "seed",
 )}  # fmt: skip
-"""Columns before those of the varied keys, and what they hold."""
+"""The first columns of `results.parquet`, before those of the varied keys, and the type of each."""
 LAW: Final = "guidance.kind"
 """Key of a scenario that names the guidance law."""
 

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
 
 FAILED: Final = 1
+"""Exit status of a command that ran but whose answer is no, or in which the software failed."""
 BAD_INPUT: Final = 2
-"""Exit statuses."""
+"""Exit status of bad input or usage."""
 IN_THE_NAME: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")
 """Keys that the default folder of a run is called after; of a model that is a folder, by the folder's last name."""
 

@@ -15,7 +15,7 @@ MOST_ITEMS: Final = 12
 """Most items of a mission that are listed one by one."""
 
 OF_NOTE: Final = ("not flown", "flown", "not reached")
-"""What becomes of items that are listed where there is a reason; those not flown always."""
+"""Treatments of mission items that are listed if there is a reason to tell; items not flown are always listed."""
 
 OF_HEIGHT_OR_SPEED: Final = (
     "climb too steep",

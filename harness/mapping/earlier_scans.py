@@ -27,18 +27,19 @@ from harness.mapping.scan_comparison import (
 from planner.interface import BoolArray, ComplexArray, IntArray
 
 COMPARED_S = 12.0
-"""Scans are compared with the last ones looked at, and with those taken so long before,"""
+"""A scan is compared with the last two that were looked at, and with two from at least this time before."""
 SLOW_MPS = 5.0
-"""and as much longer as something so slow takes to leave the noise."""
+"""The time of `COMPARED_S` is longer by that in which an obstacle of this speed moves further than the noise."""
 LOOK_EVERY_S = 3.0
+"""Least time between two looks for obstacles that have come into free space."""
 LOOK_EVERY = 0.6
-"""What has come in is looked for that often, or as often as the fastest moves on by this share of the clearance."""
+"""The time between two looks is at least that in which the fastest obstacle moves by this share of the clearance."""
 NO_STEP = 0.25
-"""Share of the clearance: returns nearer to each other than this count as returns of one thing."""
+"""Neighbouring returns nearer to each other than this share of the clearance belong to one obstacle."""
 OWN = 0.1
-"""Share of the clearance: what was met so near to where something was, was it."""
+"""A return within this share of the clearance from where a followed obstacle was belongs to that obstacle."""
 OFF = 3.0
-"""In standard errors: a velocity is off by no more."""
+"""A velocity is taken to be off by at most this many standard errors."""
 
 
 class Look(NamedTuple):

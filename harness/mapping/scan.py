@@ -31,13 +31,15 @@ from planner.compiled import (
 from planner.interface import ComplexArray, FloatArray, IntArray
 
 Beams = tuple[float, float, float, float, float]
-"""As `RangeScan.beams` has them."""
+"""What `RangeScan.beams` gives."""
 
-GRAZING, NEARER = 30.0, 0.5
-"""Neighbouring beams show one face where the range of one is less by no more than this times the width of a beam there,
-as where it is seen at 2 degrees, nor by more than this share."""
+GRAZING = 30.0
+"""Neighbouring beams show one face only if their ranges differ by at most this many widths of a beam there: a face that
+is seen at 2 degrees."""
+NEARER = 0.5
+"""Neighbouring beams show one face only if the smaller range is less by at most this share of the larger one."""
 SURELY = 3.0
-"""In standard deviations of ranges: what returned so much less is nearer."""
+"""A range that is less by this many standard deviations of the noise is that of something nearer."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,9 +15,9 @@ from harness.scenario.validation import KeyFault
 PLANE_REACH_M: Final = 400_000.0
 """Up to this distance from any origin within 85 degrees of the equator the local plane is right to 0.9 m (`pyproj`)."""
 COURSE_STEP_DEG: Final = 5
-"""Arcs and courses are looked at in steps of this."""
+"""Step in which places on an arc, and courses, are tested."""
 ROUNDING_M: Final = 1e-3
-"""So little outside of the area is inside."""
+"""A place outside of the area by at most this counts as inside."""
 
 
 def check_local_plane(area: Area) -> None:
