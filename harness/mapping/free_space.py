@@ -19,17 +19,17 @@ from planner.compiled import FLOAT, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
 NARROWEST_RAD = 1e-3
-"""What something hides is told by bearings no finer than this."""
+"""Finest step of bearing in which the space that an obstacle hides is known."""
 MISSED = 1e-2
-"""Where returns get lost, a cell is free when so many scans looked through it that all of them missed what is in it no
-more often than this."""
+"""If returns get lost, a cell is free once so many scans looked through it that the probability that all of them missed
+an obstacle in it is at most this."""
 MOST_LOOKS = 255
-"""Where more would be needed, nothing is ever seen to be free."""
+"""If a cell would need more scans than this, no space is ever seen to be free."""
 BESIDE = 3
-"""Where returns get lost or err, so many beams more to either side of a cell have to go beyond it: all returns of
-what is as wide as these have to be missed."""
+"""If returns get lost or err, this many more beams to either side of a cell must go beyond it: an obstacle as wide as
+these is then missed only if all its returns are."""
 TOUCHING = 1e-6
-"""Beams touch where this share of their spacing, or less, lies between two."""
+"""Beams touch if at most this share of their spacing lies between two of them."""
 
 
 class FreeSpace:

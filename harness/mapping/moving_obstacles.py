@@ -38,32 +38,32 @@ from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, Mov
 
 NOWHERE = np.zeros((0, 2))
 DECIDED_S = 5.0
-"""Whether something moves is decided after so long at the soonest, and when it is sure."""
+"""Whether a followed outline moves is decided once this is certain, but not before this time."""
 UNDECIDED_S = 30.0
-"""What cannot be told to move for so long is taken to stand still."""
+"""An outline that is not known to move after this time is taken to stand still."""
 LOST_S = 2.0
-"""What may move and is not seen for so long is not followed any more."""
+"""An outline that may move is followed no longer once it has not been seen for this time."""
 COASTS_S = 15.0
-"""What is known to move is believed to move on for so long."""
+"""An obstacle that is known to move is taken to move on for this time after it was last seen."""
 NEW_OUTLINE_S = 12.0
-"""Outlines are compared with one no older than this."""
+"""An outline is compared with one of the same obstacle that is at most this old."""
 GROWN = 1.3
-"""What comes into view is compared with a new outline whenever so many times as much is seen as the old one shows."""
+"""A new outline replaces the one that is compared with if it shows this many times as much of the obstacle."""
 SLANT = 4.0
-"""Neighbouring returns of one face are no further apart than this many times what one broadside would show."""
+"""Neighbouring returns of one face lie at most this many times as far apart as on a face across the beams."""
 LATELY_S = 5.0
-"""What has been an edge so long is not what has come into view of something that moves."""
+"""An edge that has stood for this time does not belong to an obstacle that has just come into view."""
 NEAR = 1.5
-"""In standard deviations of ranges: returns so near to an outline may be its."""
+"""Returns within this many standard deviations of ranges from an outline may belong to it."""
 BENT = 14.0
 """This times noise over spacing, to the power of two thirds, is how many points of a straight face a mean has to
-be of for the face not to look bent (`registration.FLAT`)."""
+be of for the face not to look bent (`scan_matching.FLAT`)."""
 NARROW = 4.0
-"""In standard deviations of ranges: what is narrower tells nothing of an outline; all about it is taken as well."""
+"""Returns on a width below this many standard deviations of ranges show no outline; those about them are added."""
 MEDIANS = 0.5
-"""In standard deviations of ranges: neighbouring medians, which have returns in common, differ by less."""
+"""Neighbouring medians of ranges, which share returns, differ by less than this many standard deviations of ranges."""
 FACES = 1.5
-"""What comes into view so many times as near as that is another face of what moves."""
+"""Another face of a moving obstacle is looked for within this many times the gap at which runs of returns break."""
 
 
 class MovingObstacles:

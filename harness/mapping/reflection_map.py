@@ -21,19 +21,20 @@ from planner.compiled import BOOL, FLOAT, FLOATS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
 LEAST_STOPPED = 5.0
-"""An edge stopped so many rays at least."""
+"""A cell is an edge only if it stopped at least this many rays."""
 STOPPED_SHORT = 0.25
-"""A ray that ended before a cell, within two standard deviations, counts for so much of one that ended in it."""
+"""A ray that ended before a cell, within two standard deviations, counts as this share of a ray that ended in it."""
 REFLECTIVITY = 0.25
-"""Least share of the rays that a cell stops, where the noise is no more than its size."""
+"""A cell is an edge only if it stops at least this share of the rays, if the noise is at most the size of a cell."""
 HAZARD = 0.5
-"""The same for more noise, times cell over noise: the hazard half a standard deviation before a wall."""
+"""With more noise that share is this times the size of a cell over the noise: the hazard half a standard deviation
+before a wall."""
 DOUBT = 0.3
-"""What is an edge remains one down to this part of both."""
+"""A cell that is an edge remains one down to this share of both bounds."""
 FORGET_AT = 48.0
-"""Counts are halved from so many on: what has gone fades, what is new counts."""
+"""Counts of rays are halved when they reach this number, so that a wall that has gone fades."""
 STOOD_S = 20.0
-"""What has been an edge for so long stands: what moves is elsewhere by then."""
+"""A cell that has been an edge for this time belongs to an obstacle that stands: a moving one has left it by then."""
 
 SLOTS, FLAGS = "Array(int32, 1, 'C', readonly=True)", "Array(boolean, 1, 'C', readonly=True)"
 COUNTED_OUT = "float32[:, ::1]"

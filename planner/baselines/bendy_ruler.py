@@ -3,12 +3,12 @@
 Written from its description in ArduPilot's documentation (`common-oa-bendyruler`) and of its parameters:
 
 1. Once a second, probe bearings every 5 degrees from the bearing of the goal outwards, left and right in turns: a
-   line of the length `lookahead` (OA_BR_LOOKAHEAD). The margin is the least distance of the line from an obstacle.
-2. Where the margin is larger than `margin_max` (OA_MARGIN_MAX), a second line is probed from its end: towards the
+   line of the length `lookahead_m` (OA_BR_LOOKAHEAD). The margin is the least distance of the line from an obstacle.
+2. Where the margin is larger than `margin_max_m` (OA_MARGIN_MAX), a second line is probed from its end: towards the
    goal, and 45 degrees to the left and to the right of that. The first bearing of which one of these is clear too is
    taken.
-3. A bearing that is more than `cont_angle` (OA_BR_CONT_ANGLE) off the last one is taken only if the margin along the
-   last bearing is less than its margin over `cont_ratio` (OA_BR_CONT_RATIO).
+3. A bearing that is more than `cont_angle_deg` (OA_BR_CONT_ANGLE) off the last one is taken only if the margin along
+   the last bearing is less than its margin over `cont_ratio` (OA_BR_CONT_RATIO).
 4. Where no bearing is clear, the one with the largest margin is taken.
 
 ArduPilot's vehicles turn on the spot or nearly so. Here the bearing is steered to by a turn at the turn radius.
