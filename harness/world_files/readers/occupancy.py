@@ -27,12 +27,12 @@ IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}
 def read_moving_ai(path: Path, reading: Reading) -> Contents:
     """Reads a MovingAI map; a cell is as large as `metres_per_cell` says, else one metre."""
     text = text_of(read_bytes(path))
-    head = re.match(r"type.*\n\s*height\s+(\d+)\s*\n\s*width\s+(\d+)\s*\n\s*map\s*\n", text)
+    head = re.match(r"type.*\n\s*height\s+(\d{1,9})\s*\n\s*width\s+(\d{1,9})\s*\n\s*map\s*\n", text)
     if head is None:
         raise WorldFileError("has no height, width and `map`; must be a MovingAI map")
     rows, columns = int(head[1]), int(head[2])
     body = [line.encode("latin-1", "replace") for line in text[head.end() :].splitlines()[:rows]]
-    if list(map(len, body)) != [columns] * rows or rows * columns == 0:
+    if len(body) != rows or set(map(len, body)) != {columns} or columns == 0:
         raise WorldFileError(f"has {len(body)} rows, not {rows} of {columns} cells: it may be torn")
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
     if strange := set(np.unique(cells).tolist()) - set(FREE + BLOCKED):

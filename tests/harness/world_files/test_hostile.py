@@ -101,6 +101,10 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "a vector file": (text("a.gpkg", "SQLite"), "is a vector file; make GeoJSON of it"),
     "a Gazebo world": (text("a.world", "<sdf><world/></sdf>"), "is a Gazebo world; give its footprints as GeoJSON"),
     "a torn map": (text("a.map", "type octile\nheight 3\nwidth 3\nmap\n...\n"), "it may be torn"),
+    "a map of a height of 5,000 digits": (
+        text("a.map", f"type octile\nheight {'9' * 5000}\nwidth 3\nmap\n...\n"),
+        "has no height, width and `map`",
+    ),
     "an arc about nothing": (text("a.txt", "AC R\nDA 5,0,90\n"), "line 2: has an arc or circle before its centre"),
     "a place of words": (text("a.txt", "AC R\nDP here\n"), "line 2: has 'here'; must be a place"),
     "an airspace of nothing": (text("a.txt", "AC R\nAN x\n"), "has no airspace with an area"),
