@@ -10,7 +10,11 @@ from planner.geometry.curves import Point
 from planner.interface import BoolArray, FloatArray, Mission, Path
 from planner.kernels import segments
 
-TOLERATED_SHARE, TOLERATED_ERRORS = 0.1, 2.0
+TOLERATED_SHARE = 0.1
+"""The default margin beyond the clearance is at least this share of the clearance."""
+
+TOLERATED_ERRORS = 2.0
+"""The default margin is at least this many times the tracking error that the aircraft showed in tight turns."""
 
 
 def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:

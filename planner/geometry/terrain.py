@@ -14,8 +14,8 @@ SQUARE = 3.0
 """Side of the squares in which edge points near a line are looked for, as a multiple of the distance kept."""
 
 CALL_WORK, TANGENT_WORK, POINT_WORK, HUG_WORK = 14.0, 0.04, 0.0016, 0.006
-"""Work in about microseconds: of one question, and of each point that it lays tangents at, compares with a line, or
-looks at for how long a step hugs it."""
+"""Counted work, some microseconds, of a call, and in it of each point at which tangents are laid, that is compared with
+a line, or along which a step may lead."""
 
 
 class WorkCount:
