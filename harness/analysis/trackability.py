@@ -227,7 +227,7 @@ class _Flown:
             reach_m = max(corner.half_m, ABOUT * allowed_m)
             after_m = reach_m + LEAD_S * float(track.groundspeed_mps[worst])
             if -reach_m <= along_m - corner.arc_length_m <= after_m:
-                cause = corner_cause(corner, allowed_m, worst, self.force)
+                cause = corner_cause(corner, max(allowed_m, corner.allowed_cut_m), worst, self.force)
                 if cause is not None:
                     return cause
         return cross_track_cause(track, worst, self.plans, self.limits, self.force)

@@ -71,6 +71,19 @@ def test_a_corner_that_is_cut_is_not_called_a_navigation_error() -> None:
     assert metrics["check"]["worst"]["off_m"] == pytest.approx((math.sqrt(2.0) - 1.0) * LEAST_M, abs=4.0)
 
 
+def test_a_law_that_overshoots_a_wide_corner_is_not_told_that_the_turn_is_too_tight(tmp_path: Path) -> None:
+    """Passed at up to 60 m, a right angle has room for an arc of 60 / (sqrt 2 - 1) = 145 m: another law flies it."""
+    path = waypoints_file(
+        tmp_path, [(0.0, 0.0), (0.0, 800.0), (800.0, 800.0), (800.0, 0.0)], acceptance_m=60.0
+    )
+    told = {
+        law: flown(path, settings={**BY_WAYPOINTS, "guidance.kind": law})[0] for law in ("bearing", "preview")
+    }
+    assert told["preview"]["check"]["ok"]
+    causes = [leg["cause"] for leg in told["bearing"]["trackability"] if not leg["trackable"]]
+    assert causes == ["tracking error", "tracking error"]
+
+
 def test_a_path_is_flown_beside_where_it_is_by_a_position_that_is_wrong_from_the_start() -> None:
     """The believed position is 60 m north of the true one: so far south of the path it is flown, right to 1 m."""
     settings = {"navigation": "{kind: rtk, position_bias_m: [0, 60]}"}
