@@ -57,6 +57,9 @@ def world(
     from harness.world_files.siting import site
 
     ends = _ends(start, goal)
+    if metres_per_cell is not None and not 0.0 < metres_per_cell < math.inf:
+        told = f"--metres-per-cell is {metres_per_cell:g}; must be a finite number greater than 0"
+        raise typer.BadParameter(told)
     if not out.absolute().parent.is_dir():
         raise InputError(f"{out}: cannot be written (its folder is not there); make the folder first")
     craft = _craft(aircraft, clearance_m)

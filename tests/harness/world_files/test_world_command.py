@@ -137,6 +137,8 @@ def test_a_map_too_small_names_the_cell_that_would_do(
         (["--start", "48,9", "--goal", "48.1,9"], "lies outside the area"),
         (["--start", "47.005,8.005", "--goal", "47.005,8.05"], "the scenario would not fly"),
         (["--altitude-m", "1"], "at least 5"),
+        (["--metres-per-cell", "nan"], "--metres-per-cell is nan; must be a finite number greater than 0"),
+        (["--metres-per-cell", "0"], "--metres-per-cell is 0; must be"),
         (["--out", "no_folder/w.yaml"], "no_folder/w.yaml: cannot be written (its folder is not there)"),
         (
             ["--altitude-m", "12000"],
