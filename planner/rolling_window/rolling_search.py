@@ -29,10 +29,10 @@ class Work(NamedTuple):
     more: float
 
 
-WORK_WHILE_SERVING = Work(2000.0, 1000.0)
+WORK_WHILE_SERVING = Work(3000.0, 1000.0)
 """Work while the plan in effect can still be flown: there is time."""
 
-WORK_WHILE_CUT = Work(2000.0, 1500.0)
+WORK_WHILE_CUT = Work(5000.0, 2000.0)
 """Work while an edge cuts the course ahead: the plan in effect leads into its turn."""
 
 WORK_WHILE_UNSAFE = Work(6000.0, 6000.0)
