@@ -12,6 +12,7 @@ import socket
 import threading
 import time
 import warnings
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
@@ -42,16 +43,16 @@ Flown: TypeAlias = tuple[int, Answer | None]
 """Number of a run that is over, and what came of it; None where the machine kept it from its end."""
 
 
-class Workers:
+class Workers(ABC):
     """Who flies: an executor of `concurrent.futures`, and the jobs that it was handed."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
         self._flying: dict[Future[Answer], Job] = {}
 
+    @abstractmethod
     def free(self) -> int:
         """How many jobs more may be handed out now; 0 or less for none."""
-        raise NotImplementedError
 
     def start(self, job: Job) -> None:
         """Hands out a job."""
