@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import AliasPath, BaseModel, ConfigDict, Field, FiniteFloat, PlainValidator, ValidationError
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import MAX_JSON_BYTES, InputError, read_text
@@ -36,40 +35,35 @@ class Origin(BaseModel):
     altitude_m: FiniteFloat = 0.0
 
 
-class Keys(BaseModel):
-    """Keys of the mapping `mission` of a JSON."""
-
-    model_config = ConfigDict(strict=True)
-    corners_east_north_m: Annotated[list[tuple[FiniteFloat, FiniteFloat]], Field(min_length=2)]
-    acceptance_radius_m: FiniteFloat | None = None
-    airspeed_command_ias_mps: FiniteFloat | None = None
-    baro_height_command_m: FiniteFloat | None = None
-    bank_limit_deg: FiniteFloat | None = None
-
-
-class Frame(BaseModel):
-    """The mapping `frame` of a JSON."""
-
-    origin: Origin | None = None
+def _corners(given: object) -> FloatArray:
+    """(k, 2) east and north of two corners or more; else ValueError."""
+    found = np.array(given)
+    if found.dtype.kind not in "if" or found.ndim != 2 or found.shape[1] != 2 or len(found) < 2:
+        raise ValueError
+    if not np.isfinite(found).all():
+        raise ValueError
+    return found.astype(np.float64)
 
 
-class MissionFile(BaseModel):
-    """A JSON with a mission; other keys are not read."""
-
-    mission: Keys
-    frame: Frame | None = None
+def _key(name: str) -> Any:
+    """A key of the mapping `mission` of a JSON; a value of None is not known."""
+    return Field(default=None, validation_alias=AliasPath("mission", name))
 
 
-@dataclass(frozen=True, eq=False)
-class FlownMission:
-    """The course that was to be flown lap by lap; a value of None is not known."""
+class FlownMission(BaseModel):
+    """The course that was to be flown lap by lap; of a JSON other keys are not read."""
 
-    corners_m: FloatArray  # (k, 2) east and north; after the last comes the first
-    acceptance_m: float | None = None  # a corner counts as reached from here; None: by the rule of the law
-    airspeed_mps: float | None = None  # commanded, indicated
-    height_m: float | None = None  # commanded, barometric
-    bank_limit_deg: float | None = None  # of the autopilot; None: the aircraft's
-    origin: Origin | None = None  # of the plane
+    model_config = ConfigDict(strict=True, frozen=True, validate_by_name=True)
+    corners_m: Annotated[Any, PlainValidator(_corners)] = Field(
+        validation_alias=AliasPath("mission", "corners_east_north_m")
+    )
+    """(k, 2) east and north; after the last comes the first."""
+    acceptance_m: FiniteFloat | None = _key("acceptance_radius_m")
+    """A corner counts as reached from here; None: by the rule of the law."""
+    airspeed_mps: FiniteFloat | None = _key("airspeed_command_ias_mps")  # commanded, indicated
+    height_m: FiniteFloat | None = _key("baro_height_command_m")  # commanded, barometric
+    bank_limit_deg: FiniteFloat | None = _key("bank_limit_deg")  # of the autopilot; None: the aircraft's
+    origin: Origin | None = Field(default=None, validation_alias=AliasPath("frame", "origin"))  # of the plane
 
 
 def read_mission(path: Path) -> FlownMission:
@@ -87,7 +81,7 @@ def read_mission(path: Path) -> FlownMission:
     height_m = float(given.altitudes_m[0]) if len(given.altitudes_m) else None
     place = given.origin_deg
     origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
-    return FlownMission(points, radius, height_m=height_m, origin=origin)
+    return FlownMission(corners_m=points, acceptance_m=radius, height_m=height_m, origin=origin)
 
 
 def mission_of_log(path: Path) -> tuple[FlownMission, str]:
@@ -102,9 +96,9 @@ def mission_of_log(path: Path) -> tuple[FlownMission, str]:
     origin = Origin(latitude_deg=lap[0].latitude_deg, longitude_deg=lap[0].longitude_deg)
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
     found = FlownMission(
-        np.array([plane.plane(each.latitude_deg, each.longitude_deg) for each in lap]),
-        radius if radius > 0.0 else None,
-        _of(parameters, CRUISE),
+        corners_m=np.array([plane.plane(each.latitude_deg, each.longitude_deg) for each in lap]),
+        acceptance_m=radius if radius > 0.0 else None,
+        airspeed_mps=_of(parameters, CRUISE),
         bank_limit_deg=_of(parameters, BANK),
         origin=origin,
     )
@@ -136,7 +130,7 @@ def mission_of_targets(flight: FlownFlight) -> tuple[FlownMission, str]:
     corners = np.array([places[target[reached] == number].mean(axis=0) for number in numbers])
     far = f"{TARGET_RADIUS_M:g} m"
     note = f"mission: {len(corners)} corners, {far} ahead of where target_index changes, reached from {far}"
-    return FlownMission(corners, TARGET_RADIUS_M), note
+    return FlownMission(corners_m=corners, acceptance_m=TARGET_RADIUS_M), note
 
 
 def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
@@ -163,7 +157,7 @@ def _of(parameters: Mapping[str, float], names: Mapping[str, float]) -> float | 
 
 def _of_json(text: str, source: str) -> FlownMission:
     try:
-        found = MissionFile.model_validate_json(text)
+        return FlownMission.model_validate_json(text)
     except ValidationError as error:
         first: Any = error.errors()[0]
         if first["type"] == "json_invalid":
@@ -171,12 +165,3 @@ def _of_json(text: str, source: str) -> FlownMission:
         value = "is missing" if first["type"] == "missing" else f"is {str(first['input'])[:80]!r}"
         right = CORNERS if "corners_east_north_m" in first["loc"] else "a number"
         raise InputError(f"{source}: {'.'.join(map(str, first['loc']))}: {value}; must be {right}") from error
-    keys = found.mission
-    return FlownMission(
-        np.array(keys.corners_east_north_m),
-        keys.acceptance_radius_m,
-        keys.airspeed_command_ias_mps,
-        keys.baro_height_command_m,
-        keys.bank_limit_deg,
-        found.frame.origin if found.frame else None,
-    )
