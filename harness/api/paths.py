@@ -94,7 +94,6 @@ def replay(
     *,
     out: str | Path | None = None,
     settings: Mapping[str, str] | None = None,
-    steady_wind: bool = False,
     recording: bool = False,
 ) -> Replay:
     """Flies the mission of a flown log with the simulated aircraft, in the wind of that day, and compares the two.
@@ -109,7 +108,6 @@ def replay(
             that an ArduPilot log (.bin) has.
         out: the folder to write; None: `runs/replay/NAME` of the log.
         settings: keys of the simulated flight's scenario, by key path; values as YAML.
-        steady_wind: one wind, not the wind as it changed in the log.
         recording: whether to record both flights for rerun.
 
     Raises:
@@ -124,7 +122,6 @@ def replay(
             None if out is None else Path(out),
             None if mission is None else Path(mission),
             list((settings or {}).items()),
-            windows=not steady_wind,
             recording=recording,
         )
 

@@ -22,7 +22,6 @@ BY: Final = "Of a campaign: a table by these keys; can be repeated."
 FORMAT: Final = "Of a campaign or comparison: only its table: latex, csv."
 LOG: Final = "A table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...)."
 MISSION: Final = "Its mission: a file of `check`, or a JSON with its corners. Default: that of the log."
-STEADY: Final = "Fly one wind, not the wind as it changed in the log."
 
 
 def view(
@@ -191,7 +190,6 @@ def replay(
     aircraft: AircraftName,
     mission: Annotated[Path | None, option("FILE", MISSION)] = None,
     given: Given = NOTHING,
-    steady_wind: Annotated[bool, flag("--steady-wind", STEADY)] = False,
     out: Out = None,
     no_recording: NoRecording = False,
     as_json: Json = False,
@@ -207,15 +205,7 @@ def replay(
     folder = out or default_folder(log)
     try:
         with interruptible(lambda: f"what was written is in {folder}"):
-            found = flown_anew(
-                log,
-                aircraft,
-                folder,
-                mission,
-                given.keys,
-                windows=not steady_wind,
-                recording=not no_recording,
-            )
+            found = flown_anew(log, aircraft, folder, mission, given.keys, recording=not no_recording)
     except OSError as error:
         raise WriteError.of("the replay", folder, error) from error
     if as_json:

@@ -54,12 +54,9 @@ class FlownFlight:
 
 
 def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
-    """Reads a flown flight; rows by hand, before the autopilot was on, are left out where the file tells them.
+    """Reads a flown flight, or InputError; rows by hand, before the autopilot was on, are left out where it tells them.
 
     Positions in degrees are put into the plane; None: into one about a table's first.
-
-    Raises:
-        InputError: it cannot be read or has no track.
     """
     suffix = path.suffix.lower()
     if suffix in TABLES:

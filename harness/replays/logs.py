@@ -20,22 +20,20 @@ from harness.run_files.igc_path import NEEDS_LOGS
 MAX_BYTES: Final = 1_000_000_000
 LONGEST_S: Final = 1e7
 """A log whose times span more than this is damaged or had its clock set in flight."""
-LEAST_ROWS: Final = 2
-FIX_3D: Final = 3
-"""`Status` of a receiver with a three-dimensional fix, in DataFlash."""
 ULOG_HEADER: Final = 16
 """Bytes of a ULog before its first message."""
 ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")
 """Letters of the kinds of messages in a ULog."""
+FIX_3D: Final = 3
+"""`Status` of a receiver with a three-dimensional fix, in DataFlash."""
 DATAFLASH: Final = b"\xa3\x95\x80"
 """What a DataFlash log begins with: a message that describes formats."""
 LAST_PAGE: Final = 528
 """Bytes at the end of a DataFlash log that may hold anything: it is written in pages."""
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
-AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")
-"""Topics of PX4 that have the true airspeed, the better one first."""
 TRUE_AIRSPEED: Final = "true_airspeed_m_s"
-"""Field of these topics that has the true airspeed."""
+"""Field of the topics `AIRSPEED_TOPICS` of PX4."""
+AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")
 
 
 class Series(NamedTuple):
@@ -113,8 +111,8 @@ def _columns(found: Series, plane: LocalPlane, path: Path) -> dict[str, FloatArr
     known = np.isfinite(places).all(axis=1) & (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)
     places = places[known & ((latitude != 0.0) | (longitude != 0.0))]  # a receiver without a fix says 0, 0
     places = places[np.unique(places[:, 0], return_index=True)[1]]
-    if len(places) < LEAST_ROWS:
-        raise InputError(f"{path}: has {len(places)} rows with a position; a track has at least {LEAST_ROWS}")
+    if len(places) < 2:
+        raise InputError(f"{path}: has {len(places)} rows with a position; a track has at least 2")
     times = places[:, 0]
     if times[-1] - times[0] > LONGEST_S:
         raise InputError(

@@ -88,10 +88,8 @@ class Side:
     def figures(self, chosen: NDArray[np.bool_]) -> dict[str, float]:
         """What is told of some rows."""
         columns = {name: each[chosen] for name, each in self.columns.items()}
-        told = {
-            **_spread(self.outside[chosen]),
-            "height_error_p95_m": _p95(np.abs(columns["up_m"] - self.height_m)),
-        }
+        told = _spread(self.outside[chosen])
+        told["height_error_p95_m"] = _p95(np.abs(columns["up_m"] - self.height_m))
         if "roll_deg" in columns:
             rate = np.gradient(self.columns["roll_deg"], self.columns["time_s"])[chosen]
             told["bank_p95_deg"] = _p95(np.abs(columns["roll_deg"]))
@@ -151,9 +149,8 @@ def rows_of(told: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     """Name, flown, simulated and difference of each figure."""
     rows = []
     for name, label in FIGURES.items():
-        flown, simulated = told["flown"].get(name), told["simulated"].get(name)
-        if flown is None or simulated is None:
-            continue
-        share = f"{100 * (simulated / flown - 1):+.1f} %" if flown else "-"
-        rows.append((label, f"{flown:.2f}", f"{simulated:.2f}", share))
+        if name in told["flown"] and name in told["simulated"]:
+            flown, simulated = told["flown"][name], told["simulated"][name]
+            share = f"{100 * (simulated / flown - 1):+.1f} %" if flown else "-"
+            rows.append((label, f"{flown:.2f}", f"{simulated:.2f}", share))
     return rows

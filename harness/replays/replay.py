@@ -21,11 +21,9 @@ from harness.replays.mission import FlownMission, mission_of_log, mission_of_tar
 from harness.replays.simulated import Asked, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows
 
-INDEX: Final = "replay.json"
+INDEX, RECORDING, SCHEMA = "replay.json", "flight.rrd", "wayproof/replay/1"
 SIMULATED: Final = "simulated"
 """The run folder of the simulated flight, in the folder of a replay."""
-RECORDING: Final = "flight.rrd"
-SCHEMA: Final = "wayproof/replay/1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +53,12 @@ def replay(
     out: Path | None = None,
     mission: Path | None = None,
     overrides: Sequence[tuple[str, str]] = (),
-    windows: bool = True,
     recording: bool = True,
 ) -> Replay:
-    """Flies the mission of a log with the simulated aircraft in the wind that the log shows.
+    """Flies the mission of a log with the simulated aircraft in the wind that the log shows, as it changes.
 
-    Args:
-        log: as `harness.replays.flown.read_flown` takes it.
-        aircraft: a name that `wayproof list aircraft` prints, or a folder.
-        out: folder to write; None: `default_folder`.
-        mission: as `harness.replays.mission.read_mission` takes it; None: that of the log or of its `target_index`.
-        overrides: keys of the simulated flight's scenario to replace, as `load_scenario` takes them.
-        windows: the wind changes as the log shows it; else it is steady.
-        recording: whether to write `flight.rrd`.
+    `log` is as `read_flown` takes it, `mission` as `read_mission`, None for that of the log or of its `target_index`;
+    `overrides` replace keys of the simulated flight's scenario. `out` is `default_folder` where it is None.
 
     Raises:
         InputError: log, mission or aircraft cannot be used; nothing was flown.
@@ -79,8 +70,8 @@ def replay(
         raise RunFolderError(f"{out} holds other things; give a new folder")
     flown_mission, flight, notes = _read(log, mission)
     wind = fit_wind(flight)
-    winds = (fit_windows(flight, wind) if windows else []) or [wind]
-    asked = _asked(flight, flown_mission, winds, wind)
+    winds = fit_windows(flight, wind)
+    asked = _asked(flight, flown_mission, winds or [wind], wind)
     scenario = scenario_for(asked, aircraft, overrides)
     flown, laps = _flown(asked)
     out.mkdir(parents=True, exist_ok=True)
@@ -97,7 +88,7 @@ def replay(
         "aircraft": aircraft,
         "guidance": dict(scenario.guidance),
         "wind": wind.told(),
-        "wind_windows": [{"time_s": each.time_s, **each.told()} for each in winds] if windows else [],
+        "wind_windows": [{"time_s": each.time_s, **each.told()} for each in winds],
         "airspeed_mps": asked.airspeed_mps,
         "latency_s": scenario.navigation.latency_s,
         **compared(flown, simulated),
@@ -181,11 +172,11 @@ def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
 
         tracks = {
             name: {
-                **each.columns,
-                "height_m": each.columns["up_m"] - each.height_m,
-                "outside_m": each.outside,
+                **side.columns,
+                "height_m": side.columns["up_m"] - side.height_m,
+                "outside_m": side.outside,
             }
-            for name, each in sides.items()
+            for name, side in sides.items()
         }
         write_tracks(f"replay of {told['log']}", found.corners_m, tracks, found.folder / RECORDING)
     between = told["distance_between_m"]

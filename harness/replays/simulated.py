@@ -30,9 +30,12 @@ DEFAULT_LAW: Final = "bearing"
 LATENCY_S: Final = 0.2
 """Age of the state that the law works with: what ArduPilot takes of a satellite receiver that it does not know
 (AP_GPS_Backend::get_lag), as a log does not tell which it was."""
-EXACT: Final = (
-    *("position_sigma_m", "altitude_sigma_m", "heading_sigma_deg"),
-    *("velocity_sigma_mps", "airspeed_sigma_mps"),
+SIGMAS: Final = (
+    "position_sigma_m",
+    "altitude_sigma_m",
+    "heading_sigma_deg",
+    "velocity_sigma_mps",
+    "airspeed_sigma_mps",
 )
 ABOUT_M: Final = 1000.0
 LOW_M: Final = 50.0
@@ -54,14 +57,6 @@ class Asked:
     airspeed_mps: float  # true, that was commanded
     height_m: float  # that was commanded, as `up_m` has it
 
-    def route_m(self, laps: int) -> FloatArray:
-        """(n, 2): from where the log begins through the corners, lap for lap, and half way on: its end is no corner."""
-        corners = self.mission.corners_m
-        order = (self.first + np.arange(laps * len(corners))) % len(corners)
-        start = np.array((self.flight["east_m"][0], self.flight["north_m"][0]))
-        beyond = 0.5 * (corners[order[-1]] + corners[(order[-1] + 1) % len(corners)])
-        return np.vstack((start, corners[order], beyond))
-
 
 class LapsEnd:
     """Over once all legs are flown, or the time is up. Implements `Termination`."""
@@ -69,8 +64,7 @@ class LapsEnd:
     contact_m = math.inf
 
     def __init__(self, law: WaypointLaw, legs: int, limit_s: float) -> None:
-        self._law, self._legs, self._limit_s = law, legs, limit_s
-        self._before_s = 0.0
+        self._law, self._legs, self._limit_s, self._before_s = law, legs, limit_s, 0.0
         self.switches_s: list[float] = []
         """Times of the updates in which a corner was reached."""
 
@@ -119,7 +113,7 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
             "autopilot": {"state_latency_s": 0.0},
         },
         "guidance": {"kind": DEFAULT_LAW, "follow": "waypoints"},
-        "navigation": {"kind": "gnss", **dict.fromkeys(EXACT, 0.0), "latency_s": LATENCY_S},
+        "navigation": {"kind": "gnss", **dict.fromkeys(SIGMAS, 0.0), "latency_s": LATENCY_S},
         "environment": {"wind": wind},
     }
     if mission.bank_limit_deg is not None:
@@ -137,16 +131,19 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
 
 
 def fly_anew(scenario: Scenario, asked: Asked, laps: int, folder: Path) -> dict[str, FloatArray]:
-    """Flies it into a run folder, so many times round.
+    """Flies it into a run folder, so many times round; `COLUMNS` of the track, with the number of the leg in `leg`.
 
-    Returns:
-        `COLUMNS` of the track, with the number of the leg in `leg`.
+    From where the log begins through the corners, and half way on: the end of the route is no corner.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
         RunFolderError: the folder holds something else or cannot be written.
     """
-    points = asked.route_m(laps)
+    corners = asked.mission.corners_m
+    order = (asked.first + np.arange(laps * len(corners))) % len(corners)
+    start = np.array((asked.flight["east_m"][0], asked.flight["north_m"][0]))
+    beyond = 0.5 * (corners[order[-1]] + corners[(order[-1] + 1) % len(corners)])
+    points = np.vstack((start, corners[order], beyond))
     ways = np.diff(points, axis=0)
     length = np.hypot(*ways.T)
     lines = length > 1e-6

@@ -16,7 +16,6 @@ from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
 
-STEPS = 50
 LEAST_TURN_DEG = 90.0
 """Courses of a window must span this much."""
 WINDOW_S, WINDOW_EVERY_S = 20.0, 10.0
@@ -49,11 +48,7 @@ class FittedWind:
 
 
 def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | None = None) -> FittedWind:
-    """The one wind that explains a flight best; `airspeed` (n,) stands in place of the flight's.
-
-    Raises:
-        InputError: the flight does not turn enough to tell it.
-    """
+    """The one wind that explains a flight best, which must turn; `airspeed` (n,) stands in place of the flight's."""
     velocity = np.array((flight["ve_mps"], flight["vn_mps"]))
     airspeed = flight.airspeed_mps if airspeed is None else airspeed
     known = np.isfinite(velocity).all(axis=0) & (True if airspeed is None else np.isfinite(airspeed))
@@ -64,7 +59,7 @@ def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | No
             f"{flight.source}: turns by less than {LEAST_TURN_DEG:g} deg; the wind cannot be told"
         )
     wind, common = np.zeros(2), float(np.hypot(*velocity).mean())
-    for _ in range(STEPS):
+    for _ in range(50):
         through = velocity - wind[:, None]
         speed = np.maximum(np.hypot(*through), 1e-6)
         left = speed - (common if airspeed is None else airspeed[known])
