@@ -95,14 +95,6 @@ class L1Memory(NamedTuple):
     last_gain: float = 0.0  # the integrator begins at 0 when its gain has changed
 
 
-class L1Leg(NamedTuple):
-    """A leg, from A to B."""
-
-    begin: complex
-    end: complex
-    min_distance_m: float = 0.0  # least L1 distance; 0 from the autopilot's plain missions
-
-
 class L1Circle(NamedTuple):
     """A circle to loiter on."""
 
@@ -111,28 +103,21 @@ class L1Circle(NamedTuple):
     direction: float  # +1 clockwise (right turns), -1 counter-clockwise
 
 
-class L1Output(NamedTuple):
-    """What to fly until the next call."""
-
-    lateral_acceleration_mps2: float
-    crosstrack_m: float  # on a leg positive to its LEFT; on a circle positive outside
-    circling: bool  # the circle is held; before, it is approached
-
-
 def right_of(a: complex, b: complex) -> float:
     """How far b leads to the right of a, times the length of a."""
     return a.imag * b.real - a.real * b.imag
 
 
 def follow_leg(
-    at: L1Motion, leg: L1Leg, since_s: float, memory: L1Memory, has: L1Config
-) -> tuple[L1Output, L1Memory]:
-    """The law on a leg, so long since the last call on one, and the memory for the next call."""
+    at: L1Motion, leg: tuple[complex, complex], since_s: float, memory: L1Memory, has: L1Config
+) -> tuple[float, L1Memory]:
+    """Lateral acceleration (m/s^2) on a leg from A to B, so long since the last call on one, and the next memory."""
+    begin, end = leg
     fresh, since = since_s > STALE_S, min(since_s, MAX_UPDATE_S)
     velocity, speed = leg_velocity(at)
-    distance = max(ONE_OVER_PI * has.damping * has.period_s * speed, leg.min_distance_m)
-    ahead, length = leg_direction(at, leg), abs(leg.end - leg.begin)
-    gone, to = at.place - leg.begin, leg.end - at.place
+    distance = ONE_OVER_PI * has.damping * has.period_s * speed
+    ahead, length = leg_direction(at, *leg), abs(end - begin)
+    gone, to = at.place - begin, end - at.place
     left, along = -right_of(ahead, gone), dot(ahead, gone)
 
     integrator, gain = 0.0 if fresh else memory.integrator_rad, memory.last_gain
@@ -152,13 +137,11 @@ def follow_leg(
     nu = decided(nu, memory.last_nu_rad, bearing_cd(to), at.yaw_cd)
     used = min(max(nu, -QUARTER_TURN), QUARTER_TURN)
     acceleration = 4.0 * has.damping * has.damping * speed * speed / distance * math.sin(used)
-    return L1Output(acceleration, left, False), L1Memory(nu, integrator, gain)
+    return acceleration, L1Memory(nu, integrator, gain)
 
 
-def follow_circle(
-    at: L1Motion, circle: L1Circle, memory: L1Memory, has: L1Config
-) -> tuple[L1Output, L1Memory]:
-    """The law on a circle, and the memory for the next call."""
+def follow_circle(at: L1Motion, circle: L1Circle, memory: L1Memory, has: L1Config) -> tuple[float, L1Memory]:
+    """Lateral acceleration (m/s^2) on a circle, and the memory for the next call."""
     radius, omega = circle.radius_m, TWO_PI / has.period_s
     speed = max(abs(at.velocity), MIN_CIRCLE_SPEED_MPS)
     distance = ONE_OVER_PI * has.damping * has.period_s * speed
@@ -188,9 +171,8 @@ def follow_circle(
         around * around / bend_m if bend_m > 0.0 else 0.0
     )  # at a centre without a circle: straight on
     hold = circle.direction * (correction + centripetal)
-    circling = not (error > 0.0 and circle.direction * capture < circle.direction * hold)
-    acceleration = hold if circling else capture
-    return L1Output(acceleration, error, circling), L1Memory(nu, memory.integrator_rad, memory.last_gain)
+    approaching = error > 0.0 and circle.direction * capture < circle.direction * hold
+    return capture if approaching else hold, L1Memory(nu, memory.integrator_rad, memory.last_gain)
 
 
 def nose(at: L1Motion) -> complex:
@@ -206,9 +188,9 @@ def leg_velocity(at: L1Motion) -> tuple[complex, float]:
     return at.velocity, speed
 
 
-def leg_direction(at: L1Motion, leg: L1Leg) -> complex:
+def leg_direction(at: L1Motion, begin: complex, end: complex) -> complex:
     """A leg's unit direction."""
-    for way in (leg.end - leg.begin, leg.end - at.place):
+    for way in (end - begin, end - at.place):
         if abs(way) >= SHORT_LEG_M:
             return way / abs(way)
     return nose(at)
@@ -253,11 +235,11 @@ class L1Law(RouteLaw):
             east, north, ahead_east, ahead_north, _, length, start, *_ = self.progress.segment
             length = min(length, place.arc_length_m - start + FAR_M)
             begin = complex(east, north)
-            leg = L1Leg(begin, begin + length * complex(ahead_east, ahead_north))
+            leg = begin, begin + length * complex(ahead_east, ahead_north)
             since_s, self._leg_time_s = state.time_s - self._leg_time_s, state.time_s
-            output, self._memory = follow_leg(at, leg, since_s, self._memory, self._has)
+            acceleration, self._memory = follow_leg(at, leg, since_s, self._memory, self._has)
         else:
             bend = place.curvature_1pm
             circle = L1Circle(complex(*centre_of(place)), abs(1.0 / bend), -math.copysign(1.0, bend))
-            output, self._memory = follow_circle(at, circle, self._memory, self._has)
-        return math.atan(output.lateral_acceleration_mps2 / GRAVITY_MPS2), math.nan
+            acceleration, self._memory = follow_circle(at, circle, self._memory, self._has)
+        return math.atan(acceleration / GRAVITY_MPS2), math.nan
