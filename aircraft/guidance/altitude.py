@@ -74,15 +74,8 @@ def slewed(airspeeds_mps: FloatArray, time_s: FloatArray, before_mps: float) -> 
     return commanded
 
 
-class LevelFlight:
-    """One altitude and one airspeed all along."""
-
-    def __init__(self, altitude_m: float, airspeed_mps: float) -> None:
-        self._held = altitude_m, airspeed_mps
-
-    def command(self, state: AircraftState, arc_length_m: float) -> tuple[float, float]:
-        """What is held."""
-        return self._held
+Vertical = Callable[[AircraftState, float], tuple[float, float]]
+"""(believed state, arc length along the route m) -> altitude above the sea (m) and true airspeed (m/s) to be held."""
 
 
 class AltitudeGuidance:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from aircraft.guidance.altitude import AltitudeGuidance, LevelFlight
+from aircraft.guidance.altitude import Vertical
 from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput
 from aircraft.guidance.progress import measures_itself
 from aircraft.interface import FlightModel
@@ -53,7 +53,7 @@ class Loop:
     guidance: GuidanceLaw
     termination: Termination
     mission: Mission
-    vertical: LevelFlight | AltitudeGuidance
+    vertical: Vertical
     scan_rate_hz: float
     navigator: StateEstimator = field(default_factory=StateEstimator)
 
@@ -184,7 +184,7 @@ class ClosedLoop:
         if ending is not None:
             return ending
         steering = self.steering
-        altitude_m, airspeed_mps = self._loop.vertical.command(believed, steering.arc_length_m)
+        altitude_m, airspeed_mps = self._loop.vertical(believed, steering.arc_length_m)
         too_high_m, too_fast_mps = self._navigator.held_errors
         self._model.command(
             steering.roll_command_rad,

@@ -234,7 +234,7 @@ def fly_along(
         planner=GivenPath(plan.way.waypoints_m, path),
         # A given path begins where it does, however far from there the aircraft believes to be.
         mission=replace(loop.mission, tracking_error_m=math.inf),
-        vertical=AltitudeGuidance(plan.profile, plan.frame.gains.altitude, plan.climb_mps),
+        vertical=AltitudeGuidance(plan.profile, plan.frame.gains.altitude, plan.climb_mps).command,
         termination=PathEnd(where, route_length(route), loop.mission.goal_radius_m, limit_s),
     )
     return replace(fly(along, observers, progress), compute_ms=())  # nothing was searched for

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aircraft.frames import LocalPlane
-from aircraft.guidance.altitude import LevelFlight
 from aircraft.interface import AircraftState, FlightModel
 from aircraft.start import Atmosphere, StartConditions
 from harness.analysis.flight_limits import FlightLimits
@@ -56,6 +55,7 @@ def make_loop(
     mission = mission_of(scenario)
     world = World.from_scenario(scenario)
     start, air = start_conditions(scenario), atmosphere(scenario)
+    held = scenario.mission.altitude_m, mission.speed_mps
     return Loop(
         world=world,
         sensor=RangeSensor(world, scenario.sensor, _stream(scenario.seed, SENSOR_STREAM)),
@@ -74,7 +74,7 @@ def make_loop(
         guidance=law_of(scenario.guidance, scenario.aircraft),
         termination=MissionEnd(world, mission, scenario.mission.time_limit_s),
         mission=mission,
-        vertical=LevelFlight(scenario.mission.altitude_m, mission.speed_mps),
+        vertical=lambda believed, arc_length_m: held,
         scan_rate_hz=scenario.sensor.rate_hz,
         navigator=Navigator(scenario.navigation, _stream(scenario.seed, NAVIGATION_STREAM)),
     )
