@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 
 CONTROLS = ("aileron", "elevator", "rudder", "throttle")
@@ -18,14 +17,6 @@ class Actuator:
     lag_s: float = 0.0
     rate_limit_degps: float | None = None  # None: no limit
     deadband_deg: float = 0.0  # about the trim
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.lag_s <= 10.0:
-            raise ValueError(f"lag_s is {self.lag_s!r}; must be from 0 to 10")
-        if self.rate_limit_degps is not None and not 0.0 < self.rate_limit_degps < math.inf:
-            raise ValueError(f"rate_limit_degps is {self.rate_limit_degps!r}; must be greater than 0")
-        if not 0.0 <= self.deadband_deg <= 90.0:
-            raise ValueError(f"deadband_deg is {self.deadband_deg!r}; must be from 0 to 90")
 
     def of_command(self, travel_deg: float) -> NormActuator:
         """The same in units of the command, for a surface that moves by so much for a command of 1."""

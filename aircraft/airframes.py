@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache, lru_cache, partial
 from hashlib import sha256
 from importlib.resources import files
@@ -11,8 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from aircraft.actuators import Actuator, Actuators, NormActuator
-from aircraft.airframe import DERIVED, FIGURES, Airframe, AirframeEntry, AutopilotKeys
-from aircraft.autopilot import Gains
+from aircraft.airframe import DERIVED, Airframe, AirframeEntry, AutopilotKeys
 from aircraft.card_cache import cached, is_kept
 from aircraft.model_files import AircraftError as AircraftError
 from aircraft.model_files import ModelFiles, model_files
@@ -120,7 +119,5 @@ def _entry(
     actuators: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
     **figures: float,
 ) -> AirframeEntry:
-    assert {*gains} <= {each.name for each in fields(Gains)}, name
-    assert {*figures} <= {*FIGURES}, name
     servos = Actuators(**{control: Actuator(**keys) for control, keys in actuators.items()})
     return AirframeEntry(name, summary, cruise_mps, verified, figures, gains, servos)

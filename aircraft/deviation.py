@@ -5,10 +5,9 @@ The deviations are put into the XML of a JSBSim model when it is loaded; moments
 
 from __future__ import annotations
 
-import math
 import re
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Final
 
 SURFACES: Final = ("elevator", "aileron", "rudder")
@@ -32,12 +31,6 @@ class Deviation:
     aileron: float = 0.0
     rudder: float = 0.0
     centre_of_gravity_m: float = 0.0  # behind that of the model, of the empty aircraft
-
-    def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if not math.isfinite(value) or (each.name != "centre_of_gravity_m" and value <= -1.0):
-                raise ValueError(f"{each.name} must be finite, a share above -1; got {value}")
 
 
 AS_MODELLED: Final = Deviation()

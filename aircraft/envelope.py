@@ -50,30 +50,19 @@ LEAST_BANK_DEG = 5.0
 
 @dataclass(frozen=True)
 class WindPoint:
-    """How a guidance law tracks a weave in one wind.
+    """How a guidance law tracks a weave in one wind."""
 
-    Attributes:
-        wind_share: speed of the wind over the airspeed.
-        radius_factor: turns this much wider than the aircraft needs are tracked well.
-        error_m: largest cross-track error on them.
-    """
-
-    wind_share: float
-    radius_factor: float
-    error_m: float
+    wind_share: float  # speed of the wind over the airspeed
+    radius_factor: float  # turns this much wider than the aircraft needs are tracked well
+    error_m: float  # largest cross-track error on them
 
 
 @dataclass(frozen=True)
 class LawCard:
-    """How a guidance law tracks with one aircraft, see `aircraft.law_cards`.
-
-    Attributes:
-        kind: the law.
-        points: in calm air first, then in ever stronger wind.
-    """
+    """How a guidance law tracks with one aircraft, see `aircraft.law_cards`."""
 
     kind: str
-    points: tuple[WindPoint, ...]
+    points: tuple[WindPoint, ...]  # in calm air first, then in ever stronger wind
 
     def at(self, wind_share: float) -> tuple[float, float]:
         """Radius factor and cross-track error (m) in a wind: between what was flown linear.
@@ -94,30 +83,19 @@ def performance(
     turbulence: str | None = None,
     law: LawCard | None = None,
 ) -> Performance:
-    """Planning figures at one airspeed.
+    """Planning figures at a true airspeed in a steady wind, at least 0, and turbulence (light, moderate, severe, None).
 
     The radius follows from the coordinated turn at the fastest groundspeed, downwind, with bank in reserve:
     R = (Va + W)^2 / (g tan(bank)), the bank being the limit less the reserve and no steeper than what the aircraft
     was seen to keep its speed and altitude at. Below it the bank saturates and tracking fails abruptly. A hold is flown
     with less in reserve (`HOLD_RESERVE_DEG`, in calm air `CALM_HOLD_RESERVE_DEG`), and so are turns with a straight to
-    roll between them (`SPACED_RESERVE_DEG`), which are no tighter than in calm air.
-
-    Args:
-        airframe: the aircraft.
-        airspeed_mps: true airspeed.
-        wind_mps: speed of the steady wind.
-        turbulence: None, "light", "moderate" or "severe".
-        law: card of the guidance law; default: of `preview`, which the aircraft's survey was flown with.
+    roll between them (`SPACED_RESERVE_DEG`), which are no tighter than in calm air. Without a law's card it is that of
+    `preview`, which the survey was flown with.
 
     Raises:
         AircraftError: if the airframe cannot hold the airspeed or cannot make way against the wind.
-        ValueError: if `wind_mps` is negative or not finite, or `turbulence` is none of the above.
     """
     airframe.check_airspeed(airspeed_mps)
-    if not 0.0 <= wind_mps < math.inf:
-        raise ValueError(f"wind_mps must be a finite number of at least 0; got {wind_mps:g}")
-    if turbulence not in BANK_RESERVE_DEG:
-        raise ValueError(f"turbulence must be light, moderate, severe or None; got {turbulence!r}")
     if wind_mps >= airspeed_mps:
         raise AircraftError(
             f"{airframe.name} at {airspeed_mps:g} m/s cannot make way against a wind of {wind_mps:g} m/s"

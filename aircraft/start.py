@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,9 +38,8 @@ DRYDEN_FT = (10.0, 1000.0)
 class DrydenGusts:
     """Turbulence over true ground: Dryden's spectra with the low-altitude sizes of MIL-F-8785C, section 3.7.3.
 
-    JSBSim's own takes the height above the sea for that over ground. u is a process of first order; v and w are
-    sqrt(1/2) (sqrt(3) y1 + (1 - sqrt(3)) y2), y1 one of first order and y2 that once more through its lag, which has
-    Dryden's transverse spectrum. No gusts of rotation.
+    JSBSim's own takes the height above the sea for that over ground. u is a process of first order; v and w have
+    Dryden's transverse spectrum: sqrt(1/2) (sqrt(3) y1 + (1 - sqrt(3)) y2), y2 being y1 once more through its lag.
     """
 
     def __init__(self, intensity: str, seed: int) -> None:
@@ -101,10 +100,6 @@ class Atmosphere:
     """Height over ground at which a wind with the profile of `profile_share` is as told; None: the same everywhere."""
     vertical_gusts: VerticalGusts | None = None
 
-    def __post_init__(self) -> None:
-        if not math.isfinite(self.wind_east_mps + self.wind_north_mps):
-            raise ValueError("the wind must be finite")
-
     @property
     def steady(self) -> bool:
         """Whether the wind is the same at all times and heights, turbulence aside."""
@@ -141,22 +136,14 @@ class StartConditions:
     course_rad: float  # over the ground, clockwise from the plane's north
     airspeed_mps: float  # true
 
-    def __post_init__(self) -> None:
-        for f in fields(self):
-            if not math.isfinite(getattr(self, f.name)):
-                raise ValueError(f"{f.name} must be finite")
-        if not self.airspeed_mps > 0.0:
-            raise ValueError(f"airspeed_mps must be positive; got {self.airspeed_mps:g}")
-
     def heading_rad(self, atmosphere: Atmosphere) -> float:
         """Heading that makes the course good in a wind (the wind triangle).
 
         Raises:
             ValueError: if the wind across the course is not weaker than the airspeed.
         """
-        across = atmosphere.wind_east_mps * math.cos(self.course_rad) - atmosphere.wind_north_mps * math.sin(
-            self.course_rad
-        )
+        cosine, sine = math.cos(self.course_rad), math.sin(self.course_rad)
+        across = atmosphere.wind_east_mps * cosine - atmosphere.wind_north_mps * sine
         if abs(across) >= self.airspeed_mps:
             raise ValueError(
                 f"a wind of {abs(across):g} m/s across the course cannot be held at {self.airspeed_mps:g} m/s"

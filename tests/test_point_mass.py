@@ -64,15 +64,3 @@ def test_big_strides_agree_with_single_steps(steps: int, roll: float) -> None:
     assert a.north_m == pytest.approx(b.north_m, abs=0.01)
     assert a.roll_rad == pytest.approx(b.roll_rad, abs=1e-9)
     assert (a.up_m, a.airspeed_mps) == (310.0, 27.0)
-
-
-def test_air_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(ValueError, match="the wind must be finite"):
-        Atmosphere(wind_east_mps=math.inf)
-
-
-def test_a_start_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(ValueError, match="course_rad must be finite"):
-        StartConditions(0.0, 0.0, 300.0, math.nan, 25.0)
-    with pytest.raises(ValueError, match="airspeed_mps must be positive"):
-        StartConditions(0.0, 0.0, 300.0, 0.0, 0.0)
