@@ -11,13 +11,11 @@ import numpy as np
 from aircraft.airframe import Airframe
 from aircraft.card_cache import cached
 from aircraft.frames import LocalPlane
-from aircraft.guidance.interface import UPDATE_RATE_HZ
-from aircraft.interface import STEP_RATE_HZ
 from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import AircraftError
 from aircraft.start import StartConditions
-from aircraft.trials import KEPT_SPEED_SHARE, farthest
+from aircraft.trials import KEPT_SPEED_SHARE, farthest, flown
 
 STEEPEST = 0.4
 """Rates beyond this share of the airspeed (24 degrees) are not looked at."""
@@ -82,19 +80,12 @@ def keeps(frame: Airframe, airspeed_mps: float, rate_mps: float) -> bool:
     start = StartConditions(0.0, 0.0, altitude, 0.0, airspeed_mps)
     try:
         model = JsbsimModel(frame, start, LocalPlane(45.0, 0.0), climb_limit_mps=abs(rate_mps))
+        model.command(0.0, altitude + math.copysign(1e5, rate_mps), airspeed_mps)
+        states = flown(model, SETTLING_S + JUDGED_S)
     except AircraftError:
         return False
-    model.command(0.0, altitude + math.copysign(1e5, rate_mps), airspeed_mps)
-    steps = STEP_RATE_HZ // UPDATE_RATE_HZ
-    flown = []
-    for _ in range(round((SETTLING_S + JUDGED_S) * UPDATE_RATE_HZ)):
-        model.advance(steps)
-        state = model.state()
-        if model.fault():
-            return False
-        if state.time_s > SETTLING_S:
-            flown.append((state.velocity_up_mps, state.airspeed_mps, state.throttle))
-    climb, speed, throttle = np.array(flown).T
+    judged = [each for each in states if each.time_s > SETTLING_S]
+    climb, speed, throttle = np.array([(s.velocity_up_mps, s.airspeed_mps, s.throttle) for s in judged]).T
     return bool(
         abs(climb.mean() - rate_mps) <= KEPT_RATE_SHARE * abs(rate_mps)
         and abs(speed - airspeed_mps).max() <= KEPT_SPEED_SHARE * airspeed_mps

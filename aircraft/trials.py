@@ -57,21 +57,29 @@ def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET
     """
     try:
         model = in_flight(frame, speed)
+        for bank_deg in banks_deg:
+            model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
+            states = flown(model, LEG_S)
+            for state in states[round(RESTED_SHARE * len(states)) + 1 :]:
+                off_deg = math.degrees(state.roll_rad) - bank_deg
+                if abs(off_deg) > KEPT_ROLL_DEG:
+                    return f"bank off by {off_deg:.1f} deg"
+            if drift := departure(states[-1], bank_deg, speed):
+                return drift
     except AircraftError as error:
         return str(error)
-    ticks = round(LEG_S * model.step_rate_hz / UPDATE_STEPS)
-    for bank_deg in banks_deg:
-        model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
-        for tick in range(ticks):
-            model.advance(UPDATE_STEPS)
-            if fault := model.fault():
-                return fault
-            off_deg = math.degrees(model.state().roll_rad) - bank_deg
-            if tick > RESTED_SHARE * ticks and abs(off_deg) > KEPT_ROLL_DEG:
-                return f"bank off by {off_deg:.1f} deg"
-        if drift := departure(model.state(), bank_deg, speed):
-            return drift
     return None
+
+
+def flown(model: JsbsimModel, seconds: float) -> list[AircraftState]:
+    """The states of all updates of so long a flight under the last command; AircraftError says how control is lost."""
+    states = []
+    for _ in range(round(seconds * model.step_rate_hz / UPDATE_STEPS)):
+        model.advance(UPDATE_STEPS)
+        states.append(model.state())
+        if fault := model.fault():
+            raise AircraftError(fault)
+    return states
 
 
 def weaving_error_m(frame: Airframe, speed: float) -> float:
@@ -194,14 +202,10 @@ def steepest_level_bank_deg(frame: Airframe, speed: float) -> float:
     def keeps(bank_deg: float) -> bool:
         try:
             model = in_flight(frame, speed)
+            model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
+            return departure(flown(model, TURN_S)[-1], bank_deg, speed) is None
         except AircraftError:
             return False
-        model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
-        for _ in range(round(TURN_S * model.step_rate_hz / UPDATE_STEPS)):
-            model.advance(UPDATE_STEPS)
-            if model.fault():
-                return False
-        return departure(model.state(), bank_deg, speed) is None
 
     found = farthest(keeps, 0.0, frame.bank_limit_deg, BANK_STEP_DEG)
     return found if found == frame.bank_limit_deg else math.floor(found)
