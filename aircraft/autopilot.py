@@ -1,9 +1,8 @@
 """Gains of the inner loops, from the linearised aircraft.
 
-The structure is in systems/autopilot.xml; it is the same for every aircraft. What differs are the gains, and
-they follow from the stability derivatives at trim by rules that put each loop at a fixed place relative to
-the aircraft's own modes. Phase margins are read off the open loops of the same plants on a grid of frequencies (any
-text on control, such as Franklin, Powell and Emami-Naeini, chapter 6).
+The structure, in systems/autopilot.xml, is the same for every aircraft. The gains follow from the stability derivatives
+at trim by rules that put each loop at a fixed place relative to the aircraft's own modes. Phase margins are read off
+the open loops on a grid of frequencies (such as Franklin, Powell and Emami-Naeini, chapter 6).
 """
 
 from __future__ import annotations
@@ -108,16 +107,12 @@ class Gains:
 
 
 def derivatives(
-    states: Sequence[str],
-    inputs: Sequence[str],
-    system: FloatArray,
-    control: FloatArray,
-    *,
-    airspeed_fps: float,
-    alpha_rad: float,
-    qbar_psf: float,
+    states: Sequence[str], inputs: Sequence[str], system: FloatArray, control: FloatArray, **trim: float
 ) -> Derivatives:
-    """Takes the derivatives from a linear model x_dot = A x + B u with FGLinearization's names, propellers settled."""
+    """Takes the derivatives from a linear model x_dot = A x + B u with FGLinearization's names, propellers settled.
+
+    `trim` has the first three fields of `Derivatives`.
+    """
     fast = [i for i, state in enumerate(states) if state.lower().startswith("rpm")]
     slow = [i for i in range(len(states)) if i not in fast]
     a, b = system[np.ix_(slow, slow)], control[slow]
@@ -132,9 +127,7 @@ def derivatives(
         return float(a[row[of], row[name]] if name in row else b[row[of], column[name]])
 
     return Derivatives(
-        airspeed_fps=airspeed_fps,
-        alpha_rad=alpha_rad,
-        qbar_psf=qbar_psf,
+        **trim,
         lp=by("P", "P"),
         lr=by("P", "R"),
         lda=by("P", "DaCmd"),
@@ -166,10 +159,8 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0, climb_pac
 
     `pace` is the share of the feedback in roll and yaw, `pitch_pace` in pitch, climb and altitude, for aircraft whose
     actuators or control laws, which the derivatives do not show, take a part of the phase; `climb_pace` is that in
-    climb and altitude alone, for those that know their climb late.
-
-    Raises:
-        ValueError: if a control has no authority or the wrong sign, or the short period is not oscillatory.
+    climb and altitude alone, for those that know their climb late. ValueError if a control has no authority or the
+    wrong sign, or the short period is not oscillatory.
     """
     authority = {"aileron": at.lda, "elevator": -at.mde, "throttle": at.xdt}
     if at.ndr:  # a flying wing has no rudder

@@ -29,10 +29,8 @@ def cached(
     """What is read from the result of a measurement, which comes from the cache if it is there.
 
     Both ways give the same values: JSON keeps every bit of a float. A cache that cannot be read or written, or whose
-    numbers are not those that were measured (its SHA-256 tells), costs time and nothing else.
-
-    The title is for the file's name, the digest of everything that the result depends on. What `measure` gives consists
-    of what JSON has, and `read` makes what is wanted of it.
+    numbers are not those that were measured (its SHA-256 tells), costs time and nothing else. The title is for the
+    file's name, the digest of all that the result depends on.
     """
     file = _file(title, digest)
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):

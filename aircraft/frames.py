@@ -4,9 +4,8 @@ The plane is the azimuthal equidistant projection about its origin: distance and
 true, so a point 142 km away is where the geodesic puts it. Closed forms on the normal section through the
 origin replace the geodesic; they agree with it to less than 0.1 m and 0.003 degrees out to 142 km.
 
-Why not pyproj, which has this projection: its numbers depend on the release of PROJ that it brings, so that a flight's
-digest would; and to import it takes longer than to read a scenario. Files of maps go through it, and the tests hold
-this plane against its geodesic.
+pyproj has this projection, but a flight's digest would depend on the release of PROJ that it brings, and to import it
+takes longer than to read a scenario. Files of maps go through it, and the tests hold this plane against its geodesic.
 """
 
 from __future__ import annotations
@@ -29,12 +28,9 @@ class LocalPlane:
             raise ValueError(f"latitude_deg of the origin must be in [-85, 85]; got {latitude_deg:g}")
         if not -180.0 <= longitude_deg <= 360.0:
             raise ValueError(f"longitude_deg of the origin must be in [-180, 360]; got {longitude_deg:g}")
-        self.latitude_deg = latitude_deg
-        self.longitude_deg = longitude_deg
-        self._latitude = math.radians(latitude_deg)
-        self._longitude = math.radians(longitude_deg)
-        self._sin = math.sin(self._latitude)
-        self._cos = math.cos(self._latitude)
+        self.latitude_deg, self.longitude_deg = latitude_deg, longitude_deg
+        self._latitude, self._longitude = math.radians(latitude_deg), math.radians(longitude_deg)
+        self._sin, self._cos = math.sin(self._latitude), math.cos(self._latitude)
         w2 = 1.0 - ECCENTRICITY_SQUARED * self._sin**2
         self._prime_vertical_m = SEMI_MAJOR_M / math.sqrt(w2)
         self._meridian_m = self._prime_vertical_m * (1.0 - ECCENTRICITY_SQUARED) / w2
@@ -51,13 +47,11 @@ class LocalPlane:
             East (m), north (m) and the meridian convergence (rad): a direction in the plane is the true
             direction minus the convergence, both clockwise from north.
         """
-        sin_latitude = math.sin(latitude_rad)
-        cos_latitude = math.cos(latitude_rad)
+        sin_latitude, cos_latitude = math.sin(latitude_rad), math.cos(latitude_rad)
         prime_m = SEMI_MAJOR_M / math.sqrt(1.0 - ECCENTRICITY_SQUARED * sin_latitude * sin_latitude)
         axis_m = prime_m * cos_latitude
         half = 0.5 * math.remainder(longitude_rad - self._longitude, math.tau)
-        sin_half = math.sin(half)
-        cos_half = math.cos(half)
+        sin_half, cos_half = math.sin(half), math.cos(half)
         east = 2.0 * axis_m * sin_half * cos_half
         outward = axis_m * (1.0 - 2.0 * sin_half * sin_half) - self._axis_m
         polar = prime_m * (1.0 - ECCENTRICITY_SQUARED) * sin_latitude - self._polar_m
@@ -117,10 +111,9 @@ class LocalPlane:
         return east_m, north_m
 
     def geodetic(self, east_m: float, north_m: float) -> tuple[float, float]:
-        """Geodetic latitude and longitude (degrees) of a plane point.
+        """Geodetic latitude and longitude (degrees) of a plane point, to a millimetre within 150 km.
 
-        A first guess on the osculating sphere is corrected with `project`, so that the round trip closes
-        to a millimetre within 150 km.
+        A first guess on the osculating sphere is corrected with `project`.
         """
         latitude = self._latitude + north_m / self._meridian_m
         longitude = self._longitude + east_m / (self._prime_vertical_m * math.cos(latitude))

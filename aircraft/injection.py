@@ -39,12 +39,8 @@ def with_autopilot(
 ) -> Iterator[Path]:
     """Yields a folder with <name>/<name>.xml, the model with the autopilot, until the context ends.
 
-    The other files of the model are linked, so that references from the model resolve as before.
-
-    `latency` is the age of the state that the autopilot reads, in s and in steps.
-
-    Raises:
-        ValueError: the model is not well-formed XML or not a JSBSim model.
+    The other files of the model are linked, so that references from the model resolve as before. `latency` is the age
+    of the state that the autopilot reads, in s and in steps. ValueError: it is no well-formed JSBSim model.
     """
     try:
         with_system = _with_system(model.read_bytes(), actuators, deviation, latency)

@@ -61,16 +61,12 @@ class AircraftState(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A path to be flown: joined segments of constant curvature (lines and arcs).
-
-    Attributes:
-        segments: (n, 6) float64, one row a segment: start east, start north, unit tangent east, unit tangent
-            north at the start, curvature (1/m, positive = left turn), length (m). Read-only, row by row.
-        loiter: the last segment is a full circle that is flown again and again.
-    """
+    """A path to be flown: joined segments of constant curvature (lines and arcs)."""
 
     segments: FloatArray
-    loiter: bool = False
+    """(n, 6) float64, read-only, one row a segment: start east, start north, unit tangent east, unit tangent north at
+    the start, curvature (1/m, positive = left turn), length (m)."""
+    loiter: bool = False  # the last segment is a full circle that is flown again and again
 
     def __post_init__(self) -> None:
         rows = np.array(self.segments, dtype=np.float64, order="C")
@@ -91,9 +87,8 @@ class Route:
 class Performance:
     """What planning must know of an aircraft at one true airspeed.
 
-    A full turn that is held needs no bank in reserve for changes of curvature, only for gusts, so its radius is the
-    least; turns with a straight between them on which the aircraft rolls come between, and need `turn_radius_m` in
-    calm air.
+    A full turn that is held needs bank in reserve for gusts alone, so its radius is the least; that of turns with a
+    straight to roll on between them lies between the two, in calm air at `turn_radius_m`.
     """
 
     airspeed_mps: float

@@ -31,7 +31,6 @@ SURFACES = {
 """Properties by which models tell where a surface is, rad."""
 MOST_ALPHA_DEG, ALPHA_STEP_DEG = 40.0, 0.5
 """Angles of attack that are looked at for the most lift."""
-MOVING_STEPS = 120
 LEAST_DEG = 0.5
 """A surface that moves by less is not moved by its command."""
 ROTATION = ("rate", "position")
@@ -80,11 +79,7 @@ def node(fdm: Any, path: str) -> Any:
 
 
 def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
-    """A fresh jsbsim.FGFDMExec with the model and the autopilot; a second model in one would crash.
-
-    Raises:
-        AircraftError: the model cannot be loaded.
-    """
+    """A fresh jsbsim.FGFDMExec with the model and the autopilot; AircraftError if it cannot be loaded."""
     jsbsim.set_logger(_SILENCE)
     _SILENCE.errors.clear()
     fdm = jsbsim.FGFDMExec(None)
@@ -132,9 +127,7 @@ def _check_properties(fdm: Any, files: ModelFiles) -> None:
 def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading_rad: float) -> None:
     """Trims for straight level flight in calm air, engines running, heading from true north.
 
-    Raises:
-        TrimError: there is no such flight.
-        AircraftError: the model cannot be started.
+    TrimError says that there is no such flight, AircraftError that the model cannot be started.
     """
     fdm["ic/lat-geod-deg"], fdm["ic/long-gc-deg"] = plane.geodetic(start.east_m, start.north_m)
     fdm["ic/h-sl-ft"] = start.altitude_m / FOOT_M
@@ -182,9 +175,10 @@ def _why_not_trimmed(fdm: Any) -> str:
     if fdm.get_property_manager().get_node("propulsion/tank/contents-lbs") is not None:
         if fdm.get_property_value("propulsion/total-fuel-lbs") <= 0.0:
             return "its tanks are dry"
-        if not any(
+        running = (
             fdm.get_property_value(f"propulsion/engine[{each}]/set-running") for each in range(engines)
-        ):
+        )
+        if not any(running):
             return "none of its engines runs after JSBSim's propulsion/set-running"
     return "; ".join(_SILENCE.errors) or "JSBSim finds no trim"
 
@@ -203,11 +197,7 @@ def mass_kg(fdm: Any) -> float:
 
 
 def most_lift_deg(files: ModelFiles, airspeed_mps: float) -> float | None:
-    """Angle of attack at which the lift of a model stops rising, controls as trimmed at a true airspeed; None: nowhere.
-
-    Raises:
-        AircraftError: the model cannot be loaded, or not trimmed.
-    """
+    """Angle of attack at which the lift stops rising, controls as trimmed at a true airspeed (m/s); None: nowhere."""
     fdm = trimmed(files, airspeed_mps)
     before_lbf, start_deg = -math.inf, math.degrees(fdm["aero/alpha-rad"])
     for alpha_deg in np.arange(start_deg, MOST_ALPHA_DEG, ALPHA_STEP_DEG):
@@ -222,11 +212,7 @@ def most_lift_deg(files: ModelFiles, airspeed_mps: float) -> float | None:
 
 
 def linearised(fdm: Any) -> Derivatives:
-    """Derivatives of a trimmed jsbsim.FGFDMExec, by JSBSim's FGLinearization.
-
-    Raises:
-        AircraftError: JSBSim cannot linearise it, or the model lacks one of the usual states and controls.
-    """
+    """Derivatives of a trimmed jsbsim.FGFDMExec, by JSBSim's FGLinearization; AircraftError if it cannot."""
     try:
         linear = jsbsim.FGLinearization(fdm)
     except jsbsim.BaseError as error:
@@ -250,7 +236,7 @@ def surface_travel_deg(files: ModelFiles) -> dict[str, float]:
         for command in (-1.0, 1.0):
             fdm = load(files)
             fdm.run_ic()
-            for _ in range(MOVING_STEPS):
+            for _ in range(120):
                 fdm[f"fcs/{control}-cmd-norm"] = command
                 fdm.run()
             ends.append([float(fdm[path]) for path in properties])

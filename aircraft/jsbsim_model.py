@@ -68,27 +68,18 @@ class JsbsimModel:
         climb_limit_mps: float | None = None,
         ground: Callable[[float, float], float] | None = None,
     ) -> None:
-        """Loads, trims and starts the aircraft.
+        """Loads, trims and starts the aircraft, in calm air by default.
 
-        Args:
-            frame: see `aircraft.airframes.airframe`.
-            start: in straight level flight.
-            plane: that all positions refer to.
-            atmosphere: default: calm.
-            step_rate_hz: integration steps per second.
-            climb_limit_mps: the fastest climb or descent that the altitude loop asks for; None: its own, for flight
-                at one altitude.
-            ground: height of the ground at an east and north (m), NaN where it is not known; None: sea level.
-                Turbulence and the profile of the wind depend on the height over it.
+        `climb_limit_mps` is the fastest climb or descent that the altitude loop asks for; None: its own, for flight at
+        one altitude. `ground` gives the height of the ground at an east and north (m), NaN where it is not known; None:
+        sea level. Turbulence and the profile of the wind depend on the height over it.
 
         Raises:
-            AircraftError: if the airspeed is out of range or too low for the wind, or the model cannot be loaded,
-                trimmed or held.
+            AircraftError: the airspeed is out of range or too low for the wind, or the model cannot be loaded or
+                trimmed.
         """
-        self.airframe = frame
         frame.check_airspeed(start.airspeed_mps)
-        self.step_rate_hz = step_rate_hz
-        """Integration steps per simulated second."""
+        self.airframe, self.step_rate_hz = frame, step_rate_hz
         self._step, self._read_at_step = 0, -1
         # Roll, airspeed, altitude and angle of attack, as read.
         self._judged = math.nan, math.nan, math.nan, math.nan
@@ -105,7 +96,7 @@ class JsbsimModel:
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
         """Of the meridian convergence where the state was last read."""
         self._vertical_gusts: VerticalGusts | None = None
-        self._turbulence: DrydenGusts | None = None
+        self._turbulence: DrydenGusts | None = None  # over true ground
         self._windy = atmosphere.wind_mps > 0.0
         self._air = None if atmosphere.steady else atmosphere
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)

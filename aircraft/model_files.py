@@ -73,14 +73,9 @@ class ModelFiles:
 
 
 def model_files(name: str) -> ModelFiles:
-    """The files of an aircraft.
+    """The files of a model of this package or of the JSBSim wheel, or of a folder; AircraftError if there is none.
 
-    Args:
-        name: of a model of this package or of the JSBSim wheel, or a folder that holds a model:
-            <folder>/<its name>.xml, or the only JSBSim model among its XML files.
-
-    Raises:
-        AircraftError: there is no such model.
+    A folder holds <its name>.xml, or else one JSBSim model among its XML files.
     """
     wheel = _wheel()
     folder = None

@@ -79,12 +79,9 @@ def survey(entry: AirframeEntry, files: ModelFiles) -> dict[str, Any]:
 
 
 def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> Airframe:
-    """The airframe as far as its cruise tells, its loops as fast as they can be to track a weave well.
+    """The airframe as far as its cruise tells, its loops as fast as they can be to track a weave well, else the best.
 
-    If they do so at no pace, the pace at which they do it best.
-
-    Raises:
-        AircraftError: it has no trim there, none that gains can be derived for, or is not held at any pace.
+    AircraftError: it has no trim there, none that gains can be derived for, or is not held at any pace.
     """
     best, reason = None, ""
     try:
@@ -93,7 +90,7 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
         for pace in (*PACES, LAST_PACE):
             if pace == LAST_PACE and best is not None:
                 break
-            found = _at_pace(entry, files, cruise, at, pace, pitch_paces)
+            found = _at_pace(entry, files, cruise, at, pace, *pitch_paces)
             if isinstance(found, str):
                 reason = found
                 continue
@@ -112,20 +109,15 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
 
 
 def _at_pace(
-    entry: AirframeEntry,
-    files: ModelFiles,
-    cruise: float,
-    at: Derivatives,
-    pace: float,
-    pitch_paces: tuple[float, float],
+    entry: AirframeEntry, files: ModelFiles, cruise: float, at: Derivatives, *paces: float
 ) -> Airframe | str:
-    """The airframe with roll loops of a pace, or why it is not held with them."""
-    placed = replace(gains(at, pace, *pitch_paces).rounded(GAIN_DIGITS), **entry.gains)
+    """The airframe with loops of a pace in roll, pitch and climb, or why it is not held with them."""
+    placed = replace(gains(at, *paces).rounded(GAIN_DIGITS), **entry.gains)
     late = _lag_s(files, "aileron"), files.latency_s
     margin_deg = roll_margin_deg(at, placed, *late)
     if any(late) and margin_deg < NEEDED_DEG:
         return _too_slow("aileron", sum(late), "roll", margin_deg)
-    frame = _provisional(entry, files, cruise, at, placed, pace)
+    frame = _provisional(entry, files, cruise, at, placed, paces[0])
     if reason := not_held(frame, cruise, REVERSALS):
         return reason
     if "turn_rate_share" not in entry.figures:
@@ -202,11 +194,7 @@ def _provisional(
 
 
 def middle_of_trims(files: ModelFiles) -> float:
-    """The (geometric) middle of the longest run of speeds at which a model can be trimmed, m/s.
-
-    Raises:
-        AircraftError: there is no such speed, or the model cannot be loaded.
-    """
+    """The (geometric) middle of the longest run of speeds at which a model can be trimmed, m/s; AircraftError: none."""
     runs: list[list[float]] = [[]]
     reasons: Counter[str] = Counter()
     speed = SLOWEST_MPS

@@ -25,10 +25,8 @@ FREQUENCIES_RADPS = np.logspace(-2.5, 2.0, 20_000)
 class LawMargins(NamedTuple):
     """How far a law is from swinging on a straight line in calm air."""
 
-    gain: float
-    """The loop may be stronger by this factor."""
-    delay_s: float
-    """The state may be older by this."""
+    gain: float  # the loop may be stronger by this factor
+    delay_s: float  # the state may be older by this
 
 
 def law_margins(kind: GuidanceKind, limits: GuidanceLimits) -> LawMargins:
@@ -38,20 +36,9 @@ def law_margins(kind: GuidanceKind, limits: GuidanceLimits) -> LawMargins:
     def roll_rad(off_m: float, course_rad: float) -> float:
         law = kind.law(limits)
         law.follow(Route(np.array([[0.0, 0.0, 0.0, 1.0, 0.0, LINE_M]])), 0.5 * LINE_M)
-        state = AircraftState(
-            time_s=0.0,
-            east_m=off_m,
-            north_m=0.5 * LINE_M,
-            up_m=300.0,
-            velocity_east_mps=speed * math.sin(course_rad),
-            velocity_north_mps=speed * math.cos(course_rad),
-            velocity_up_mps=0.0,
-            heading_rad=course_rad % math.tau,
-            roll_rad=0.0,
-            pitch_rad=0.0,
-            airspeed_mps=speed,
-            load_factor=1.0,
-        )
+        velocity = speed * math.sin(course_rad), speed * math.cos(course_rad), 0.0
+        attitude = course_rad % math.tau, 0.0, 0.0
+        state = AircraftState(0.0, off_m, 0.5 * LINE_M, 300.0, *velocity, *attitude, speed, 1.0)
         for _ in range(3):  # a command that leads has come to rest
             output = law.update(state)
         return output.roll_command_rad

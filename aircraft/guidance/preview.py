@@ -102,12 +102,8 @@ def bandwidth_of_delay_margin(
 
     The open loop of the cross-track error is (2 zeta omega s + omega^2) / s^2, roll made up for by the lead of the
     command. Its gain is 1 at omega_c = omega sqrt(2 zeta^2 + sqrt(4 zeta^4 + 1)), its phase margin there is
-    atan(2 zeta omega_c / omega), and the delay that takes it up is that over omega_c.
-
-    Args:
-        margin_s: further delay.
-        delay_s: delay that there is: of roll and of the state, without that of the held command.
-        damping: zeta.
+    atan(2 zeta omega_c / omega), and the delay that takes it up is that over omega_c. `delay_s` is that of roll and of
+    the state, without that of the held command.
     """
     crossing = math.sqrt(2.0 * damping**2 + math.sqrt(4.0 * damping**4 + 1.0))
     return math.atan(2.0 * damping * crossing) / crossing / (margin_s + delay_s + 0.5 / UPDATE_RATE_HZ)

@@ -1,14 +1,12 @@
 """A plan or a mission flown leg by leg: the law follows the straight leg to the next waypoint, then the leg after it.
 
-This is how the aircraft of ArduPilot and PX4 fly: they know nothing of the arcs of a plan. Its waypoints are where the
-lines of the plan meet: the corners that its arcs round. A closing loiter is flown as a circle. A waypoint counts as
-reached within an acceptance radius, its own or that of the law's autopilot, or when the aircraft is past it (ArduPilot,
-"Mission planning", WP_RADIUS; PX4, "Fixed-wing mission mode"; Beard and McLain, algorithm 5).
+So ArduPilot and PX4 fly, which know nothing of the arcs of a plan. Its waypoints are the corners that its arcs round; a
+closing loiter is flown as a circle. A waypoint counts as reached within an acceptance radius, its own or that of the
+law's autopilot, or when the aircraft is past it (ArduPilot, "Mission planning", WP_RADIUS; PX4, "Fixed-wing mission
+mode"; Beard and McLain, algorithm 5).
 
-A mission's loiter is left when the aircraft has gone round far enough. Autopilots that head for the centre of a loiter
-and then join its circle are flown so: PX4 (`navigateLoiter`: far from the circle the bearing is that to its nearest
-point, which is towards the centre) and ArduPilot (ArduPlane's mission mode: the line to the centre is followed until
-three radii from it, then `update_loiter` captures the circle).
+A mission's loiter is left when the aircraft has gone round far enough. Autopilots that head for its centre and then
+join its circle are flown so: PX4 (`navigateLoiter`) and ArduPilot (`update_loiter` from three radii on).
 """
 
 from __future__ import annotations
@@ -80,9 +78,8 @@ def straight(
     length_m = abs(goal - start)
     ahead = (goal - start) / length_m
     row = (start.real, start.imag, ahead.real, ahead.imag, 0.0, length_m)
-    return MissionLeg(
-        Route(np.array([row])), stations_m, (goal.real, goal.imag), acceptance_m, abs(goal - end)
-    )
+    route = Route(np.array([row]))
+    return MissionLeg(route, stations_m, (goal.real, goal.imag), acceptance_m, abs(goal - end))
 
 
 @runtime_checkable
