@@ -16,11 +16,11 @@ DASH: Final = "\N{EN DASH}"
 
 COMPARED: Final = {metric.name: metric for metric in METRICS if metric.short or metric.derived}
 """The figures of a row, by name: those that people are shown, and those that take more than `metrics.json`."""
-ON_TERMINAL: Final = (
-    *("outcome", "km", "ratio", "clear m"),
-    *("\N{GREEK SMALL LETTER KAPPA}\N{MIDDLE DOT}R", "tracks", "tse max", "p99 ms"),
+_SHORT: Final = {metric.short: metric for metric in METRICS}
+ON_TERMINAL: Final = tuple(
+    _SHORT[each] for each in ("outcome", "km", "ratio", "clear m", "κ·R", "tracks", "tse max", "p99 ms")
 )
-"""Those that fit 80 columns, by `Metric.short`."""
+"""Those that fit 80 columns."""
 LATEX: Final = str.maketrans(
     {
         **{each: f"\\{each}" for each in "&%$#_{}"},
@@ -108,11 +108,10 @@ def shown_figures(rows: Sequence[Row]) -> list[Metric]:
 
 def rows_for_paper(rows: Sequence[Row]) -> tuple[list[str], list[list[str]], list[str]]:
     """Headings, a line a flight, and what each heading is, with its unit: the figures of `ON_TERMINAL`."""
-    shown = [next(each for each in METRICS if each.short == short) for short in ON_TERMINAL]
-    heads = ["scenario", "planner", *ON_TERMINAL]
-    lines = [[row.scenario, row.label, *(row.text(each) or DASH for each in shown)] for row in rows]
-    units = {each.short: f", in {each.unit}" if each.unit else "" for each in shown}
-    told = [f"{each.short}: {each.title}{units[each.short]}." for each in shown if each.title != each.short]
+    heads = ["scenario", "planner", *(each.short for each in ON_TERMINAL)]
+    lines = [[row.scenario, row.label, *(row.text(each) or DASH for each in ON_TERMINAL)] for row in rows]
+    named = [each for each in ON_TERMINAL if each.title != each.short]
+    told = [f"{each.short}: {each.title}{each.unit and f', in {each.unit}'}." for each in named]
     return heads, lines, told
 
 

@@ -1,7 +1,7 @@
 """The command `wayproof`. Each command is a few lines round functions that are imported when they are needed.
 
-Standard output carries results, standard error everything else. Exit status: 0 done, 1 flown but the goal was
-not reached safely, 2 bad input or usage, 3 the goal is proved unreachable, 130 interrupted by Ctrl-C, 143 by SIGTERM.
+Standard output carries results, standard error everything else. Exit status 130: interrupted by Ctrl-C, 143: by
+SIGTERM; those of commands stand in their help.
 """
 
 from __future__ import annotations
@@ -20,14 +20,12 @@ from harness.cli.certify import certify
 from harness.cli.check import check
 from harness.cli.command_line import BAD_INPUT, FAILED, with_remedy
 from harness.cli.compare import compare
-from harness.cli.export import export
 from harness.cli.falsify import falsify
 from harness.cli.fly import fly
-from harness.cli.formats import schema, validate
-from harness.cli.names import list_names
+from harness.cli.inputs import list_names, schema, validate
 from harness.cli.options import Command, Group, flag
-from harness.cli.review import replay, report, view
-from harness.cli.standard_output import kept_up, results_alone, results_over, say, to_nowhere
+from harness.cli.review import export, replay, report, view
+from harness.cli.standard_output import kept_up, results_alone, results_over, say
 from harness.cli.sweep import sweep
 from harness.cli.world import world
 from harness.files.errors import RunFolderError, WriteError
@@ -54,12 +52,9 @@ app.command("list", cls=Command)(list_names)
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import PackageNotFoundError, version
+        from harness.files.versions import versions
 
-        try:
-            say(f"wayproof {version('wayproof')}")
-        except PackageNotFoundError:
-            say("wayproof, run from its sources without being installed")
+        say(f"wayproof {versions()['wayproof'] or '(run from its sources without being installed)'}")
         raise typer.Exit
 
 
@@ -78,11 +73,7 @@ def wayproof(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command line and returns its exit status.
-
-    Args:
-        arguments: without the program's name; default: those of the process.
-    """
+    """Runs the command line, by default that of the process, and returns its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
     words = [word for word in given if word != "--debug"]
@@ -114,9 +105,7 @@ def _warn_of_little_memory() -> None:
 def _run(words: Sequence[str], debug: bool) -> int:
     try:
         with kept_up():
-            status = int(app(list(words) or ["--help"], prog_name="wayproof", standalone_mode=False) or 0)
-            _flush()
-        return status
+            return int(app(list(words) or ["--help"], prog_name="wayproof", standalone_mode=False) or 0)
     except KeyboardInterrupt:
         return INTERRUPTED
     except SystemExit:
@@ -130,45 +119,29 @@ def _run(words: Sequence[str], debug: bool) -> int:
         return _report(error)
 
 
-def _flush() -> None:
-    """Writes out what was printed."""
-    if sys.stdout is None:  # closed by whoever started us
-        return
-    try:
-        sys.stdout.flush()
-    except OSError:
-        to_nowhere(sys.stdout)
-        raise
-
-
 def _report(error: Exception) -> int:
     """Says on standard error what went wrong and returns the exit status."""
+    told, status = f"wayproof: {error}", BAD_INPUT
     if isinstance(error, InputError):
-        say(str(error), err=True)
-        return BAD_INPUT
-    if isinstance(error, typer.TyperException):
+        told = str(error)
+    elif isinstance(error, typer.TyperException):
         # typer checks with pydantic
         text = " ".join(error.format_message().split()).replace("Value error, ", "")
         whose = getattr(getattr(error, "ctx", None), "command_path", "wayproof")
-        say(f"wayproof: {text} (see {whose} --help)", err=True)
-        return BAD_INPUT
-    if isinstance(error, OSError):
-        written = isinstance(error, WriteError)
-        say(f"wayproof: {error if written else with_remedy(error)}", err=True)
-        return FAILED if written or error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
-    if isinstance(error, (RunFolderError, *_others())):
-        say(f"wayproof: {error}", err=True)
-        return BAD_INPUT
-    from harness.files.crash import sentence
+        told = f"wayproof: {text} (see {whose} --help)"
+    elif isinstance(error, WriteError):
+        status = FAILED
+    elif isinstance(error, OSError):
+        told = f"wayproof: {with_remedy(error)}"
+        status = FAILED if error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
+    elif not isinstance(error, RunFolderError):
+        # Rooms that take long to import.
+        from aircraft.model_files import AircraftError
+        from harness.files.crash import PlannerError, sentence
+        from harness.scenario.kinds import PluginError
 
-    say(f"wayproof: internal error, {sentence(error)}; --debug shows where", err=True)
-    return FAILED
-
-
-def _others() -> tuple[type[Exception], ...]:
-    """Faults of planners, laws and aircraft, whose rooms take long to import."""
-    from aircraft.model_files import AircraftError
-    from harness.files.crash import PlannerError
-    from harness.scenario.kinds import PluginError
-
-    return AircraftError, PlannerError, PluginError
+        if not isinstance(error, AircraftError | PlannerError | PluginError):
+            told = f"wayproof: internal error, {sentence(error)}; --debug shows where"
+            status = FAILED
+    say(told, err=True)
+    return status

@@ -10,7 +10,7 @@ import typer
 
 from harness.cli.command_line import FAILED, load, print_json
 from harness.cli.options import AircraftArgument, AircraftOption, Count, Json, Text, argument, option
-from harness.cli.replacing import law_kind
+from harness.cli.replacing import kind_of
 from harness.cli.terminal import legible, print_table, progress_bar, step_bar
 
 SCENARIO: Final = "A file or shipped name; or the word tracking."
@@ -53,7 +53,7 @@ def _bench_tracking(name: str, seeds: int, as_json: bool, guidance: str) -> int:
     from harness.bench.tracking import bench_tracking
     from harness.scenario.kinds import guidance_kinds
 
-    guidance = law_kind(guidance)
+    guidance = kind_of(guidance, "guidance")
     if guidance not in guidance_kinds():
         known = ", ".join(sorted(guidance_kinds()))
         raise typer.BadParameter(f"there is no guidance law {guidance!r}; known are: {known}")

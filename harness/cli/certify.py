@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 
 SHOWN: Final = 5
 """Ways to fail, and quantities that explain failures, that are printed; the file has all."""
-
 LEAST_SHARE: Final = 0.01
 """A quantity that explains less is not printed."""
-
 STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
 
 CLAIM: Final = "reached (default), no-contact, trackable; as-given (default of a path)."

@@ -10,23 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from harness.cli.command_line import FAILED, interruptible, marked_incomplete, print_json, told_apart
+from harness.cli.command_line import FAILED, flying_into, print_json, told_apart
 from harness.cli.flight_rows import verdict_rows
-from harness.cli.options import (
-    AircraftName,
-    Count,
-    Json,
-    NoRecording,
-    Number,
-    Out,
-    Quiet,
-    Text,
-    argument,
-    option,
-)
+from harness.cli.options import AircraftName, Count, Json, NoRecording, Number, Out, Quiet, argument, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
-from harness.cli.terminal import plain, print_table, progress_bar
+from harness.cli.terminal import plain, print_table
 
 if TYPE_CHECKING:
     from harness.certification.days import Days
@@ -35,6 +24,8 @@ if TYPE_CHECKING:
 
 PATH: Final = "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints)."
 WORLD: Final = "A scenario that gives obstacles, bounds, environment, seed, altitude."
+ALTITUDE: Final = "Altitude above sea level. Default: the file's, else 300."
+LEVEL: Final = "Largest distance from the altitude. Default: 10 m."
 TOLERANCE: Final = "Largest distance from the path. Default: a tenth of C, or 10 m without C."
 ACCEPTED: Final = "at waypoints of a mission the acceptance radius in the file, else 90 m."
 CORNER: Final = f"Largest distance from corners. Default: T; {ACCEPTED}"
@@ -47,15 +38,11 @@ def check(
     aircraft: AircraftName,
     given: Given = NOTHING,
     airspeed_mps: Annotated[Number, option("V", "True airspeed. Default: the aircraft's cruise.")] = None,
-    altitude_m: Annotated[
-        Number, option("H", "Altitude above sea level. Default: the file's, else 300.")
-    ] = None,
-    scenario: Annotated[Text, option("WORLD", WORLD)] = None,
+    altitude_m: Annotated[Number, option("H", ALTITUDE)] = None,
+    scenario: Annotated[str | None, option("WORLD", WORLD)] = None,
     clearance_m: Annotated[Number, option("C", "Wanted clearance. Default: WORLD's, if written.")] = None,
     tolerance_m: Annotated[Number, option("T", TOLERANCE)] = None,
-    altitude_tolerance_m: Annotated[
-        Number, option("A", "Largest distance from the altitude. Default: 10 m.")
-    ] = None,
+    altitude_tolerance_m: Annotated[Number, option("A", LEVEL)] = None,
     corner_m: Annotated[Number, option("R", CORNER)] = None,
     days: Annotated[Count, option("N", DAYS, min=1)] = None,
     out: Out = None,
@@ -140,11 +127,9 @@ def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> di
     import numpy as np
 
     from harness.run.path_check import fly_check
-    from harness.run_files.run_folder import MANIFEST, SCHEMA
 
     length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
-    progress = progress_bar(length_m, silent)
-    with interruptible(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
+    with flying_into(folder, length_m, silent) as report:
         return fly_check(check, folder, recording, report)
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from harness.cli.standard_output import say
+from harness.cli.terminal import FlightReport, progress_bar
 from harness.files.input_file import InputError, read_index
 from harness.files.wording import printable
 
@@ -80,6 +81,16 @@ def interruptible(left: Callable[[], str]) -> Iterator[None]:
         raise
 
 
+@contextmanager
+def flying_into(folder: Path, length_m: float, silent: bool) -> Iterator[FlightReport]:
+    """Progress of a flight of about this length into a run folder; after Ctrl-C it is said what became of that."""
+    from harness.run_files.run_folder import MANIFEST, SCHEMA
+
+    left = marked_incomplete("run", folder, MANIFEST, SCHEMA)
+    with interruptible(left), progress_bar(length_m, silent) as report:
+        yield report
+
+
 def marked_incomplete(what: str, folder: Path, index: str, schema: str) -> Callable[[], str]:
     """What became of a folder that was being written, for `interruptible`."""
 
@@ -106,11 +117,7 @@ def resumable(folder: Path, index: str) -> Iterator[None]:
 
 @contextmanager
 def written(out: Path) -> Iterator[None]:
-    """Around writing a file that somebody named.
-
-    Raises:
-        InputError: it cannot be written.
-    """
+    """Around writing a file that somebody named; an InputError says that it cannot be written."""
     try:
         yield
     except OSError as error:

@@ -16,7 +16,6 @@ from harness.cli.terminal import coloured, plain, print_line, print_table, step_
 from harness.files.errors import WriteError
 
 if TYPE_CHECKING:
-    from harness.analysis.metric import Metric
     from harness.analysis.rows import Row
 
 LEGEND: Final = (
@@ -69,18 +68,14 @@ def compare(
     else:
         print_comparison(comparison.rows)
         say(f"report: {folder / 'report.html'}")
-        _print_view([folder / each.name / OVERLAY for each in loaded])
+        overlays = [folder / each.name / OVERLAY for each in loaded]
+        for overlay in [each for each in overlays if each.is_file()][:1]:
+            say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
     return 0 if comparison.all_reached else FAILED
 
 
 def _split(names: str | None) -> list[str | None]:
     return [None] if names is None else [name.strip() for name in names.split(",")]
-
-
-def _print_view(overlays: Sequence[Path]) -> None:
-    """How to see the first overlay, if there is one."""
-    for overlay in [each for each in overlays if each.is_file()][:1]:
-        say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
 
 
 def print_comparison(rows: Sequence[Row]) -> None:
@@ -100,24 +95,13 @@ def print_comparison(rows: Sequence[Row]) -> None:
 
 
 def _print_scenario(name: str, rows: Sequence[Row]) -> None:
+    from harness.analysis.rows import DASH, ON_TERMINAL
+
     by_law = all(row.guidance for row in rows) and len({row.planner for row in rows}) == 1
-    heads = ("guidance" if by_law else "planner", *(figure.short for figure in _shown()))
-    title = f"{name}, {rows[0].planner}" if by_law else name
-    print_table(title, [_cells(row, by_law) for row in rows], heads)
-
-
-def _shown() -> list[Metric]:
-    """The figures that fit 80 columns, the outcome first."""
-    from harness.analysis.registry import METRICS
-    from harness.analysis.rows import ON_TERMINAL
-
-    return [next(figure for figure in METRICS if figure.short == short) for short in ON_TERMINAL]
-
-
-def _cells(row: Row, by_law: bool) -> list[str]:
-    """The name of a row, its outcome and its figures."""
-    from harness.analysis.rows import DASH
-
-    name = row.guidance if by_law else "\n ".join(filter(None, (row.planner, row.guidance)))
-    figures = [plain(row.text(figure)) or DASH for figure in _shown()[1:]]
-    return [plain(name), coloured(row.outcome), *figures]
+    lines = []
+    for row in rows:
+        label = row.guidance if by_law else "\n ".join(filter(None, (row.planner, row.guidance)))
+        figures = [plain(row.text(figure)) or DASH for figure in ON_TERMINAL[1:]]
+        lines.append([plain(label), coloured(row.outcome), *figures])
+    heads = ("guidance" if by_law else "planner", *(figure.short for figure in ON_TERMINAL))
+    print_table(f"{name}, {rows[0].planner}" if by_law else name, lines, heads)

@@ -109,11 +109,7 @@ def _flown(scenario: Scenario) -> dict[str, Any]:
 
 
 def range_of(text: str) -> tuple[str, float, float]:
-    """KEY.PATH=LO:HI as its three parts.
-
-    Raises:
-        typer.BadParameter: it is something else, or a range that no search is made over.
-    """
+    """KEY.PATH=LO:HI as its three parts; a BadParameter says that it is something else, or no range to search."""
     key, equals, ends = text.partition("=")
     low, colon, high = ends.partition(":")
     try:

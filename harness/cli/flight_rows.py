@@ -10,13 +10,10 @@ from harness.files.wording import counted, tallied
 
 SHOWN: Final = 6
 """Most corners, legs, contacts and breaches that are listed; the others are counted."""
-
 MOST_ITEMS: Final = 12
 """Most items of a mission that are listed one by one."""
-
 OF_NOTE: Final = ("not flown", "flown", "not reached")
 """Treatments of mission items that are listed if there is a reason to tell; items not flown are always listed."""
-
 OF_HEIGHT_OR_SPEED: Final = (
     "climb too steep",
     "descent too steep",

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from harness.cli.command_line import FAILED, interruptible, load, marked_incomplete, print_json, told_apart
+from harness.cli.command_line import FAILED, flying_into, load, print_json, told_apart
 from harness.cli.flight_rows import flight_rows
 from harness.cli.options import Count, Json, NoRecording, Number, OptionalScenario, Out, Quiet, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.review import open_viewer
 from harness.cli.standard_output import say
-from harness.cli.terminal import plain, print_table, progress_bar
+from harness.cli.terminal import plain, print_table
 from harness.files.input_file import InputError
 
 if TYPE_CHECKING:
@@ -114,11 +114,9 @@ def _fly(
 ) -> dict[str, Any]:
     """Flies into a folder, with progress on standard error."""
     from harness.run.scenario_flight import fly_to_folder
-    from harness.run_files.run_folder import MANIFEST, SCHEMA
 
     straight_m = math.dist(scenario.mission.start_m, scenario.mission.goal_m)
-    progress = progress_bar(straight_m, silent)
-    with interruptible(marked_incomplete("run", folder, MANIFEST, SCHEMA)), progress as report:
+    with flying_into(folder, straight_m, silent) as report:
         if onlookers is None:
             return fly_to_folder(scenario, folder, recording, report)
         from harness.watching.watched_flight import fly_watched
@@ -148,8 +146,7 @@ def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_
 def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Onlookers, Callable[[], None]]]:
     """A viewer of our own, open no longer than the block, and what waits until it is closed.
 
-    Raises:
-        InputError: there is no screen for the viewer.
+    An InputError says that there is no screen for it.
     """
     from harness.recording.viewer import ViewerError, empty_viewer
     from harness.watching.watched_flight import Onlookers

@@ -7,28 +7,21 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 import typer
 
 from harness.cli.options import AircraftOption, Count, Text, option
 
-if TYPE_CHECKING:
-    from harness.scenario.kinds import LoopPart
-
 Run = TypeVar("Run", bound=Callable[..., int])
-
 _KIND: Final = "Replaces {}.kind; or FILE.py:NAME, MODULE:NAME."
-_LAWS: Final = "harness.scenario.kinds:guidance_kinds"
 _DAY: Final = "Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."
 _ANY: Final = "Replaces any key of a scenario; can be repeated."
 
 REPLACING: Final[dict[str, Any]] = {
-    "planner": Annotated[
-        Text, option("KIND", _KIND.format("planner"), completes="harness.scenario.kinds:planner_kinds")
-    ],
+    "planner": Annotated[Text, option("KIND", _KIND.format("planner"))],
     "aircraft": AircraftOption,
-    "guidance": Annotated[Text, option("KIND", _KIND.format("guidance"), completes=_LAWS)],
+    "guidance": Annotated[Text, option("KIND", _KIND.format("guidance"))],
     "conditions": Annotated[Text, option("DAY", _DAY)],
     "wind": Annotated[Text, option("SPEED,FROM", "Steady wind: m/s, degrees it blows from.")],
     "turbulence": Annotated[Text, option("INTENSITY", "light, moderate or severe; or milspec:light, ...")],
@@ -40,17 +33,11 @@ REPLACING: Final[dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Given:
-    """What the options of `REPLACING` replace in a scenario.
-
-    Attributes:
-        options: key paths and values (YAML) of the options but --set.
-        settings: those of --set.
-        planner: as given; None where none was.
-        guidance: likewise.
-    """
+    """What the options of `REPLACING` replace in a scenario: key paths, and values as YAML."""
 
     options: tuple[tuple[str, str], ...] = ()
     settings: tuple[tuple[str, str], ...] = ()
+    """Those of --set."""
     planner: str | None = None
     guidance: str | None = None
 
@@ -67,8 +54,7 @@ class Given:
     def plus(self, **keys: Any) -> Given:
         """With further values by key path, its points written as two underscores; None replaces nothing.
 
-        Raises:
-            typer.BadParameter: --set gives such a key another value.
+        A BadParameter says that --set gives such a key another value.
         """
         named = {name.replace("__", "."): value for name, value in keys.items() if value is not None}
         more = [(name, json.dumps(value)) for name, value in named.items()]
@@ -117,20 +103,16 @@ def given_by(
     seed: int | None = None,
     conditions: str | None = None,
 ) -> Given:
-    """What the texts of options replace.
-
-    Raises:
-        typer.BadParameter: one cannot be used, or --set gives a key that another option gives with another value.
-    """
+    """What the texts of options replace; a BadParameter says which cannot be used, or contradicts --set."""
     from harness.scenario.sections import SHIELDED
 
     is_shielded = planner is not None and planner.endswith(SHIELDED)
     begun = Given((), tuple(_setting(text) for text in settings or ()), planner, guidance)
     return begun.plus(
-        planner__kind=planner and planner_kind(planner).removesuffix(SHIELDED),
+        planner__kind=planner and kind_of(planner).removesuffix(SHIELDED),
         planner__shield="loiter" if is_shielded else None,
         aircraft__model=aircraft,
-        guidance__kind=guidance and law_kind(guidance),
+        guidance__kind=guidance and kind_of(guidance, "guidance"),
         environment__wind=wind and _wind(wind),
         environment__turbulence=turbulence and _turbulence(turbulence),
         seed=seed,
@@ -161,32 +143,22 @@ def _setting(text: str) -> tuple[str, str]:
     return name.strip(), value
 
 
-def planner_kind(text: str) -> str:
-    """The kind that --planner means: FILE.py:NAME and MODULE:NAME are imported, and known by their name then."""
-    from harness.scenario.kinds import PLANNER
+def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:
+    """The kind that --planner or --guidance means: FILE.py:NAME and MODULE:NAME are imported and known as NAME."""
+    from harness.scenario.given import registered
+    from harness.scenario.kinds import GUIDANCE, PLANNER
     from harness.scenario.sections import SHIELDED
 
-    shielded = SHIELDED if text.endswith(SHIELDED) else ""
-    return _kind(text.removesuffix(SHIELDED), PLANNER, "--planner") + shielded
-
-
-def law_kind(text: str) -> str:
-    """The kind that --guidance means, likewise."""
-    from harness.scenario.kinds import GUIDANCE
-
-    return _kind(text, GUIDANCE, "--guidance")
-
-
-def _kind(text: str, part: LoopPart, option: str) -> str:
-    from harness.scenario.given import registered
-
+    part = PLANNER if name == "planner" else GUIDANCE
+    shielded = SHIELDED if part is PLANNER and text.endswith(SHIELDED) else ""
+    text = text.removesuffix(shielded)
     if text.endswith(".py") and text not in part.known():
         told = f"is {text}; must be one of {', '.join(part.known())}, or FILE.py:NAME as {text}:NAME"
-        raise typer.BadParameter(told, param_hint=option)
+        raise typer.BadParameter(told, param_hint=f"--{name}")
     try:
-        return registered(text, part)
+        return registered(text, part) + shielded
     except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint=option) from error
+        raise typer.BadParameter(str(error), param_hint=f"--{name}") from error
 
 
 def sources(*names: str | None) -> tuple[str, ...]:

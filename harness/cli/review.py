@@ -1,22 +1,31 @@
-"""The commands that show what was flown: `view`, `report`, `replay`."""
+"""The commands about what was flown: `view`, `report`, `replay`, `export`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import typer
 
-from harness.cli.command_line import FAILED, interruptible, print_json
+from harness.cli.command_line import FAILED, interruptible, print_json, written
 from harness.cli.options import AircraftName, Json, NoRecording, Out, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.standard_output import say
+from harness.cli.sweep import print_summary
 from harness.cli.terminal import print_table
 from harness.files.errors import RunFolderError, WriteError
 from harness.files.input_file import InputError
 
+Form = Literal["plan", "waypoints", "geojson", "kml"]
+What = Literal["flown", "planned"]
+
+NO_RECORDINGS: Final = (
+    "has no recordings: `recordings: thin` in the campaign's file keeps a small one of every run, `all` a whole one, "
+    "`failures` a whole one of those that failed"
+)
 RUN_DIRS: Final = "Run folders (several are overlaid), or a campaign's folder, as a table of runs."
 BY: Final = "Of a campaign: a table by these keys; can be repeated."
 FORMAT: Final = "Of a campaign or comparison: only its table: latex, csv."
@@ -35,15 +44,13 @@ def view(
     from harness.campaign.results import INDEX
 
     campaign = next((each for each in runs if (each / INDEX).is_file()), None)
-    if campaign is None:
-        for each in runs:
-            _need_folder(each)
-        return 0 if open_viewer(runs, web) else FAILED
-    if len(runs) > 1:
+    if campaign is not None and len(runs) > 1:
         raise InputError(
             f"{campaign}: the folder of a campaign is opened alone; its runs are in {campaign / 'runs'}"
         )
-    return 0 if open_campaign(campaign, web) else FAILED
+    for each in runs if campaign is None else ():
+        _need_folder(each)
+    return 0 if open_viewer(runs, web, campaign) else FAILED
 
 
 def _need_folder(run: Path) -> None:
@@ -56,6 +63,31 @@ def _need_folder(run: Path) -> None:
             f"{run}: no run folder was kept; `{fly_again(runs.parent / RESULTS, int(run.name))}` flies the run again "
             "with a recording, `recordings: thin` in the campaign's file keeps one of every run"
         )
+
+
+def open_viewer(runs: Sequence[Path], web: bool = False, campaign: Path | None = None) -> bool:
+    """Shows recordings, those of a campaign as a table, until the viewer is closed; says why, if it cannot start."""
+    from harness.recording.viewer import ViewerError, open_viewer
+
+    def tell(told: str) -> None:
+        say(told, err=True)
+
+    try:
+        if campaign is None:
+            open_viewer(runs, web, tell)
+        else:
+            from harness.campaign.results import recordings_of
+            from harness.recording.catalog import open_table
+
+            recordings = recordings_of(campaign)
+            if not recordings:
+                raise RunFolderError(f"{campaign} {NO_RECORDINGS}")
+            tell(f"{len(recordings)} recordings")
+            open_table(campaign.resolve().name, recordings, web, tell)
+    except ViewerError as error:
+        tell(f"wayproof: {error}")
+        return False
+    return True
 
 
 def report(
@@ -74,6 +106,7 @@ def report(
     runs/comparison --format latex
     """
     from harness.campaign.results import RESULTS
+    from harness.campaign.summary import summarise, write_summary
     from harness.report.run_report import write_report
 
     if out is not None and table is None:
@@ -86,7 +119,10 @@ def report(
     if table is not None:
         _print_table(run, keys, table, out)
     elif (run / RESULTS).is_file():
-        _summary(run, keys)
+        summary = summarise(run, keys)
+        page = write_summary(summary, run)
+        print_summary(summary, all_tables=keys is not None)
+        say(f"summary: {page}")
     else:
         _need_run(run)
         say(f"report: {write_report(run)}")
@@ -108,17 +144,6 @@ def _need_run(folder: Path) -> None:
         )
 
 
-def _summary(folder: Path, keys: Sequence[Sequence[str]] | None) -> None:
-    """The answers of a campaign once more, by other keys perhaps."""
-    from harness.campaign.summary import summarise, write_summary
-    from harness.cli.summary_table import print_summary
-
-    summary = summarise(folder, keys)
-    page = write_summary(summary, folder)
-    print_summary(summary, all_tables=keys is not None)
-    say(f"summary: {page}")
-
-
 def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str, out: Path | None) -> None:
     """The table of a campaign or a comparison for a paper."""
     from harness.analysis import rows as compared
@@ -136,10 +161,8 @@ def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str,
     if out is None:
         say(text.removesuffix("\n"))
         return
-    try:
+    with written(out):
         replace_text(out, text)
-    except OSError as error:
-        raise WriteError(f"cannot write the table {out} ({error.strerror or error})") from error
     say(f"table: {out}")
 
 
@@ -151,37 +174,6 @@ def _column(key: str) -> str:
         return as_spelt(key)
     except ValueError as error:
         raise InputError(f"command line: --by: {error}") from error
-
-
-def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
-    """Shows recordings until the viewer is closed; says on standard error why, if it cannot start."""
-    from harness.recording.viewer import open_viewer
-
-    return _opened(partial(open_viewer, runs, web))
-
-
-def open_campaign(folder: Path, web: bool = False) -> bool:
-    """The same with the recordings of a campaign as a table."""
-    from harness.campaign.results import recordings_of
-    from harness.recording.catalog import open_table
-    from harness.recording.properties import NO_RECORDINGS
-
-    recordings = recordings_of(folder)
-    if not recordings:
-        raise RunFolderError(NO_RECORDINGS.format(folder))
-    say(f"{len(recordings)} recordings", err=True)
-    return _opened(partial(open_table, folder.resolve().name, recordings, web))
-
-
-def _opened(shown: Callable[[Callable[[str], None]], None]) -> bool:
-    from harness.recording.viewer import ViewerError
-
-    try:
-        shown(lambda told: say(told, err=True))
-    except ViewerError as error:
-        say(f"wayproof: {error}", err=True)
-        return False
-    return True
 
 
 @replacing("guidance", "settings")
@@ -223,4 +215,35 @@ def replay(
     for note in told["notes"]:
         say(f"note: {note}")
     say(f"folder: {folder}")
+    return 0
+
+
+def export(
+    run_dir: Annotated[Path, argument("RUN_DIR", "A run folder.")],
+    form: Annotated[Form, option("FORMAT", "plan, waypoints, geojson or kml.", "--format")],
+    what: Annotated[What, option("WHAT", "flown: the track; planned: the plans in effect.")] = "flown",
+    out: Annotated[Path | None, option("FILE", "Default: standard output.")] = None,
+) -> int:
+    """Writes a run for QGroundControl (plan), MAVLink (waypoints) or maps (geojson, kml).
+
+    For example: wayproof export runs/my_run --format plan --out way.plan
+    """
+    from harness.files.whole_file import replace_bytes
+    from harness.run_files.exports import exported
+    from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
+
+    try:
+        content, notes = exported(load_run(run_dir), form, what)
+    except (InputError, RunFolderError):
+        raise
+    except WRONG_CONTENT as error:
+        raise damaged(run_dir, error) from error
+    if out is None:
+        with suppress(BrokenPipeError):  # a reader that goes away is no fault
+            sys.stdout.buffer.write(content)
+    else:
+        with written(out):
+            replace_bytes(out, content)
+    for note in notes:
+        say(note, err=True)
     return 0

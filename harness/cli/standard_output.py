@@ -6,9 +6,7 @@ Standard output outlives its reader: what nobody takes any more is lost, and not
 from __future__ import annotations
 
 import os
-import shutil
 import sys
-import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
@@ -21,15 +19,6 @@ from harness.files.wording import printable
 def say(text: str, *, err: bool = False) -> None:
     """A line of text, control characters in it spelt out, on standard output or standard error."""
     typer.echo(printable(text), err=err)
-
-
-def folded(head: str, text: str) -> str:
-    """A line whose text goes on below its beginning where a terminal is too narrow for it."""
-    if not sys.stdout.isatty():
-        return head + text
-    room = max(shutil.get_terminal_size().columns - len(head), 20)
-    first, *others = textwrap.wrap(text, room) or [""]
-    return "\n".join([head + first, *(" " * len(head) + line for line in others)])
 
 
 def results_alone() -> None:
@@ -69,10 +58,13 @@ def results_over() -> None:
 def kept_up() -> Iterator[None]:
     """A reader that goes away meanwhile (`wayproof fly ... | head -1`) changes neither what is done nor its status."""
     stream = sys.stdout
-    if stream is not None:  # None: closed by whoever started us
-        sys.stdout = _Unread(stream)
+    if stream is None:  # closed by whoever started us
+        yield
+        return
+    sys.stdout = _Unread(stream)
     try:
         yield
+        sys.stdout.flush()
     finally:
         sys.stdout = stream
 
@@ -94,6 +86,7 @@ class _Unread:
         except BrokenPipeError:
             to_nowhere(self._stream)
         except OSError as error:
+            to_nowhere(self._stream)
             raise OSError(error.errno, error.strerror, "standard output") from error
 
     def __getattr__(self, name: str) -> Any:

@@ -22,22 +22,16 @@ from harness.files.wording import printable
 
 FlightReport: TypeAlias = Callable[[float, float, str], None]
 """Takes simulated time (s), distance to go (m) and what is being done."""
-
 StepReport: TypeAlias = Callable[[int, int, str], None]
 """Takes how many steps are done, of how many, and what is being done."""
-
 LINE_EVERY_S: Final = 10.0
 """Without a terminal, progress is a line on standard error at this interval."""
-
 MOST_COLUMNS: Final = 80
 """Tables are never wider."""
-
 LEAST_NAME: Final = 14
 """Figures are kept in one line where they leave the first column this width."""
-
 BREAKS: Final = re.compile(r"(?<=[ _+./:=-])")
 """Places within a name at which it may go on in the next line."""
-
 OUTCOME_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
 """Colour of an outcome; all others are bold red."""
 
@@ -102,10 +96,8 @@ def print_table(
 ) -> None:
     """Prints a table on standard output, at most `MOST_COLUMNS` wide; what is too long goes on below itself.
 
-    Args:
-        title: text of others too: what rich takes for markup in it is shown as it is.
-        rows: name and value of each row; or the cells of each, where `columns` are given. They may have markup.
-        columns: heading of each column; all but the first hold figures and are aligned to the right.
+    `rows` are name and value of each row; or the cells of each, where `columns` names them, all but the first aligned
+    right. Rows may have markup; what rich takes for markup in the title is shown as it is.
     """
     console = Console()
     width = min(MOST_COLUMNS, console.width)

@@ -22,11 +22,6 @@ RUN: Final = "run"
 VARIED: Final = "varied"
 """Name of the properties with the keys that a campaign varied."""
 
-NO_RECORDINGS: Final = (
-    "{} has no recordings: `recordings: thin` in the campaign's file keeps a small one of every run, `all` a whole "
-    "one, `failures` a whole one of those that failed"
-)
-"""Said of a campaign of which there is no table."""
 NOT_FAIR: Final = 1.0
 """Severity of a run that reached its goal and was not tracked, or came nearer to an obstacle than was wanted."""
 

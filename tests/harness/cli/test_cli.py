@@ -86,23 +86,9 @@ def test_help_of_a_command_has_an_example_fills_80_columns_and_breaks_no_word(
     assert re.findall(r"<[^>\n]*?(?:  |$)", shown, re.MULTILINE) == [], "a list of choices is cut"
 
 
-@pytest.mark.parametrize(
-    ("words", "offered"),
-    [
-        ("wayproof be", {"bench"}),
-        ("wayproof fly paper_b", {"paper_bug_trap"}),
-        ("wayproof fly x --planner tangent", {"tangent_bug"}),
-        ("wayproof fly x --aircraft aero", {"aerosonde"}),
-        ("wayproof list sc", {"scenarios"}),
-    ],
-)
-def test_the_shell_completes_commands_and_names(words: str, offered: set[str], tmp_path: Path) -> None:
-    completing = {
-        "_WAYPROOF_COMPLETE": "complete_bash",
-        "COMP_WORDS": words,
-        "COMP_CWORD": str(len(words.split()) - 1),
-    }
-    assert set(wayproof(folder=tmp_path, **completing).stdout.split()) == offered
+def test_the_shell_completes_commands(tmp_path: Path) -> None:
+    completing = {"_WAYPROOF_COMPLETE": "complete_bash", "COMP_WORDS": "wayproof be", "COMP_CWORD": "1"}
+    assert wayproof(folder=tmp_path, **completing).stdout.split() == ["bench"]
 
 
 @pytest.mark.parametrize(

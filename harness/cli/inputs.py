@@ -1,27 +1,30 @@
-"""The command `list`: the names that a scenario or a command can use, and what there is to know of each."""
+"""The commands about what can be given to others: `list` names it, `validate` and `schema` are about files."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import sys
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import typer
 
-from harness.cli.options import argument, called
-from harness.cli.standard_output import folded, say
+from harness.cli.command_line import BAD_INPUT, load, print_json
+from harness.cli.options import argument
+from harness.cli.standard_output import say
 from harness.cli.terminal import step_bar
+from harness.files.input_file import InputError
 
 _AIRCRAFT_ROW: Final = "{:13} {:>7} {:>10} {:>6} {:>6} {:6} "
 _WIDTH: Final = 80
 WHAT: Final = "planners, aircraft, guidance, scenarios, worlds, campaigns or metrics."
 
 
-def list_names(
-    what: Annotated[str, argument("WHAT", WHAT, "harness.cli.names:listed")],
-) -> int:
+def list_names(what: Annotated[str, argument("WHAT", WHAT)]) -> int:
     """Prints the names that a scenario or a command can use; for planners and guidance laws also their keys.
 
     `list aircraft` first measures, in flight, each aircraft that is new to this machine: about a minute for all. The
@@ -29,7 +32,18 @@ def list_names(
 
     For example: wayproof list planners
     """
-    lists = listed()
+    from harness.scenario.kinds import guidance_kinds, planner_kinds
+    from harness.scenario.shipped import shipped_campaigns, shipped_scenarios
+
+    lists: dict[str, Callable[[], Iterator[str]]] = {
+        "planners": lambda: _kinds(planner_kinds()),
+        "aircraft": _aircraft,
+        "guidance": lambda: _kinds(guidance_kinds()),
+        "scenarios": lambda: _files(shipped_scenarios()),
+        "worlds": _worlds,
+        "campaigns": lambda: _files(shipped_campaigns()),
+        "metrics": _metrics,
+    }
     if what not in lists:
         raise typer.BadParameter(f"{what[:60]!r} is not one of {', '.join(lists)}", param_hint="WHAT")
     for line in lists[what]():
@@ -37,25 +51,20 @@ def list_names(
     return 0
 
 
-def listed() -> dict[str, Callable[[], Iterator[str]]]:
-    """What makes the lines of each list."""
-    return {
-        "planners": lambda: _kinds(called("harness.scenario.kinds:planner_kinds")),
-        "aircraft": _aircraft,
-        "guidance": lambda: _kinds(called("harness.scenario.kinds:guidance_kinds")),
-        "scenarios": lambda: _files(called("harness.scenario.shipped:shipped_scenarios")),
-        "worlds": _worlds,
-        "campaigns": lambda: _files(called("harness.scenario.shipped:shipped_campaigns")),
-        "metrics": _metrics,
-    }
-
-
 def _files(files: Mapping[str, Path]) -> Iterator[str]:
     """Shipped files, a row each."""
     from harness.scenario.shipped import summary
 
     width = max(map(len, files), default=0)
-    return (folded(f"{name:{width}}  ", summary(path)) for name, path in files.items())
+    return (_folded(f"{name:{width}}  ", summary(path)) for name, path in files.items())
+
+
+def _folded(head: str, text: str) -> str:
+    """A line whose text goes on below its beginning where a terminal is too narrow for it."""
+    if not sys.stdout.isatty():
+        return head + text
+    room = max(shutil.get_terminal_size().columns - len(head), 20)
+    return head + f"\n{' ' * len(head)}".join(textwrap.wrap(text, room))
 
 
 def _metrics() -> Iterator[str]:
@@ -84,7 +93,7 @@ def _worlds() -> Iterator[str]:
         families.setdefault(name.partition("/")[0], []).append(name)
     for family, names in families.items():
         source = summary(worlds[names[0]]).replace(", see ../LICENCES.md", "")
-        yield folded(f"{family:15} {len(names):3}  ", f"{names[0]}: {source}")
+        yield _folded(f"{family:15} {len(names):3}  ", f"{names[0]}: {source}")
 
 
 def _kinds(kinds: Mapping[str, Any]) -> Iterator[str]:
@@ -116,9 +125,8 @@ def _aircraft() -> Iterator[str]:
         seal()
         many = f"{len(new)} aircraft are" if len(new) > 1 else f"{new[0]} is"
         say(f"{many} flown for the figures, once; some seconds each", err=True)
-    rows = [
-        folded(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "tested"), "what")
-    ]
+    heads = ("name", "mass kg", "speed m/s", "cruise", "turn m", "tested")
+    rows = [_folded(_AIRCRAFT_ROW.format(*heads), "what")]
     with step_bar(silent=not new) as report:
         for done, name in enumerate(names):
             report(done, len(names), name)
@@ -129,12 +137,66 @@ def _aircraft() -> Iterator[str]:
                 rows.append(f"{name:13} cannot be flown: {error}")
                 continue
             low, high = frame.airspeed_range_mps
-            figures = (
-                f"{frame.mass_kg:.0f}",
-                f"{low:g}-{high:g}",
-                f"{frame.cruise_mps:g}",
-                f"{radius_m:.0f}",
-            )
-            tested = "yes" if frame.verified else "no"
-            rows.append(folded(_AIRCRAFT_ROW.format(name, *figures, tested), frame.summary))
+            speeds = f"{low:g}-{high:g}", f"{frame.cruise_mps:g}"
+            figures = f"{frame.mass_kg:.0f}", *speeds, f"{radius_m:.0f}", "yes" if frame.verified else "no"
+            rows.append(_folded(_AIRCRAFT_ROW.format(name, *figures), frame.summary))
     return iter(rows)
+
+
+def validate(
+    files: Annotated[list[str], argument("FILE...", "Scenario or campaign files, or shipped names.")],
+) -> int:
+    """Checks scenario and campaign files without flying them; in a campaign, every run.
+
+    For example: wayproof validate my_world.yaml paper_circles
+    """
+    status = 0
+    for file in files:
+        try:
+            found = _found(file)
+        except InputError as error:
+            say(str(error), err=True)
+            status = BAD_INPUT
+        else:
+            say(f"{file}: {found[0]}: valid")
+            for sentence in found[1]:
+                say(f"  not covered by what the planner promises: {sentence}")
+    return status
+
+
+def _found(file: str) -> tuple[str, tuple[str, ...]]:
+    """What a valid file holds, in a few words, and what of a scenario lies outside the planner's assumptions."""
+    from harness.campaign.campaign_file import is_campaign
+    from harness.files.wording import counted
+    from harness.scenario.shipped import campaign_path, shipped_campaigns
+
+    if file in shipped_campaigns() or (os.path.isfile(file) and is_campaign(Path(file))):
+        from harness.cli.sweep import checked
+
+        runs = checked(campaign_path(file))
+        return f"{runs.campaign.name}, {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}", ()
+    loaded = load(file)
+    from harness.world.motion_assumptions import outside_assumptions
+
+    held = f"{loaded.name}, {counted(len(loaded.obstacles), 'obstacle')}"
+    return held, outside_assumptions(loaded)
+
+
+def schema(
+    kind: Annotated[
+        Literal["scenario", "campaign"], argument("FORMAT", "The file format.", show_default=True)
+    ] = "scenario",
+) -> int:
+    """Prints the JSON Schema of a file format, for editors.
+
+    For example: wayproof schema > scenario.schema.json
+    """
+    if kind == "campaign":
+        from harness.campaign.campaign_file import campaign_schema
+
+        print_json(campaign_schema())
+    else:
+        from harness.scenario.scenario import scenario_schema
+
+        print_json(scenario_schema())
+    return 0
