@@ -22,9 +22,15 @@ from PIL import Image
 
 from harness.cli.app import main as wayproof
 from harness.recording.blueprint import TIMELINE
-from harness.recording.local_page import LOCALHOST
 from harness.recording.overlay import send_recording
-from harness.recording.viewer import NO_DRIVER, ViewerError, empty_viewer, free_port, viewer_process
+from harness.recording.viewer import (
+    LOCALHOST,
+    NO_DRIVER,
+    ViewerError,
+    empty_viewer,
+    free_port,
+    viewer_process,
+)
 from tests.page import NoBrowserError, browser, shown
 
 SETTLE_S = 1.5

@@ -81,20 +81,20 @@ def kept(
     for fence in fences.exclusions:
         margin = -inside_m(track, fence.area)
         margins.append(float(margin.min()))
-        found += crossings(track, margin, fence.kind, fence.name, outside_of=fence.area)
+        found += crossings(track, margin, fence.area, fence.kind, fence.name)
     allowed = fences.allowed
     if allowed is not None:
         margin = inside_m(track, allowed)
         margins.append(float(margin.min()))
         names = ", ".join(fence.name for fence in fences.inclusions)
         name = names if len(fences.inclusions) == 1 else f"all of {names}"
-        found += crossings(track, margin, "inclusion", name, inside_of=allowed)
+        found += crossings(track, margin, allowed, "inclusion", name, stays_in=True)
     margins += [-each.depth_m for each in found]
     if heights is not None:
         found += _stretches(track, np.nan_to_num(heights, nan=np.inf), TERRAIN, "the ground")
     if bounded:
         area = shapely.box(*world.bounds_m)
-        found += crossings(track, inside_m(track, area), "area", "area.bounds_m", inside_of=area)
+        found += crossings(track, inside_m(track, area), area, "area", "area.bounds_m", stays_in=True)
     return Kept(tuple(sorted(found, key=lambda each: each.start_s)), min(margins), _heights(track, heights))
 
 
@@ -146,15 +146,9 @@ def inside_m(track: Track, area: Geometry) -> FloatArray:
 
 
 def crossings(
-    track: Track,
-    margin_m: FloatArray,
-    kind: str,
-    name: str,
-    *,
-    inside_of: Geometry | None = None,
-    outside_of: Geometry | None = None,
+    track: Track, margin_m: FloatArray, area: Geometry, kind: str, name: str, *, stays_in: bool = False
 ) -> list[Breach]:
-    """Stretches of a track on the wrong side of a line, those between two rows among them."""
+    """Stretches of a track in an area, or out of one that it stays in, those between two rows among them."""
     import shapely
 
     margin = margin_m.copy()
@@ -164,11 +158,10 @@ def crossings(
     )
     for row in near.tolist():
         way = shapely.LineString(np.column_stack((track.east_m[row : row + 2], track.north_m[row : row + 2])))
-        wrong = way.difference(inside_of) if inside_of is not None else way.intersection(outside_of)
+        wrong = way.difference(area) if stays_in else way.intersection(area)
         if wrong.length > 0.0:
-            area = inside_of if inside_of is not None else outside_of
             middle = wrong.interpolate(0.5, normalized=True) if wrong.geom_type == "LineString" else wrong
-            margin[row] = min(-shapely.distance(area.boundary, middle), -1e-9)  # type: ignore[union-attr]
+            margin[row] = min(-shapely.distance(area.boundary, middle), -1e-9)
     return _stretches(track, margin, kind, name)
 
 
@@ -179,9 +172,6 @@ def _stretches(track: Track, margin_m: FloatArray, kind: str, name: str) -> list
     found = []
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         row = first + int(margin_m[first:stop].argmin())
-        end_s = float(track.time_s[min(stop, len(track) - 1)])
-        depth_m = float(-margin_m[row])
-        found.append(
-            Breach(kind, name, float(track.time_s[first]), end_s, **_where(track, row), depth_m=depth_m)
-        )
+        ends_s = float(track.time_s[first]), float(track.time_s[min(stop, len(track) - 1)])
+        found.append(Breach(kind, name, *ends_s, **_where(track, row), depth_m=float(-margin_m[row])))
     return found

@@ -1,9 +1,8 @@
 """How far a flown track and the path that was given are from one another, both ways.
 
-A track is close to a path only if it keeps close to it all the way and leaves no part of it out. So every row of the
-track is measured against the path, and every point of the path against the track. Both know how far along they are:
-a point is compared with that part of the other line which is about as far along. A track that takes another leg of a
-path that comes by again is not taken to have flown this one.
+Every row of the track is measured against the path, and every point of the path against the track: none may be left
+out. A point is compared with that part of the other line which is about as far along: who takes another leg of a path
+that comes by again has not flown this one.
 """
 
 from __future__ import annotations
@@ -49,8 +48,9 @@ class Deviation:
         """95th percentile and maximum of all of them; None where nothing was flown."""
         every = np.concatenate((self.rows_m, self.points_m))
         every = every[np.isfinite(every)]
-        largest = (float(np.percentile(every, 95)), float(every.max())) if len(every) else (None, None)
-        return dict(zip(("p95", "max"), largest, strict=True))
+        if not len(every):
+            return {"p95": None, "max": None}
+        return {"p95": float(np.percentile(every, 95)), "max": float(every.max())}
 
 
 def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: float) -> Deviation:
@@ -80,9 +80,8 @@ def allowed_m(track: Track, tolerance_m: float, corners: Iterable[CutCorner]) ->
 def at_corner(track: Track, corner: CutCorner) -> NDArray[np.bool_]:
     """(n,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
 
-    They reach as far as the planned path is off the corner's legs and one limit more, and at least `ABOUT` limits to
-    each side: within three times the distance by which it overshoots a corner an aircraft has come back to the next
-    leg.
+    They reach one limit further than the planned path is off the corner's legs, and at least `ABOUT` limits to each
+    side: within these an aircraft that overshoots has come back to the next leg.
     """
     reach_m = max(corner.half_m + corner.allowed_cut_m, ABOUT * corner.allowed_cut_m)
     about: NDArray[np.bool_] = np.abs(track.arc_length_m - corner.arc_length_m) <= reach_m
@@ -131,10 +130,7 @@ def _block_distances(points: FloatArray, line: FloatArray, window_m: float) -> F
 
 
 def _along(line: FloatArray, spacing_m: float) -> FloatArray:
-    """(k, 3) points along a line, its vertices among them.
-
-    They are no further apart than `spacing_m`, or than 1 / `MOST_SAMPLES` of the length where that is more.
-    """
+    """(k, 3) points along a line, its vertices among them, at most `spacing_m` or length / `MOST_SAMPLES` apart."""
     length = np.hypot(*np.diff(line[:, :2], axis=0).T)
     spacing = max(spacing_m, float(length.sum()) / MOST_SAMPLES)
     pieces = np.maximum(np.ceil(length / spacing), 1.0).astype(np.intp)

@@ -56,23 +56,22 @@ class FlightLimits:
 
 @dataclass(frozen=True, eq=False)
 class AsGiven:
-    """A path that was given and how it was flown, row by row of the track."""
+    """A path that was given and how it was flown, row by row of the track, (n,) each.
+
+    Each of `corners`, in order, ends a leg; one that is no corner has no `cut_m` and no `half_m`. `deviation_m` is the
+    distance between the track and the path, `allowed_m` the largest that is allowed there; `altitude_m` and
+    `climb_mps`, negative for a descent, are the path's at `airspeed_mps`, the true airspeed commanded there.
+    `fastest_mps` (n, 2) are the fastest climb and descent of the aircraft at its airspeed there. `unheld_mps` says how
+    far the commanded airspeed lies outside the range of level flight, `believed_off_m` how far the believed position is
+    from the path; None where navigation is perfect.
+    """
 
     corners: Sequence[CutCorner]
-    """Places on the path, in order; each ends a leg. One that is no corner has no `cut_m` and no `half_m`."""
     deviation_m: FloatArray
-    """(n,) distance between the track and the path as given."""
     allowed_m: FloatArray
-    """(n,) largest deviation that is allowed there."""
     altitude_m: FloatArray
-    """(n,) altitude of the path there."""
     climb_mps: FloatArray
-    """(n,) climb rate of the path there at the commanded airspeed, negative for a descent."""
     fastest_mps: FloatArray
-    """(n, 2) fastest climb and descent of the aircraft at its airspeed there."""
     airspeed_mps: FloatArray
-    """(n,) true airspeed that was commanded there."""
     unheld_mps: FloatArray | float = 0.0
-    """(n,) how far the commanded airspeed lies outside the range of level flight."""
     believed_off_m: FloatArray | None = None
-    """(n,) distance of the believed position from the path; None where navigation is perfect."""

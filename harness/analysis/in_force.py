@@ -27,15 +27,15 @@ LEAST_WIND_MPS = 1.0
 
 @dataclass(frozen=True, eq=False)
 class InForce:
-    """What an aircraft was told and flew in, row by row of a track."""
+    """What an aircraft was told and flew in, row by row of a track: true airspeed commanded, wind, limits of the bank.
+
+    The wind (n, 2) is its velocity, east and north, averaged over `WIND_S`; sideslip is taken to be zero.
+    """
 
     commanded_mps: FloatArray
-    """(n,) true airspeed that was commanded."""
     wind_mps: FloatArray
-    """(n, 2) velocity of the wind, east and north, averaged over `WIND_S`; sideslip is taken to be zero."""
     bank_limit_rad: float
     roll_rate_radps: float
-    """Fastest change of the bank that may be commanded."""
 
     @classmethod
     def of(cls, track: Track, limits: FlightLimits, commanded_mps: FloatArray | None = None) -> InForce:
@@ -62,14 +62,15 @@ class InForce:
 
 @dataclass(frozen=True)
 class Demand:
-    """What turns of a plan ask for, over what was in force there; above 1 the aircraft cannot do it."""
+    """What turns of a plan ask for, over what was in force there; above 1 the aircraft cannot do it.
+
+    The largest lateral acceleration, in calm air and in the wind there, over g tan(bank limit); the largest roll rate
+    over its limit.
+    """
 
     calm: float
-    """Largest lateral acceleration, in calm air, over g tan(bank limit)."""
     windy: float
-    """Largest lateral acceleration, in the wind there, over g tan(bank limit)."""
     roll_rate: float
-    """Largest roll rate over the roll rate limit."""
 
 
 def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand:

@@ -1,14 +1,19 @@
-"""What is known of a figure of a flight, and how bad an outcome is."""
+"""What is known of a figure of a flight, how bad an outcome is, and what may be claimed of a flight."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, get_args
 
-from harness.analysis.flight_limits import FlightLimits
-from harness.flight.record import Flight
+if TYPE_CHECKING:
+    from harness.analysis.flight_limits import FlightLimits
+    from harness.flight.record import Flight
 
+Claim: TypeAlias = Literal["reached", "no-contact", "trackable", "as-given"]
+CLAIMS: Final[tuple[Claim, ...]] = get_args(Claim)
+UNKNOWN_AFTER: Final = ("collision", "lost_control", "planner_failed", "error")
+"""Outcomes after which nobody can say that nothing is touched: `no-contact` does not hold."""
 ERROR: Final = "error"
 """Outcome of a flight whose software failed before its end; the other outcomes are those of `metrics.json`."""
 SEVERITY: Final[Mapping[str, float]] = {
@@ -106,3 +111,19 @@ def number(value: float | None, factor: float = 1.0) -> str:
 def severity(outcome: str) -> float:
     """How bad an outcome is; one that is not known is the mildest of those that did not reach the goal."""
     return SEVERITY.get(outcome, SEVERITY["unreachable"])
+
+
+def holds(claim: Claim, metrics: Mapping[str, Any]) -> bool:
+    """Whether a claim holds of one flight, by the content of its `metrics.json`.
+
+    `reached`: goal reached, without contact and inside the area. `no-contact`: nothing was touched, and the flight did
+    not break off. `trackable`: goal reached and every leg tracked. `as-given`: a given path was flown as given, with no
+    contact and no breach, as `wayproof check` judges it.
+    """
+    if claim == "reached":
+        return bool(metrics["outcome"] == "reached")
+    if claim == "no-contact":
+        return metrics["outcome"] not in UNKNOWN_AFTER and not metrics.get("contact")
+    if claim == "trackable":
+        return metrics["outcome"] == "reached" and bool(metrics["trackable"])
+    return bool(metrics.get("check", {}).get("ok"))

@@ -31,16 +31,13 @@ COUNTED_BEAMS: Final = 20
 def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) -> dict[str, Any]:
     """All figures of a flight, ready for JSON: a figure that does not exist is None, never NaN or infinity.
 
-    `planned_length_m` is the curve length of those parts of the plans that were in effect. `min_clearance_m` is that
-    of the rows, or at a contact between the last two. Cross-track figures are of the rows flown under a plan, altitude
-    figures of all rows, all of the true position. Errors have the names of performance-based navigation (ICAO Doc
-    9613): `total_system_error_m` is how far the true position is off the path, `flight_technical_error_m` how far the
-    believed one is. `navigation_error_m`, `navigation_jump_m` (the most that this error changes from row to row, as a
-    vector) and `navigation_margin_m` are there unless navigation is perfect. `clearance_violation_s` counts the
-    intervals at whose end the distance to an obstacle edge was below the wanted clearance. `compute_ms` is processor
-    time of all calls in which the planner searched, `timing.planner_wall_ms` the wall-clock time of the same.
-
-    A ValueError says that the track is empty.
+    `min_clearance_m` is that of the rows, or at a contact between the last two. Cross-track figures are of the rows
+    flown under a plan, altitude figures of all rows, all of the true position. Errors have the names of performance-
+    based navigation (ICAO Doc 9613): `total_system_error_m` is how far the true position is off the path,
+    `flight_technical_error_m` how far the believed one is. `navigation_jump_m`: the most that the navigation error
+    changes from row to row, as a vector. `clearance_violation_s` counts the intervals at whose end the distance to an
+    obstacle edge was below the wanted clearance. `compute_ms` is processor time of all calls in which the planner
+    searched, `timing.planner_wall_ms` the wall-clock time of the same. A ValueError says that the track is empty.
     """
     track = flight.track
     if not len(track):
@@ -59,11 +56,11 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "outcome": flight.outcome.value,
         "reason": flight.reason,
         "flown_length_m": float(flown_lengths(track).sum()),
-        "planned_length_m": planned_length_m(flight),
+        "planned_length_m": _planned_length_m(flight),
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
         "min_clearance_m": _finite(nearest_m.min()),
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
-        "clearance_violation_s": clearance_violation_s(track.time_s, nearest_m, limits.clearance_m),
+        "clearance_violation_s": float(np.diff(track.time_s)[nearest_m[1:] < limits.clearance_m].sum()),
         "cross_track_m": off_path,
         "total_system_error_m": {**off_path},
         "flight_technical_error_m": error_figures(believed_m[under_plan]),
@@ -78,27 +75,21 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "trackable": bool(verdicts) and all(leg.trackable for leg in verdicts),
         "trackability": [dict(vars(leg)) for leg in verdicts],
         "findings": [dataclasses.asdict(each) for each in findings(flight, limits)],
-        **_registered(flight, limits),
+        **{metric.path: metric.of(flight, limits) for metric in METRICS if metric.of is not None},
         "replans": max(len(flight.plans) - 1, 0),
         "shield": flight.shield and dataclasses.asdict(flight.shield),
         "plan_delay_s": percentiles(list(filter(math.isfinite, (plan.delay_s for plan in flight.plans)))),
         "lost_returns": lost_returns(flight.lost_returns),
         "compute_ms": percentiles(flight.compute_ms),
-        "timing": _timing(flight),
+        "timing": {
+            "sim_s": flight.sim_s,
+            "wall_s": flight.wall_s,
+            "realtime_factor": flight.sim_s / flight.wall_s if flight.wall_s > 0 else None,
+            "planner_wall_ms": percentiles(flight.compute_wall_ms),
+        },
         "digest": digest(track),
         "error": flight.error,
     }
-
-
-def _registered(flight: Flight, limits: FlightLimits) -> dict[str, Any]:
-    """Figures that the registry computes."""
-    return {metric.path: metric.of(flight, limits) for metric in METRICS if metric.of is not None}
-
-
-def _timing(flight: Flight) -> dict[str, Any]:
-    factor = flight.sim_s / flight.wall_s if flight.wall_s > 0 else None
-    told = {"sim_s": flight.sim_s, "wall_s": flight.wall_s, "realtime_factor": factor}
-    return {**told, "planner_wall_ms": percentiles(flight.compute_wall_ms)}
 
 
 def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:
@@ -146,12 +137,7 @@ def lost_returns(counts: IntArray | None) -> dict[str, float | None]:
     return {"share": share, "max": worst}
 
 
-def clearance_violation_s(time_s: FloatArray, clearance_m: FloatArray, wanted_m: float) -> float:
-    """Time below the wanted clearance, counted by intervals between rows."""
-    return float(np.diff(time_s)[clearance_m[1:] < wanted_m].sum())
-
-
-def planned_length_m(flight: Flight) -> float:
+def _planned_length_m(flight: Flight) -> float:
     """Length of the planned curve that was in effect: progress along each plan while it was flown, up to its end."""
     flown_m = 0.0
     for index, start, end in stations_in_effect(flight.track):

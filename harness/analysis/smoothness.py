@@ -1,9 +1,8 @@
 """How smooth a path is, planned and flown, in the same figures.
 
-Both are brought to one form, a curvature profile: consecutive pieces of length `l_i` (m) and constant
-curvature `k_i` (1/m, positive = left). A plan has this form already. A flown track gets it from the course
-over the ground, averaged over `COURSE_WINDOW_S`, which is longer than the course jitter of turbulence and
-shorter than a turn.
+Both are brought to one form, a curvature profile: consecutive pieces of length `l_i` (m) and constant curvature `k_i`
+(1/m, positive = left). A plan has this form already. A flown track gets it from the course over the ground, averaged
+over `COURSE_WINDOW_S`, which is longer than the course jitter of turbulence and shorter than a turn.
 """
 
 from __future__ import annotations
@@ -102,9 +101,8 @@ def flown_lengths(track: Track) -> FloatArray:
 def planned_profile(track: Track, plans: Sequence[FlownPlan], window_m: float) -> Profile:
     """Curvature profile of what was planned and in effect, plan after plan.
 
-    Of every plan, the part between the stations at which it was taken up and replaced counts. A corner, where
-    the tangent jumps, counts as an arc of length `window_m`: inside a plan, and where a plan takes over from
-    another in a different direction.
+    Of every plan, the part between the stations at which it was taken up and replaced counts. A corner, within a plan
+    or from one to the next, counts as an arc of length `window_m`.
     """
     pieces: list[tuple[float, float]] = []
     left: tuple[float, float] | None = None
@@ -152,8 +150,7 @@ def polyline_profile(points_m: FloatArray, window_m: float) -> Profile:
 def stations_in_effect(track: Track) -> list[tuple[int, float, float]]:
     """Which part of which plan was flown: (plan_index, first station, last station), in order of time.
 
-    Between the last row of one plan and the first of the next the distance flown is given to the older plan,
-    so that nothing is lost however often plans change.
+    Between the last row of one plan and the first of the next the distance flown is given to the older plan.
     """
     index = track.plan_index
     starts = np.flatnonzero(np.diff(index, prepend=index[:1] - 1))

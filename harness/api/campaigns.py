@@ -14,7 +14,7 @@ from harness.files.input_file import InputError
 from harness.scenario.scenario import Scenario, load_scenario
 
 if TYPE_CHECKING:
-    from harness.analysis.claims import Claim
+    from harness.analysis.metric import Claim
     from harness.campaign.flight import Answer
     from harness.certification.certification import Certificate, Tally
     from harness.scenario.kinds import LoopPart

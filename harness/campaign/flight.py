@@ -10,8 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from harness.analysis.claims import Claim, holds
-from harness.analysis.metric import ERROR
+from harness.analysis.metric import ERROR, Claim, holds
 from harness.campaign.results import metric_cells, time_cells
 from harness.files.crash import PlannerError, sentence, trace
 from harness.files.errors import RunFolderError, WriteError

@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from harness.analysis.claims import Claim
+from harness.analysis.metric import Claim
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.flight import Job
 from harness.campaign.results import LAW, RESULTS, RUN, RUNS, fly_again, read_table

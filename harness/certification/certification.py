@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.analysis.band import BAND, write_band
-from harness.analysis.claims import Claim
+from harness.analysis.metric import Claim
 from harness.campaign.cell import grouped
 from harness.campaign.flight import Answer
 from harness.campaign.folder import CampaignFolder

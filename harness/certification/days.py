@@ -16,7 +16,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final
 
-from harness.analysis.claims import CLAIMS, Claim
+from harness.analysis.metric import CLAIMS, Claim
 from harness.campaign.campaign_file import Base, CampaignFile, absolute_paths, is_scenario, validated
 from harness.campaign.flight import Job
 from harness.campaign.runs import CampaignRuns

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from harness.analysis.claims import Claim
+from harness.analysis.metric import Claim
 from harness.cli.command_line import FAILED, at_a_time, print_json, resumable, told_apart
 from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, replacing

@@ -21,7 +21,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
-from harness.analysis.claims import Claim, holds
+from harness.analysis.metric import Claim, holds
 from harness.campaign.folder import claim_folder
 from harness.campaign.sampling import takes_whole_numbers
 from harness.files.crash import sentence

@@ -167,20 +167,11 @@ def series_lines(name: str, colour: tuple[int, ...], width: float) -> rr.SeriesL
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is known before the flight, true world included.
+    """What is known before the flight, the true obstacles and ground included.
 
-    Attributes:
-        name: of the recording, for example "paper_circles, rolling_window, aerosonde, seed 1".
-        mission: goal, bounds, clearance and sensing range.
-        start_m: (east, north).
-        limits: altitude to be held, bank limit, and the error from which on a plan is not tracked.
-        obstacles: the true ones.
-        scenario_yaml: as flown, for the summary.
-        searches: whether a planner searches; not where a given path is flown.
-        ground: heights of the true ground, where they are known.
-        believes: whether the aircraft does not know its state exactly.
-        profile: altitudes to be held at places along the path, above mean sea level; None: one all along.
-        wind: speed (m/s), and the direction (deg clockwise from north) that it blows from.
+    A planner `searches`, but not where a given path is flown; the aircraft `believes` where it does not know its state
+    exactly. `profile` gives altitudes to be held at places along the path, above mean sea level; None: one all along.
+    `wind` is its speed (m/s), and the direction (deg clockwise from north) that it blows from.
     """
 
     name: str

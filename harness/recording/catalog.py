@@ -6,16 +6,14 @@ import contextlib
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.analysis.registry import METRICS
 from harness.recording.blueprint import FRAME, Frame
 from harness.recording.layout import layout_of
-from harness.recording.local_page import LOCALHOST
 from harness.recording.properties import RUN, VARIED
-from harness.recording.viewer import ViewerError, empty_viewer, wait_for
+from harness.recording.viewer import LOCALHOST, ViewerError, empty_viewer, wait_for
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -37,39 +35,16 @@ COLUMNS: Final = {
 A browser cuts a heading that is longer than the name of its figure by more than a letter."""
 LEADING_COLUMNS: Final = 3
 """Number of columns before the varied keys, of which more may be varied than fit a window."""
-
-
 ENDING_S: Final = 2.0
 """The server has so long to end."""
 
 
-@dataclass(frozen=True)
-class Catalog:
-    """A campaign's recordings, being served.
-
-    Attributes:
-        url: of the dataset: what a viewer opens.
-        dataset: rerun's handle of it, for queries.
-    """
-
-    url: str
-    dataset: Any
-
-    def table(self) -> pa.Table:
-        """The runs as a table, one row a recording, worst first."""
-        from datafusion import col
-
-        worst_first = col(f'"{_figure("severity")}"').sort(ascending=False)
-        table: pa.Table = self.dataset.segment_table().sort(worst_first).to_arrow_table()
-        return table
-
-
 @contextlib.contextmanager
-def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
+def catalog(name: str, recordings: Sequence[Path]) -> Iterator[tuple[str, Any]]:
     """Serves recordings as one dataset on 127.0.0.1, as long as the block lasts. To read a thousand takes seconds.
 
-    Raises:
-        ViewerError: rerun's server is not installed or does not start.
+    Gives the address that a viewer opens, and rerun's handle of the dataset. A ViewerError says that rerun's server is
+    not installed or does not start.
     """
     try:
         import datafusion  # noqa: F401
@@ -84,7 +59,7 @@ def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
     with ended_in_time(server), tempfile.TemporaryDirectory(prefix="wayproof-table-") as scratch:
         dataset = server.client().get_dataset(name)
         _lay_out(dataset, Path(scratch))
-        yield Catalog(f"{server.url()}/entry/{dataset.id}", dataset)
+        yield f"{server.url()}/entry/{dataset.id}", dataset
 
 
 @contextlib.contextmanager
@@ -148,20 +123,14 @@ def common_frame(runs: pa.Table) -> Frame:
     return Frame((xmin, ymin, xmax, ymax), altitude_m, clearance_m)
 
 
-def open_table(
-    name: str,
-    recordings: Sequence[Path],
-    web: bool = False,
-    tell: Callable[[str], None] = lambda address: None,
-) -> None:
+def open_table(name: str, recordings: Sequence[Path], web: bool, tell: Callable[[str], None]) -> None:
     """Opens the table of a campaign in the viewer and waits until it is closed.
 
-    Raises:
-        ViewerError: there is no screen, or the viewer or the server does not start.
+    `tell` is told the address for a browser. A ViewerError says that there is no screen, or what does not start.
     """
-    with catalog(name, recordings) as served, empty_viewer(web, tell, served.url) as (viewer, source):
+    with catalog(name, recordings) as (url, _), empty_viewer(web, tell, url) as (viewer, source):
         if not web:
             from rerun.experimental import ViewerClient
 
-            ViewerClient.connect(source).open(served.url)
+            ViewerClient.connect(source).open(url)
         wait_for(viewer)

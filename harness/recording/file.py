@@ -51,11 +51,7 @@ class RunningViewer:
         default_blueprint.let_go()
 
     def flush(self) -> None:
-        """Has the viewer take what was logged.
-
-        Raises:
-            OSError: it does not.
-        """
+        """Has the viewer take what was logged; an OSError says that it does not."""
         try:
             self._rec.flush(timeout_sec=ANSWER_S)
         except RuntimeError as error:
@@ -67,11 +63,7 @@ class RunningViewer:
 
 
 class RecordingFile:
-    """Where a recording goes. `end` must be called, also when the flight breaks off.
-
-    Raises:
-        OSError: the file cannot be made.
-    """
+    """Where a recording goes. `end` must be called, also when the flight breaks off."""
 
     def __init__(self, rec: rr.RecordingStream, path: Path, default_blueprint: Layout) -> None:
         self._rec, self._path = rec, path
@@ -87,20 +79,12 @@ class RecordingFile:
             os.close(into)  # rerun has opened the pipe for itself
 
     def flush(self) -> None:
-        """Has rerun write out what was logged.
-
-        Raises:
-            OSError: some of the recording could not be written.
-        """
+        """Has rerun write out what was logged; an OSError says that some of it could not be written."""
         self._rec.flush()
         self._check()
 
     def end(self) -> None:
-        """Ends the recording; again it does nothing.
-
-        Raises:
-            OSError: some of it could not be written.
-        """
+        """Ends the recording, again it does nothing; an OSError says that some of it could not be written."""
         if not self._file.closed:
             self._rec.disconnect()
             self._mover.join()

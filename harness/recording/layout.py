@@ -45,12 +45,9 @@ def blueprint(
 ) -> Layout:
     """The layout: plan view and 3-D flight, states, events and summary, time series.
 
-    Args:
-        frame: what to frame the views on.
-        runs: entity of each run below PLAN and WORLD, ending in a slash; of a single recording "", of a thin one none.
-        without: names of time series that have nothing to show.
-        follows: whether the cursor stays at the latest time, for a flight that goes on.
-        lanes: how many lanes of states there are; default: those of `runs`.
+    `runs` are entities of runs below PLAN and WORLD, ending in a slash: of a single recording "", of a thin one none.
+    `without` names time series that have nothing to show. The cursor `follows` a flight that goes on. `lanes`: how many
+    lanes of states there are; default: those of `runs`.
     """
     plan = plan_view(frame, runs)
     states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())

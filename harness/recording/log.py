@@ -27,8 +27,7 @@ from harness.recording.layout import NOT_THIN, blueprint
 from harness.recording.moving import Changing, Tracked
 from harness.recording.plans import send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
-from harness.recording.scene import lines_2d, log_end, log_scene, log_summary, quaternions
-from harness.recording.sensed import Sensed, returns_m
+from harness.recording.scene import lines_2d, log_end, log_scene, log_styles, log_summary, quaternions
 from harness.recording.series import curves, send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_3d
 from harness.recording.states import (
@@ -43,8 +42,7 @@ from harness.recording.states import (
     send_events,
     tracking_changes,
 )
-from harness.recording.styles import log_styles
-from harness.recording.trail import Trail
+from harness.recording.trail import Sensed, Trail, returns_m
 
 if TYPE_CHECKING:
     from harness.mapping.scan import RangeScan
@@ -67,17 +65,10 @@ THIN_CHORD_ERROR = 1e-2
 class RerunLog:
     """Writes one recording. A process that is killed leaves it readable up to the last block.
 
-    Args:
-        into: the file, whose folder must exist; or the address of a viewer that is running, as text, which then follows
-            the flight.
-        scene: what is known before the flight.
-        recording_id: identity of the recording; the same run gives the same one.
-        moving: tells what the map takes to move.
-        thin: no more than track, plans, obstacles and few rows of three time series, for campaigns that keep
-            thousands.
-
-    Raises:
-        OSError: the file cannot be written.
+    It goes into a file, or, where `into` is text, to the viewer that runs at this address and then follows the flight.
+    The same run gives the same `recording_id`. `moving` tells what the map takes to move. A `thin` recording, of which
+    campaigns keep thousands, has no more than track, plans, obstacles and few rows of three time series. An OSError
+    says that the file cannot be written.
     """
 
     def __init__(
@@ -212,11 +203,7 @@ class RerunLog:
             send_curves(self._rec, {name: curve[kept]}, block.time_s[kept])
 
     def flush(self) -> None:
-        """Writes out all that has been logged; a process killed afterwards leaves about that.
-
-        Raises:
-            OSError: it cannot be written.
-        """
+        """Writes out all that has been logged; an OSError says that it cannot be written."""
         self._sink.flush()
 
     def end(self) -> None:

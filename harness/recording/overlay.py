@@ -5,7 +5,6 @@ An overlay has the world of the first, tracks and series of all.
 
 from __future__ import annotations
 
-import json
 import re
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from harness.analysis.metric import Metric
 from harness.analysis.registry import METRICS
 from harness.analysis.rows import escaped
 from harness.files.errors import RunFolderError
@@ -41,12 +41,8 @@ FLOWN_LINE = "/flown"
 def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) -> str:
     """Writes the overlay of recordings to `path`, in the world of the first.
 
-    Returns:
-        Which of them are of other worlds, a sentence that stands in the summary too; empty where none is.
-
-    Raises:
-        RunFolderError: a recording cannot be read.
-        OSError: the overlay cannot be written.
+    Returns which of them are of other worlds, a sentence that stands in the summary too; empty where none is. A
+    RunFolderError says which recording cannot be read, an OSError that the overlay cannot be written.
     """
     chunks = [chunks_of(recording) for recording in recordings]
     runs = [f"runs/{place}/" for place in range(len(recordings))]
@@ -54,7 +50,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
     with recording_stream(f"overlay: {title}") as rec:
         entities = {
             renamed.entity_path
-            for own, run, place in zip(chunks, runs, range(len(runs)), strict=True)
+            for place, (own, run) in enumerate(zip(chunks, runs, strict=True))
             for renamed in _renamed(own, run, place, str(place))
         }
         file = RecordingFile(rec, path, layout_of(frame_of(chunks[0], recordings[0]), entities, runs))
@@ -64,22 +60,12 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             rec.send_chunks(_renamed(own, run, place, rr.escape_entity_path_part(name)))
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
-        figures = [_metrics(own) for own in chunks]
-        without = [_missing(own, each) for own, each in zip(chunks, figures, strict=True)]
-        told = _of_other_worlds(
-            names, [_properties(own).get(look.FRAME, {}).get("world", "") for own in chunks]
-        )
-        summary = (f"**{escaped(told)}**\n\n" if told else "") + _summary(names, figures, without)
+        properties = [properties_of(own) for own in chunks]
+        told = _of_other_worlds(names, [each.get(look.FRAME, {}).get("world", "") for each in properties])
+        summary = (f"**{escaped(told)}**\n\n" if told else "") + _summary(names, properties)
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
         return told
-
-
-def _missing(chunks: Sequence[rr.chunk.Chunk], figures: Mapping[str, Any]) -> str:
-    """What is said of a recording where it has no such figure."""
-    if f"/{look.SUMMARY}" not in {chunk.entity_path for chunk in chunks}:
-        return "log"
-    return "none" if figures else "unfinished"
 
 
 def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:
@@ -94,9 +80,7 @@ def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:
 def add_band(recording: Path, left_m: FloatArray, right_m: FloatArray) -> None:
     """Replaces a recording by one that also shows the edges (n, 2) of the band in which days fly, in both views.
 
-    Raises:
-        RunFolderError: the recording cannot be read.
-        OSError: it cannot be written.
+    A RunFolderError says that it cannot be read, an OSError that it cannot be written.
     """
     chunks = chunks_of(recording)
     frame = frame_of(chunks, recording)
@@ -115,11 +99,7 @@ def add_band(recording: Path, left_m: FloatArray, right_m: FloatArray) -> None:
 
 
 def send_recording(recording: Path, address: str) -> None:
-    """Sends a recording, or an overlay, with its layout to a viewer that listens.
-
-    Raises:
-        RunFolderError: the recording cannot be read.
-    """
+    """Sends a recording, or an overlay, with its layout to a viewer; a RunFolderError says that it cannot be read."""
     chunks = chunks_of(recording)
     entities = {chunk.entity_path for chunk in chunks}
     with recording_stream(str(recording)) as rec:
@@ -148,7 +128,7 @@ def chunks_of(recording: Path) -> list[rr.chunk.Chunk]:
         raise RunFolderError(f"cannot read the recording {recording}: {error}") from error
 
 
-def _properties(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]:
+def properties_of(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]:
     """The properties of a recording, by their names and those of their values."""
     return {
         chunk.entity_path.rpartition("/")[2]: {
@@ -163,7 +143,7 @@ def _properties(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]:
 
 def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
     """What its views are framed on."""
-    kept = _properties(chunks).get(look.FRAME)
+    kept = properties_of(chunks).get(look.FRAME)
     if kept is None:
         raise RunFolderError(f"{recording} is not a recording of a flight")
     xmin, ymin, xmax, ymax = kept["bounds_m"]
@@ -240,42 +220,21 @@ def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
         rec.log(f"{look.SERIES}/{line}/{place}", points, static=True)
 
 
-def _metrics(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, Any]:
-    """The figures that a recording carries, by `Metric.name`; empty where its run did not end, few of a log."""
-    found = _properties(chunks)
-    if "metrics" in found:
-        whole = json.loads(found["metrics"]["json"][0])
-        return {metric.name: metric.value(whole) for metric in METRICS}
-    run = {name: values[0] for name, values in found.get(RUN, {}).items()}
-    factors = {each.name: each.factor for each in METRICS if (each.kind, each.unit) == ("number", "%")}
-    recorded = {each.name: run[each.recorded_as] for each in METRICS if each.recorded_as in run}
-    return {name: value / factors[name] if name in factors else value for name, value in recorded.items()}
-
-
-def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]], without: Sequence[str]) -> str:
+def _summary(names: Sequence[str], properties: Sequence[Mapping[str, Mapping[str, Any]]]) -> str:
     """What came out of every run, side by side, as Markdown."""
-    rows = [
-        " | ".join(
-            [
-                metric.label or metric.name,
-                *(
-                    escaped(metric.text(each.get(metric.name))) or what
-                    for each, what in zip(figures, without, strict=True)
-                ),
-            ]
-        )
-        for metric in METRICS
-        if metric.heading
-    ]
     colours = [COLOUR_NAMES[place % len(COLOUR_NAMES)] for place in range(len(names))]
-    return "\n".join(
-        [
-            f"| | {' | '.join(map(escaped, names))} |",
-            f"|---{'|---' * len(names)}|",
-            f"| colour | {' | '.join(colours)} |",
-            *(f"| {row} |" for row in rows),
-            "",
-            "Solid grey: the true obstacles. Dimmed: track still ahead of the time cursor.",
-            "",
-        ]
-    )
+    rows = [["", *map(escaped, names)], ["---"] * (1 + len(names)), ["colour", *colours]]
+    runs = [each.get(RUN, {}) for each in properties]
+    for metric in METRICS:
+        if metric.heading:
+            shown = [_shown(metric, run) or ("none" if run else "unfinished") for run in runs]
+            rows.append([metric.label or metric.name, *shown])
+    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return f"{table}\n\nSolid grey: the true obstacles. Dimmed: track still ahead of the time cursor.\n"
+
+
+def _shown(metric: Metric, run: Mapping[str, Any]) -> str:
+    """A figure among the properties of a run, which have percent in place of shares; empty where it has none."""
+    (value,) = run.get(metric.recorded_as, (None,))
+    share = metric.unit == "%" and value is not None
+    return escaped(metric.text(value / metric.factor if share else value))

@@ -11,8 +11,6 @@ from harness.analysis.metric import SEVERITY
 from harness.analysis.registry import METRICS
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import rerun as rr
 
     from harness.scenario.scenario import Scenario
@@ -29,12 +27,9 @@ Value = str | float | int | bool
 
 
 def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, Value]:
-    """The figures of a run, each under a name with its unit.
+    """The figures of a run, each under a name with its unit; one that it does not have is left out.
 
-    Returns:
-        `severity` grows with how badly the run went: the outcome before the point, and for equal outcomes more the
-        less clearance there was; navigation errors that were planned for are no fault. A figure that a run does not
-        have (clearance in an empty world) is left out.
+    Navigation errors that were planned for are no fault in its `severity`.
     """
     clearance_m = metrics.get("min_clearance_m")
     ratio = None if clearance_m is None else clearance_m / (scenario.planner.clearance_m or math.inf)
@@ -86,14 +81,3 @@ def send_properties(rec: rr.RecordingStream, name: str, values: Mapping[str, Val
     if values:
         components: dict[str, Any] = {each: _rounded(value) for each, value in values.items()}
         rec.send_property(name, rr.AnyValues(**components))
-
-
-def properties_of(recording: Path) -> Mapping[str, Any]:
-    """The typed figures of one recording; empty where it was not closed."""
-    import rerun as rr
-
-    for chunk in rr.chunk.RrdReader(str(recording)).stream():
-        if str(chunk.entity_path) == f"/__properties/{RUN}":
-            row = chunk.to_record_batch().to_pylist()[0]
-            return {name: value[0] for name, value in row.items() if isinstance(value, list)}
-    return {}

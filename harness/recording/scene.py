@@ -1,4 +1,4 @@
-"""What stays the same in a recording: area, standing obstacles, shape of the aircraft, summary.
+"""What stays the same in a recording: area, standing obstacles, shape of the aircraft, summary, and how all is drawn.
 
 Frame: local ENU plane, metres.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import rerun as rr
@@ -15,13 +15,36 @@ import rerun as rr
 from harness.flight.record import FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
+from harness.recording.series import log_series_styles
 from harness.recording.solids import CIRCLE_POINTS, circle, log_ground, log_solids, outlines, rims, strips_2d
+from harness.recording.states import AT_LIMIT, FREE, log_colours
 from harness.recording.summary import colours, summary
 
 LEAST_CIRCLE_POINTS, THIN_CIRCLE_POINTS, POINTS_OF_ALL = 12, 24, 400_000
 """Thousands of circles are drawn with fewer points each, so that their recording fits into memory."""
 AIRCRAFT_SHARE = 0.022
 """Wing span of the drawn aircraft as a share of the area: its true size could not be seen."""
+
+STYLES: Final[tuple[tuple[str, Any, look.Colour | None, float, float | None], ...]] = (
+    (f"{look.PLAN}/{look.SENSED}", rr.Points2D, look.EDGE, 1.25, 12),
+    (f"{look.PLAN}/window", rr.LineStrips2D, look.WINDOW, 0.75, 22),
+    (f"{look.PLAN}/sectors", rr.LineStrips2D, look.SECTOR, 0.75, 23),
+    (f"{look.PLAN}/{look.MET}", rr.Points2D, look.MET_DOTS, 1.0, 24),
+    (f"{look.PLAN}/scan", rr.Points2D, look.HIT, 1.5, 25),
+    (f"{look.PLAN}/{look.TRACKED}", rr.LineStrips2D, look.MOVES, 1.5, 26),
+    (f"{look.PLAN}/{look.TRACKED}/velocity", rr.Arrows2D, look.MOVES, 1.0, 27),
+    (f"{look.PLAN}/candidates", rr.LineStrips2D, look.CANDIDATE, 0.5, 30),
+    (f"{look.PLAN}/guide", rr.Arrows2D, look.GUIDE, 1.0, 35),
+    (f"{look.PLAN}/chosen", rr.LineStrips2D, look.CHOSEN, 1.5, 40),
+    (f"{look.PLAN}/waypoints", rr.Points2D, look.CHOSEN, 3.5, 41),
+    (f"{look.PLAN}/{look.FLOWN}", rr.LineStrips2D, None, 1.25, 50),
+    (f"{look.WORLD}/{look.SENSED}", rr.LineStrips3D, look.EDGE, 0.75, None),
+    (f"{look.WORLD}/chosen", rr.LineStrips3D, look.CHOSEN, 1.25, None),
+    (f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D, None, 1.25, None),
+)
+"""Entity, archetype, colour (None: it comes with the data), size in points of the screen, order of drawing."""
+THIN: Final = (f"{look.PLAN}/chosen", f"{look.PLAN}/waypoints")
+"""Those that a thin recording has."""
 
 SHAPE = np.array(
     [
@@ -63,6 +86,18 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         page = rr.TextDocument(colours(scene), media_type=rr.MediaType.MARKDOWN)
         rec.log(look.COLOURS, page, static=True)
         log_summary(rec, scene, None)
+
+
+def log_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
+    """Logs how all entities and time series are drawn that the recording has."""
+    for entity, archetype, colour, size, order in STYLES:
+        if entity in THIN or not thin:
+            style = {"colors": colour and [colour], "radii": rr.Radius.ui_points(size)}
+            style |= {"draw_order": order} if order else {}
+            rec.log(entity, archetype.from_fields(**style), static=True)
+    log_series_styles(rec, scene, thin)
+    if not thin:
+        log_colours(rec, look.BANK_LANE, {FREE: look.CALM, AT_LIMIT: look.HIT})
 
 
 def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:

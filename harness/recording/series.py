@@ -10,6 +10,7 @@ import rerun as rr
 
 from harness.flight.record import FloatArray, IntArray, Track
 from harness.recording import blueprint as look
+from harness.recording.layout import THIN_SERIES
 
 
 def thin_curves(block: Track) -> dict[str, FloatArray]:
@@ -60,3 +61,16 @@ def send_levels(rec: rr.RecordingStream, scene: look.Scene, time_s: FloatArray) 
     levels = {"clearance/wanted": wanted} if "clearance" not in scene.empty_series else {}
     levels |= {"bank/limit": np.tile((-limit_deg, limit_deg), (2, 1))}
     send_curves(rec, levels, time_s[[0, -1]])
+
+
+def log_series_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
+    """Logs how the time series are drawn that the recording has: a layout is made by what there is."""
+    empty = {*scene.empty_series, *(() if scene.believes else (look.BELIEVED_OFF,))}
+    for entity, (name, colour, width) in look.SERIES_STYLE.items():
+        plot = entity.partition("/")[0]
+        too_much = thin and (plot not in THIN_SERIES or entity in look.WHOLE_ONLY)
+        if not too_much and not empty & {plot, entity}:
+            rec.log(f"{look.SERIES}/{entity}", look.series_lines(name, colour, width), static=True)
+    for entity, name in () if thin else ((look.SEARCH, "search"), (look.DELAYS, "plan delay")):
+        points = rr.SeriesPoints(names=[name], colors=[look.CHOSEN], marker_sizes=[2.0])
+        rec.log(f"{look.SERIES}/{entity}", points, static=True)

@@ -1,9 +1,8 @@
 """Obstacles and ground as drawings: solids and rims between heights, outlines seen from above, a shaded mesh.
 
-Frame: local ENU plane, metres. An obstacle without heights is a column without end in the simulated world; it is cut
-off somewhat above the flight altitude. Terrain is drawn as the height it was cut at, a rim without a body: its body is
-the ground. Polylines are turned into what rerun keeps all at once: rerun itself would turn them one by one, a tenth of
-what a recording costs.
+Frame: local ENU plane, metres. An obstacle without heights has no end in the simulated world; it is cut off somewhat
+above the flight altitude. Terrain is drawn as a rim at the height it was cut at: its body is the ground. Polylines are
+turned into what rerun keeps all at once: rerun itself would turn them one by one, a tenth of what a recording costs.
 """
 
 from __future__ import annotations
@@ -35,11 +34,7 @@ LOW, HIGH = np.array((58.0, 74.0, 62.0)), np.array((150.0, 140.0, 126.0))
 SHADE: Final = 0.35
 """Share of the colour that is left where no light falls."""
 
-Prism: TypeAlias = tuple[
-    np.ndarray[Any, np.dtype[np.float32]],
-    np.ndarray[Any, np.dtype[np.float32]],
-    np.ndarray[Any, np.dtype[np.uint32]],
-]
+Prism: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint32]]
 """Vertices (n, 3), their normals (n, 3) and triangles (k, 3) of indices, in the types that rerun keeps."""
 
 
@@ -107,42 +102,32 @@ def log_solids(
 ) -> None:
     """Logs obstacles as solids: circles as cylinders, polygons as one mesh of prisms, terrain as its rim."""
     shapes = [(each.shape, *drawn_heights(scene, each)) for each in obstacles]
-    cylinders = _cylinders([each for each in shapes if isinstance(each[0], Circle)], colour)
-    if cylinders is not None:
+    circles = [(shape, low, high) for shape, low, high in shapes if isinstance(shape, Circle)]
+    if circles:
+        cylinders = rr.Cylinders3D(
+            lengths=[high - low for _, low, high in circles],
+            radii=[shape.radius_m for shape, _, _ in circles],
+            centers=[(*shape.center_m, 0.5 * (low + high)) for shape, low, high in circles],
+            colors=[colour],
+            fill_mode="solid",
+        )
         rec.log(f"{entity}/circles", cylinders, static=static)
-    mesh = _mesh([each for each in shapes if isinstance(each[0], Polygon) and each[2] > each[1]], colour)
-    if mesh is not None:
+    prisms = [
+        prism(shape, *ends) for shape, *ends in shapes if isinstance(shape, Polygon) and ends[1] > ends[0]
+    ]
+    if prisms:
+        vertices, normals, faces = zip(*prisms, strict=True)
+        firsts = np.cumsum([0, *map(len, vertices[:-1])], dtype=np.uint32)
+        mesh = rr.Mesh3D(
+            vertex_positions=np.concatenate(vertices),
+            vertex_normals=np.concatenate(normals),
+            triangle_indices=np.concatenate([own + at for own, at in zip(faces, firsts, strict=True)]),
+            albedo_factor=colour,
+        )
         rec.log(f"{entity}/polygons", mesh, static=static)
     terrain = [each for each, (_, low, high) in zip(obstacles, shapes, strict=True) if high <= low]
     if terrain:
         rec.log(f"{entity}/terrain", rims(scene, terrain, colour), static=static)
-
-
-def _cylinders(shapes: Sequence[tuple[Any, float, float]], colour: Colour) -> rr.Cylinders3D | None:
-    """Circles between heights; None without any."""
-    if not shapes:
-        return None
-    return rr.Cylinders3D(
-        lengths=[high - low for _, low, high in shapes],
-        radii=[shape.radius_m for shape, _, _ in shapes],
-        centers=[(*shape.center_m, 0.5 * (low + high)) for shape, low, high in shapes],
-        colors=[colour],
-        fill_mode="solid",
-    )
-
-
-def _mesh(shapes: Sequence[tuple[Any, float, float]], colour: Colour) -> rr.Mesh3D | None:
-    """One mesh of the prisms over polygons; None without any. Of 100,000 it is large: the prisms end here."""
-    if not shapes:
-        return None
-    vertices, normals, faces = zip(*(prism(*shape) for shape in shapes), strict=True)
-    firsts = np.cumsum([0, *map(len, vertices[:-1])], dtype=np.uint32)
-    return rr.Mesh3D(
-        vertex_positions=np.concatenate(vertices),
-        vertex_normals=np.concatenate(normals),
-        triangle_indices=np.concatenate([own + first for own, first in zip(faces, firsts, strict=True)]),
-        albedo_factor=colour,
-    )
 
 
 def prism(polygon: Polygon, low_m: float, high_m: float) -> Prism:
@@ -206,10 +191,9 @@ def shaded(heights: FloatArray, right_m: float, up_m: float) -> NDArray[np.uint8
     low, high = float(known.min()), float(known.max())
     share = (known - low) / max(high - low, 1.0)
     colour = LOW + share[..., None] * (HIGH - LOW)
-    lit: NDArray[np.uint8] = np.clip(
-        colour * (SHADE + (1.0 - SHADE) * light / SUN[2])[..., None], 0, 255
-    ).astype(np.uint8)
-    return lit
+    lit = colour * (SHADE + (1.0 - SHADE) * light / SUN[2])[..., None]
+    found: NDArray[np.uint8] = np.clip(lit, 0, 255).astype(np.uint8)
+    return found
 
 
 def triangles(known: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -119,11 +119,7 @@ def plan_text(accepted: AcceptedPlan) -> str:
 def send_events(
     rec: rr.RecordingStream, events: Sequence[tuple[float, str, look.Colour]], after_s: float = -math.inf
 ) -> float:
-    """Writes lines into the log of events; a `Caution` is a warning.
-
-    Returns:
-        The time of the last line.
-    """
+    """Writes lines into the log of events, a `Caution` as a warning; returns the time of the last line."""
     if not events:
         return after_s
     times, texts, colours = zip(*sorted(events, key=lambda event: event[0]), strict=True)

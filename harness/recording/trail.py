@@ -1,9 +1,10 @@
-"""A line that grows with the flight, in the plan view and in the 3-D view: the flown track, and the believed one."""
+"""What grows with the flight, in the plan view and in the 3-D view: trails, and what the sensor has shown so far."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rerun as rr
@@ -12,16 +13,14 @@ from harness.flight.record import FloatArray, IntArray
 from harness.recording import blueprint as look
 from harness.recording.solids import strips_2d, strips_3d
 
+if TYPE_CHECKING:
+    from harness.mapping.scan import RangeScan
+
 Colours = np.ndarray[Any, np.dtype[np.uint8]]
 
 
 class Trail:
-    """Pieces, each at the time of its last point and joined to the one before.
-
-    Args:
-        entity: below PLAN and WORLD.
-        piece_rows: rows of the track in a piece.
-    """
+    """A line below PLAN and WORLD, in pieces of `piece_rows` rows; each is joined to the one before."""
 
     def __init__(self, entity: str, piece_rows: int) -> None:
         self._entity, self._rows = entity, piece_rows
@@ -34,11 +33,7 @@ class Trail:
         points_m: FloatArray,
         colours: Callable[[IntArray], Colours],
     ) -> FloatArray:
-        """Sends consecutive points (n, 3); `colours` tells (k, 3) of pieces by their first rows.
-
-        Returns:
-            What was drawn, (m, 3).
-        """
+        """Sends consecutive points (n, 3), `colours` (k, 3) by first rows of pieces; returns what was drawn, (m, 3)."""
         last_row, step = len(points_m) - 1, max(self._rows // 4, 1)
         ends = np.append(np.arange(self._rows - 1, last_row, self._rows), last_row)
         starts = np.append(0, ends[:-1] + 1)
@@ -53,3 +48,29 @@ class Trail:
         rec.send_columns(f"{look.PLAN}/{self._entity}", times, flat)
         rec.send_columns(f"{look.WORLD}/{self._entity}", times, steep)
         return np.concatenate(pieces)
+
+
+class Sensed:
+    """Gathers places that two scans have shown, one a cell of a square grid: a false return is seen once."""
+
+    def __init__(self, cell_m: float) -> None:
+        self._cell_m = cell_m
+        self._once: set[int] = set()
+        self._known: set[int] = set()
+
+    def new(self, points_m: FloatArray) -> FloatArray:
+        """(k, 2) those places of the next scan, of what it returned (n, 2), that are shown for the second time."""
+        cells = (np.round(points_m / self._cell_m).astype(np.int64) @ (1 << 32, 1)).tolist()
+        rows = {cell: row for row, cell in reversed([*enumerate(cells)])}  # the first of each cell
+        fresh = (rows.keys() & self._once) - self._known
+        self._once |= rows.keys()
+        self._known |= fresh
+        shown: FloatArray = points_m[sorted(rows[cell] for cell in fresh)]
+        return shown
+
+
+def returns_m(scan: RangeScan) -> FloatArray:
+    """(k, 2) places from which something came back."""
+    if scan.nearest_m == math.inf:
+        return np.zeros((0, 2))
+    return scan.returned()[1].view(np.float64).reshape(-1, 2)

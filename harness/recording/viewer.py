@@ -1,7 +1,8 @@
 """Looking at recordings: the rerun viewer of the installed wheel, in a window, a browser or without a screen.
 
 The viewer runs as a process of its own, listens on 127.0.0.1 only and sends no usage statistics; nor does the page
-that it serves to a browser (`harness.recording.local_page`).
+that it serves to a browser. rerun's web page posts usage statistics and asks for fonts, examples and versions: it is
+passed on with a content security policy (W3C, CSP level 3), with which the browser itself refuses every other address.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -16,19 +19,31 @@ import sys
 import tempfile
 import threading
 import time
+import urllib.request
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from urllib.error import HTTPError
 from urllib.parse import quote
 
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
-from harness.recording.local_page import LOCALHOST, local_page
 from harness.recording.overlay import send_recording, write_overlay
 from harness.run_files.run_folder import OVERLAY, RECORDING, recording_of
 
+LOCALHOST = "127.0.0.1"
+POLICY = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
+    f"connect-src 'self' blob: data: http://{LOCALHOST}:* ws://{LOCALHOST}:*"
+)
+"""What the page may load: its own parts; and what it may talk to: this machine."""
+PASSED_ON = ("Content-Type", "Content-Encoding", "Cache-Control")
+"""Headers of rerun's server that go with its answers."""
+OUTSIDE = re.compile(rb"<link\b[^>]*https?://[^>]*>|https://[^\"']*\.js\b")
+"""Parts of the page that would load something from elsewhere: fonts and the script of statistics."""
 START_TIMEOUT_S = 30.0
 ALONE = ".rrd"
 LOG = "viewer.log"
@@ -98,10 +113,8 @@ def empty_viewer(
 ) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Opens a viewer, in a window or a browser; gives it, and the address that takes recordings.
 
-    `tell` is told the address for the browser, which opens `url` in place of what the viewer is sent.
-
-    Raises:
-        ViewerError: there is no screen, or the viewer does not start.
+    `tell` is told the address for the browser, which opens `url` in place of what the viewer is sent. A ViewerError
+    says that there is no screen, or that the viewer does not start.
     """
     if not web and sys.platform == "linux" and not (os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}):
         raise ViewerError(NO_SCREEN)
@@ -124,12 +137,48 @@ def empty_viewer(
             yield viewer, source
 
 
-def wait_for(viewer: subprocess.Popen[str]) -> None:
-    """Waits until a viewer is closed, or Ctrl-C is pressed.
+@contextlib.contextmanager
+def local_page(port: int, source_port: int) -> Iterator[None]:
+    """Serves the page of rerun's web server with the policy, for the length of the block."""
 
-    Raises:
-        ViewerError: it broke off.
-    """
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            try:
+                with urllib.request.urlopen(f"http://{LOCALHOST}:{source_port}{self.path}") as answer:
+                    self.send_response(answer.status)
+                    for name in PASSED_ON:
+                        if name in answer.headers:
+                            self.send_header(name, answer.headers[name])
+                    self.send_header("Content-Security-Policy", POLICY)
+                    self.send_header("Connection", "close")
+                    if answer.headers.get_content_type() == "text/html":
+                        page = OUTSIDE.sub(b"", answer.read())
+                        self.send_header("Content-Length", str(len(page)))
+                        self.end_headers()
+                        self.wfile.write(page)
+                    else:
+                        self.end_headers()
+                        shutil.copyfileobj(answer, self.wfile)
+            except HTTPError as error:
+                self.send_error(error.code)
+            except ConnectionError:  # the browser has gone, or the viewer has
+                self.close_connection = True
+
+        def log_message(self, format: str, *args: object) -> None:
+            """Requests are not logged."""
+
+    with ThreadingHTTPServer((LOCALHOST, port), Handler) as server:
+        thread = threading.Thread(target=server.serve_forever, name="page", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def wait_for(viewer: subprocess.Popen[str]) -> None:
+    """Waits until a viewer is closed, or Ctrl-C is pressed; a ViewerError says that it broke off."""
     with contextlib.suppress(KeyboardInterrupt):
         if viewer.wait() == 0:
             return
@@ -163,8 +212,7 @@ def _executable() -> str:
 def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iterator[subprocess.Popen[str]]:
     """Runs a viewer that is ended with the block; settings that allow no statistics lie in `scratch`.
 
-    Raises:
-        ViewerError: there is no viewer, or it does not come to listen on the ports.
+    A ViewerError says that there is none, or that it does not come to listen on the ports.
     """
     settings = scratch / "rerun" / "analytics.json"
     settings.parent.mkdir()
@@ -214,11 +262,7 @@ def in_notebook() -> bool:
 
 
 def viewer_widget(recording: Path, width_px: int, height_px: int) -> Any:
-    """A widget of a notebook that shows a recording with its layout.
-
-    Raises:
-        ViewerError: rerun's notebook viewer is not installed.
-    """
+    """A widget of a notebook that shows a recording; a ViewerError says that rerun's notebook viewer is missing."""
     import rerun as rr
     from rerun import notebook
 

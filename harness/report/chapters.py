@@ -75,19 +75,12 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
     numbered = [(place, drawn) for place, each in enumerate(entries) if (drawn := _drawn(each))]
     pictures: list[Picture] = []
     if numbered:
-        tracks = figures.overview(scene, numbered)
-        pictures.append(
-            _picture(folder / "map", tracks, f"{scene.name}: the tracks of all planners, from S to G.")
-        )
+        caption = f"{scene.name}: the tracks of all planners, from S to G."
+        pictures.append(_picture(folder / "map", figures.overview(scene, numbered), caption))
         for place, drawn in numbered:
-            path = planner_figure(scene, drawn, place)
-            pictures.append(
-                _picture(
-                    folder / f"path-{drawn.planner.replace(', ', '-')}",
-                    path,
-                    f"{drawn.planner} on {scene.name}, alone{_enlarged(scene, drawn)}.",
-                )
-            )
+            stem = folder / f"path-{drawn.planner.replace(', ', '-')}"
+            caption = f"{drawn.planner} on {scene.name}, alone{_enlarged(scene, drawn)}."
+            pictures.append(_picture(stem, planner_figure(scene, drawn, place), caption))
         pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
     rows = [each.row for each in entries]
     facts = {"conditions": told(scenario)} | _facts(scene, optimum)
@@ -133,9 +126,8 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
 
 def _enlarged(scene: FigureScene, drawn: DrawnRun) -> str:
     """What the figure of a planner enlarges, as the end of a sentence."""
-    return (
-        "" if drawn.nearest(scene.clearance_m) is None else "; enlarged: where it came nearest to an obstacle"
-    )
+    near = drawn.nearest(scene.clearance_m) is not None
+    return "; enlarged: where it came nearest to an obstacle" if near else ""
 
 
 JOINING_SHARES = np.linspace(0.05, 1.0, 20)
@@ -222,23 +214,17 @@ def _picture(stem: Path, figure: Any, caption: str) -> Picture:
     return Picture(content, caption, caption)
 
 
-def _kept(scene: FigureScene) -> str:
-    """The wanted clearance, and what is planned beyond it."""
-    margin = scene.navigation_margin_m
-    beyond = f" + {number(margin)} m for the navigation error" if margin > 0.0 else ""
-    return f"{number(scene.clearance_m)} m{beyond}"
-
-
 def _facts(scene: FigureScene, optimum: Optimum) -> dict[str, str]:
     def km(value_m: float | None) -> str:
         return f"{number(value_m, 1e-3)} km" if value_m is not None else "none"
 
-    (east, north), (goal_east, goal_north) = scene.start_m, scene.goal_m
+    margin = scene.navigation_margin_m
+    beyond = f" + {number(margin)} m for the navigation error" if margin > 0.0 else ""
     return {
-        "straight line": km(((goal_east - east) ** 2 + (goal_north - north) ** 2) ** 0.5),
+        "straight line": km(math.dist(scene.start_m, scene.goal_m)),
         "clairvoyant optimum": km(optimum.length_m),
         "estimate with turn radius R": km(scene.turning_optimum_m),
         "obstacles": str(len(scene.obstacles)),
-        "wanted clearance": _kept(scene),
+        "wanted clearance": f"{number(scene.clearance_m)} m{beyond}",
         "turn radius R": f"{number(scene.turn_radius_m)} m",
     }

@@ -148,10 +148,8 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
     if not ends:
         return []
     (east, north), (goal_east, goal_north) = np.array(scene.start_m) / 1e3, np.array(scene.goal_m) / 1e3
-    straight = axes.plot(
-        [east, goal_east], [north, goal_north], color="0.3", lw=0.7, ls="--", label="straight line"
-    )
-    legend: list[Any] = [*straight]
+    ends_km = [east, goal_east], [north, goal_north]
+    legend: list[Any] = axes.plot(*ends_km, color="0.3", lw=0.7, ls="--", label="straight line")
     if len(scene.optimum_m):
         legend += axes.plot(
             *scene.optimum_m.T / 1e3, color="black", lw=0.9, ls=":", label="clairvoyant optimum", zorder=4
@@ -188,16 +186,9 @@ def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
     tip = (0.06 - 0.04 * math.sin(back), 0.94 - 0.04 * math.cos(back))
     arrow = {"arrowstyle": "-|>", "color": "#0B5C8C", "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", tip, tail, "axes fraction", "axes fraction", arrowprops=arrow, zorder=9)
-    told = axes.text(
-        0.12,
-        0.94,
-        f"wind {speed_mps:.3g} m/s from {from_deg:.0f}\N{DEGREE SIGN}",
-        transform=axes.transAxes,
-        va="center",
-        fontsize=8,
-        zorder=9,
-    )
-    told.set_bbox(BEHIND_TEXT)
+    told = f"wind {speed_mps:.3g} m/s from {from_deg:.0f}\N{DEGREE SIGN}"
+    wind = axes.text(0.12, 0.94, told, transform=axes.transAxes, va="center", fontsize=8, zorder=9)
+    wind.set_bbox(BEHIND_TEXT)
 
 
 def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **style: Any) -> patches.Patch:

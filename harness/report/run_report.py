@@ -1,4 +1,4 @@
-"""The report of a single run, written into its folder: page, figures as SVG and PNG, table as CSV and Markdown."""
+"""The report of a single run, written into its folder: page, figures as SVG and PNG, table as CSV."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -48,6 +49,8 @@ KEYS_OF_THE_WORLD: Final = (
     *(("trackability", "cross_track_m"), ("trackability", "altitude_m")),
 )
 """Single keys that it takes from there too: the altitude, and what sets the limits."""
+UNUSED: Final = re.compile(r"planner\.(?!clearance_m$)|mission\.(?!altitude_m$|goal_radius_m$)")
+"""Begin of keys in whose place the path stands: who plans, start, goal, and until when."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +104,8 @@ def asked(
     scenario file with obstacles, area, air, altitude, clearance and seed; without it nothing is there. The altitude is
     that of the path, else of the world, else 300 m, unless it is given. `corner_m` is as `PathCheck` has it.
     """
+    for key in [key.strip() for key, _ in settings if UNUSED.match(key.strip())]:
+        raise InputError(f"command line: {key}: has no effect on a given path; leave it out")
     keys = {("name",): name, **_own_keys(given, world, altitude_m)}
     base, folder = _of_the_world(world), None if world is None else world.parent
 

@@ -315,5 +315,5 @@ def layer_contacts(
                 solid = shapely.union_all(source.polygons)
                 margin: FloatArray = np.where(layer == number, -inside_m(track, solid), np.inf)
                 least = min(least, float(margin.min()))
-                found += crossings(track, margin, CONTACT, source.spec.path.name, outside_of=solid)
+                found += crossings(track, margin, solid, CONTACT, source.spec.path.name)
     return tuple(found), least

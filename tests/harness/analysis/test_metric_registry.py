@@ -12,7 +12,7 @@ from harness.analysis.metric import SEVERITY
 from harness.analysis.registry import METRICS
 from harness.cli.app import main
 from harness.flight.record import Outcome
-from harness.recording.properties import properties_of
+from harness.recording.overlay import chunks_of, properties_of
 from tests.harness.breaking import SCENARIO
 
 CAMPAIGN = """\
@@ -51,7 +51,7 @@ def test_a_figure_stands_alike_in_metrics_campaign_comparison_and_recording(tmp_
         main(["sweep", str(tmp_path / "figures.yaml"), "--out", str(tmp_path / "all"), "--workers", "1"]) == 0
     )
     (row,) = pq.read_table(tmp_path / "all" / "results.parquet").to_pylist()
-    recorded = properties_of(tmp_path / "run" / "flight.rrd")
+    recorded = properties_of(chunks_of(tmp_path / "run" / "flight.rrd"))["run"]
     content = run.metrics.to_dict()
     there = paths_of(content)
     for metric in METRICS:
@@ -64,7 +64,7 @@ def test_a_figure_stands_alike_in_metrics_campaign_comparison_and_recording(tmp_
             assert row[metric.path] == value, metric.name
         if metric.recorded and value is not None and metric.kind == "number":
             shown = value * metric.factor if metric.unit == "%" else value
-            assert recorded[metric.recorded_as] == pytest.approx(shown, rel=1e-5), metric.name
+            assert recorded[metric.recorded_as] == [pytest.approx(shown, rel=1e-5)], metric.name
 
 
 def test_the_list_of_figures_is_printed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,12 +10,10 @@ import pytest
 
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import (
-    clearance_violation_s,
     error_figures,
     lost_returns,
     metrics,
     percentiles,
-    planned_length_m,
 )
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
 from planner.interface import Path
@@ -108,8 +106,8 @@ def test_planned_length_survives_frequent_replanning(
     rows = np.arange(1001)
     track = make_track(1001, plan_index=rows // 10, arc_length_m=2.5 * (rows % 10))
     plans = [make_plan([(0, 25.0 * i, 0, 1, 0.0, 5000.0)], index=i) for i in range(101)]
-    assert planned_length_m(flight(track, *plans)) == pytest.approx(2500.0)
-    assert metrics(flight(track, *plans), LIMITS)["replans"] == 100
+    figures = metrics(flight(track, *plans), LIMITS)
+    assert (figures["planned_length_m"], figures["replans"]) == (pytest.approx(2500.0), 100)
 
 
 def test_planned_length_counts_every_round_of_a_loiter_and_nothing_beyond_an_end(
@@ -118,11 +116,16 @@ def test_planned_length_counts_every_round_of_a_loiter_and_nothing_beyond_an_end
     once = circle_plan.plan.path
     assert once is not None
     for_ever = replace(circle_plan, plan=replace(circle_plan.plan, path=Path(once.segments, loiter=True)))
-    track = make_track(2001)
-    assert planned_length_m(flight(track, for_ever)) == pytest.approx(5000.0)
-    assert planned_length_m(flight(track, circle_plan)) == pytest.approx(once.length_m)
-    beyond = make_track(101, arc_length_m=once.length_m + 10.0 + 2.5 * np.arange(101))
-    assert planned_length_m(flight(beyond, circle_plan)) == 0.0
+    track, beyond = (
+        make_track(2001),
+        make_track(101, arc_length_m=once.length_m + 10.0 + 2.5 * np.arange(101)),
+    )
+    for flown, plan, length_m in (
+        (track, for_ever, 5000.0),
+        (track, circle_plan, once.length_m),
+        (beyond, circle_plan, 0.0),
+    ):
+        assert metrics(flight(flown, plan), LIMITS)["planned_length_m"] == pytest.approx(length_m)
 
 
 def test_error_figures_leave_out_nan() -> None:
@@ -160,10 +163,12 @@ def test_a_jump_of_the_believed_position_is_from_row_to_row(
     assert metrics(flight(track, straight_plan), LIMITS)["navigation_jump_m"] == pytest.approx(29.8)
 
 
-def test_exactly_the_wanted_clearance_is_no_violation() -> None:
-    times_s = np.arange(50) / 10.0
-    assert clearance_violation_s(times_s, np.full(50, 200.0), 200.0) == 0.0
-    assert clearance_violation_s(times_s, np.full(50, 199.9), 200.0) == pytest.approx(4.9)
+@pytest.mark.parametrize(("clearance_m", "violation_s"), [(200.0, 0.0), (199.9, 4.9)])
+def test_exactly_the_wanted_clearance_is_no_violation(
+    clearance_m: float, violation_s: float, make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    figures = metrics(flight(make_track(50, clearance_m=clearance_m), straight_plan), LIMITS)
+    assert figures["clearance_violation_s"] == pytest.approx(violation_s)
 
 
 def test_a_contact_between_two_rows_is_below_the_wanted_clearance(

@@ -22,6 +22,13 @@ STRIP = "x_m,y_m\n0,0\n0,2000\n60,2000\n60,0\n"
 CIRCUIT = "x_m,y_m\n0,0\n0,2000\n1500,2000\n1500,0\n0,0\n"
 
 
+def flown(path: Path, out: Path, *options: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, Any]:
+    """Exit status and metrics of a check."""
+    given = ["--aircraft", "aerosonde", "--no-recording", "--json", "--out", str(out), *options]
+    status = main(["check", str(path), *given])
+    return status, json.loads(capsys.readouterr().out)
+
+
 @pytest.fixture
 def strip(tmp_path: Path) -> Path:
     path = tmp_path / "Strip 1.csv"
@@ -68,17 +75,9 @@ def test_a_circuit_is_flown_to_its_end_and_is_trackable(
 ) -> None:
     path = tmp_path / "circuit.csv"
     path.write_text(CIRCUIT)
-    options = [
-        "--aircraft",
-        "aerosonde",
-        "--no-recording",
-        "--out",
-        str(tmp_path / "run"),
-        "--corner-m",
-        "120",
-    ]
-    assert main(["check", str(path), *options, "--wind", "6,200", "--turbulence", "light", "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
+    options = ["--corner-m", "120", "--wind", "6,200", "--turbulence", "light"]
+    status, said = flown(path, tmp_path / "run", *options, capsys=capsys)
+    assert status == 0
     assert said == json.loads((tmp_path / "run" / "metrics.json").read_text())
     assert said["outcome"] == "reached"
     assert 6500.0 < said["planned_length_m"] < 7000.0
@@ -92,64 +91,45 @@ def test_an_end_that_is_passed_far_off_is_not_reached(
 ) -> None:
     path = tmp_path / "path.csv"
     path.write_text("x_m,y_m\n0,0\n2400,0\n1900,500\n3000,700\n7000,0\n")
-    options = ["--aircraft", "T38", "--no-recording", "--out", str(tmp_path / "run")]
-    assert main(["check", str(path), *options, "--json"]) == 1
-    said = json.loads(capsys.readouterr().out)
+    status, said = flown(path, tmp_path / "run", "--aircraft", "T38", capsys=capsys)
     track = load_run(tmp_path / "run").track
     off_m = math.dist((track.east_m[-1], track.north_m[-1]), (7000.0, 0.0))
     assert off_m > 1000.0
-    assert (said["outcome"], said["trackable"]) == ("timeout", False)
+    assert (status, said["outcome"], said["trackable"]) == (1, "timeout", False)
     assert "the end of the path" in said["reason"]
 
 
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--aircraft", "concorde"], "command line: aircraft.model: unknown aircraft 'concorde'"),
+        ("--aircraft concorde", "command line: aircraft.model: unknown aircraft 'concorde'"),
+        ("--airspeed-mps 90", "aircraft.airspeed_mps: aerosonde cannot hold 90"),
+        ("--airspeed-mps 3 --wind 8,270", "aircraft.airspeed_mps: aerosonde cannot hold 3"),
+        ("--wind 8", "'8' is not SPEED,FROM such as 8,270"),
+        ("--wind 24,0", "environment.wind.speed_mps: is 24; must be below 0.9"),
+        ("--turbulence mild", "'light', 'moderate' or 'severe'"),
+        ("--altitude-m 4", "mission.altitude_m: is 4; must be at least 5"),
+        ("--tolerance-m 0", "trackability.cross_track_m: is 0; must be greater"),
+        ("--set trackability.load_facter=2", "did you mean load_factor?"),
+        ("--aircraft c172p --airspeed-mps 60 --altitude-m 9000", "cannot be trimmed"),
+        ("--corner-m inf", "--corner-m: is inf; must be at least 0, and finite"),
         (
-            ["--aircraft", "aerosonde", "--airspeed-mps", "90"],
-            "aircraft.airspeed_mps: aerosonde cannot hold 90",
+            "--set planner.kind=bug2",
+            "command line: planner.kind: has no effect on a given path; leave it out",
         ),
-        (
-            ["--aircraft", "aerosonde", "--airspeed-mps", "3", "--wind", "8,270"],
-            "aircraft.airspeed_mps: aerosonde cannot hold 3",
-        ),
-        (["--aircraft", "aerosonde", "--wind", "8"], "'8' is not SPEED,FROM such as 8,270"),
-        (
-            ["--aircraft", "aerosonde", "--wind", "24,0"],
-            "environment.wind.speed_mps: is 24; must be below 0.9",
-        ),
-        (["--aircraft", "aerosonde", "--turbulence", "mild"], "'light', 'moderate' or 'severe'"),
-        (["--aircraft", "aerosonde", "--altitude-m", "4"], "mission.altitude_m: is 4; must be at least 5"),
-        (
-            ["--aircraft", "aerosonde", "--tolerance-m", "0"],
-            "trackability.cross_track_m: is 0; must be greater",
-        ),
-        (["--aircraft", "aerosonde", "--set", "trackability.load_facter=2"], "did you mean load_factor?"),
-        (["--aircraft", "c172p", "--airspeed-mps", "60", "--altitude-m", "9000"], "cannot be trimmed"),
-        (
-            ["--aircraft", "aerosonde", "--corner-m", "inf"],
-            "--corner-m: is inf; must be at least 0, and finite",
-        ),
-        ([], "Missing option"),
+        ("--set mission.goal_m=[0,9]", "command line: mission.goal_m: has no effect on a given path"),
     ],
 )
 def test_bad_input_is_refused_before_anything_is_flown(
-    options: list[str], sentence: str, strip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    options: str, sentence: str, strip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["check", str(strip), *options, "--out", str(tmp_path / "run")]) == 2
+    words = ["check", str(strip), "--aircraft", "aerosonde", *options.split()]
+    assert main([*words, "--out", str(tmp_path / "run")]) == 2
     said = capsys.readouterr()
     assert said.out == ""
     assert len(said.err.splitlines()) <= 2
     assert sentence in said.err
     assert not (tmp_path / "run").exists()
-
-
-def flown(path: Path, out: Path, *options: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, Any]:
-    """Exit status and metrics of a check."""
-    given = ["--aircraft", "aerosonde", "--no-recording", "--json", "--out", str(out), *options]
-    status = main(["check", str(path), *given])
-    return status, json.loads(capsys.readouterr().out)
 
 
 @pytest.fixture
@@ -236,20 +216,12 @@ def test_a_path_may_begin_outside_the_area(
 
 def mission(*fences: dict[str, Any], acceptance_m: float = 0.0, firmware: int = 12) -> str:
     places = [(47.0, 8.0), (47.012, 8.0), (47.012, 8.016)]
+    item = {"type": "SimpleItem", "command": 16, "frame": 0}
     items = [
-        {
-            "type": "SimpleItem",
-            "command": 16,
-            "frame": 0,
-            "doJumpId": number,
-            "params": [0, acceptance_m, 0, None, latitude, longitude, 500],
-        }
-        for number, (latitude, longitude) in enumerate(places, start=1)
+        {**item, "doJumpId": number, "params": [0, acceptance_m, 0, None, *place, 500]}
+        for number, place in enumerate(places, start=1)
     ]
-    fence = {
-        "circles": [each for each in fences if "circle" in each],
-        "polygons": [each for each in fences if "polygon" in each],
-    }
+    fence = {f"{kind}s": [each for each in fences if kind in each] for kind in ("circle", "polygon")}
     home = {"plannedHomePosition": [47.0, 8.0, 400], "firmwareType": firmware}
     return json.dumps({"fileType": "Plan", "mission": {"items": items, **home}, "geoFence": fence})
 

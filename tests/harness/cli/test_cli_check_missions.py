@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
+from tests.harness.cli.test_cli_check import flown
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real"
 MISSIONS = sorted((REAL / "missions").glob("*")) if REAL.is_dir() else []
@@ -32,15 +32,6 @@ def write(path: Path, *rows: str) -> Path:
     home = "\t".join(map(str, (0, 1, 0, 16, 0, 0, 0, 0, 47.0, 8.0, 400.0, 1)))
     path.write_text("\n".join(("QGC WPL 110", home, *rows)) + "\n")
     return path
-
-
-def flown(
-    path: Path, out: Path, *options: str, capsys: pytest.CaptureFixture[str]
-) -> tuple[int, dict[str, Any]]:
-    """Exit status and metrics of a check."""
-    given = ["--aircraft", "aerosonde", "--no-recording", "--json", "--out", str(out), *options]
-    status = main(["check", str(path), *given])
-    return status, json.loads(capsys.readouterr().out)
 
 
 @pytest.mark.flights
@@ -67,12 +58,8 @@ def test_a_mission_is_flown_item_by_item(tmp_path: Path, capsys: pytest.CaptureF
     track = load_run(tmp_path / "run").track
     assert (track.up_m[0], track.up_m.max()) == pytest.approx((460.0, 580.0), abs=3.0)
     assert track.up_m[-1] == pytest.approx(415.0, abs=3.0)
-    assert (
-        main(
-            ["check", str(path), "--aircraft", "aerosonde", "--no-recording", "--out", str(tmp_path / "run")]
-        )
-        == 0
-    )
+    words = ["--aircraft", "aerosonde", "--no-recording", "--out", str(tmp_path / "run")]
+    assert main(["check", str(path), *words]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "items 9: 7 flown, 1 passed over, 1 not flown" in said
     assert "item 7 command 186 (DO_CHANGE_ALTITUDE), not flown: an aeroplane here cannot" in said
@@ -159,10 +146,8 @@ def test_a_building_is_touched_only_below_its_roof(
     town.write_text(json.dumps({"type": "FeatureCollection", "features": [house]}))
     solid = f"obstacles=[{{file: {{path: {town}, ground_m: 0}}}}]"
     for low_m, contacts in ((60.0, 1), (150.0, 0)):
-        line = {
-            "type": "LineString",
-            "coordinates": [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5]],
-        }
+        places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5]]
+        line = {"type": "LineString", "coordinates": places}
         path = tmp_path / "line.geojson"
         path.write_text(json.dumps(line))
         _, metrics = flown(path, tmp_path / "run", "--set", solid, capsys=capsys)

@@ -110,13 +110,6 @@ def test_a_folder_with_other_things_is_refused_and_left_alone(
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
 
-def test_a_second_run_replaces_the_first(tmp_path: Path) -> None:
-    options = ["--out", str(tmp_path / "run"), "--no-recording", "--quiet"]
-    assert main(["fly", "aerosonde_forest", "--set", "mission.time_limit_s=9", *options]) == 1
-    assert main(["fly", "aerosonde_forest", *SHORT, *options]) == 1
-    assert load_run(tmp_path / "run").metrics["flight_time_s"] == 15.0
-
-
 def test_viewing_a_run_without_a_recording_is_bad_input(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

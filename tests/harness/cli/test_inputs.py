@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from aircraft import airframes
-from aircraft.model_files import AircraftError
 from harness.cli.app import main
 from harness.scenario import kinds as registry
 from harness.scenario import shipped
@@ -92,11 +91,6 @@ def test_new_aircraft_are_flown_once_and_kept(
     said = capfd.readouterr()
     assert said.err.startswith("SGS is flown for the figures")
     assert said.out.splitlines()[1].startswith("aerosonde ")
-
-
-def test_whether_an_aircraft_is_surveyed_is_not_asked_of_nobody() -> None:
-    with pytest.raises(AircraftError):
-        airframes.is_surveyed("no-such-aircraft")
 
 
 def test_what_of_another_distribution_cannot_be_loaded_is_told_in_a_line(

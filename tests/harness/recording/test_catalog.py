@@ -20,7 +20,8 @@ from harness.cli.app import main
 from harness.flight.record import Flight, Outcome
 from harness.recording.catalog import catalog
 from harness.recording.log import RerunLog
-from harness.recording.properties import properties_of, run_properties
+from harness.recording.overlay import chunks_of, properties_of
+from harness.recording.properties import run_properties
 from harness.recording.viewer import NO_DRIVER, ViewerError, free_port, viewer_process
 from harness.scenario.scenario import parse_scenario
 from tests.harness.conftest import plan as make_plan
@@ -80,8 +81,9 @@ def test_a_thin_recording_is_small_and_has_typed_properties(tmp_path: Path) -> N
     given = record(tmp_path, 7, flight(Outcome.TIMEOUT, 90.0))
     (path,) = recordings_of(tmp_path)
     assert path.stat().st_size < 300_000
-    assert properties_of(path) == pytest.approx(given)
-    kinds = {name: type(value) for name, value in properties_of(path).items()}
+    kept = {name: value for name, (value,) in properties_of(chunks_of(path))["run"].items()}
+    assert kept == pytest.approx(given)
+    kinds = {name: type(value) for name, value in kept.items()}
     assert kinds["outcome"] is str
     assert kinds["trackable"] is bool
     assert kinds["replans"] is int
@@ -170,14 +172,16 @@ def test_a_campaign_without_recordings_says_how_to_get_some(
 
 def test_a_campaign_is_one_table_worst_first(campaign: Path) -> None:
     pytest.importorskip("datafusion")
-    with catalog("small", recordings_of(campaign)) as served:
-        assert served.url.startswith("rerun+http://127.0.0.1:")
-        table = served.table().to_pydict()
-    assert table["rerun_segment_id"] == ["run 1", "run 2", "run 0"]
-    assert table["property:run:outcome"] == [["collision"], ["reached"], ["reached"]]
-    assert table["property:run:min_clearance_m"] == [[-3.0], [120.0], [250.0]]
+    with catalog("small", recordings_of(campaign)) as (url, dataset):
+        assert url.startswith("rerun+http://127.0.0.1:")
+        table = dataset.segment_table().to_arrow_table().to_pydict()
+    worst_first = sorted(range(3), key=lambda row: -table["property:run:severity"][row][0])
+    assert [table["rerun_segment_id"][row] for row in worst_first] == ["run 1", "run 2", "run 0"]
+    outcomes = [table["property:run:outcome"][row] for row in worst_first]
+    assert outcomes == [["collision"], ["reached"], ["reached"]]
+    assert [table["property:run:min_clearance_m"][row] for row in worst_first] == [[-3.0], [120.0], [250.0]]
     varied = next(name for name in table if name.startswith("property:varied:"))
-    assert table[varied] == [[5.0], [6.0], [4.0]]
+    assert [table[varied][row] for row in worst_first] == [[5.0], [6.0], [4.0]]
 
 
 @contextlib.contextmanager
@@ -198,11 +202,11 @@ def test_the_table_is_drawn_and_a_run_opens_in_our_layout(campaign: Path, tmp_pa
     arguments = ["--headless", "--window-size", "1600x900", "--bind", "127.0.0.1", "--port", str(port)]
     with (
         driven(),
-        catalog("small", recordings_of(campaign)) as served,
+        catalog("small", recordings_of(campaign)) as (url, _),
         viewer_process(arguments, tmp_path, port),
     ):
         client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
-        client.open(served.url)
+        client.open(url)
         draw_settled(client, png)
         table = seen(client, lambda state: "/dataset/" in state.location).location
         client.open(f"{table}?segment_id=run%201")

@@ -102,7 +102,7 @@ def record(path: Path, east_m: float = 0.0, told: Sequence[str] = ("goal reached
     for start in range(0, 1001, 300):
         log.on_block(Track(**{name: column[start : start + 300] for name, column in vars(track).items()}))
     flight = Flight(track, (first, second), Outcome.REACHED, "in the goal's circle", (2.5, 2.5), 100.0, 0.1)
-    log.close(metrics(flight, LIMITS))
+    log.close(metrics(flight, LIMITS), {"outcome": "reached"})
     return flight
 
 
