@@ -277,6 +277,6 @@ def test_outputs_are_written_by_one_writer() -> None:
         "harness/api/paths.py",
         "harness/recording/viewer.py",
         "harness/replays/logs.py",
-        "harness/cli/standard_output.py",
+        "harness/cli/terminal.py",
     }
     assert found == scratch

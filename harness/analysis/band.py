@@ -22,15 +22,12 @@ STEP_M: Final = 5.0
 """They are at least this far apart."""
 
 
-def band_of(tracks: Sequence[FloatArray], share: float = SHARE) -> tuple[FloatArray, FloatArray]:
+def band_of(tracks: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Left and right edge of the band, (n, 2) each, east and north in metres.
 
-    At each place the offsets are those from the median position, across its direction; the edges are their percentiles
-    (1 - share) / 2 and (1 + share) / 2. Days that ended before a place do not count there.
-
-    Args:
-        tracks: of each day (k, 3): distance along the path (NaN before the first plan), east and north.
-        share: of the days that lie between the edges at each place.
+    `tracks` are (k, 3) of each day: distance along the path (NaN before the first plan), east and north. At each place
+    the offsets are those from the median position, across its direction; the edges are their percentiles 2.5 and 97.5.
+    Days that ended before a place do not count there.
     """
     known = [track[np.isfinite(track[:, 0])] for track in tracks]
     length_m = float(np.median([track[:, 0].max() for track in known]))
@@ -41,7 +38,7 @@ def band_of(tracks: Sequence[FloatArray], share: float = SHARE) -> tuple[FloatAr
     ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     left = np.column_stack((-ahead[:, 1], ahead[:, 0]))
     off_m = ((places - middle) * left).sum(axis=2)
-    low_m, high_m = np.nanpercentile(off_m, (50 * (1 - share), 50 * (1 + share)), axis=0)
+    low_m, high_m = np.nanpercentile(off_m, (50 * (1 - SHARE), 50 * (1 + SHARE)), axis=0)
     return middle + high_m[:, None] * left, middle + low_m[:, None] * left
 
 
@@ -50,8 +47,7 @@ def _at(track: FloatArray, stations_m: FloatArray) -> FloatArray:
     along_m = np.maximum.accumulate(track[:, 0])
     beyond = stations_m > along_m[-1]
     columns = [np.where(beyond, np.nan, np.interp(stations_m, along_m, track[:, axis])) for axis in (1, 2)]
-    found: FloatArray = np.column_stack(columns)
-    return found
+    return np.column_stack(columns)
 
 
 def write_band(folder: Path, runs: Sequence[Path]) -> None:

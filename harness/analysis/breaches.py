@@ -27,10 +27,9 @@ CONTACTS: Final = (CONTACT, TERRAIN)
 
 @dataclass(frozen=True)
 class Breach:
-    """One stretch of flight where the aircraft was where it must not be, and the time and place where it was deepest.
+    """A stretch of flight where the aircraft was where it must not be, and when, where and how far in it was deepest.
 
-    `kind` is `obstacle`, `terrain`, `exclusion`, `inclusion` or `area`; `depth_m` is how far inside it was there, or
-    outside of what it had to stay in.
+    `kind` is `obstacle`, `terrain`, `exclusion`, `inclusion` or `area`.
     """
 
     kind: str

@@ -11,6 +11,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.interface import GRAVITY_MPS2
 from harness.analysis.flight_limits import LOAD_S, AsGiven, FlightLimits
@@ -83,12 +84,10 @@ FINDINGS: Mapping[str, str] = {
 def is_allowed_for(causes: Collection[str], error_m: float | None, margin_m: float | None) -> bool:
     """Whether a flight was not tracked for navigation errors alone that are within what was planned for them.
 
-    Such a flight is as the scenario means it to be. Nearly all flights with a receiver of the usual kind are so, and
-    hide those in which something went wrong.
+    Nearly all flights with a receiver of the usual kind are so, and hide those in which something went wrong.
     """
-    if error_m is None or margin_m is None:
-        return False
-    return set(causes) == {NAVIGATION_ERROR} and error_m <= margin_m
+    planned_for = error_m is not None and margin_m is not None and error_m <= margin_m
+    return planned_for and set(causes) == {NAVIGATION_ERROR}
 
 
 def cross_track_cause(
@@ -227,18 +226,13 @@ def _stop_share(lead: Track, names: Sequence[str]) -> float:
     return float((deflected >= AT_STOP).mean())
 
 
-def saturated(track: Track, bank_limit_rad: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def saturated(track: Track, bank_limit_rad: float) -> NDArray[np.bool_]:
     """(n,) whether the bank command is at its limit, to a hundredth of a degree."""
-    at_limit: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    at_limit = np.abs(track.roll_command_deg) >= math.degrees(bank_limit_rad) - 0.01
-    return at_limit
+    return np.greater_equal(np.abs(track.roll_command_deg), math.degrees(bank_limit_rad) - 0.01)
 
 
 def _servo_share(lead: Track, lateral: bool) -> float:
-    """Share of the time for which servos were at their rate limits, each counted.
-
-    They are those of aileron and rudder (`lateral`), or of elevator and throttle.
-    """
+    """Summed shares of the time for which servos, of aileron and rudder or of the others, were at their rate limits."""
     limited_s, every_s = lead.vertical_actuator_limited_s, lead.actuator_limited_s
     assert limited_s is not None
     assert every_s is not None

@@ -30,14 +30,15 @@ BANKED_DEG: Final = 10.0
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that happened in a flight and that its outcome does not say."""
+    """One thing that happened in a flight, for the first time at `time_s`, and that its outcome does not say.
+
+    `kind` is `plan ended`, `planner slower than the scans` or `plans contradict each other`; `text` a clause with
+    figures.
+    """
 
     kind: str
-    """`plan ended`, `planner slower than the scans` or `plans contradict each other`."""
     time_s: float
-    """Simulated time at which it happened for the first time."""
     text: str
-    """What happened, in one clause with its figures."""
 
 
 def findings(flight: Flight, limits: FlightLimits) -> tuple[Finding, ...]:
@@ -57,9 +58,8 @@ def beyond_end_m(track: Track, plans: Sequence[AcceptedPlan]) -> FloatArray:
 
 def is_past_end(track: Track, plans: Sequence[AcceptedPlan], limits: FlightLimits) -> NDArray[np.bool_]:
     """(n,) whether the aircraft is further beyond the end of its plan than it may be off it and flies in a second."""
-    past: NDArray[np.bool_]
-    past = beyond_end_m(track, plans) > limits.cross_track_threshold_m + SLACK_S * track.groundspeed_mps
-    return past
+    allowed_m = limits.cross_track_threshold_m + SLACK_S * track.groundspeed_mps
+    return np.greater(beyond_end_m(track, plans), allowed_m)
 
 
 def bank_reversals_per_min(track: Track) -> float:

@@ -116,9 +116,9 @@ def severity(outcome: str) -> float:
 def holds(claim: Claim, metrics: Mapping[str, Any]) -> bool:
     """Whether a claim holds of one flight, by the content of its `metrics.json`.
 
-    `reached`: goal reached, without contact and inside the area. `no-contact`: nothing was touched, and the flight did
-    not break off. `trackable`: goal reached and every leg tracked. `as-given`: a given path was flown as given, with no
-    contact and no breach, as `wayproof check` judges it.
+    `reached`: without contact and inside the area. `no-contact`: nothing was touched, and the flight did not break off.
+    `trackable`: goal reached and every leg tracked. `as-given`: as `wayproof check` judges a path, with no contact and
+    no breach.
     """
     if claim == "reached":
         return bool(metrics["outcome"] == "reached")

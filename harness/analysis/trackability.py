@@ -34,15 +34,15 @@ SHORTEST_LEG_S = 5.0
 """A plan flown for less time is judged together with its successor."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Leg:
     """A stretch of flight under one plan, and the verdict on it.
 
     Errors are absolute; airspeed is averaged over `SPEED_S` (None where it is not judged), load factor over `LOAD_S`.
-    `threshold_m` is what the cross-track error may be. `waypoint` is the number of the point of a given path that the
+    `threshold_m` is what the cross-track error may be. Of a given path: `waypoint` is the number of the point that the
     leg leads to, `corner_cut_m` how far from the corner there the plan passes, `max_deviation_m` the largest distance
-    from the path as given. Of several limits that were exceeded the first is the cause: control lost, cross-track error
-    or distance from the path as given, load factor, airspeed, altitude.
+    from it. Of several limits that were exceeded the first is the cause: control lost, cross-track error or distance
+    from the path as given, load factor, airspeed, altitude.
     """
 
     start_s: float
@@ -52,9 +52,9 @@ class Leg:
     max_altitude_error_m: float
     max_airspeed_error_mps: float | None
     max_load_factor: float
-    waypoint: int | None
-    corner_cut_m: float
-    max_deviation_m: float | None
+    waypoint: int | None = None
+    corner_cut_m: float = 0.0
+    max_deviation_m: float | None = None
     trackable: bool
     cause: str | None
 
@@ -148,9 +148,6 @@ class _Flown:
             max_altitude_error_m=float(np.abs(high).max()),
             max_airspeed_error_mps=float(slow.max()) if np.isfinite(slow.max()) else None,
             max_load_factor=float(loads.max()),
-            waypoint=None,
-            corner_cut_m=0.0,
-            max_deviation_m=None,
             trackable=cause is None,
             cause=cause,
         )

@@ -25,8 +25,8 @@ from harness.cli.fly import fly
 from harness.cli.inputs import list_names, schema, validate
 from harness.cli.options import Command, Group, flag
 from harness.cli.review import export, replay, report, view
-from harness.cli.standard_output import kept_up, results_alone, results_over, say
 from harness.cli.sweep import sweep
+from harness.cli.terminal import kept_up, results_alone, results_over, say
 from harness.cli.world import world
 from harness.files.errors import RunFolderError, WriteError
 from harness.files.input_file import InputError

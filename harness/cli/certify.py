@@ -14,8 +14,7 @@ from harness.analysis.metric import Claim
 from harness.cli.command_line import FAILED, at_a_time, print_json, resumable, told_apart
 from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, replacing
-from harness.cli.standard_output import say
-from harness.cli.terminal import plain, print_table, step_bar
+from harness.cli.terminal import plain, print_table, say, step_bar
 
 if TYPE_CHECKING:
     from harness.certification.certification import Certificate, Tally, Terms
@@ -96,13 +95,24 @@ def _drawn(vary: Sequence[str]) -> Mapping[str, Any]:
 
 
 def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
-    """Flies a given path on a fixed number of days, and prints how often it was flown as given."""
+    """Flies a given path on some days into the folder of its check, and prints how often it was flown as given.
+
+    The recording of the check then shows the band in which 95 % of them fly.
+    """
+    from harness.analysis.band import read_band
     from harness.certification.certification import Terms
+    from harness.run_files.run_folder import RECORDING
 
     days.check()
-    found = _fly(days, folder, None, Terms(), resume=(folder / "campaign.json").exists(), silent=silent)
+    resume = (folder / "days" / "campaign.json").exists()
+    found = _fly(days, folder / "days", None, Terms(), resume=resume, silent=silent)
     if not silent:
-        _print(found, f"{found.subject}: {found.runs} days", folder)
+        _print(found, f"{found.subject}: {found.runs} days", folder / "days")
+    band = read_band(folder / "days")
+    if band is not None and (folder / RECORDING).is_file():
+        from harness.recording.overlay import add_band
+
+        add_band(folder / RECORDING, *band[1:])
 
 
 def _fly(

@@ -14,11 +14,9 @@ from harness.cli.command_line import FAILED, flying_into, print_json, told_apart
 from harness.cli.flight_rows import verdict_rows
 from harness.cli.options import AircraftName, Count, Json, NoRecording, Number, Out, Quiet, argument, option
 from harness.cli.replacing import NOTHING, Given, replacing
-from harness.cli.standard_output import say
-from harness.cli.terminal import plain, print_table
+from harness.cli.terminal import plain, print_table, say
 
 if TYPE_CHECKING:
-    from harness.certification.days import Days
     from harness.run.path_check import PathCheck
 
 
@@ -100,26 +98,13 @@ def check(
         _print_verdict(f"{path.name}: {aircraft}", check, metrics, folder)
     if days is not None:
         from harness.certification.days import PathDays
+        from harness.cli.certify import fly_path_days
 
         content = f"{path.read_bytes().hex()} {differs} {replaced} {world and world.read_text()}"
         again = ["wayproof", "check", str(path), "--aircraft", aircraft]
         drawn = PathDays(on_day, content, again, {}, claim="as-given", most=days, band=True)
-        _fly_days(drawn, folder, silent=quiet or as_json)
+        fly_path_days(drawn, folder, silent=quiet or as_json)
     return 0 if metrics["check"]["ok"] else FAILED
-
-
-def _fly_days(days: Days, folder: Path, *, silent: bool) -> None:
-    """Flies the days of a path, and puts the band in which 95 % of them fly into the recording of the check."""
-    from harness.analysis.band import read_band
-    from harness.cli.certify import fly_path_days
-    from harness.run_files.run_folder import RECORDING
-
-    fly_path_days(days, folder / "days", silent=silent)
-    band = read_band(folder / "days")
-    if band is not None and (folder / RECORDING).is_file():
-        from harness.recording.overlay import add_band
-
-        add_band(folder / RECORDING, *band[1:])
 
 
 def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from harness.cli.standard_output import say
-from harness.cli.terminal import FlightReport, progress_bar
+from harness.cli.terminal import FlightReport, progress_bar, say
 from harness.files.input_file import InputError, read_index
 from harness.files.wording import printable
 

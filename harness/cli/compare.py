@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 from harness.cli.command_line import FAILED, at_a_time, interruptible, load, marked_incomplete, print_json
 from harness.cli.options import Json, NoRecording, Out, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, given_by, replacing, sources
-from harness.cli.standard_output import say
-from harness.cli.terminal import coloured, plain, print_line, print_table, step_bar
+from harness.cli.terminal import coloured, plain, print_line, print_table, say, step_bar
 from harness.files.errors import WriteError
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ import typer
 from harness.cli.command_line import interruptible, load, print_json, told_apart
 from harness.cli.options import Count, Json, Out, Quiet, ScenarioArgument, option
 from harness.cli.replacing import NOTHING, Given, replacing
-from harness.cli.standard_output import say
-from harness.cli.terminal import plain, print_table, step_bar
+from harness.cli.terminal import plain, print_table, say, step_bar
 from harness.files.wording import counted
 
 if TYPE_CHECKING:

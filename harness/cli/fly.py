@@ -16,8 +16,7 @@ from harness.cli.flight_rows import flight_rows
 from harness.cli.options import Count, Json, NoRecording, Number, OptionalScenario, Out, Quiet, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.review import open_viewer
-from harness.cli.standard_output import say
-from harness.cli.terminal import plain, print_table
+from harness.cli.terminal import plain, print_table, say
 from harness.files.input_file import InputError
 
 if TYPE_CHECKING:

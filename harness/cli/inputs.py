@@ -15,8 +15,7 @@ import typer
 
 from harness.cli.command_line import BAD_INPUT, load, print_json
 from harness.cli.options import argument
-from harness.cli.standard_output import say
-from harness.cli.terminal import step_bar
+from harness.cli.terminal import say, step_bar
 from harness.files.input_file import InputError
 
 _AIRCRAFT_ROW: Final = "{:13} {:>7} {:>10} {:>6} {:>6} {:6} "

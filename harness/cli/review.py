@@ -13,9 +13,8 @@ import typer
 from harness.cli.command_line import FAILED, interruptible, print_json, written
 from harness.cli.options import AircraftName, Json, NoRecording, Out, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
-from harness.cli.standard_output import say
 from harness.cli.sweep import print_summary
-from harness.cli.terminal import print_table
+from harness.cli.terminal import print_table, say
 from harness.files.errors import RunFolderError, WriteError
 from harness.files.input_file import InputError
 

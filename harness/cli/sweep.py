@@ -14,8 +14,7 @@ import typer
 from harness.cli.command_line import FAILED, at_a_time, print_json, resumable
 from harness.cli.options import Json, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, kind_of, replacing, sources
-from harness.cli.standard_output import say
-from harness.cli.terminal import coloured, plain, print_line, print_table, step_bar
+from harness.cli.terminal import coloured, plain, print_line, print_table, say, step_bar
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 

@@ -1,15 +1,21 @@
-"""What a person sees on a terminal: progress while flying, and the one table of results."""
+"""What a person sees on a terminal: lines without control characters of others, progress, the one table of results.
+
+Standard output outlives its reader: what nobody takes any more is lost, and nothing else.
+"""
 
 from __future__ import annotations
 
 import operator
+import os
 import re
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Final, TypeAlias
+from typing import Any, Final, TextIO, TypeAlias
 
+import typer
 from rich import box
 from rich.console import Console
 from rich.markup import escape
@@ -17,7 +23,6 @@ from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeR
 from rich.table import Table
 from rich.text import Text
 
-from harness.cli.standard_output import say
 from harness.files.wording import printable
 
 FlightReport: TypeAlias = Callable[[float, float, str], None]
@@ -173,3 +178,85 @@ def legible(value: float | None) -> str:
 def spread(values: Mapping[str, float | None], names: Sequence[str] = ("rms", "p95", "max")) -> str:
     """Figures of one error, each after its name; their unit, once, comes after them."""
     return " / ".join(f"{name} {legible(values[name])}" for name in names)
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """A line of text, control characters in it spelt out, on standard output or standard error."""
+    typer.echo(printable(text), err=err)
+
+
+def results_alone() -> None:
+    """From now on only what this program prints as its result reaches the standard output of the process.
+
+    What code of others writes past Python, from C or a process of its own, goes to standard error, so that it cannot
+    get into `--json`. So does what is printed when the interpreter ends, once `results_over` was called.
+    """
+    if sys.stdout is None or sys.stderr is None:
+        return
+    try:
+        results, aside = os.dup(sys.stdout.fileno()), sys.stderr.fileno()
+    except (OSError, ValueError):
+        return  # no file of the process, or a closed one
+    sys.stdout.flush()
+    os.dup2(aside, sys.stdout.fileno())
+    sys.stdout = open(  # noqa: SIM115  it stays open to the end
+        results,
+        "w",
+        encoding=sys.stdout.encoding,
+        errors=sys.stdout.errors,
+        buffering=1 if os.isatty(results) else -1,
+    )
+
+
+def results_over() -> None:
+    """The result is printed."""
+    if sys.stdout is not None:
+        try:
+            sys.stdout.flush()
+        except (OSError, ValueError):
+            to_nowhere(sys.stdout)
+    sys.stdout = sys.stderr
+
+
+@contextmanager
+def kept_up() -> Iterator[None]:
+    """A reader that goes away meanwhile (`wayproof fly ... | head -1`) changes neither what is done nor its status."""
+    stream = sys.stdout
+    if stream is None:  # closed by whoever started us
+        yield
+        return
+    sys.stdout = _Unread(stream)
+    try:
+        yield
+        sys.stdout.flush()
+    finally:
+        sys.stdout = stream
+
+
+class _Unread:
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        self._quietly(lambda: self._stream.write(text))
+        return len(text)
+
+    def flush(self) -> None:
+        self._quietly(self._stream.flush)
+
+    def _quietly(self, action: Callable[[], object]) -> None:
+        try:
+            action()
+        except BrokenPipeError:
+            to_nowhere(self._stream)
+        except OSError as error:
+            to_nowhere(self._stream)
+            raise OSError(error.errno, error.strerror, "standard output") from error
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def to_nowhere(stream: TextIO) -> None:
+    """Has all that is still to be written to a stream lost, so that the interpreter does not try again at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

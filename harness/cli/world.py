@@ -14,8 +14,7 @@ import typer
 
 from harness.cli.command_line import written
 from harness.cli.options import AircraftName, Number, Text, argument, option
-from harness.cli.standard_output import say
-from harness.cli.terminal import plain, print_table
+from harness.cli.terminal import plain, print_table, say
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 

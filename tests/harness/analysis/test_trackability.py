@@ -157,25 +157,6 @@ def test_corners_end_legs_and_belong_to_the_leg_that_they_end(
 
 
 @pytest.mark.parametrize(
-    ("asked_mps", "side", "cause"),
-    [(6.0, 1.0, "climb too steep"), (-9.0, -1.0, "descent too steep"), (4.0, 1.0, "tracking error")],
-)
-def test_an_altitude_that_is_off_because_more_was_asked_for_than_the_aircraft_climbs(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan, asked_mps: float, side: float, cause: str
-) -> None:
-    """For 10 s the path climbs or sinks; the aircraft, which can climb at 5 and sink at 8 m/s, falls behind by 20 m."""
-    track = make_track(601)
-    climbing = (track.time_s >= 20.0) & (track.time_s < 30.0)
-    wanted = 300.0 + side * np.clip(2.0 * (track.time_s - 20.0), 0.0, 20.0)
-    limits = replace(LIMITS, max_altitude_error_m=10.0)
-    given = as_given(track, [], np.zeros(601), 50.0)
-    given = replace(given, altitude_m=wanted, climb_mps=np.where(climbing, asked_mps, 0.0))
-    (leg,) = legs(track, [straight_plan], limits, given=given)
-    assert (leg.cause, leg.max_altitude_error_m) == (cause, 20.0)
-    assert legs(track, [straight_plan], limits, given=replace(given, altitude_m=track.up_m))[0].trackable
-
-
-@pytest.mark.parametrize(
     ("heading_deg", "side", "cause"),
     [
         (-15.0, 1.0, "wind drift"),

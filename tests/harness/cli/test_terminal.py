@@ -13,8 +13,7 @@ import pytest
 from harness.cli.app import main
 from harness.cli.command_line import print_json
 from harness.cli.flight_rows import flight_rows
-from harness.cli.standard_output import say
-from harness.cli.terminal import print_table, progress_bar, step_bar
+from harness.cli.terminal import print_table, progress_bar, say, step_bar
 from harness.files.wording import printable
 
 METRICS: dict[str, Any] = {
@@ -128,7 +127,7 @@ def test_the_commands_speak_through_what_spells_control_characters_out() -> None
     """`say` and `plain` know how."""
     for path in sorted((Path(__file__).parents[3] / "harness" / "cli").glob("*.py")):
         text = path.read_text(encoding="utf-8")
-        assert ("typer.echo(" in text) == (path.name == "standard_output.py"), path.name
+        assert ("typer.echo(" in text) == (path.name == "terminal.py"), path.name
         assert ("rich.markup" in text) == (path.name == "terminal.py"), path.name
         assert not re.search(r"(?<![\w.])print\(", text), path.name
 

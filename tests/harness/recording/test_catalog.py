@@ -26,7 +26,7 @@ from harness.recording.viewer import NO_DRIVER, ViewerError, free_port, viewer_p
 from harness.scenario.scenario import parse_scenario
 from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
-from tests.harness.recording.test_rerun_log import LIMITS, SCENE
+from tests.harness.recording.test_rerun_log import LIMITS, SCENE, column, read, seconds
 from tests.pictures import draw_settled
 
 SCENARIO = """\
@@ -93,24 +93,16 @@ def test_a_thin_recording_is_small_and_has_typed_properties(tmp_path: Path) -> N
 
 
 def test_a_thin_recording_shows_the_whole_track(campaign: Path) -> None:
-    rows: dict[str, int] = {}
-    for chunk in rr.chunk.RrdReader(str(recordings_of(campaign)[0])).stream():
-        rows[str(chunk.entity_path)] = rows.get(str(chunk.entity_path), 0) + chunk.to_record_batch().num_rows
-    assert rows["/world/aircraft"] == 1001 // 20 + 1
-    (line,) = strips(recordings_of(campaign)[0], "/world/whole_track")
-    (flat,) = strips(recordings_of(campaign)[0], "/plan/whole_track")
+    entities = read(recordings_of(campaign)[0])
+    assert len(column(entities, "/world/aircraft", "translation")) >= 1001 // 20 + 1
+    ((line,), (flat,)) = (
+        np.array(column(entities, f"/{view}/whole_track", "strips")[0]) for view in ("world", "plan")
+    )
     assert len(line) == 1001 // 20 + 1
     assert line[[0, -1]].tolist() == [[0.0, 0.0, 300.0], [0.0, 2500.0, 300.0]]
     np.testing.assert_array_equal(line[:, :2], flat)
-    assert {
-        "/plan/chosen",
-        "/plan/waypoints",
-        "/plan/whole_track",
-        "/plan/outlines",
-        "/world/true_obstacles/circles",
-        "/summary",
-        "/events",
-    } <= rows.keys()
+    drawn = {"/plan/chosen", "/plan/waypoints", "/plan/outlines", "/world/true_obstacles/circles"}
+    assert {*drawn, "/summary", "/events"} <= entities.keys()
 
 
 def test_the_plots_of_a_thin_recording_have_the_peaks_that_its_figures_name(tmp_path: Path) -> None:
@@ -120,34 +112,13 @@ def test_the_plots_of_a_thin_recording_have_the_peaks_that_its_figures_name(tmp_
     cross_track_m[507], clearance_m[613], bank_deg[999] = -2.5, 37.5, -45.0
     track = make_track(1001, cross_track_m=cross_track_m, clearance_m=clearance_m, roll_deg=bank_deg)
     record(tmp_path, 0, replace(flight(Outcome.REACHED, 250.0), track=track))
-    assert curve(tmp_path, "cross_track/flown")[50.7] == -2.5
-    assert curve(tmp_path, "clearance/flown")[61.3] == 37.5
-    assert curve(tmp_path, "bank/flown")[99.9] == -45.0
-    assert len(curve(tmp_path, "clearance/flown")) == 1001 // 20 + 1 + 1
-
-
-def strips(recording: Path, entity: str) -> list[np.ndarray]:
-    """The line strips of an entity."""
-    for chunk in rr.chunk.RrdReader(str(recording)).stream():
-        if str(chunk.entity_path) == entity:
-            rows = chunk.to_record_batch().to_pydict()
-            return [
-                np.array(each) for name, (found,) in rows.items() if name.endswith("strips") for each in found
-            ]
-    return []
-
-
-def curve(campaign: Path, entity: str) -> dict[float, float]:
-    """Values by time, s, of a curve of a campaign's first recording."""
-    values: dict[float, float] = {}
-    for chunk in rr.chunk.RrdReader(str(recordings_of(campaign)[0])).stream():
-        if str(chunk.entity_path) == f"/series/{entity}":
-            rows = chunk.to_record_batch().to_pydict()
-            times, scalars = rows.get("sim_time"), rows.get("Scalars:scalars")
-            if times and scalars:
-                pairs = zip(times, scalars, strict=True)
-                values |= {round(time.total_seconds(), 3): value[0] for time, value in pairs}
-    return values
+    entities = read(recordings_of(tmp_path)[0])
+    for name, at_s, peak in (("cross_track", 50.7, -2.5), ("clearance", 61.3, 37.5), ("bank", 99.9, -45.0)):
+        entity = f"/series/{name}/flown"
+        values = [cell[0] for cell in column(entities, entity, "scalars") if cell]
+        times = np.round(seconds(entities, entity), 3)
+        assert dict(zip(times, values, strict=True))[at_s] == peak
+    assert len(column(entities, "/series/clearance/flown", "scalars")) <= 1001 // 20 + 3
 
 
 def test_a_campaign_without_recordings_says_how_to_get_some(
