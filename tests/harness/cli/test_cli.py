@@ -103,7 +103,7 @@ print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["flight"], "No such command 'flight'. (see wayproof --help)"),
+        (["flight"], "No such command 'flight'. Did you mean 'list'? (see wayproof --help)"),
         (["fly"], "SCENARIO"),
         (["fly", "paper_circles", "--sed", "3"], "No such option: --sed"),
         (["fly", "paper_circles", "--seed", "three"], "--seed"),
