@@ -1,9 +1,8 @@
 """What the closed loop costs on this machine, against the bare flight model.
 
-All costs are processor time of the whole process, threads of libraries included, so that a ratio hides no work and
-does not count the time for which other programs had the core. The speed of a machine that others share changes from one
-second to the next: so a flight and its bare run take turns, half a minute of flight each, and only their ratio counts:
-the median of some, after one that loads what is loaded at its first use.
+All costs are processor time of the whole process, threads of libraries included. The speed of a machine that others
+share changes from one second to the next: so a flight and its bare run take turns, half a minute of flight each, and
+only their ratio counts: the median of some, after one that loads what is loaded at its first use.
 """
 
 from __future__ import annotations
@@ -20,16 +19,15 @@ from typing import Any, NamedTuple, TypeVar
 
 from aircraft.interface import AircraftState
 from harness.flight.closed_loop import Loop, fly
-from harness.flight.observer import Progress
-from harness.flight.record import AcceptedPlan, Flight, Track
+from harness.flight.observer import Observer, Progress
+from harness.flight.record import Flight
 from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import atmosphere, fly_to_folder, jsbsim_aircraft, make_loop
 from harness.scenario.scenario import Scenario
 from harness.scenario.start import start_conditions
 
 ROUNDS = 5
-"""Each round is one flight without and one with the recording, both in turns with the bare model. One more goes before
-them and does not count."""
+"""Each is one flight without and one with the recording; one round more goes before them and does not count."""
 TURN_S = 30.0
 """The bare model follows the flight in turns of so long, simulated."""
 WATCHED = {
@@ -56,18 +54,14 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
     """Measures a complete scenario, in this process.
 
     First the loop is flown once alone with its blocks timed: that gives their shares. Then come rounds of two whole
-    flights to a complete run folder, one without and one with the recording. Either takes turns with `run()` of the
-    aircraft, autopilot on, commands set once, from the same start in the same air, for as long as the flight takes, at
-    its step rate; loading and trimming are not counted.
-
-    Returns:
-        `scenario`, `outcome`, `step_rate_hz` and `bare_rate_hz` (the same); the ratios `closed_loop_ratio` and
-        `closed_loop_recording_ratio`; `planner_ms`, `p50`, `p99` and `max` of the processor time of all searches of a
-        flight, the least of all flights; `blocks`, the share of each in the flight with the recording.
+    flights to a complete run folder, without and with the recording. Either takes turns with `run()` of the aircraft,
+    autopilot on, commands set once, from the same start in the same air at the same step rate; loading and trimming
+    are not counted. `planner_ms` is the processor time of all searches of a flight, the least of all flights; `blocks`
+    has the share of each in the flight with the recording.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
-        ValueError: the flight is over before anything was planned or flown, so there is nothing to compare.
+        ValueError: the flight is over before anything was planned or flown.
     """
     flight, blocks = _flown_alone(scenario, progress)
     taken: dict[bool, list[Turns]] = {False: [], True: []}
@@ -114,8 +108,8 @@ def watched(loop: Loop, seconds: dict[str, float]) -> Loop:
 def block_shares(in_loop: Mapping[str, float], closed: float, recorded: float) -> dict[str, float]:
     """Share of each block in a whole flight with the recording; they sum to 1.
 
-    From the cost of each in a flight of the loop alone, and those of the whole flight without and with the recording.
-    What comes before and after the loop (loading, metrics, files) is booked to `record`.
+    From its cost in a flight of the loop alone, and those of the whole flight without and with the recording. What
+    comes before and after the loop (loading, metrics, files) is booked to `record`.
     """
     loop = sum(in_loop.values())
     scale = min(1.0, closed / loop)  # the lone flight may have been disturbed
@@ -143,8 +137,8 @@ class _Watched:
         return getattr(self._part, name)
 
 
-class Bare:
-    """Flies the bare model as far as the flight that it observes has come. Implements `Observer`."""
+class Bare(Observer):
+    """Flies the bare model as far as the flight that it observes has come."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.model = jsbsim_aircraft(scenario, start_conditions(scenario), atmosphere(scenario))
@@ -155,12 +149,6 @@ class Bare:
         if state.time_s >= self._turn_s:
             self._turn_s = state.time_s + TURN_S
             self._fly_to(state.time_s)
-
-    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        """Is of no interest."""
-
-    def on_block(self, block: Track) -> None:
-        """Is of no interest."""
 
     def on_event(self, time_s: float, text: str) -> None:
         """Flies up to it: the last one is the end."""
@@ -178,9 +166,8 @@ def in_turns(scenario: Scenario, recording: bool) -> Turns:
     """One flight into a folder that is thrown away, and its bare run."""
     bare = Bare(scenario)
     with tempfile.TemporaryDirectory(prefix="wayproof-bench-") as folder:
-        whole_s, figures = _cpu_s(
-            lambda: fly_to_folder(scenario, Path(folder) / "run", recording, watching=[bare])
-        )
+        out = Path(folder) / "run"
+        whole_s, figures = _cpu_s(lambda: fly_to_folder(scenario, out, recording, watching=[bare]))
     return Turns(bare.cpu_s, whole_s - bare.cpu_s, figures)
 
 

@@ -1,7 +1,7 @@
 """The envelope card of an aircraft: what it can do, measured by flying it in JSBSim.
 
-The first page, mass and speeds and banks, is the aircraft's survey, which planning uses; the others fly turns
-and courses at given airspeeds and winds. A card is kept by the content of model and package.
+Mass, speeds and banks are of the aircraft's survey, which planning uses; pages fly turns and courses at airspeeds and
+winds. They are kept by the content of model and package.
 """
 
 from __future__ import annotations
@@ -43,11 +43,9 @@ def envelope_card(
 ) -> dict[str, Any]:
     """The card of an aircraft, flown unless that has been done before.
 
-    Returns:
-        `aircraft`, `mass_kg`, `airspeed_range_mps`, `cruise_mps`, `bank_limit_deg`, `roll_rate_dps`, `verified`,
-        `laws`: the `gain` and `delay_s` that each law bears on a straight line (see `aircraft.guidance.margins`), and
-        `at`: for each airspeed `airspeed_mps`, `roll_in_s`, `level_bank_deg`, `climb_mps` and `descent_mps` (see
-        `aircraft.climb`), `turns` (see `flown_turn`) and `tracked` (see `tightest`).
+    Beside figures of the survey `laws` has the `gain` and `delay_s` that each law bears on a straight line (see
+    `aircraft.guidance.margins`), and `at` a page for each airspeed: `climb_mps` and `descent_mps` (see
+    `aircraft.climb`), `turns` (see `flown_turn`) and `tracked` (see `tightest`).
 
     Raises:
         AircraftError: there is no such aircraft, or it cannot fly at one of the airspeeds or in one of the winds.
@@ -66,18 +64,15 @@ def envelope_card(
             report(done, len(speeds), f"{frame.name} at {speed:g} m/s")
         title = f"{frame.name}-envelope-{FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
         pages.append(cached(title, digest, partial(_page, frame, speed, winds), dict))
+    limits = frame.guidance_limits()
     return {
         "aircraft": frame.name,
-        "mass_kg": frame.mass_kg,
-        "airspeed_range_mps": list(frame.airspeed_range_mps),
-        "cruise_mps": frame.cruise_mps,
-        "bank_limit_deg": frame.bank_limit_deg,
-        "roll_rate_dps": frame.roll_rate_dps,
-        "verified": frame.verified,
-        "laws": {
-            name: law_margins(kind, frame.guidance_limits())._asdict()
-            for name, kind in GUIDANCE.installed().items()
+        **{
+            name: getattr(frame, name)
+            for name in ("mass_kg", "cruise_mps", "bank_limit_deg", "roll_rate_dps", "verified")
         },
+        "airspeed_range_mps": list(frame.airspeed_range_mps),
+        "laws": {name: law_margins(kind, limits)._asdict() for name, kind in GUIDANCE.installed().items()},
         "at": pages,
     }
 
@@ -101,9 +96,8 @@ def _page(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, An
 def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, float | None]:
     """One turn at a bank, after 10 s of rolling in and settling, for 30 s.
 
-    Returns:
-        `bank_deg`; `radius_m`, path length over change of course, None if control is lost on the way; the greatest
-        `load_factor`; `altitude_lost_m` and `airspeed_lost_mps`, the most below what was commanded from the roll-in on.
+    `radius_m` is path length over change of course, None if control is lost on the way, `altitude_lost_m` and
+    `airspeed_lost_mps` the most below what was commanded from the roll-in on.
     """
     from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M  # loads JSBSim
     from aircraft.trials import UPDATE_STEPS, in_flight
@@ -132,10 +126,10 @@ def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, floa
 
 
 def tightest(frame: Airframe, speed: float, wind_mps: float) -> dict[str, float | None]:
-    """The tightest radius of which a course of 8 turns is tracked in a wind without the bank being cut.
+    """The tightest radius of which a course of 8 turns is tracked in a wind, the bank never cut; None if none is.
 
-    Tracked means within the error that planning allows for. The search is between the radius at the bank limit in calm
-    air and that of planning, to 2 %; None if not even that is tracked.
+    Tracked means within the error that planning allows for. The search goes, to 2 %, from the radius of planning to
+    that at the bank limit in calm air.
     """
     from aircraft.trials import farthest  # loads JSBSim
 

@@ -1,7 +1,7 @@
 """How close an aircraft stays to planned paths: random courses flown in JSBSim, the worst of many.
 
-A course is a chain of lines and arcs as planners make them, at the radius that planning uses in that air. The
-figures are those of guidance, autopilot and flight model together; no planner takes part.
+A course is a chain of lines and arcs as planners make them, at the radius that planning uses in that air; no planner
+takes part.
 """
 
 from __future__ import annotations
@@ -131,10 +131,7 @@ def tracked(
     guidance: str = DEFAULT_KIND,
     actuators: Actuators | None = None,
 ) -> Tracking:
-    """The worst of the courses of some seeds, each at the radius that planning uses for `preview` in that air.
-
-    `actuators` are its servos, None: those of the airframe table.
-    """
+    """The worst of the courses of some seeds, each at the radius that planning uses for `preview` in that air."""
     seal()
     frame = airframe(name, actuators)
     speed = airspeed_mps or frame.cruise_mps
@@ -154,10 +151,8 @@ def bench_tracking(
 ) -> dict[str, Any]:
     """Flies every case; AircraftError if the aircraft cannot be flown in one of them.
 
-    Returns:
-        `aircraft`, `guidance`, `airspeed_mps`, `seeds`, and `cases`: for each its name, the figures of `Tracking`,
-        worst over the seeds, its `limits` likewise (None where nothing is promised), whether they are `kept`, and how
-        control was `lost` (None where it was not): then the figures are None.
+    Each of `cases` has the figures of `Tracking`, worst over the seeds, its `limits` likewise (None where nothing is
+    promised), whether they are `kept`, and how control was `lost`: then the figures are None.
     """
     factor = LIMIT_FACTORS.get(name) if guidance == DEFAULT_KIND else None
     rows = []
@@ -173,10 +168,5 @@ def bench_tracking(
         else:
             row |= {**vars(flown), "kept": flown.within(limits) if limits else None}
         rows.append(row)
-    return {
-        "aircraft": name,
-        "guidance": guidance,
-        "airspeed_mps": airframe(name).cruise_mps,
-        "seeds": seeds,
-        "cases": rows,
-    }
+    told = {"aircraft": name, "guidance": guidance, "airspeed_mps": airframe(name).cruise_mps}
+    return {**told, "seeds": seeds, "cases": rows}
