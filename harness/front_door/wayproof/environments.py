@@ -7,7 +7,6 @@ import sys
 TYPE_CHECKING = False  # as of `typing`, which takes longer to import than all of this
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from importlib.abc import Loader
     from importlib.machinery import ModuleSpec
     from types import ModuleType
 
@@ -32,12 +31,12 @@ def _register() -> None:
 
 
 class _Watcher:
-    """Waits for the import of gymnasium, once. A finder, without its base class, which takes long to import."""
+    """A finder that waits for the import of gymnasium, once; its base class takes long to import."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """The module as all others find it, with a loader that registers afterwards."""
+        """The module as all others find it, which registers our environments once it is there."""
         if fullname != GYMNASIUM:
             return None
         from importlib.util import find_spec
@@ -45,23 +44,11 @@ class _Watcher:
         sys.meta_path.remove(self)
         spec = find_spec(fullname)
         if spec is not None and spec.loader is not None:
-            spec.loader = _Registers(spec.loader)  # type: ignore[assignment]
+            fill = spec.loader.exec_module
+
+            def fill_and_register(module: ModuleType) -> None:
+                fill(module)
+                _register()
+
+            spec.loader.exec_module = fill_and_register  # type: ignore[method-assign]
         return spec
-
-
-class _Registers:
-    """A loader, likewise, that registers once its module is there."""
-
-    def __init__(self, loader: Loader) -> None:
-        self._loader = loader
-
-    def create_module(self, spec: ModuleSpec) -> ModuleType | None:
-        """As the loader does."""
-        return self._loader.create_module(spec)
-
-    def exec_module(self, module: ModuleType) -> None:
-        """As the loader does, and then registers."""
-        self._loader.exec_module(module)
-        if module.__spec__ is not None:
-            module.__spec__.loader = module.__loader__ = self._loader
-        _register()
