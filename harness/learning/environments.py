@@ -8,6 +8,7 @@ and truncated by the scenario's time limit.
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -21,21 +22,38 @@ from aircraft.airframes import airframe
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import AircraftState
 from harness.flight.closed_loop import Loop
+from harness.flight.observer import Observer
 from harness.flight.record import Outcome, digest
 from harness.flight.stepped import Status, SteppedLoop
-from harness.learning.observation import LEAST, MOST, ScanKeeper, state_of
 from harness.learning.pilots import Episode, WaypointPilot
+from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import make_loop
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, load_scenario
 from harness.scenario.shipped import scenario_path
+from planner.interface import Mission
 
 Observation = dict[str, NDArray[Any]]
 Action = NDArray[Any]
+Floats = NDArray[np.float32]
 
 MOST_BEAMS: Final = 72
 """Beams of an observation where nobody says how many."""
 BAD: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)
+STATE: Final = (
+    "goal distance over the diagonal of the area",
+    "cosine of the goal's bearing from the course",
+    "sine of it, positive to the right",
+    "east over the width of the area, from its western bound",
+    "north over the height of the area, from its southern bound",
+    "cosine of the course",
+    "sine of the course",
+    "bank over the bank limit, positive to the right",
+    "ground speed over twice the airspeed of the mission",
+)
+"""What each number of `state` is."""
+LEAST: Final = np.array([0, -1, -1, 0, 0, -1, -1, -1, 0], dtype=np.float32)
+MOST: Final = np.ones(len(STATE), dtype=np.float32)
 
 
 class WaypointsEnv(gymnasium.Env[Observation, Action]):
@@ -49,26 +67,18 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
     any seed it is the scenario's own.
 
     Args:
-        scenario: a scenario, its file, or the name of one that comes with wayproof.
+        scenario: a scenario, its file, or the name of one that comes with wayproof; InputError if it cannot be used.
         step_s: simulated time of a step: a multiple of the interval between two updates of guidance (0.1 s).
         beams: how many beams of the scan are observed, each the least of neighbouring ones; default: all, at most 72.
-        render_mode: None; `episode` can be flown again with a recording.
-
-    Raises:
-        InputError: the scenario cannot be used.
-        ValueError: step or beams make no sense.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012  as gymnasium declares it
 
     def __init__(
-        self,
-        scenario: Scenario | str | Path,
-        step_s: float = 1.0,
-        beams: int | None = None,
-        render_mode: str | None = None,
+        self, scenario: Scenario | str | Path, step_s: float = 1.0, beams: int | None = None
     ) -> None:
-        self._own = self._flown = _loaded(scenario)
+        own = scenario if isinstance(scenario, Scenario) else load_scenario(scenario_path(str(scenario)))
+        self._own = self._flown = own
         self._updates = round(step_s * UPDATE_RATE_HZ) if math.isfinite(step_s) else 0
         if self._updates < 1 or abs(self._updates - step_s * UPDATE_RATE_HZ) > 1e-9:
             raise ValueError(f"step_s is {step_s:g}; must be a multiple of {1.0 / UPDATE_RATE_HZ:g} s")
@@ -76,7 +86,6 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         self._beams = min(rays, MOST_BEAMS) if beams is None else beams
         if not 1 <= self._beams <= rays:
             raise ValueError(f"beams is {beams}; must be from 1 to the {rays} rays of the scenario's sensor")
-        self.render_mode = render_mode
         self._mission = replace(mission_of(self._own), bounds_m=self._own.area.bounds_m)
         limits = airframe(self._own.aircraft.model).guidance_limits(self._own.aircraft.airspeed_mps)
         self._bank_limit_rad = limits.bank_limit_rad
@@ -89,12 +98,11 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         self._scans = ScanKeeper()
         self._loop: SteppedLoop | None = None
         self._seeded, self._to_go_m = False, math.nan
-        observed: Any = spaces.Dict(
-            {
-                "scan": spaces.Box(0.0, 1.0, (self._beams,), np.float32),
-                "state": spaces.Box(LEAST, MOST, dtype=np.float32),
-            }
+        scan, state = (
+            spaces.Box(0.0, 1.0, (self._beams,), np.float32),
+            spaces.Box(LEAST, MOST, dtype=np.float32),
         )
+        observed: Any = spaces.Dict({"scan": scan, "state": state})
         self.observation_space = observed
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
 
@@ -113,12 +121,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         return self._observed(status), self._info(status)
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Flies on for a step; after the end nothing more is flown.
-
-        Raises:
-            RuntimeError: no episode has begun.
-            ValueError: the action has another shape, or lies beyond -1 and 1.
-        """
+        """Flies on for a step; after the end nothing more is flown. ValueError: the action is none."""
         if self._loop is None:
             raise RuntimeError("reset() before step(): no episode has begun")
         before = self._loop.status
@@ -127,9 +130,8 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
             raise ValueError(f"action is {action!r}; must be 2 numbers from -1 to 1")
         self._act(given, before.believed)
         status = self._advanced(before)
-        reward = (self._to_go_m - status.to_go_m) / math.dist(
-            self._own.mission.start_m, self._own.mission.goal_m
-        )
+        whole_m = math.dist(self._own.mission.start_m, self._own.mission.goal_m)
+        reward = (self._to_go_m - status.to_go_m) / whole_m
         self._to_go_m = status.to_go_m
         if not before.done:  # else it has been given
             reward += float(status.outcome is Outcome.REACHED) - float(status.outcome in BAD)
@@ -171,16 +173,54 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
 
     def _info(self, status: Status) -> dict[str, Any]:
         """Time, distance to go and seed; at the end outcome, reason and digest of the flight."""
-        info: dict[str, Any] = {
-            "time_s": status.time_s,
-            "to_go_m": status.to_go_m,
-            "seed": self._flown.seed,
-        }
+        info: dict[str, Any] = {"time_s": status.time_s, "to_go_m": status.to_go_m, "seed": self._flown.seed}
         if status.outcome is not None and self._loop is not None:
             track = self._loop.flight().track
             info |= {"outcome": status.outcome.value, "reason": status.reason, "digest": digest(track)}
         return info
 
 
-def _loaded(given: Scenario | str | Path) -> Scenario:
-    return given if isinstance(given, Scenario) else load_scenario(scenario_path(str(given)))
+class ScanKeeper(Observer):
+    """An observer of the loop that keeps the last scan which has become available."""
+
+    def __init__(self) -> None:
+        self._coming: deque[RangeScan] = deque()
+        self._last: RangeScan | None = None
+
+    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
+        """Keeps a scan."""
+        self._coming.append(scan)
+
+    def forget(self) -> None:
+        """Begins anew, for the next flight."""
+        self._coming.clear()
+        self._last = None
+
+    def ranges(self, time_s: float, beams: int) -> Floats:
+        """(beams,) the nearest return of neighbouring rays over the sensing range, clockwise; 1: there was none."""
+        while self._coming and self._coming[0].available_s <= time_s + 1e-9:
+            self._last = self._coming.popleft()
+        if self._last is None:
+            return np.ones(beams, dtype=np.float32)
+        shares = np.minimum(self._last.ranges_m / self._last.max_range_m, 1.0)
+        first = np.arange(beams) * len(shares) // beams
+        return np.clip(np.minimum.reduceat(shares, first), 0.0, 1.0).astype(np.float32)
+
+
+def state_of(state: AircraftState, mission: Mission, bank_limit_rad: float) -> Floats:
+    """The numbers of `STATE`, of what the aircraft believes."""
+    xmin, ymin, xmax, ymax = mission.bounds_m
+    east, north = mission.goal_m[0] - state.east_m, mission.goal_m[1] - state.north_m
+    bearing = math.atan2(east, north) - state.course_rad
+    values = (
+        math.hypot(east, north) / math.hypot(xmax - xmin, ymax - ymin),
+        math.cos(bearing),
+        math.sin(bearing),
+        (state.east_m - xmin) / (xmax - xmin),
+        (state.north_m - ymin) / (ymax - ymin),
+        math.cos(state.course_rad),
+        math.sin(state.course_rad),
+        state.roll_rad / bank_limit_rad,
+        state.groundspeed_mps / (2.0 * mission.speed_mps),
+    )
+    return np.clip(np.array(values, dtype=np.float32), LEAST, MOST)

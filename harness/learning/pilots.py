@@ -29,9 +29,7 @@ class Waypoint(NamedTuple):
 class WaypointPilot:
     """A planner whose plan is a turn onto the line to a waypoint, and straight on beyond it.
 
-    Args:
-        mission: turn radius and sensing range.
-        noted: of an earlier flight; None where somebody sets `target_m`.
+    `noted` are the waypoints of an earlier flight; None where somebody sets `target_m`.
     """
 
     def __init__(self, mission: Mission, noted: Sequence[Waypoint] | None = None) -> None:
@@ -55,30 +53,18 @@ class WaypointPilot:
         if math.dist(target, request.position_m) < NEAREST_M or way is None:
             way = [(*begin, 0.0, NEAREST_M)]
         beyond = (*along(way[-1], way[-1][5]), 0.0, self._mission.sensor_range_m)
-        return Plan(
-            PlanStatus.FOUND, "a waypoint from outside", np.array([target]), Path(np.array([*way, beyond]))
-        )
+        path = Path(np.array([*way, beyond]))
+        return Plan(PlanStatus.FOUND, "a waypoint from outside", np.array([target]), path)
 
 
 @dataclass(frozen=True)
 class Episode:
-    """What was flown, and the waypoints that the agent gave.
+    """What was flown; `wayproof.fly(episode.scenario, **episode.pilots)` flies it again, to the same digest."""
 
-    `wayproof.fly(episode.scenario, **episode.pilots)` flies it again, to the same digest.
-
-    Attributes:
-        scenario: with the seed that was flown.
-        waypoints: that the planner gave.
-    """
-
-    scenario: Scenario
-    waypoints: tuple[Waypoint, ...] = ()
+    scenario: Scenario  # with the seed that was flown
+    waypoints: tuple[Waypoint, ...] = ()  # that the agent gave
 
     @property
     def pilots(self) -> dict[str, Callable[[Mission], WaypointPilot]]:
         """`planner`, as `wayproof.fly` takes it."""
-
-        def planner(mission: Mission) -> WaypointPilot:
-            return WaypointPilot(mission, self.waypoints)
-
-        return {"planner": planner}
+        return {"planner": lambda mission: WaypointPilot(mission, self.waypoints)}

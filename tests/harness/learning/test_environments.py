@@ -18,7 +18,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import wayproof
-from harness.learning.observation import STATE, ScanKeeper, state_of
+from harness.learning.environments import STATE, ScanKeeper, state_of
 from harness.mapping.scan import RangeScan
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario
