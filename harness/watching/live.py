@@ -25,14 +25,9 @@ HAND_OVER_S: Final = 0.1
 
 
 class LiveLog(Observer):
-    """Sends a flight to a viewer that is running. Nothing that becomes of the viewer reaches the flight.
+    """Sends a flight to a viewer that is running, at least five times a second of wall time; `begin` comes first.
 
-    What is flown is handed over at least five times a second of wall time, if the flight itself goes on that often.
-    `begin` comes first.
-
-    Args:
-        relay: takes what is handed over.
-        url: of the viewer, as rerun+http://127.0.0.1:9876/proxy.
+    Nothing that becomes of the viewer, whose `url` is as rerun+http://127.0.0.1:9876/proxy, reaches the flight.
     """
 
     def __init__(self, relay: RelayProcess, url: str) -> None:

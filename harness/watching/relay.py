@@ -44,11 +44,9 @@ class Call(NamedTuple):
 
 
 def show(pipe: Connection) -> None:
-    """Sends a flight to a viewer, as it is told of it, until the pipe is closed.
+    """Sends a flight to a viewer until the pipe is closed, which gives an `Opening`, and then lists of `Call`.
 
-    Args:
-        pipe: gives an `Opening`, and then lists of `Call`. The viewer has each list before the next is read;
-            an answer of one byte says so.
+    The viewer has each list before the next is read; an answer of one byte says so.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.dup2(2, 1)
@@ -77,8 +75,7 @@ def show(pipe: Connection) -> None:
 class RelayProcess:
     """The process, and a thread that waits for it: who hands something over never does. `end` must be called.
 
-    Args:
-        gone: is told once if the viewer goes away before the end.
+    `gone` is told once if the viewer goes away before the end.
     """
 
     def __init__(self, gone: Callable[[], None] = lambda: None) -> None:

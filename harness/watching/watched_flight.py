@@ -24,16 +24,11 @@ _NAP_S: Final = 0.05
 
 
 class Pace(Observer):
-    """Holds a flight back to a speed. One that has fallen behind catches up by a second, and is late for the rest.
-
-    Args:
-        speed: simulated seconds a second; 1 is real time.
-    """
+    """Holds a flight back to a speed (simulated over wall time). One that has fallen behind catches up by a second."""
 
     def __init__(self, speed: float) -> None:
-        self._speed = speed
+        self._speed, self._flown_s = speed, 0.0
         self._due_s: float | None = None
-        self._flown_s = 0.0
 
     def on_row(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
         """Waits until it is time for a row of the track."""
@@ -48,17 +43,11 @@ class Pace(Observer):
 
 @dataclass(frozen=True)
 class Onlookers:
-    """Who looks on.
+    """Who looks on."""
 
-    Attributes:
-        viewer: address of a rerun viewer that is running, as rerun+http://127.0.0.1:9876/proxy.
-        speed: simulated seconds a second that are not exceeded; None: as fast as it goes.
-        viewer_gone: is told if the viewer goes away before the end.
-    """
-
-    viewer: str
-    speed: float | None = None
-    viewer_gone: Callable[[], None] = lambda: None
+    viewer: str  # address of a rerun viewer that is running, as rerun+http://127.0.0.1:9876/proxy
+    speed: float | None = None  # simulated seconds a second that are not exceeded; None: as fast as it goes
+    viewer_gone: Callable[[], None] = lambda: None  # is told if the viewer goes away before the end
 
 
 def fly_watched(
