@@ -127,7 +127,7 @@ def elevator_deg(speed_mps: float, bank_deg: float) -> float:
 
 def at_the_stop(draw: Draw) -> Asked:
     """Turns that take more elevator than the 25 degrees there are, and less bank than the limit."""
-    speed, bank = draw(17.8, 19.0), draw(32.0, 40.0)
+    speed, bank = draw(17.8, 19.0), draw(36.0, 40.0)
     assert elevator_deg(speed, bank) < -26.5
     radius = speed**2 / (G * math.tan(math.radians(bank)))
     return circles(radius, 4.0), {"airspeed_mps": speed}
