@@ -147,10 +147,12 @@ class RollingWindow:
             self._proofs.no_room_to_turn.closed(request.position_m)
             return self._roll(Situation(request, None))
         now = Situation(request, plan, request.arc_length_m)
-        if plan.holds(request.arc_length_m):
+        in_turn = plan.holds(request.arc_length_m)
+        if in_turn:
             now = Situation(request, plan, on_loiter(plan.path, request.arc_length_m))
             self._loiter(now, plan)
-        if self._free_again(now):
+        # In the turn a search goes to its end: begun anew with every edge that goes, it might never come to it.
+        if self._free_again(now) and not (in_turn and self._search.running):
             self._search.stop()  # it was begun with edges that have gone
             self._search.anew = True
         newly_cut = self._monitor.look(plan, now.here_m, request.position_m, fresh_m)

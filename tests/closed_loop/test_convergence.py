@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from harness.flight.record import FloatArray, Outcome
 from harness.run.scenario_flight import make_loop
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario
+from tests.closed_loop.worlds_table import SHARED, judged
 from tests.longer import longer
 from tests.point_mass import PointMass
 
@@ -298,6 +300,14 @@ def assert_converges(seed: int) -> None:
 )
 def test_converges(seed: int) -> None:
     assert_converges(seed)
+
+
+@pytest.mark.flights
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the folder of benchmark worlds, shared, is absent")
+def test_a_search_in_the_turn_ends_though_edges_go(tmp_path: Path) -> None:
+    """Begun anew with every edge that went, it never ended here: the flight turned to its time limit of 8,000 s."""
+    flown = judged(SHARED / "worlds/barn/barn-world-168.json", tmp_path, "8")
+    assert (flown["end"], flown["faults"]) == ("reached", [])
 
 
 @pytest.mark.slow
