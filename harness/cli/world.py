@@ -52,7 +52,6 @@ def world(
     from harness.files.strict_yaml import dump
     from harness.files.whole_file import replace_text
     from harness.world_files.expansion import FileFault, FileSpec
-    from harness.world_files.parts import WorldFileError
     from harness.world_files.siting import site
 
     ends = _ends(start, goal)
@@ -70,7 +69,7 @@ def world(
         found = site(specs, altitude_m, craft, ends, lambda what: say(f"wayproof: {what}", err=True))
     except FileFault as fault:
         raise InputError(f"{files[fault.index]}: {fault}") from fault
-    except WorldFileError as error:
+    except InputError as error:
         raise InputError(f"{' '.join(map(str, files))}: {error}") from error
     name = re.sub(r"[^a-z0-9._-]+", "_", out.stem.lower())[:100].strip(".") or "world"
     area: dict[str, Any] = {"bounds_m": list(found.bounds_m)}

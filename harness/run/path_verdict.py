@@ -299,7 +299,7 @@ def layer_contacts(
     from harness.world_files.expansion import expanded, loaded_file
     from harness.world_files.plane import Place
 
-    specs = [each for each in files if loaded_file(each.path, each.kind, each.reading).terrain is None]
+    specs = [each for each in files if loaded_file(each).terrain is None]
     origin = scenario.area.origin
     place = Place(origin.latitude_deg, origin.longitude_deg)
     known = None if scenario.ground is None else scenario.ground.field()

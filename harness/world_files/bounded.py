@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import codecs
 from pathlib import Path
 from typing import Any, Final
 
 from harness.files.input_file import InputError, open_regular
 from harness.files.values import parsed_json
-from harness.world_files.parts import WorldFileError
 
 MAX_BYTES: Final = 400_000_000
 """Largest file that is read in pieces, or whose numbers take little more room than its bytes."""
 MAX_TREE_BYTES: Final = 64_000_000
 """Largest JSON or text file that is read whole: it takes about ten times its size in memory."""
-UTF_16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-"""Byte order marks of UTF-16, which editors on Windows write."""
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> bytes:
@@ -25,21 +21,19 @@ def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> b
             too_large = path.stat().st_size > most
             data: bytes = b"" if too_large else file.read(most if first is None else first)
     except InputError as error:
-        raise WorldFileError(str(error).removeprefix(f"{path}: ")) from error
+        raise InputError(str(error).removeprefix(f"{path}: ")) from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise WorldFileError(f"cannot be read ({reason}); give the path of a file") from error
+        raise InputError(f"cannot be read ({reason}); give the path of a file") from error
     if too_large:
-        raise WorldFileError(f"is larger than {most // 10**6} MB; cut the area of interest out of it")
+        raise InputError(f"is larger than {most // 10**6} MB; cut the area of interest out of it")
     return data
 
 
 def text_of(data: bytes) -> str:
-    """The text of some bytes: UTF-8 or UTF-16 that says so, else Latin-1."""
-    if data.startswith(UTF_16):
-        return data.decode("utf-16", "replace")
+    """The text of some bytes: UTF-8, else Latin-1."""
     if b"\0" in data:
-        raise WorldFileError("is not a text file; give one of the kinds that are known")
+        raise InputError("is not a text file; must be one, as UTF-8")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

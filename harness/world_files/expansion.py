@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -13,14 +13,13 @@ from typing import Any, Final
 import numpy as np
 import shapely
 
-from harness.files.input_file import open_regular
+from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files import kinds
-from harness.world_files.cells import placed_cells, simplified
 from harness.world_files.height_field import HeightField, cell_sides, height_field
-from harness.world_files.parts import Box, Contents, FloatArray, Raster, Reading, WorldFileError
+from harness.world_files.parts import Box, Contents, FloatArray, Raster, Reading
 from harness.world_files.plane import Mapping, Place, geodetic
-from harness.world_files.slicing import HeightBand, KnownGround, Solid, clipped, sliced_parts
+from harness.world_files.solids import Layer, Solid, clipped, placed_cells, simplified, sliced_parts
 
 MARGIN: Final = 0.02
 """What lies outside the area by more than this share of its longer side is left out."""
@@ -28,8 +27,6 @@ DECIMALS: Final = 3
 """Decimals of a corner in metres: corners are rounded to a millimetre."""
 MAX_CORNERS: Final = 900_000
 """Most corners of all files together: a scenario with more could not be read again."""
-MANY_CORNERS: Final = 20_000
-"""Most corners that are compared with the area one by one; of more, only their hull is."""
 MAX_POLYGONS: Final = 150_000
 """Most polygons of a file."""
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
@@ -38,7 +35,7 @@ HEIGHTS_M: Final = (-1000.0, 30_000.0)
 
 @dataclass(frozen=True)
 class FileSpec:
-    """One file of a scenario, as its key `file` has it; units as named there."""
+    """One file of a scenario, as its key `file` has it."""
 
     path: Path
     kind: str | None = None
@@ -52,17 +49,12 @@ class FileSpec:
     default_height_m: float = 6.0
     ground_m: float | None = None
 
-    @property
-    def reading(self) -> Reading:
-        """What the readers need of it."""
-        return Reading(self.metres_per_cell, self.crs, self.default_height_m)
-
 
 @dataclass(frozen=True, eq=False)
 class Source:
     """What became of one file: shapely polygons in the plane, cut to the area and valid, and what was assumed.
 
-    `heights_m` has bottom and top of each, above mean sea level; of terrain the height of the cut, twice.
+    `heights_m` has bottom and top of each, above mean sea level.
     """
 
     spec: FileSpec
@@ -82,7 +74,7 @@ class Expanded:
     notes: tuple[str, ...]
 
 
-class FileFault(WorldFileError):
+class FileFault(InputError):
     """A file that cannot be used, and its index among those that were asked for."""
 
     def __init__(self, index: int, sentence: str) -> None:
@@ -95,7 +87,6 @@ def expanded(
     place: Place,
     bounds_m: Box,
     altitude_m: float,
-    tell: Callable[[str], None] = lambda _: None,
     ground: HeightField | None = None,
 ) -> Expanded:
     """Obstacles and ground of some files, in the plane of a place; a fault is a FileFault.
@@ -107,17 +98,17 @@ def expanded(
     loaded: list[tuple[Contents, Mapping]] = []
     for index, spec in enumerate(specs):
         with blaming(index):
-            contents = loaded_file(spec.path, spec.kind, spec.reading)
+            contents = loaded_file(spec)
             loaded.append((contents, Mapping(contents.crs, place, spec.shift_m)))
             _check_place(*loaded[-1], box)
     field, notes = height_field([(each.terrain, at) for each, at in loaded if each.terrain is not None], box)
     field = field or ground
     sources: list[Source] = []
     for index, (spec, (contents, mapping)) in enumerate(zip(specs, loaded, strict=True)):
-        tell(f"cutting {spec.path.name} at {altitude_m:g} m")
         with blaming(index):
-            known = KnownGround(field, spec.ground_m, bounds_m)
-            sources.append(_cut(spec, contents, mapping, known, box, altitude_m))
+            reach_m = spec.vertical_clearance_m
+            layer = Layer(altitude_m - reach_m, altitude_m + reach_m, field, spec.ground_m, bounds_m)
+            sources.append(_cut(spec, contents, mapping, layer, box))
             _check_size(sources)
     return Expanded(tuple(sources), field, tuple(notes))
 
@@ -127,7 +118,7 @@ def blaming(index: int) -> Iterator[None]:
     """Turns an error of a file into one that says which file."""
     try:
         yield
-    except WorldFileError as error:
+    except InputError as error:
         raise FileFault(index, str(error)) from error
 
 
@@ -135,45 +126,41 @@ def _check_size(sources: Sequence[Source]) -> None:
     every = [each for source in sources for each in source.polygons]
     corners = int(shapely.get_num_coordinates(np.array(every, dtype=object)).sum())
     if corners > MAX_CORNERS or len(every) > MAX_POLYGONS:
-        raise WorldFileError(
+        raise InputError(
             f"has {counted(len(sources[-1].polygons), 'polygon')}, {corners:,} corners in the area with those of the "
             f"files before; at most {MAX_CORNERS:,} corners can be kept: make area.bounds_m smaller"
         )
 
 
-def loaded_file(path: Path, kind: str | None, reading: Reading) -> Contents:
+def loaded_file(spec: FileSpec) -> Contents:
     """Contents of a file; the last few are kept, for who flies the same files many times."""
-    return _loaded(*_as_it_is(path), kind, reading)
-
-
-def _as_it_is(path: Path) -> tuple[Path, tuple[int, int]]:
-    """A file by one path, however its folder is written, of a link by its name; and its size and time."""
     try:
-        stamp = path.stat()
+        stamp = spec.path.stat()
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise WorldFileError(f"cannot be read ({reason}); give the path of a file") from error
-    return path.parent.resolve() / path.name, (stamp.st_size, stamp.st_mtime_ns)
+        raise InputError(f"cannot be read ({reason}); give the path of a file") from error
+    # One path, however its folder is written, of a link by its name.
+    path, reading = (
+        spec.path.parent.resolve() / spec.path.name,
+        Reading(spec.metres_per_cell, spec.crs, spec.default_height_m),
+    )
+    return _loaded(path, (stamp.st_size, stamp.st_mtime_ns), spec.kind, reading)
 
 
 @lru_cache(maxsize=4)
 def _loaded(path: Path, stamp: tuple[int, int], kind: str | None, reading: Reading) -> Contents:
     try:
-        return kinds.read(path, kind, reading)
+        contents = kinds.read(path, kind, reading)
+        with path.open("rb") as file:
+            return replace(contents, sha256=hashlib.file_digest(file, "sha256").hexdigest())
     except MemoryError as error:
-        raise WorldFileError("needs more memory than there is; cut the area of interest out of it") from error
+        raise InputError("needs more memory than there is; cut the area of interest out of it") from error
     except RecursionError as error:
-        raise WorldFileError("is nested too deeply; must be a map") from error
-
-
-@lru_cache(maxsize=16)
-def _digest(path: Path, stamp: tuple[int, int]) -> str:
-    with open_regular(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
+        raise InputError("is nested too deeply; must be a map") from error
 
 
 def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
-    """X and y, in the file, of the corners of all that it holds, of many those of their hull; empty without any."""
+    """X and y, in the file, of the corners of all that it holds, of each part those of its box; empty without any."""
     found = [np.zeros((0, 2))]
     for raster in (contents.terrain, contents.occupied):
         if raster is not None:
@@ -183,71 +170,61 @@ def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
     if contents.parts:
         bounds = shapely.bounds(np.array([part.footprint for part in contents.parts], dtype=object))
         found += [bounds[:, [i, j]] for i in (0, 2) for j in (1, 3)]
-    corners = np.concatenate(found)
-    if len(corners) > MANY_CORNERS and np.isfinite(corners).all():
-        corners = shapely.get_coordinates(shapely.convex_hull(shapely.linestrings(corners)))
-    return corners[:, 0], corners[:, 1]
+    x, y = np.concatenate(found).T
+    return x, y
 
 
 def _check_place(contents: Contents, mapping: Mapping, box: Box) -> None:
-    """Raises WorldFileError if nothing of a file lies anywhere near the area."""
+    """Raises InputError if nothing of a file lies anywhere near the area."""
     east, north = mapping.to_plane(*corners_of(contents))
     known = np.isfinite(east) & np.isfinite(north)
     if not known.any():
-        raise WorldFileError("lies where its coordinates have no place on earth; its crs may be another")
+        raise InputError("lies where its coordinates have no place on earth; its crs may be another")
     xmin, xmax, ymin, ymax = east[known].min(), east[known].max(), north[known].min(), north[known].max()
     if xmin <= box[2] and xmax >= box[0] and ymin <= box[3] and ymax >= box[1]:
         return
     where = f"lies outside the area, at east {xmin:,.0f} to {xmax:,.0f} m, north {ymin:,.0f} to {ymax:,.0f} m"
     if contents.crs is None:
-        raise WorldFileError(f"{where}; must reach into it: give shift_m")
+        raise InputError(f"{where}; must reach into it: give shift_m")
     latitude, longitude = geodetic(contents.crs, *corners_of(contents))
     middle = f"{np.nanmean(latitude):.4f}, longitude_deg: {np.nanmean(longitude):.4f}"
-    raise WorldFileError(f"{where}; area.origin {{latitude_deg: {middle}}} is in its middle")
+    raise InputError(f"{where}; area.origin {{latitude_deg: {middle}}} is in its middle")
 
 
-def _cut(
-    spec: FileSpec, contents: Contents, mapping: Mapping, ground: KnownGround, box: Box, altitude_m: float
-) -> Source:
+def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box: Box) -> Source:
     """The polygons of one file."""
     notes = list(contents.notes)
-    band = HeightBand(altitude_m - spec.vertical_clearance_m, altitude_m + spec.vertical_clearance_m)
-    if (ground.flat_m, ground.field) == (None, None) and any(part.rigid for part in contents.parts):
-        ground = KnownGround(None, 0.0, ground.known_in)
+    if layer.field is None and layer.flat_m is None and any(part.rigid for part in contents.parts):
+        layer = layer._replace(flat_m=0.0)
         notes.append("no terrain: the ground is taken as flat at 0 m (ground_m)")
-    solids = sliced_parts(contents.parts, mapping, band, ground, box)
+    solids = sliced_parts(contents.parts, mapping, layer, box)
     tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
-    for raster, solid, heights_m in _solid_cells(contents, spec, band, notes):
-        found, factor = placed_cells(raster, solid, mapping, box)
-        solids += [Solid(shape, *heights_m) for shape in found]
-        if factor > 1:
-            notes.append(f"its cells were taken together {factor} by {factor}: they are too ragged")
+    for raster, solid, heights_m in _solid_cells(contents, spec, layer, notes):
+        solids += [Solid(shape, *heights_m) for shape in placed_cells(raster, solid, mapping, box)]
         if spec.tolerance_m is None:
             rows, columns = raster.values.shape
-            tolerance_m = factor * max(cell_sides(raster, mapping, columns / 2, rows / 2) or (tolerance_m,))
+            tolerance_m = max(cell_sides(raster, mapping, columns / 2, rows / 2) or (tolerance_m,))
     solids = clipped(solids, box)
-    polygons = _rounded(_outlines([each.shape for each in solids], tolerance_m))
+    polygons = _outlines([each.shape for each in solids], tolerance_m)
     if polygons:
         notes.append(f"outlines simplified by at most {tolerance_m:.3g} m, outwards only")
     else:
-        notes.append(f"nothing of it is solid in the area between {band.low_m:g} and {band.high_m:g} m")
+        notes.append(f"nothing of it is solid in the area between {layer.low_m:g} and {layer.high_m:g} m")
     heights = tuple(_heights(polygons, solids))
-    digest = _digest(*_as_it_is(spec.path))
-    return Source(spec, contents.kind, digest, tuple(polygons), heights, tuple(notes))
+    return Source(spec, contents.kind, contents.sha256, tuple(polygons), heights, tuple(notes))
 
 
 def _solid_cells(
-    contents: Contents, spec: FileSpec, band: HeightBand, notes: list[str]
+    contents: Contents, spec: FileSpec, layer: Layer, notes: list[str]
 ) -> Iterator[tuple[Raster, Any, tuple[float, float]]]:
     """Rasters of a file with those of their cells that are solid, and between which heights."""
     if (terrain := contents.terrain) is not None:
         missing = np.isnan(terrain.values)
         if missing.any():
-            notes.append(
-                f"{counted(int(missing.sum()), 'cell')} without a height taken as {spec.nodata} (nodata)"
-            )
-        solid = (terrain.values >= band.low_m) | (missing & (spec.nodata == "solid"))
-        yield terrain, solid, (band.low_m, band.low_m)
+            told = f"without a height taken as {spec.nodata} (nodata)"
+            notes.append(f"{counted(int(missing.sum()), 'cell')} {told}")
+        solid = (terrain.values >= layer.low_m) | (missing & (spec.nodata == "solid"))
+        yield terrain, solid, (layer.low_m, layer.low_m)
     if (occupied := contents.occupied) is not None:
         missing = np.isnan(occupied.values)
         if missing.any():
@@ -256,12 +233,15 @@ def _solid_cells(
 
 
 def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
-    """The union of polygons, simplified."""
-    merged = shapely.get_parts(shapely.disjoint_subset_union_all(polygons)) if polygons else []
+    """The union of polygons, simplified, with corners on a fine grid, valid."""
+    merged = shapely.get_parts(shapely.disjoint_subset_union_all(polygons))
     grown = simplified([each for each in merged if each.geom_type == "Polygon"], tolerance_m)
-    if tolerance_m > 0 and grown:
-        grown = list(shapely.get_parts(shapely.disjoint_subset_union_all(grown)))
-    return grown
+    shapes = np.array(shapely.get_parts(shapely.disjoint_subset_union_all(grown)), dtype=object)
+    placed = shapely.transform(shapes, lambda points: np.round(points, DECIMALS))
+    bad = ~shapely.is_valid(placed)  # a sliver that the grid makes a line, too: of it nothing is left
+    placed[bad] = shapely.set_precision(shapes[bad], 10.0**-DECIMALS)
+    placed = shapely.remove_repeated_points(placed)
+    return [each for each in shapely.get_parts(placed) if each.geom_type == "Polygon" and each.area > 0]
 
 
 def _heights(polygons: Sequence[Any], solids: Sequence[Solid]) -> Iterator[tuple[float, float]]:
@@ -272,13 +252,3 @@ def _heights(polygons: Sequence[Any], solids: Sequence[Solid]) -> Iterator[tuple
         low = min((each.low_m for each in inside), default=HEIGHTS_M[0])
         high = max((each.high_m for each in inside), default=HEIGHTS_M[1])
         yield max(low, HEIGHTS_M[0]), min(high, HEIGHTS_M[1])
-
-
-def _rounded(polygons: Sequence[Any]) -> list[Any]:
-    """The same with corners on a fine grid, valid."""
-    shapes = np.array(polygons, dtype=object)
-    placed = shapely.transform(shapes, lambda points: np.round(points, DECIMALS))
-    bad = ~shapely.is_valid(placed)  # a sliver that the grid makes a line, too: of it nothing is left
-    placed[bad] = shapely.set_precision(shapes[bad], 10.0**-DECIMALS)
-    placed = shapely.remove_repeated_points(placed)
-    return [each for each in shapely.get_parts(placed) if each.geom_type == "Polygon" and each.area > 0]

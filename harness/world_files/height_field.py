@@ -1,6 +1,6 @@
-"""The ground as heights on a grid of the local plane: from terrain of files, and as a text of a scenario file.
+"""The ground as heights (m) above mean sea level on a grid of the local ENU plane (m).
 
-Frame: local ENU plane, x = east, y = north, metres; heights above mean sea level, metres.
+It comes from terrain of files, and is a text in a scenario file.
 """
 
 from __future__ import annotations
@@ -30,12 +30,9 @@ MOST_NODES: Final = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class HeightField:
-    """Heights at the nodes of a regular grid, bilinear in between.
+    """Heights at the nodes of a regular grid, bilinear in between, (rows, columns) from south to north; NaN: not known.
 
-    Attributes:
-        corner_m: east and north of the south-western node.
-        spacing_m: east and north from a node to the next.
-        heights_m: (rows, columns) from south to north and west to east; NaN where the height is not known.
+    The corner is the south-western node, the spacing is east and north from a node to the next.
     """
 
     corner_m: tuple[float, float]
@@ -90,11 +87,7 @@ def packed(heights_m: FloatArray, lowest_m: float, step_m: float) -> str:
 
 
 def unpacked(text: str, rows: int, columns: int, lowest_m: float, step_m: float) -> FloatArray:
-    """What `packed` was given, to the step.
-
-    Raises:
-        ValueError: the text is not that of so many heights.
-    """
+    """What `packed` was given, to the step; a ValueError says that the text is not that of so many heights."""
     size = 2 * rows * columns
     if rows * columns > MAX_NODES:
         raise ValueError(f"has {rows} x {columns} heights; must be at most {MAX_NODES:,}")

@@ -11,13 +11,12 @@ from typing import Final
 
 from harness.files.input_file import InputError
 from harness.world_files import bounded
-from harness.world_files.parts import Contents, Reading, WorldFileError
+from harness.world_files.parts import Contents, Reading
 from harness.world_files.readers import (
     city_json,
     fences,
     footprints,
-    geo_json,
-    kml,
+    maps,
     occupancy,
     open_air,
     osm,
@@ -33,8 +32,8 @@ KINDS: Final[dict[str, Callable[[Path, Reading], Contents]]] = {
     "osm": osm.read_xml,
     "osm_pbf": osm.read_pbf,
     "cityjson": city_json.read,
-    "geojson": geo_json.read,
-    "kml": kml.read,
+    "geojson": maps.read_geojson,
+    "kml": maps.read_kml_polygons,
     "openair": open_air.read,
     "ed269": zones.read_ed269,
     "ed318": zones.read_ed318,
@@ -62,8 +61,6 @@ GIVEN_UP: Final = {
     **dict.fromkeys((".gpkg", ".shp", ".fgb"), "a vector file; make GeoJSON of it (ogr2ogr a.geojson FILE)"),
     ".scen": "a list of MovingAI problems; give the .map file that it names",
     ".npy": "a plain array; save it as GeoTIFF or ESRI ASCII grid",
-    ".dxf": "a drawing without a place on earth; give GeoJSON",
-    ".las": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
     "rally": "a list of rally points: places to return to, no obstacles; give the fence",
     "overpass": "JSON of Overpass; ask it for XML ([out:xml]) and give that",
 }
@@ -105,43 +102,38 @@ _JSON: Final = (
 
 def read(path: Path, kind: str | None, reading: Reading) -> Contents:
     """Reads a world file of a kind of `KINDS`; without one, or with one of `GROUPS`, it is told from the file."""
-    try:
-        found = kind if kind in KINDS else kind_of(path)
-        if kind in GROUPS and found not in GROUPS[kind]:
-            raise WorldFileError(f"is of the kind {found}, not {kind}; leave kind out, or give {found}")
-        contents = footprints.finished(KINDS[found](path, reading))
-    except InputError as error:
-        raise WorldFileError(str(error)) from error
+    bounded.read_bytes(path, first=1)  # a library might wait for who writes a pipe
+    found = kind if kind in KINDS else kind_of(path)
+    if kind in GROUPS and found not in GROUPS[kind]:
+        raise InputError(f"is of the kind {found}, not {kind}; leave kind out, or give {found}")
+    contents = footprints.finished(KINDS[found](path, reading))
     return replace(contents, kind=found, notes=_together(contents.notes))
 
 
 def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
     """Notes, those that say the same of several parts made one."""
-    same: dict[str, list[str]] = {}
+    names: dict[str, list[str]] = {}
     for note in notes:
-        name, found, sentence = note.partition(": its ")
-        same.setdefault(f"its {sentence}" if found else note, []).append(name if found else "")
-    told = []
-    for sentence, names in same.items():
-        first = names[0] if len(names) == 1 else f"{len(names)} parts, {names[0]} the first"
-        told.append(f"{first}: {sentence}" if names[0] else sentence)
-    return tuple(told)
+        name, its, sentence = note.rpartition(": its ")
+        names.setdefault(its + sentence, []).append(name)
+    return tuple(
+        (of[0] if len(of) == 1 else f"{len(of)} parts, {of[0]} the first" if of[0] else "") + sentence
+        for sentence, of in names.items()
+    )
 
 
 def kind_of(path: Path) -> str:
-    """The kind of a file, told from what stands in it; of none of them, a WorldFileError says what would do."""
+    """The kind of a file, told from what stands in it; of none of them, a InputError says what would do."""
     first, ending = bounded.read_bytes(path, first=HEAD), path.suffix.lower()
     if not first:
-        raise WorldFileError("is empty; get it again")
+        raise InputError("is empty; get it again")
     if path.name.lower().endswith((".hgt", ".hgt.gz")):
         return "srtm"
     found = next((kind for kind, pattern in _BINARY if pattern.match(first)), None)
     found = found or (_packed(path) if first[:2] == b"PK" else _text(path, first))
     if found is None or found in GIVEN_UP:
         given_up = GIVEN_UP.get(found or ending)
-        raise WorldFileError(
-            f"is {given_up}" if given_up else f"is of no kind that is known; give {FAMILIES}"
-        )
+        raise InputError(f"is {given_up}" if given_up else f"is of no kind that is known; give {FAMILIES}")
     return found
 
 
@@ -151,17 +143,17 @@ def _packed(path: Path) -> str:
         with zipfile.ZipFile(path) as archive:
             names = [name.lower() for name in archive.namelist() if not name.endswith("/")]
     except (zipfile.BadZipFile, OSError, ValueError) as error:
-        raise WorldFileError("is a damaged ZIP archive; get it again") from error
+        raise InputError("is a damaged ZIP archive; get it again") from error
     found = [kind for end, kind in _PACKED.items() if any(name.endswith(end) for name in names)]
     if not found:
         held = names[0].rpartition("/")[2][:40] if names else "nothing"
-        raise WorldFileError(f"is a ZIP archive with {held!r}; unpack it and give the file")
+        raise InputError(f"is a ZIP archive with {held!r}; unpack it and give the file")
     return found[0]
 
 
 def _text(path: Path, first: bytes) -> str | None:
     """The kind of a text."""
-    if b"\0" in first and not first.startswith(bounded.UTF_16):
+    if b"\0" in first:
         return None
     text = bounded.text_of(first).lstrip("\ufeff\x1e \t\r\n")
     if text[:1] in ("{", "["):

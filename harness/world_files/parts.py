@@ -26,10 +26,6 @@ LEVEL_M: Final = 3.0
 """Height of a storey where a file gives storeys only."""
 
 
-class WorldFileError(ValueError):
-    """A world file that cannot be used. The message is one sentence, without the file's name."""
-
-
 class Datum(Enum):
     """What a height is counted from."""
 
@@ -54,9 +50,8 @@ NO_TOP: Final = Limit(math.inf)
 class Part:
     """A solid: a shapely Polygon or MultiPolygon in the coordinates of the file, between two heights.
 
-    Where `keep_in`, the footprint is what is free, and all outside is solid (an inclusion fence). What is `rigid`
-    stands level on the ground below it, as a building does; limits above ground of others, those of an airspace, follow
-    the ground. The name is for messages.
+    Where `keep_in`, the footprint is free, and all outside is solid (an inclusion fence). What is `rigid` stands level
+    on the ground below it, as a building; limits above ground of others follow the ground. The name is for messages.
     """
 
     footprint: Any
@@ -69,13 +64,11 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """Numbers in rows and columns, the first row on top.
+    """Numbers in rows and columns, the first row on top: heights above mean sea level (m), NaN where there is none.
 
-    Attributes:
-        values: (rows, columns) heights above mean sea level (m), NaN where there is none; or, of an occupancy map,
-            1 where a cell is occupied, 0 where it is free, NaN where it is not known.
-        affine: a, b, c, d, e, f: the corner of column i and row j is at x = a i + b j + c, y = d i + e j + f; the
-            value belongs to the middle of a cell.
+    Of an occupancy map they are 1 where a cell is occupied, 0 where it is free, NaN where it is not known. The affine
+    a, b, c, d, e, f puts the corner of column i and row j at x = a i + b j + c, y = d i + e j + f; the value belongs to
+    the middle of a cell.
     """
 
     values: FloatArray
@@ -101,15 +94,9 @@ class Raster:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """All that was read from a file.
+    """All that was read from a file with a SHA-256, and sentences on what was passed over or assumed.
 
-    Attributes:
-        kind: its format, as `kinds` names it.
-        crs: its coordinate reference system, as pyproj takes it; None: metres in a plane of its own.
-        parts: solids.
-        terrain: heights of the ground.
-        occupied: an occupancy map.
-        notes: what was passed over or assumed, one sentence each.
+    Its coordinate reference system is one that pyproj takes; None: metres in a plane of its own.
     """
 
     kind: str
@@ -118,6 +105,7 @@ class Contents:
     terrain: Raster | None = None
     occupied: Raster | None = None
     notes: tuple[str, ...] = ()
+    sha256: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
 """From the coordinates of a file to the local ENU plane of a scenario, and back, by pyproj.
 
-Axis order is always x, y (longitude, latitude), and grid north of a national grid is turned to true north at the
-origin. The plane is the azimuthal equidistant one of `aircraft.frames`. A coordinate reference system that pyproj does
-not know raises WorldFileError.
+Axis order is always x, y (longitude, latitude). The plane is the azimuthal equidistant one of `aircraft.frames`. A
+coordinate reference system that pyproj does not know raises InputError.
 """
 
 from __future__ import annotations
@@ -16,7 +15,8 @@ import shapely
 from pyproj import CRS, Transformer
 from pyproj.exceptions import CRSError
 
-from harness.world_files.parts import WGS84, FloatArray, WorldFileError
+from harness.files.input_file import InputError
+from harness.world_files.parts import WGS84, FloatArray
 
 TURN_DEG: Final = 360.0
 METRES: Final = ("m", "metre", "meter", "metres", "meters", "degree")
@@ -51,11 +51,7 @@ class Mapping:
     def from_plane(
         self, east: FloatArray, north: FloatArray, about_x: float
     ) -> tuple[FloatArray, FloatArray]:
-        """X and y in the file of places of the plane.
-
-        Longitudes are given by the turn that is nearest to `about_x`, the middle of what the file has: files write
-        those across the antimeridian in several ways.
-        """
+        """X and y in the file of places of the plane, longitudes by the turn that is nearest to `about_x`."""
         if self.crs is None:
             return east - self.shift_m[0], north - self.shift_m[1]
         x, y = (np.asarray(each) for each in self._transformer.transform(east, north, direction="INVERSE"))
@@ -76,11 +72,11 @@ class Mapping:
 
 
 def check_metres(crs: str, named: str = "") -> None:
-    """Raises WorldFileError unless heights are metres: by the name of their unit, the vertical system, or the plane."""
+    """Raises InputError unless heights are metres: by the name of their unit, the vertical system, or the plane."""
     axes = _system(crs).axis_info
     unit = named or next((axis.unit_name for axis in axes if axis.direction == "up"), axes[0].unit_name)
     if unit.strip().lower() not in METRES:
-        raise WorldFileError(
+        raise InputError(
             f"has heights in {unit[:20]}; make them metres, or give a crs with heights in metres, as EPSG:2263+5703"
         )
 
@@ -94,22 +90,14 @@ def _system(name: str) -> Any:
     try:
         return CRS.from_user_input(name)
     except CRSError as error:
-        raise WorldFileError(f"has the crs {name[:60]!r}, which is not known; give EPSG:N") from error
+        raise InputError(f"has the crs {name[:60]!r}, which is not known; give EPSG:N") from error
 
 
 def short_way(longitudes_deg: FloatArray) -> FloatArray:
-    """Longitudes by turns that bring them nearest together: across the antimeridian, files go on at its other side.
-
-    Those that leave no half of the earth free stay as they are, and so do the two ends of a map of the whole.
-    """
-    turned = longitudes_deg % TURN_DEG
-    every = np.unique(turned)
-    gaps = np.diff(every, append=every[:1] + TURN_DEG)
-    if len(every) < 2 or gaps.max() < 0.5 * TURN_DEG:
-        return longitudes_deg
-    begin = every[(int(np.argmax(gaps)) + 1) % len(every)]
-    together: FloatArray = begin + (turned - begin) % TURN_DEG
-    return together
+    """Longitudes by the turns that are nearest to the first: across the antimeridian, files go on at its other side."""
+    from_first = longitudes_deg - longitudes_deg[:1]
+    nearest: FloatArray = longitudes_deg - TURN_DEG * np.round(from_first / TURN_DEG)
+    return nearest
 
 
 def geodetic(crs: str, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

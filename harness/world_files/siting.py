@@ -1,7 +1,7 @@
 """From files alone to an area with start and goal: what `wayproof world` writes.
 
-Frame: local ENU plane about the origin that is chosen, metres; a file without a place on earth keeps its own metres,
-moved so that the south-western corner of the area is (0, 0).
+The local ENU plane lies about the origin that is chosen; files without a place on earth keep their own metres, moved so
+that the south-western corner of the area is (0, 0).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from harness.world_files.cells import placed_cells
+from harness.files.input_file import InputError
 from harness.world_files.expansion import (
     Expanded,
     FileFault,
@@ -24,8 +24,9 @@ from harness.world_files.expansion import (
     loaded_file,
 )
 from harness.world_files.free_room import LEAST_WAY, TURNS, FreeRoom, ends, free_room
-from harness.world_files.parts import WGS84, Box, Contents, FloatArray, WorldFileError
+from harness.world_files.parts import WGS84, Box, Contents, FloatArray
 from harness.world_files.plane import TURN_DEG, Mapping, Place, geodetic, short_way
+from harness.world_files.solids import placed_cells
 
 ANY_PLACE: Final = Place(47.0, 8.0)
 """Where the plane lies of a file that has no place on earth."""
@@ -85,24 +86,21 @@ def site(
     """Chooses an area with start and goal in what some files hold, at an altitude above mean sea level.
 
     Of files larger than an area, other parts are tried where the first has no room for start and goal. Those that are
-    given are latitude and longitude where the files have a place on earth, else x and y.
-
-    Raises:
-        FileFault: a file cannot be used.
-        WorldFileError: there is no room; the message has the numbers and what would do.
+    given are latitude and longitude where the files have a place on earth, else x and y. A FileFault says that a file
+    cannot be used, another InputError that there is no room, with the numbers and what would do.
     """
     contents = _read(specs, tell)
     places = None if given is None else np.array(given)
     files = _Files(tuple(specs), contents, None if contents[0].crs is None else _origin(contents, places))
     if places is not None and files.place is not None:
         places = np.column_stack(Mapping(WGS84, files.place).to_plane(places[:, 1], places[:, 0]))
-    faults: list[WorldFileError] = []
+    faults: list[InputError] = []
     for area in _areas(files, craft, places):
         try:
-            return _in_area(*area, altitude_m, craft, places, tell)
+            return _in_area(*area, altitude_m, craft, places)
         except FileFault:
             raise
-        except WorldFileError as error:
+        except InputError as error:
             faults.append(error)
     raise faults[0]
 
@@ -114,7 +112,6 @@ def _in_area(
     altitude_m: float,
     craft: Craft,
     places: FloatArray | None,
-    tell: Callable[[str], None],
 ) -> Site:
     """A mission in an area, or a sentence with the numbers that say why there is none."""
     if files.place is None:
@@ -128,7 +125,7 @@ def _in_area(
     low = [round(math.ceil(side / step - 1e-9) * step, 1) for side in bounds[:2]]
     high = [round(math.floor(side / step + 1e-9) * step, 1) for side in bounds[2:]]
     bounds = (*low, *high)  # type: ignore[assignment]
-    found = expanded(files.specs, files.place or ANY_PLACE, bounds, altitude_m, tell)
+    found = expanded(files.specs, files.place or ANY_PLACE, bounds, altitude_m)
     if places is None:
         places, told = _ends(files, craft, bounds, found)
         notes = notes + told
@@ -141,9 +138,9 @@ def _read(specs: Sequence[FileSpec], tell: Callable[[str], None]) -> tuple[Conte
     for index, spec in enumerate(specs):
         tell(f"reading {spec.path.name}")
         with blaming(index):
-            contents.append(loaded_file(spec.path, spec.kind, spec.reading))
+            contents.append(loaded_file(spec))
     local = [each.crs is None for each in contents]
-    if any(local) and not all(local):
+    if len(set(local)) > 1:
         raise FileFault(local.index(True), "names no place on earth, another file does; give crs")
     return tuple(contents)
 
@@ -155,7 +152,7 @@ def _origin(contents: Sequence[Contents], given: FloatArray | None) -> Place:
     found = np.hstack([np.stack(geodetic(str(each.crs), *corners_of(each))) for each in contents])
     latitude, longitude = found[:, np.isfinite(found).all(axis=0)]
     if not len(latitude):
-        raise WorldFileError("nothing of these files has a place on earth; their crs may be another")
+        raise InputError("nothing of these files has a place on earth; their crs may be another")
     north, east = (0.5 * float(x.min() + x.max()) for x in (latitude, short_way(longitude)))
     return _place(min(max(north, -84.0), 84.0), east)
 
@@ -172,21 +169,22 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     inside, around = _covered(files)
     pad = PAD_TURNS * craft.turn_radius_m
     if given is not None:
-        yield files, _about(given, pad, inside), []
+        reach = max(pad, 0.25 * math.dist(*given))
+        box = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
+        yield files, _common(*inside, box) or box, []
         return
     low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
     whole = _common(*inside, (*low.tolist(), *high.tolist()))
     if whole is None:
-        raise WorldFileError("nothing of these files lies in one area; must overlap")
+        raise InputError("nothing of these files lies in one area; must overlap")
     sides = np.subtract(whole[2:], whole[:2])
     half = np.minimum(sides, min(LARGEST_TURNS * craft.turn_radius_m, LARGEST_M)) / 2.0
     if (2.0 * half >= sides).all():
         told = f"the area reaches {pad:,.0f} m beyond what the file holds, to leave room to turn"
         yield files, whole, [] if inside else [told]
         return
-    told = (
-        f"the files reach over {sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km; the area is a part of that"
-    )
+    over = f"{sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km"
+    told = f"the files reach over {over}; the area is a part of that (--start and --goal choose another)"
     corners = [(x, y) for x in whole[::2] for y in whole[1::2]]
     for middle in (*_crowded(files, half), np.mean(corners, axis=0), *corners):
         x, y = np.clip(middle, whole[:2] + half, whole[2:] - half).tolist()
@@ -196,23 +194,13 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
             at = replace(files, place=_place(float(latitude[0]), float(longitude[0])))
             box = (*(-half).tolist(), *half.tolist())
             box = _common(box, *_covered(at)[0]) or box
-        yield at, box, [f"{told} (--start and --goal choose another)"]
-
-
-def _about(given: FloatArray, pad_m: float, inside: Sequence[Box]) -> Box:
-    """Bounds about a start and a goal."""
-    reach = max(pad_m, 0.25 * math.dist(*given))
-    box = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
-    return _common(*inside, box) or box
+        yield at, box, [told]
 
 
 def _crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
     """The middle of the most corners of obstacles, each its box, that fit in one part; none of rasters alone."""
-    corners = [
-        np.stack(mapping.to_plane(*corners_of(replace(each, terrain=None, occupied=None))))
-        for each, mapping in files.placed()
-    ]
-    places = np.hstack(corners).T
+    drawn = ((replace(each, terrain=None, occupied=None), mapping) for each, mapping in files.placed())
+    places = np.hstack([np.stack(mapping.to_plane(*corners_of(each))) for each, mapping in drawn]).T
     places = places[np.isfinite(places).all(axis=1)]
     if not len(places):
         return []
@@ -249,7 +237,7 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
     solid = [each for source in found.sources for each in source.polygons]
     for each, mapping in files.placed():
         if each.occupied is not None:  # what is not known is no place for a start
-            solid += placed_cells(each.occupied, np.isnan(each.occupied.values), mapping, bounds)[0]
+            solid += placed_cells(each.occupied, np.isnan(each.occupied.values), mapping, bounds)
     room = free_room(solid, bounds)
     turn_m, clearance_m = craft.turn_radius_m, craft.clearance_m
     if (chosen := ends(room, turn_m, clearance_m, turning=True)) is not None:
@@ -262,7 +250,7 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
         )
         return chosen, [told + (f"; with {cell} it can" if cell else "")]
     would = cell or "--start and --goal, another altitude, a smaller clearance or aircraft, or a larger file"
-    raise WorldFileError(
+    raise InputError(
         f"{bounds[2] - bounds[0]:,.0f} x {bounds[3] - bounds[1]:,.0f} m, {(room.room_m > 0).mean():.0%} free, are too "
         f"small for {craft.name}: its start and goal need {clearance_m + TURNS[-1] * turn_m:,.0f} m of free room "
         f"around and {LEAST_WAY * turn_m:,.0f} m between them, the widest free disc has {room.room_m.max():,.0f} m; "

@@ -1,1 +1,1 @@
-"""Readers of world files, one module a format; a file that cannot be used is a WorldFileError."""
+"""Readers of world files, one module a format; a file that cannot be used is a InputError."""

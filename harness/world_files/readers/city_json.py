@@ -14,8 +14,9 @@ from typing import Any, Final
 import numpy as np
 import shapely
 
+from harness.files.input_file import InputError
 from harness.world_files.bounded import json_of
-from harness.world_files.parts import Contents, FloatArray, Limit, Part, Reading, WorldFileError
+from harness.world_files.parts import Contents, FloatArray, Limit, Part, Reading
 from harness.world_files.plane import check_metres
 from harness.world_files.readers import limits
 
@@ -36,47 +37,37 @@ def read(path: Path, reading: Reading) -> Contents:
     """
     contents = json_of(path, lines=True)
     if not all(isinstance(each, dict) and isinstance(each.get("CityObjects"), dict) for each in contents):
-        raise WorldFileError("has no CityObjects; must be CityJSON")
+        raise InputError("has no CityObjects; must be CityJSON")
     crs = reading.crs or _crs(contents[0].get("metadata"))
     if crs is not None:
         check_metres(crs)
     parts: list[Part] = []
-    passed, doubts = Counter[str](), limits.Doubts()
+    passed, buildings = Counter[str](), limits.Buildings(reading)
     for content in contents:
         vertices = _vertices(content, contents[0].get("transform"))
         for name, thing in content["CityObjects"].items():
-            parts += _parts(name, thing if isinstance(thing, dict) else {}, vertices, reading, doubts, passed)
+            kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
+            if kind.startswith(SOLID):
+                parts += _parts(name, thing, vertices, buildings, passed)
+            else:
+                passed[kind] += 1
     if not parts:
-        raise WorldFileError("has no building with a shape; must have some")
-    notes = (*doubts.notes(reading), *_told(passed, crs))
-    return Contents("cityjson", crs, tuple(parts), notes=notes)
-
-
-def _told(passed: Counter[str], crs: str | None) -> Iterator[str]:
-    """What is said of objects that are passed over by their kinds, and of a missing system."""
-    told = [f"{number} {kind}" for kind, number in (+passed).most_common()]
-    if told:
-        yield f"passed over: {', '.join(told[:4])}{' and others' if len(told) > 4 else ''}"
+        raise InputError("has no building with a shape; must have some")
+    notes = buildings.notes()
+    if told := [f"{number} {kind}" for kind, number in (+passed).most_common()]:
+        notes.append(f"passed over: {', '.join(told)}")
     if crs is None:
-        yield "names no coordinate reference system: its metres are taken as they are (crs)"
+        notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
+    return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
 
 
 def _parts(
-    name: str,
-    thing: dict[str, Any],
-    vertices: FloatArray,
-    reading: Reading,
-    doubts: limits.Doubts,
-    passed: Counter[str],
+    name: str, thing: dict[str, Any], vertices: FloatArray, buildings: limits.Buildings, passed: Counter[str]
 ) -> list[Part]:
-    """The part that an object is, at its highest level of detail; what of it is passed over is counted.
+    """The part that an object is: its surfaces from above, between its lowest and its highest vertex.
 
-    It is its surfaces from above, between its lowest and its highest vertex.
+    What of it is passed over is counted.
     """
-    kind = str(thing.get("type", "?"))
-    if not kind.startswith(SOLID):
-        passed[kind] += 1
-        return []
     instances = sum(each["type"] == INSTANCE for each in _geometries(thing))
     passed[INSTANCE] += instances
     surfaces = list(_best_surfaces(name, thing, vertices))
@@ -90,7 +81,7 @@ def _parts(
     low, high = float(heights.min()), float(heights.max())
     if high - low < LOW_M:
         tags = thing["attributes"] if isinstance(thing.get("attributes"), dict) else {}
-        high = low + limits.building(tags, footprint, reading, doubts).top.height_m
+        high = low + buildings.part(tags, footprint).top.height_m
     return [Part(footprint, Limit(low), Limit(high), name=name[:40])]
 
 
@@ -101,9 +92,9 @@ def _vertices(content: dict[str, Any], common: Any) -> FloatArray:
         if (how := content.get("transform", common)) is not None:
             vertices = vertices * np.array(how["scale"], np.float64) + np.array(how["translate"], np.float64)
     except (TypeError, ValueError, KeyError) as error:
-        raise WorldFileError("has vertices or a transform that are not numbers in threes") from error
+        raise InputError("has vertices or a transform that are not numbers in threes") from error
     if not np.isfinite(vertices).all():
-        raise WorldFileError("has vertices that are not finite")
+        raise InputError("has vertices that are not finite")
     return vertices
 
 
@@ -126,7 +117,7 @@ def _best_surfaces(name: str, thing: dict[str, Any], vertices: FloatArray) -> It
 
 def _places(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:
     if not all(isinstance(index, int) and 0 <= index < len(vertices) for index in ring):
-        raise WorldFileError(f"has an object {name[:40]!r} with a vertex that is not there")
+        raise InputError(f"has an object {name[:40]!r} with a vertex that is not there")
     found: FloatArray = vertices[ring]
     return found
 
@@ -134,7 +125,7 @@ def _places(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:
 def _surfaces(boundaries: Any) -> Iterator[list[list[Any]]]:
     """Surfaces, each a list of rings of indices, of a MultiSurface, Solid or MultiSolid."""
     if not isinstance(boundaries, list) or not all(isinstance(each, list) for each in boundaries):
-        raise WorldFileError("has boundaries that are not lists of rings")
+        raise InputError("has boundaries that are not lists of rings")
     if boundaries and boundaries[0] and not isinstance(boundaries[0][0], list):
         yield boundaries
         return
@@ -143,9 +134,6 @@ def _surfaces(boundaries: Any) -> Iterator[list[list[Any]]]:
 
 
 def _crs(metadata: Any) -> str | None:
-    if not isinstance(metadata, dict):
-        return None
-    old = metadata.get("crs")  # before version 1.0
-    named = metadata.get("referenceSystem") or (f"EPSG:{old.get('epsg')}" if isinstance(old, dict) else None)
-    match = re.search(r"EPSG[:/]+(?:[\d.]*[:/])?(\d+)", str(named), re.IGNORECASE) if named else None
+    named = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
+    match = re.search(r"EPSG[:/]+(?:[\d.]*[:/])?(\d+)", str(named), re.IGNORECASE)
     return f"EPSG:{match[1]}" if match else None

@@ -11,12 +11,13 @@ from typing import Any, Final
 
 import shapely
 
+from harness.files.input_file import InputError
 from harness.files.mavlink import commands
 from harness.files.mavlink.fences import Fence, item_fences, plan_fences
 from harness.files.mavlink.items import WPL, wpl_items
 from harness.files.wording import counted
 from harness.world_files.bounded import json_of, read_bytes, text_of
-from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
+from harness.world_files.parts import WGS84, Contents, Part, Reading
 from harness.world_files.readers.footprints import circle, on_earth
 
 MAX_BYTES: Final = 10_000_000
@@ -26,7 +27,7 @@ def read_plan(path: Path, reading: Reading) -> Contents:
     """Reads the geoFence of a QGroundControl plan."""
     content = json_of(path)
     if not isinstance(content, dict) or not isinstance(content.get("geoFence"), dict):
-        raise WorldFileError("has no geoFence; must be a QGroundControl plan with one")
+        raise InputError("has no geoFence; must be a QGroundControl plan with one")
     mission, rally = content.get("mission"), content.get("rallyPoints")
     firmware = mission.get("firmwareType") if isinstance(mission, dict) else None
     points = rally.get("points") if isinstance(rally, dict) else None
@@ -46,9 +47,9 @@ def read_ardupilot(path: Path, reading: Reading) -> Contents:
     try:
         places = [(float(north), float(east)) for north, east in rows]
     except ValueError as error:
-        raise WorldFileError("has a line that is not latitude and longitude; must be a fence") from error
+        raise InputError("has a line that is not latitude and longitude; must be a fence") from error
     if len(places) < 4:
-        raise WorldFileError(f"has {len(places)} lines; must be a return point and at least three corners")
+        raise InputError(f"has {len(places)} lines; must be a return point and at least three corners")
     # Mission Planner saves polygons as fences, without a return point.
     bare = path.suffix.lower() == ".poly" or (places[0] == places[-1] != places[1])
     told = ("has no return point: its first place is a corner",) if bare else ()
@@ -61,7 +62,7 @@ def _shape(fence: Fence) -> Any:
     if fence.center is not None:
         return circle(places[0], fence.radius_m)
     if len(set(places)) < 3:
-        raise WorldFileError(f"{fence.name}: has fewer than three corners; must enclose an area")
+        raise InputError(f"{fence.name}: has fewer than three corners; must enclose an area")
     return shapely.Polygon(places)
 
 
@@ -72,7 +73,7 @@ def _contents(
     points = counted(rally, "rally point")
     if not fences:
         held = f", but {points}, which are no obstacles" if rally else ""
-        raise WorldFileError(
+        raise InputError(
             f"has an empty fence{held}; must have at least one polygon or circle (a mission is flown by `wayproof "
             "check`)"
         )

@@ -11,8 +11,9 @@ import numpy as np
 import shapely
 from pyproj import Geod
 
+from harness.files.input_file import InputError
 from harness.files.wording import counted
-from harness.world_files.parts import Contents, FloatArray, WorldFileError
+from harness.world_files.parts import Contents, FloatArray
 from harness.world_files.plane import TURN_DEG, in_degrees
 
 CIRCLE_POINTS: Final = 96
@@ -30,15 +31,18 @@ def finished(contents: Contents) -> Contents:
     if contents.terrain is not None or contents.occupied is not None:
         return contents
     if not contents.parts:
-        raise WorldFileError("has no polygon; must have some")
+        raise InputError("has no polygon; must have some")
     shapes = np.array([part.footprint for part in contents.parts], dtype=object)
     bounds = shapely.bounds(shapes)
     if in_degrees(contents.crs):
         _check_degrees(bounds)
-        for index in np.flatnonzero(bounds[:, 2] - bounds[:, 0] > TURN_DEG / 2).tolist():
-            shapes[index] = _short_way(shapes[index])
+        wide = bounds[:, 2] - bounds[:, 0] > TURN_DEG / 2
+        turned = shapely.transform(shapes[wide], lambda p: np.column_stack((p[:, 0] % TURN_DEG, p[:, 1])))
+        west, _, east, _ = shapely.bounds(turned).T
+        narrower = (east - west < TURN_DEG / 2) & (shapely.area(turned) > 0.0)
+        shapes[wide] = np.where(narrower, turned, shapes[wide])
     if not np.isfinite(bounds[~shapely.is_empty(shapes)]).all():
-        raise WorldFileError("has a position that is not finite")
+        raise InputError("has a position that is not finite")
     bad = ~shapely.is_valid(shapes)
     shapes[bad] = shapely.make_valid(shapes[bad], method="structure", keep_collapsed=False)
     area = shapely.area(shapes)
@@ -48,7 +52,7 @@ def finished(contents: Contents) -> Contents:
         if size > 0.0
     )
     if not parts:
-        raise WorldFileError("has no polygon with an area; must have some")
+        raise InputError("has no polygon with an area; must have some")
     flat = len(area) - len(parts)
     passed = (f"{counted(flat, 'polygon')} without an area passed over",) if flat else ()
     return replace(contents, parts=parts, notes=(*contents.notes, *passed))
@@ -58,25 +62,16 @@ def _check_degrees(bounds: FloatArray) -> None:
     off = (np.abs(bounds) > (TURN_DEG, 90.0, TURN_DEG, 90.0)).any(axis=1)
     if off.any():
         x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
-        raise WorldFileError(f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs")
-
-
-def _short_way(shape: Any) -> Any:
-    """A shape wider than half the earth with longitudes from 0 to 360 degrees, where that makes it narrower."""
-    turned = shapely.transform(shape, lambda p: np.column_stack((p[:, 0] % TURN_DEG, p[:, 1])))
-    west, _, east, _ = shapely.bounds(turned)
-    return turned if east - west < TURN_DEG / 2 and turned.area > 0.0 else shape
+        raise InputError(f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs")
 
 
 def circle(center: Place, radius_m: float) -> Any:
     """A polygon round a circle on the ellipsoid."""
     if not 0.0 < radius_m <= LARGEST_M:
-        raise WorldFileError(
-            f"has a circle of radius {radius_m:g} m; must be above 0 and at most {LARGEST_M:g}"
-        )
+        raise InputError(f"has a circle of radius {radius_m:g} m; must be above 0 and at most {LARGEST_M:g}")
+    away_m = radius_m / math.cos(math.pi / CIRCLE_POINTS)
     azimuths = np.arange(0.0, TURN_DEG, TURN_DEG / CIRCLE_POINTS)
-    away = radius_m / math.cos(math.pi / CIRCLE_POINTS)
-    return shapely.Polygon(_around(center, azimuths, np.full(CIRCLE_POINTS, away)))
+    return shapely.Polygon(_around(center, azimuths, np.full(CIRCLE_POINTS, away_m)))
 
 
 def _around(center: Place, azimuth_deg: FloatArray, distance_m: FloatArray) -> list[Place]:
@@ -113,5 +108,5 @@ def corridor(line: Sequence[Place], width_m: float) -> Any:
 def on_earth(longitude: float, latitude: float) -> Place:
     """The place, which must be on earth."""
     if not (abs(longitude) <= TURN_DEG and abs(latitude) <= 90.0):
-        raise WorldFileError(f"has a place at {latitude:g}, {longitude:g}; must be degrees, WGS84")
+        raise InputError(f"has a place at {latitude:g}, {longitude:g}; must be degrees, WGS84")
     return longitude, latitude

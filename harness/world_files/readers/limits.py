@@ -9,21 +9,11 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Final
 
+from harness.files.input_file import InputError
 from harness.files.wording import counted
-from harness.world_files.parts import (
-    FOOT_M,
-    LEVEL_M,
-    NO_BOTTOM,
-    NO_TOP,
-    Datum,
-    Limit,
-    Part,
-    Reading,
-    WorldFileError,
-)
+from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum, Limit, Part, Reading
 
 _FEET: Final = dict.fromkeys(("FEET", "FOOT", "FT", "F"), FOOT_M)
 _METRES: Final = dict.fromkeys(("METRES", "METERS", "METRE", "METER", "MTR", "M"), 1.0)
@@ -68,8 +58,12 @@ _LENGTHS_M: Final = {
 }
 """Metres of the units that OpenStreetMap has: https://wiki.openstreetmap.org/wiki/Map_features/Units."""
 _HEIGHT: Final = (
-    *("height", "building:height", "building_height"),
-    *("measuredheight", "render_height", "est_height"),
+    "height",
+    "building:height",
+    "building_height",
+    "measuredheight",
+    "render_height",
+    "est_height",
 )
 _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")
 
@@ -102,20 +96,17 @@ def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | No
     The value is a number or a text; where it has none, `said` has its unit and reference, as `FT AGL`, `m AMSL`, `FL`.
     """
     text = str(value) if isinstance(value, str | int | float) else ""
-    (own_unit, own_datum), (unit, datum) = (
-        _told(_WORD.findall(text.upper())),
-        _told(re.findall("[A-Z]+", said.upper())),
-    )
+    own_unit, own_datum = _told(_WORD.findall(text.upper()))
+    unit, datum = _told(re.findall("[A-Z]+", said.upper()))
     limit = limit_of(text, unit or "M", datum or Datum.SEA)
     if limit is None or not re.search(r"[1-9]", text):  # the surface, or nothing that is known
         return limit
-    undated = (
-        "are above the ellipsoid" if re.search("WGS|W84|HAE|ELLIPS", said.upper()) else "name no reference"
-    )
-    missing = ["name no unit; taken as metres"] * ((unit, own_unit) == (None, None))
-    missing += [f"{undated}; taken as above mean sea level"] * ((datum, own_datum) == (None, None))
-    told = [f"{name or 'a part'}: its limits {what}" for what in missing]
-    notes += [each for each in told if each not in notes[-4:]]
+    for none, what, taken in (
+        ((unit, own_unit) == (None, None), "unit", "metres"),
+        ((datum, own_datum) == (None, None), "known reference", "above mean sea level"),
+    ):
+        told = f"{name or 'a part'}: its limits name no {what}; taken as {taken}"
+        notes += [told] * (none and told not in notes[-4:])
     return limit
 
 
@@ -125,9 +116,9 @@ def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: st
     Files write an upper limit of 0 where there is none; a zone of no height would forbid nothing.
     """
     told = f"{name or 'a part'}: its"
-    which = {(True, True): "limits are", (True, False): "lower limit is", (False, True): "upper limit is"}
-    if unknown := which.get((lower is None, upper is None)):
-        notes.append(f"{told} {unknown} not known; taken as without")
+    for side, limit in (("lower", lower), ("upper", upper)):
+        if limit is None:
+            notes.append(f"{told} {side} limit is not known; taken as without")
     bottom, top = lower or NO_BOTTOM, upper or NO_TOP
     if top == NO_BOTTOM or (top.height_m == 0.0 and bottom.height_m in (0.0, -math.inf)):
         notes.append(f"{told} upper limit is 0, or the surface; taken as without")
@@ -147,27 +138,19 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     """Limits of an airspace from attributes, named in any case; a number alone is metres above mean sea level."""
     given = _plain_names(tags)
     if "ceiling" in given and any(key.startswith(("apt1", "mapeff")) for key in given):
-        raise WorldFileError("is a facility map: one may fly up to its ceilings; give the airspace")
-    both = [str(value) for key, value in given.items() if _BOTH.fullmatch(key)]
-    lower, upper = (
-        _limit(
-            {key: value for key, value in given.items() if key.startswith(begins)}, both, none, notes, name
-        )
-        for begins, none in zip(_SIDES, (NO_BOTTOM, NO_TOP), strict=True)
-    )
-    return band_of(lower, upper, notes, name)
-
-
-def _limit(
-    side: Mapping[str, Any], both: Sequence[str], none: Limit, notes: list[str], name: str
-) -> Limit | None:
-    """The limit that the attributes of one side give."""
-    match = next((match for key in side if (match := _NAME.fullmatch(key))), None)
-    if match is None:
-        return none
-    own = [str(value) for key, value in side.items() if _OWN.search(key)]
-    words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
-    return limit_told(side[match[0]], " ".join((*words, *own, *both)), notes, name)
+        raise InputError("is a facility map: one may fly up to its ceilings; give the airspace")
+    found: list[Limit | None] = []
+    for begins, none in zip(_SIDES, (NO_BOTTOM, NO_TOP), strict=True):
+        side = [key for key in given if key.startswith(begins)]
+        match = next((match for key in side if (match := _NAME.fullmatch(key))), None)
+        if match is None:
+            found.append(none)
+            continue
+        words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
+        words += [str(given[key]) for key in side if _OWN.search(key)]
+        words += [str(value) for key, value in given.items() if _BOTH.fullmatch(key)]
+        found.append(limit_told(given[match[0]], " ".join(words), notes, name))
+    return band_of(found[0], found[1], notes, name)
 
 
 def has_limits(tags: Mapping[str, Any]) -> bool:
@@ -196,68 +179,58 @@ def _largest(value: Any) -> float:
     return max((each for each in numbers if math.isfinite(each)), default=0.0)
 
 
-@dataclass
-class Doubts:
-    """What has to be said of the heights of buildings.
+class Buildings:
+    """The buildings of one file, and what has to be said of their heights."""
 
-    Attributes:
-        guessed: buildings of which no height is known.
-        odd: heights that are no plain length, and how often each comes.
-    """
+    def __init__(self, reading: Reading) -> None:
+        self._default_m, self._guessed = reading.default_height_m, 0
+        self._odd = Counter[str]()  # heights that are no plain length, and how often each comes
 
-    guessed: int = 0
-    odd: Counter[str] = field(default_factory=Counter)
+    def part(self, tags: Mapping[str, Any], footprint: Any, name: str = "") -> Part:
+        """A building from its tags, as OpenStreetMap has them, named in any case.
 
-    def notes(self, reading: Reading) -> list[str]:
-        """A line of each."""
-        notes = []
-        if self.guessed:
-            notes.append(
-                f"{counted(self.guessed, 'building')} without height and levels taken as "
-                f"{reading.default_height_m:g} m high (default_height_m)"
-            )
-        if self.odd:
-            notes.append(
-                f"{counted(self.odd.total(), 'height')} of buildings no plain length, {next(iter(self.odd))} the "
-                "first: the largest number in it is taken, in metres; of a bottom the ground; nothing below 0"
-            )
-        return notes
+        `height` is that of the whole building; else there are storeys (`building:levels`) of 3 m each and above them
+        the roof, `roof:height` or else `roof:levels` of 3 m each; else `default_height_m`. It begins at `min_height`,
+        else at `building:min_level` times 3 m, else at the ground. A height of zero or less says nothing.
+        """
+        tags = {key.lower(): value for key, value in tags.items()}
+        top = self._length_m(tags, _HEIGHT)
+        if not top and (levels := self._length_m(tags, _LEVELS)):
+            roof = self._length_m(tags, ("roof:height", "roof_height"))
+            top = LEVEL_M * levels + (roof or LEVEL_M * self._length_m(tags, ("roof:levels",)))
+        if not top:
+            top = self._default_m
+            self._guessed += 1
+        bottom = self._length_m(tags, ("min_height", "render_min_height"), bottom=True)
+        bottom = bottom or LEVEL_M * self._length_m(tags, ("building:min_level", "min_level"), bottom=True)
+        begin = NO_BOTTOM if bottom <= 0.0 else Limit(min(bottom, top), Datum.GROUND)
+        return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
 
-    def length_m(self, tags: Mapping[str, Any], names: Sequence[str], bottom: bool = False) -> float:
+    def _length_m(self, tags: Mapping[str, Any], names: Sequence[str], bottom: bool = False) -> float:
         """The first of some attributes that is above zero, of a bottom that is a plain length; 0 where none is."""
         for name in names:
             if (given := tags.get(name)) is None:
                 continue
             plain = metres_of(given)
             if plain is None or (plain < 0.0 and not bottom):
-                self.odd[f"{name}={str(given)[:20]!r}"] += 1
+                self._odd[f"{name}={str(given)[:20]!r}"] += 1
             found = (plain or 0.0) if bottom else _largest(given)
             if found > 0.0 or (bottom and plain is not None):
                 return found
         return 0.0
 
-
-def building(
-    tags: Mapping[str, Any], footprint: Any, reading: Reading, doubts: Doubts, name: str = ""
-) -> Part:
-    """A building from its tags, as OpenStreetMap has them, named in any case.
-
-    `height` is that of the whole building; else there are storeys (`building:levels`) of 3 m each and above them the
-    roof, `roof:height` or else `roof:levels` of 3 m each; else `default_height_m`. It begins at `min_height`, else at
-    `building:min_level` times 3 m, else at the ground. A height of zero or less says nothing.
-    """
-    tags = {key.lower(): value for key, value in tags.items()}
-    top = doubts.length_m(tags, _HEIGHT)
-    if not top and (levels := doubts.length_m(tags, _LEVELS)):
-        roof = doubts.length_m(tags, ("roof:height", "roof_height"))
-        top = LEVEL_M * levels + (roof or LEVEL_M * doubts.length_m(tags, ("roof:levels",)))
-    if not top:
-        top = reading.default_height_m
-        doubts.guessed += 1
-    bottom = doubts.length_m(tags, ("min_height", "render_min_height"), bottom=True)
-    bottom = bottom or LEVEL_M * doubts.length_m(tags, ("building:min_level", "min_level"), bottom=True)
-    begin = NO_BOTTOM if bottom <= 0.0 else Limit(min(bottom, top), Datum.GROUND)
-    return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
+    def notes(self) -> list[str]:
+        """A line on those without a height, and on odd heights."""
+        told = f"taken as {self._default_m:g} m high (default_height_m)"
+        notes = [f"{counted(self._guessed, 'building')} without height and levels {told}"] * bool(
+            self._guessed
+        )
+        if self._odd:
+            notes.append(
+                f"{counted(self._odd.total(), 'height')} of buildings no plain length, {next(iter(self._odd))} the "
+                "first: the largest number in it is taken, in metres; of a bottom the ground; nothing below 0"
+            )
+        return notes
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:
@@ -280,15 +253,15 @@ def parts_of(
     features: Sequence[tuple[Mapping[str, Any], Any]], reading: Reading, notes: list[str]
 ) -> tuple[Part, ...]:
     """Features, attributes and footprint each, as parts: buildings by their heights, all others by their limits."""
-    parts, doubts, bare = [], Doubts(), 0
+    parts, buildings, bare = [], Buildings(reading), 0
     for tags, footprint in features:
         name = name_of(tags)
         if is_building(tags):
-            parts.append(building(tags, footprint, reading, doubts, name))
+            parts.append(buildings.part(tags, footprint, name))
         else:
             bare += not has_limits(tags)
             parts.append(Part(footprint, *limits(tags, notes, name), name=name))
-    notes += doubts.notes(reading)
+    notes += buildings.notes()
     if bare:
         notes.append(f"{counted(bare, 'polygon')} without height limits taken as solid at every altitude")
     return tuple(parts)

@@ -13,7 +13,7 @@ import numpy as np
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.world_files.bounded import read_bytes, text_of
-from harness.world_files.parts import Contents, FloatArray, Raster, Reading, WorldFileError
+from harness.world_files.parts import Contents, FloatArray, Raster, Reading
 from harness.world_files.readers import raster
 
 FREE, BLOCKED = b".GS", b"@OTW"
@@ -27,16 +27,17 @@ IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}
 def read_moving_ai(path: Path, reading: Reading) -> Contents:
     """Reads a MovingAI map; a cell is as large as `metres_per_cell` says, else one metre."""
     text = text_of(read_bytes(path))
-    head = re.match(r"type.*\n\s*height\s+(\d{1,9})\s*\n\s*width\s+(\d{1,9})\s*\n\s*map\s*\n", text)
-    if head is None:
-        raise WorldFileError("has no height, width and `map`; must be a MovingAI map")
-    rows, columns = int(head[1]), int(head[2])
+    head = re.match(r"type.*\n((?:\s*(?:height|width)\s+\d{1,9}\s*\n){2})\s*map\s*\n", text)
+    sizes = dict(line.split() for line in head[1].split("\n") if line.strip()) if head else {}
+    if head is None or len(sizes) != 2:
+        raise InputError("has no height, width and `map`; must be a MovingAI map")
+    rows, columns = int(sizes["height"]), int(sizes["width"])
     body = [line.encode("latin-1", "replace") for line in text[head.end() :].splitlines()[:rows]]
     if len(body) != rows or set(map(len, body)) != {columns} or columns == 0:
-        raise WorldFileError(f"has {len(body)} rows, not {rows} of {columns} cells: it may be torn")
+        raise InputError(f"has {len(body)} rows, not {rows} of {columns} cells: it may be torn")
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
     if strange := set(np.unique(cells).tolist()) - set(FREE + BLOCKED):
-        raise WorldFileError(f"has the cell {chr(min(strange))!r}; must be one of . G S @ O T W")
+        raise InputError(f"has the cell {chr(min(strange))!r}; must be one of . G S @ O T W")
     occupied = np.isin(cells, list(BLOCKED)).astype(np.float64)
     size = reading.metres_per_cell or 1.0
     notes = () if reading.metres_per_cell else ("says not how large a cell is: 1 m (metres_per_cell)",)
@@ -53,19 +54,19 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     try:
         keys = strict_yaml.parse(text_of(read_bytes(path, 100_000)), "map").plain()
     except InputError as error:
-        raise WorldFileError(str(error).removeprefix("map:")) from error
+        raise InputError(str(error).removeprefix("map:")) from error
     if not isinstance(keys, dict) or not isinstance(keys.get("image"), str):
-        raise WorldFileError("names no image; must be a map of ROS map_server")
+        raise InputError("names no image; must be a map of ROS map_server")
     mode, size = str(keys.get("mode", "trinary")).lower(), keys.get("resolution", 0.0)
     origin = keys.get("origin", (0.0, 0.0, 0.0))
     over, under = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
     if mode not in MODES:
-        raise WorldFileError(f"has the mode {mode[:20]!r}; must be one of {', '.join(MODES)}")
+        raise InputError(f"has the mode {mode[:20]!r}; must be one of {', '.join(MODES)}")
     if not _are_numbers((size, over, under), least=0.0) or size == 0 or max(over, under) > 1:
         told = f"the resolution {size} and the thresholds {over}, {under}"
-        raise WorldFileError(f"has {told}; must be metres above 0, and shares between 0 and 1")
+        raise InputError(f"has {told}; must be metres above 0, and shares between 0 and 1")
     if not isinstance(origin, tuple) or len(origin) not in (2, 3) or not _are_numbers(origin):
-        raise WorldFileError("has an origin that is not [x, y, yaw]")
+        raise InputError("has an origin that is not [x, y, yaw]")
     greys = _greys(path.parent / keys["image"])
     share = np.abs(greys - (not keys.get("negate", 0)))
     solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
@@ -83,14 +84,14 @@ def _greys(path: Path) -> FloatArray:
     try:
         with raster.opened(path, IMAGES.get(read_bytes(path, first=1), "PNM")) as source:
             if source.colorinterp[0].name == "palette" or source.count in (2, 4):
-                raise WorldFileError("has a palette or is not opaque; save it as plain grey PGM or PNG")
+                raise InputError("has a palette or is not opaque; save it as plain grey PGM or PNG")
             greys: FloatArray = source.read().astype(np.float64).mean(axis=0)
             return greys / (255.0 if source.dtypes[0] == "uint8" else 65_535.0)
-    except WorldFileError as error:
+    except InputError as error:
         if "pip install" in str(error):
             raise
         said = str(error).partition(";")[0]
-        raise WorldFileError(f"names the image {path.name}, which {said}; must be grey PGM or PNG") from error
+        raise InputError(f"names the image {path.name}, which {said}; must be grey PGM or PNG") from error
 
 
 def _are_numbers(values: Sequence[Any], least: float = -math.inf) -> bool:

@@ -1,13 +1,12 @@
 """Buildings of OpenStreetMap, XML or PBF, by osmium (`wayproof[maps]`), which puts ways and relations together.
 
 Buildings and their parts (`building:part`), chimneys, towers and tanks (`man_made`) are all taken, each with its own
-height: where they overlap the union is solid, which is never less than the Simple 3D Buildings scheme has it.
+height: where they overlap the union is solid.
 """
 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -17,9 +16,10 @@ from typing import Any, Final
 
 import shapely
 
+from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_BYTES, read_bytes
-from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
+from harness.world_files.parts import WGS84, Contents, Part, Reading
 from harness.world_files.readers import limits
 
 TALL: Final = frozenset(
@@ -33,9 +33,9 @@ def read_xml(path: Path, reading: Reading) -> Contents:
     """Reads an OpenStreetMap XML file."""
     data = read_bytes(path, MAX_BYTES)
     if re.search(rb"<nd [^>]*\blat=", data):
-        raise WorldFileError("has places inside its ways (`out geom`); ask for `out body; >; out skel`")
+        raise InputError("has places inside its ways (`out geom`); ask for `out body; >; out skel`")
     if re.search(rb"<way id=['\"]-|action=['\"]delete", data):
-        raise WorldFileError("has ways of JOSM that are new or deleted; give a file without them")
+        raise InputError("has ways of JOSM that are new or deleted; give a file without them")
     osmium = _osmium()
     if data.rfind(b"<node ") < data.find(b"<way "):
         return read_pbf(path, reading)
@@ -55,23 +55,22 @@ def _readable() -> Iterator[None]:
     try:
         yield
     except Exception as error:  # of kinds of its own, too
-        raise WorldFileError(f"cannot be read by osmium ({' '.join(str(error).split())[:60]})") from error
+        raise InputError(f"cannot be read by osmium ({' '.join(str(error).split())[:60]})") from error
 
 
 def _osmium() -> Any:
     try:
         import osmium
     except ImportError as error:
-        raise WorldFileError("is OpenStreetMap, which osmium reads: pip install 'wayproof[maps]'") from error
+        raise InputError("is OpenStreetMap, which osmium reads: pip install 'wayproof[maps]'") from error
     return osmium
 
 
 def read_pbf(path: Path, reading: Reading) -> Contents:
     """Reads an OpenStreetMap PBF file."""
-    read_bytes(path, first=1)
     osmium = _osmium()
     keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
-    found = _Found(reading, osmium.geom.WKBFactory())
+    found = _Found(limits.Buildings(reading), osmium.geom.WKBFactory())
     with _readable():
         for each in osmium.FileProcessor(str(path)).with_locations().with_areas().with_filter(keys):
             found.take(each, {tag.k: tag.v for tag in each.tags})
@@ -82,11 +81,10 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
 class _Found:
     """What was found so far; `ways` are buildings whose area comes later, or never, by their names."""
 
-    reading: Reading
+    buildings: limits.Buildings
     shape_of: Any
     parts: list[Part] = field(default_factory=list)
-    doubts: limits.Doubts = field(default_factory=limits.Doubts)
-    told: Counter[str] = field(default_factory=Counter)
+    tall: int = 0
     ways: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = field(default_factory=dict)
 
     def take(self, each: Any, tags: dict[str, str]) -> None:
@@ -102,12 +100,17 @@ class _Found:
             nodes = getattr(each, "nodes", ())
             places = [(node.lon, node.lat) for node in nodes if node.location.valid()]
             self.ways[f"{kind} {each.id}"] = tags, places
-        elif is_tall(tags) or limits.metres_of(tags.get("height")) is not None:
-            self.told[kind] += 1
+        else:
+            self.tall += (
+                is_building(tags)
+                or tags.get("power") == "tower"
+                or tags.get("generator:source") == "wind"
+                or limits.metres_of(tags.get("height")) is not None
+            )
 
     def _add(self, tags: dict[str, str], shape: Any, name: str) -> None:
         shape = shape.geoms[0] if len(getattr(shape, "geoms", ())) == 1 else shape
-        self.parts.append(limits.building(tags, shape, self.reading, self.doubts, name))
+        self.parts.append(self.buildings.part(tags, shape, name))
 
     def contents(self) -> Contents:
         """All buildings, those with an open outline closed."""
@@ -115,16 +118,14 @@ class _Found:
         for name, (tags, ring) in whole.items():
             self._add(tags, shapely.Polygon(ring), name)
         if not self.parts:
-            raise WorldFileError("has no building with an outline; must have some")
-        notes = self.doubts.notes(self.reading)
+            raise InputError("has no building with an outline; must have some")
+        notes = self.buildings.notes()
         if whole:
             notes.append(f"{counted(len(whole), 'building')} with an open outline closed by a straight line")
         if broken := len(self.ways) - len(whole):
             notes.append(f"{counted(broken, 'building')} whose outline is not there passed over")
-        if plain := [
-            counted(self.told[kind], kind) for kind in ("point", "way", "relation") if self.told[kind]
-        ]:
-            notes.append(f"{' and '.join(plain)} with a height, or a mast, without an area passed over")
+        if self.tall:
+            notes.append(f"{counted(self.tall, 'mast or turbine')} without an area passed over")
         return Contents("osm", WGS84, tuple(self.parts), notes=tuple(notes))
 
 
@@ -132,8 +133,3 @@ def is_building(tags: Mapping[str, Any]) -> bool:
     """Whether tags are those of a building, of a part of one, or of what stands up like one."""
     named = any(tags.get(key, "no") not in ("no", "entrance") for key in ("building", "building:part"))
     return named or tags.get("man_made") in TALL
-
-
-def is_tall(tags: Mapping[str, Any]) -> bool:
-    """Whether tags of a node are those of something that stands up: a building, a tower, a wind turbine."""
-    return is_building(tags) or tags.get("power") == "tower" or tags.get("generator:source") == "wind"

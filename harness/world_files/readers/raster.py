@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import warnings
 import zipfile
@@ -13,9 +12,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from harness.files.input_file import InputError
 from harness.files.zip_archive import DAMAGES, member_path
 from harness.world_files.bounded import read_bytes
-from harness.world_files.parts import WGS84, Contents, Raster, Reading, WorldFileError
+from harness.world_files.parts import WGS84, Contents, Raster, Reading
 from harness.world_files.plane import check_metres
 
 MAX_CELLS: Final = 60_000_000
@@ -37,7 +37,7 @@ def opened(path: Path | str, driver: str) -> Iterator[Any]:
         import rasterio
         from rasterio.errors import RasterioError
     except ImportError as error:
-        raise WorldFileError("is a raster, which rasterio reads: pip install 'wayproof[maps]'") from error
+        raise InputError("is a raster, which rasterio reads: pip install 'wayproof[maps]'") from error
     try:
         with (
             warnings.catch_warnings(action="ignore"),
@@ -46,40 +46,40 @@ def opened(path: Path | str, driver: str) -> Iterator[Any]:
         ):
             if source.height * source.width > MAX_CELLS:
                 size = f"{source.height} x {source.width}"
-                raise WorldFileError(
-                    f"has {size} cells; must have at most {MAX_CELLS:,}: cut the area out of it"
-                )
+                raise InputError(f"has {size} cells; must have at most {MAX_CELLS:,}: cut the area out of it")
             yield source
-    except WorldFileError:
+    except InputError:
         raise
     except (RasterioError, ValueError, OSError, MemoryError) as error:
         said = " ".join(str(error).replace(str(path), "it").split())[:120]
-        raise WorldFileError(f"cannot be read as a raster ({said}); it may be torn: get it again") from error
+        raise InputError(f"cannot be read as a raster ({said}); it may be torn: get it again") from error
 
 
 def read(path: Path, reading: Reading) -> Contents:
     """Reads a raster of one band of heights in metres; an SRTM tile may be packed as .zip or .gz."""
-    read_bytes(path, first=1)
     notes: tuple[str, ...] = ()
     with opened(*_inside(path)) as source:
-        _check_bands(source)
+        if source.count > 1 or source.colorinterp[0].name == "palette":
+            raise InputError(f"has {source.count} bands or a palette; must have one band, of heights")
         if source.driver == "AAIGrid":
             _check_grid(path, source.height * source.width)
         band = source.read(1, masked=True)
         values = band.data.astype(np.float64) * source.scales[0] + source.offsets[0]
         values[np.ma.getmaskarray(band) | np.isin(band.data, VOIDS)] = np.nan
-        affine = _placed(source)
+        affine: Any = tuple(source.transform)[:6]
+        if source.transform.is_identity or affine[0] * affine[4] == affine[1] * affine[3]:
+            raise InputError("says not where it lies (no transformation); warp it with gdalwarp")
         if (crs := reading.crs or _crs(source, affine)) is not None:
             check_metres(crs, source.units[0] or "")
         elif source.driver != "AAIGrid":
-            raise WorldFileError("names no coordinate reference system; give crs, as EPSG:32632")
+            raise InputError("names no coordinate reference system; give crs, as EPSG:32632")
         else:
             scale = (reading.metres_per_cell or affine[0]) / affine[0]
-            affine = tuple(scale * each for each in affine)  # type: ignore[assignment]
+            affine = tuple(scale * each for each in affine)
             notes = ("names no place on earth: its metres are taken as they are (crs, metres_per_cell)",)
     values[(values <= HEIGHTS_M[0]) | (values >= HEIGHTS_M[1])] = np.nan
     if np.isnan(values).all():
-        raise WorldFileError("has no cell with a height between -12000 and 9000 m; must be terrain")
+        raise InputError("has no cell with a height between -12000 and 9000 m; must be terrain")
     return Contents("raster", crs, terrain=Raster(values, affine), notes=notes)
 
 
@@ -95,49 +95,29 @@ def _inside(path: Path) -> tuple[Path | str, str]:
     if path.suffix.lower() != ".hgt":
         return path, "AAIGrid"
     if not re.match(r"[NS]\d{2}[EW]\d{3}", path.name, re.IGNORECASE):
-        raise WorldFileError("is an SRTM tile by its ending; its name must say where it lies, as N46E009.hgt")
+        raise InputError("is an SRTM tile by its ending; its name must say where it lies, as N46E009.hgt")
     return path, "SRTMHGT"
 
 
 def _check_grid(path: Path, cells: int) -> None:
-    """Raises WorldFileError if an ESRI ASCII grid has more or fewer numbers than cells: GDAL fills up with zeros."""
+    """Raises InputError if an ESRI ASCII grid has more or fewer numbers than cells: GDAL fills up with zeros."""
     found = 0
     with path.open("rb") as file:
         for line in file:
             if not line.strip()[:1].isalpha():
                 found += len(line.split())
                 if line.translate(None, b"0123456789+-.eE \t\r\n\x1a"):
-                    raise WorldFileError("has something that is no number among its heights")
+                    raise InputError("has something that is no number among its heights")
     if found != cells:
-        raise WorldFileError(f"has {found:,} heights; nrows times ncols are {cells:,}: it may be torn")
-
-
-def _check_bands(source: Any) -> None:
-    """Raises WorldFileError if a raster is a picture."""
-    from rasterio.enums import ColorInterp
-
-    others = [each for each in source.colorinterp[1:] if each is not ColorInterp.alpha]
-    if others or source.colorinterp[0] is ColorInterp.palette:
-        raise WorldFileError(f"has {source.count} bands or a palette; must have one band, of heights")
+        raise InputError(f"has {found:,} heights; nrows times ncols are {cells:,}: it may be torn")
 
 
 def _crs(source: Any, affine: tuple[float, ...]) -> str | None:
     """The coordinate reference system that a raster names; degrees where a grid without one can be nothing else."""
-    system = source.crs or source.gcps[1]
-    if system:
-        return str(system.to_wkt())
+    if source.crs:
+        return str(source.crs.to_wkt())
     degrees = affine[0] < 0.1 and 0.0 < abs(affine[2]) <= 180.0 and abs(affine[5]) <= 90.0
     return WGS84 if degrees and source.driver == "AAIGrid" else None
-
-
-def _placed(source: Any) -> tuple[float, float, float, float, float, float]:
-    """Where a raster of rasterio lies, by its transformation."""
-    a, b, c, d, e, f = tuple(source.transform)[:6]
-    if source.transform.is_identity:
-        raise WorldFileError("says not where it lies (no transformation); warp it with gdalwarp")
-    if not math.isfinite(a + b + c + d + e + f) or a * e == b * d:
-        raise WorldFileError("has cells of no size; must be terrain")
-    return a, b, c, d, e, f
 
 
 def read_numpy(path: Path, reading: Reading) -> Contents:
@@ -145,21 +125,19 @@ def read_numpy(path: Path, reading: Reading) -> Contents:
 
     It has `elevation` in rows from the north, and its edges in degrees: of `ymin` and `ymax` the larger is north.
     """
-    read_bytes(path, first=1)
     try:
         with zipfile.ZipFile(path) as archive:
-            if sum(each.file_size for each in archive.infolist()) > MAX_NUMPY_BYTES:
-                raise WorldFileError(f"unpacks to more than {MAX_NUMPY_BYTES // 10**6} MB")
+            too_large = sum(each.file_size for each in archive.infolist()) > MAX_NUMPY_BYTES
         with np.load(path, allow_pickle=False) as arrays:
-            values = arrays["elevation"].astype(np.float64)
+            values: Any = np.zeros(0) if too_large else arrays["elevation"].astype(np.float64)
             west, east, south, north = (float(arrays[name]) for name in ("xmin", "xmax", "ymin", "ymax"))
-    except WorldFileError:
-        raise
     except (KeyError, TypeError, *DAMAGES) as error:
-        raise WorldFileError("must have numbers `elevation`, `xmin`, `xmax`, `ymin`, `ymax`") from error
+        raise InputError("must have numbers `elevation`, `xmin`, `xmax`, `ymin`, `ymax`") from error
     south, north = min(south, north), max(south, north)
     if values.ndim != 2 or not values.size or not (-180 <= west < east <= 180 and -90 <= south < north <= 90):
-        raise WorldFileError("must have rows and columns of elevation, and edges in degrees around an area")
+        raise InputError(
+            "must have up to 500 MB of elevation in rows and columns, and edges in degrees around it"
+        )
     rows, columns = values.shape
     affine: Any = ((east - west) / columns, 0.0, west, 0.0, -(north - south) / rows, north)
     return Contents("numpy_dem", reading.crs or WGS84, terrain=Raster(values, affine))

@@ -7,13 +7,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from harness.files.input_file import InputError
+from harness.files.values import numbers
 from harness.files.wording import counted
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Limit, Part, Reading
-from harness.world_files.parts import WorldFileError as Fault
 from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import circle
-from harness.world_files.readers.geo_json import features_of, polygon_of, simple, whole
+from harness.world_files.readers.maps import features_of, polygon_of, simple
 
 UNITS: Final = {"": "m", "m": "m", "ft": "ft", "feet": "ft", "fl": "fl"}
 """Units of limits by the names that files use."""
@@ -26,114 +27,105 @@ PASSED: Final = (
 """What is said of zones that are passed over or simplified."""
 
 
+class _Zones:
+    """The zones of a file while it is read: parts, notes, and how many are passed over or simplified."""
+
+    def __init__(self, ends: tuple[str, str]) -> None:
+        self._ends = ends  # what follows `lower` and `upper` in the names of limit and reference
+        self.parts: list[Part] = []
+        self.notes: list[str] = []
+        self.told = Counter[str]()
+
+    def passes(self, restriction: Any, geometry: Any, at_times: bool) -> bool:
+        """Whether a zone is passed over, as it forbids nothing or has no geometry."""
+        why = "free" if restriction == "NO_RESTRICTION" else "" if geometry else "empty"
+        self.told[why] += 1
+        self.told["at times"] += at_times and not why
+        return bool(why)
+
+    def add(self, shape: Any, says: Mapping[str, Any], unit: str, name: str) -> None:
+        """A zone between the limits that a mapping says."""
+        found: list[Limit | None] = []
+        for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
+            value, reference = (says.get(f"{side}{end}") for end in self._ends)
+            told = limits.limit_told(value, f"{unit} {reference or ''}", self.notes, name)
+            found.append(none if value is None else told)
+        self.parts.append(Part(shape, *limits.band_of(found[0], found[1], self.notes, name), name=name))
+
+    def contents(self, kind: str) -> Contents:
+        """All zones."""
+        if not self.parts:
+            raise InputError("has no zone with an area that forbids something; must have some")
+        told = [
+            f"{counted(self.told[why], what)} {sentence}" for why, what, sentence in PASSED if self.told[why]
+        ]
+        return Contents(kind, WGS84, tuple(self.parts), notes=(*self.notes, *told))
+
+
 def read_ed269(path: Path, reading: Reading) -> Contents:
     """Reads all zones of ED-269 but those without restriction, whatever the time."""
     content = json_of(path)
     if isinstance(content, dict):
         content = content.get("features", content.get("UASZoneList"))
     if not isinstance(content, list):
-        raise Fault("has neither features nor UASZoneList; must be ED-269")
-    notes: list[str] = []
-    parts: list[Part] = []
-    told = Counter[str]()
+        raise InputError("has neither features nor UASZoneList; must be ED-269")
+    found = _Zones(("Limit", "VerticalReference"))
     for zone in content:
         if not isinstance(zone, dict) or not isinstance(zone.get("geometry"), list):
-            raise Fault("has a zone without a list `geometry`; must be ED-269")
-        if _is_passed(zone.get("restriction"), zone["geometry"], told):
-            continue
-        told["at times"] += _is_at_times(zone.get("applicability") or ())
+            raise InputError("has a zone without a list `geometry`; must be ED-269")
+        times = zone.get("applicability") or ()
+        times = [each for each in ([times] if isinstance(times, dict) else times) if isinstance(each, dict)]
+        at_times = any(each.get("permanent") == "NO" or "schedule" in each for each in times)
         name = str(zone.get("identifier") or zone.get("name") or "")[:40]
-        parts += [_ed269_part(each, name, notes) for each in zone["geometry"]]
-    return _contents("ed269", parts, told, notes)
-
-
-def _is_at_times(applicability: Any) -> bool:
-    """Whether a zone of ED-269 applies at times only."""
-    times = (applicability,) if isinstance(applicability, dict) else applicability
-    return any(
-        isinstance(each, dict) and (each.get("permanent") == "NO" or "schedule" in each) for each in times
-    )
-
-
-def _ed269_part(volume: Any, name: str, notes: list[str]) -> Part:
-    projection = volume.get("horizontalProjection") if isinstance(volume, dict) else None
-    if not isinstance(projection, dict):
-        raise Fault(f"has zone {name!r} without a horizontalProjection")
-    round_ = projection.get("type") == "Circle"
-    shape = _disc(projection.get("center"), projection.get("radius")) if round_ else polygon_of(projection)
-    if shape is None:
-        raise Fault(f"has zone {name!r} whose projection is neither a circle nor a polygon with an area")
-    if round_ and _unit(volume.get("uomDimensions")) != "m":
-        notes.append(f"{name or 'a zone'}: its radius is taken as metres, its limits as feet")
-    band = _band(volume, volume.get("uomDimensions"), ("Limit", "VerticalReference"), notes, name)
-    return Part(shape, *band, name=name)
+        for volume in (
+            () if found.passes(zone.get("restriction"), zone["geometry"], at_times) else zone["geometry"]
+        ):
+            projection = volume.get("horizontalProjection") if isinstance(volume, dict) else None
+            if not isinstance(projection, dict):
+                raise InputError(f"has zone {name!r} without a horizontalProjection")
+            unit, round_ = _unit(volume.get("uomDimensions")), projection.get("type") == "Circle"
+            if round_ and unit != "m":
+                found.notes.append(f"{name or 'a zone'}: its radius is taken as metres, its limits as feet")
+            shape = _disc(projection, "center") if round_ else polygon_of(projection)
+            if shape is None:
+                raise InputError(
+                    f"has zone {name!r} whose projection is neither a circle nor a polygon with an area"
+                )
+            found.add(shape, volume, unit, name)
+    return found.contents("ed269")
 
 
 def read_ed318(path: Path, reading: Reading) -> Contents:
     """Reads all zones of ED-318: each geometry has a layer, and a circle is a point with an extent."""
-    notes: list[str] = []
-    parts: list[Part] = []
-    told = Counter[str]()
-    for tags, geometry in features_of(whole(path)):
-        if _is_passed(str(tags.get("type", "")).upper(), geometry, told):
-            continue
-        told["at times"] += bool(tags.get("limitedApplicability"))
-        name = limits.name_of(tags)
-        for one in simple(geometry):
+    found = _Zones(("", "Reference"))
+    for tags, geometry in features_of(json_of(path)):
+        name, at_times = limits.name_of(tags), bool(tags.get("limitedApplicability"))
+        passed = found.passes(str(tags.get("type", "")).upper(), geometry, at_times)
+        for one in () if passed else simple(geometry):
             extent, layer = one.get("extent"), one.get("layer") or {}
+            if not isinstance(layer, dict):
+                raise InputError(f"has zone {name!r} whose layer is no mapping; must be ED-318")
             if isinstance(extent, dict) and one.get("type") == "Point":
-                shape = _disc(one.get("coordinates"), extent.get("radius"))
+                shape = _disc({**extent, **one}, "coordinates")
             else:
                 shape = polygon_of(one)
-            if not isinstance(layer, dict):
-                raise Fault(f"has zone {name!r} whose layer is no mapping; must be ED-318")
             if shape is None:
-                told["flat"] += 1
+                found.told["flat"] += 1
             else:
-                band = _band(layer, layer.get("uom"), ("", "Reference"), notes, name)
-                parts.append(Part(shape, *band, name=name))
-    return _contents("ed318", parts, told, notes)
+                found.add(shape, layer, _unit(layer.get("uom")), name)
+    return found.contents("ed318")
 
 
-def _is_passed(restriction: Any, geometry: Any, told: Counter[str]) -> bool:
-    """Whether a zone is passed over, as it forbids nothing or has no geometry; it is counted."""
-    why = "free" if restriction == "NO_RESTRICTION" else "" if geometry else "empty"
-    told[why] += 1
-    return bool(why)
-
-
-def _contents(kind: str, parts: list[Part], told: Counter[str], notes: list[str]) -> Contents:
-    if not parts:
-        raise Fault("has no zone with an area that forbids something; must have some")
-    notes += [f"{counted(told[why], what)} {sentence}" for why, what, sentence in PASSED if told[why]]
-    return Contents(kind, WGS84, tuple(parts), notes=tuple(notes))
-
-
-def _disc(center: Any, radius: Any) -> Any:
-    metres = limits.metres_of(radius)
+def _disc(says: Mapping[str, Any], center: str) -> Any:
+    metres = limits.metres_of(says.get("radius"))
     if metres is None:
-        raise Fault("has a circle without a radius")
-    try:
-        east, north = (float(each) for each in center[:2])
-    except (TypeError, ValueError) as error:
-        raise Fault("has a circle whose centre is not two numbers") from error
+        raise InputError("has a circle without a radius")
+    east, north, *_ = numbers(says.get(center), "the centre of a circle", "[longitude, latitude]", (2, 3))
     return circle((east, north), metres)
-
-
-def _band(
-    says: Mapping[str, Any], unit: Any, ends: tuple[str, str], notes: list[str], name: str
-) -> tuple[Limit, Limit]:
-    """Bottom and top of a zone; `ends` are what follows `lower` and `upper` in the names of limit and reference."""
-    found: list[Limit | None] = []
-    for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
-        value, reference = says.get(f"{side}{ends[0]}"), str(says.get(f"{side}{ends[1]}") or "")
-        told = limits.limit_told(value, f"{_unit(unit)} {reference}", notes, name)
-        found.append(none if value is None else told)
-    return limits.band_of(found[0], found[1], notes, name)
 
 
 def _unit(name: Any) -> str:
     word = str(name or "").strip().lower()
     if word not in UNITS:
-        raise Fault(f"has limits in {word[:20]!r}; must be in m, ft or FL")
+        raise InputError(f"has limits in {word[:20]!r}; must be in m, ft or FL")
     return UNITS[word]

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from harness.cli.app import main
+from harness.files.input_file import InputError
 from harness.world_files.kinds import read
-from harness.world_files.parts import Reading, WorldFileError
+from harness.world_files.parts import Reading
 from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, npy, osm, zipped
 
 BOMB = '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "lol"><!ENTITY b "&a;&a;">]><osm>&b;</osm>'
@@ -122,7 +123,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
 def test_a_hostile_file_is_told_in_one_sentence(
     make: Callable[[Path], Path], sentence: str, tmp_path: Path
 ) -> None:
-    with pytest.raises(WorldFileError, match=sentence) as caught:
+    with pytest.raises(InputError, match=sentence) as caught:
         read(make(tmp_path), None, Reading())
     assert "\n" not in str(caught.value)
 
@@ -148,7 +149,7 @@ def test_the_command_and_the_scenario_say_it_with_status_2(
 
 def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(WorldFileError, match="is a pipe"):
+    with pytest.raises(InputError, match="is a pipe"):
         read(tmp_path / "pipe", None, Reading())
 
 

@@ -12,10 +12,11 @@ import pytest
 import shapely
 
 from aircraft.frames import LocalPlane
-from harness.world_files import cells
-from harness.world_files.cells import outlines, simplified
+from harness.files.input_file import InputError
+from harness.world_files import solids
 from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners_of, expanded, loaded_file
 from harness.world_files.plane import Mapping, Place, geodetic
+from harness.world_files.solids import outlines, simplified
 from tests.harness.world_files.making import SHARED, SQUARE, feature, geojson, geotiff
 from tests.longer import longer
 
@@ -27,7 +28,7 @@ real = pytest.mark.skipif(not SHARED.is_dir(), reason="real files are not beside
 def cut(path: Path, altitude_m: float, **keys: Any) -> tuple[Expanded, Mapping]:
     """A file cut at an altitude, in a plane about its middle and an area as large as it is."""
     spec = FileSpec(path, **keys)
-    contents = loaded_file(path, spec.kind, spec.reading)
+    contents = loaded_file(spec)
     place = Place(47.0, 8.0)
     if contents.crs:
         latitude, longitude = geodetic(contents.crs, *corners_of(contents))
@@ -254,17 +255,13 @@ def test_outlines_only_grow_and_by_no_more_than_they_may() -> None:
         assert all(each.is_valid for each in grown)
 
 
-def test_a_ragged_mask_is_made_coarser_and_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_outlines_are_those_of_the_cells_and_too_many_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     mask = np.random.default_rng(4).random((37, 53)) < 0.02
     squares = shapely.union_all([shapely.box(x, y, x + 1, y + 1) for y, x in np.argwhere(mask).tolist()])
-    found, factor = outlines(mask)
-    assert factor == 1
-    assert shapely.union_all(found).equals(squares)
-    monkeypatch.setattr(cells, "MAX_RUNS", 15)
-    found, factor = outlines(mask)
-    assert factor > 1
-    assert shapely.covers(shapely.union_all(found), squares)
-    assert (shapely.get_coordinates(found) % factor == 0).all()
+    assert shapely.union_all(outlines(mask)).equals(squares)
+    monkeypatch.setattr(solids, "MAX_RUNS", 15)
+    with pytest.raises(InputError, match="runs of solid cells in the area; give it with larger cells"):
+        outlines(mask)
 
 
 def test_a_keep_in_fence_leaves_its_inside_free(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from harness.files.input_file import InputError
 from harness.run_files.mission.mission_files import read_waypoints
 from harness.run_files.path_files import read_path
 from harness.world_files.kinds import read as read_world
-from harness.world_files.parts import Reading, WorldFileError
+from harness.world_files.parts import Reading
 
 CORNERS = [(46.99, 7.99), (47.03, 7.99), (47.03, 8.01), (46.99, 8.01)]
 PLACES = [(47.0, 8.0), (47.02, 8.0)]
@@ -49,7 +49,7 @@ def test_a_fence_about_home(tmp_path: Path) -> None:
     path.write_text("QGC WPL 110\n0 0 0 5005 50 0 0 0 0 0 0 0\n")
     with pytest.raises(InputError, match="no items to fly to, but 1 fence item"):
         read_path(path)
-    with pytest.raises(WorldFileError, match="is a fence about home, which has no position"):
+    with pytest.raises(InputError, match="is a fence about home, which has no position"):
         read_world(path, None, Reading())
     path.write_text(wpl(*WAYPOINTS, (5005, 50.0, 0.0, 0.0)))
     (part,) = read_world(path, None, Reading()).parts

@@ -1,0 +1,108 @@
+"""Polygons of maps: GeoJSON (RFC 7946), buildings by their heights and airspace by its limits; KML, also as KMZ."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import shapely
+
+from harness.files.input_file import InputError
+from harness.files.kml import Shape, read_kml
+from harness.files.wording import counted
+from harness.world_files.bounded import MAX_TREE_BYTES, json_of, read_bytes
+from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Datum, Limit, Part, Reading
+from harness.world_files.readers import limits
+
+DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
+"""What an altitude of KML is above, by its altitudeMode; clamped to the ground it means nothing."""
+
+
+def read_geojson(path: Path, reading: Reading) -> Contents:
+    """Reads the polygons of a GeoJSON file; points and lines are passed over and counted."""
+    content = json_of(path)
+    shapes = [
+        (tags, polygon_of(each)) for tags, geometry in features_of(content) for each in simple(geometry)
+    ]
+    notes: list[str] = []
+    parts = limits.parts_of([each for each in shapes if each[1] is not None], reading, notes)
+    if passed := sum(shape is None for _, shape in shapes):
+        notes.append(f"{counted(passed, 'point or line')} without an area passed over")
+    # An older file may name a system that is not WGS84.
+    named = re.search(r"EPSG:+(?:[\d.]*:)?(\d+)", str(content.get("crs")))
+    crs = reading.crs or (f"EPSG:{named[1]}" if named else WGS84)
+    return Contents("geojson", crs, parts, notes=tuple(notes))
+
+
+def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any]]:
+    """Attributes and geometry of each feature; its `id` is an attribute where it has no name."""
+    kind = content.get("type") if isinstance(content, dict) else None
+    features = content.get("features") if kind == "FeatureCollection" else [content]
+    if not isinstance(features, list) or not all(isinstance(each, dict) for each in features):
+        raise InputError("has no list of features; must be GeoJSON")
+    for feature in features:
+        if feature.get("type") == "Feature":
+            tags = feature.get("properties")
+            named = {"identifier": feature.get("id")}
+            yield {**named, **(tags if isinstance(tags, dict) else {})}, feature.get("geometry")
+        else:
+            yield {}, feature
+
+
+def simple(geometry: Any) -> Iterator[dict[str, Any]]:
+    """The geometries of a collection one after the other; an empty one where there is none."""
+    if not isinstance(geometry, dict):
+        yield {}
+    elif geometry.get("type") == "GeometryCollection":
+        for each in geometry.get("geometries") or ():
+            yield from simple(each)
+    else:
+        yield geometry
+
+
+def polygon_of(geometry: dict[str, Any]) -> Any:
+    """The shapely geometry of a Polygon or MultiPolygon; None of anything else."""
+    if geometry.get("type") not in ("Polygon", "MultiPolygon"):
+        return None
+    try:
+        return shapely.force_2d(shapely.geometry.shape(geometry))
+    except (TypeError, ValueError, LookupError, AttributeError, shapely.GEOSException) as error:
+        said = " ".join(str(error).split())[:60]
+        raise InputError(f"has a polygon whose rings are not lists of positions ({said})") from error
+
+
+def read_kml_polygons(path: Path, reading: Reading) -> Contents:
+    """Reads the polygons of a KML file, or of a KMZ archive with one.
+
+    Each is solid from the ground up to its highest corner; on the ground it is solid at every altitude. Limits in its
+    ExtendedData go before altitudes.
+    """
+    found = read_kml(read_bytes(path, MAX_TREE_BYTES), "", MAX_TREE_BYTES)
+    notes: list[str] = []
+    parts = tuple(_part(each, notes) for each in found.polygons if each.rings)
+    flat = sum((part.bottom, part.top) == (NO_BOTTOM, NO_TOP) for part in parts)
+    if flat:
+        notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
+    if len(parts) > flat:
+        notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
+    others = {"LineString": len(found.lines), **found.others}
+    notes += [f"{counted(count, kind)} passed over" for kind, count in others.items() if count > 0]
+    return Contents("kml", reading.crs or WGS84, parts, notes=tuple(notes))
+
+
+def _part(shape: Shape, notes: list[str]) -> Part:
+    """The part that a polygon of KML is."""
+    rings = [[(longitude, latitude) for latitude, longitude, _ in ring] for ring in shape.rings]
+    name, datum = shape.name[:40], DATUMS.get(shape.mode)
+    try:
+        footprint = shapely.Polygon(rings[0], [ring for ring in rings[1:] if ring])
+    except ValueError as error:  # of one or two corners
+        raise InputError(f"{name}: has a ring that encloses no area ({error})") from error
+    if limits.has_limits(shape.data):
+        return Part(footprint, *limits.limits(shape.data, notes, name), name=name)
+    if datum is None:
+        return Part(footprint, name=name)
+    top_m = max(altitude or 0.0 for ring in shape.rings for *_, altitude in ring)
+    return Part(footprint, top=Limit(top_m, datum), name=name)

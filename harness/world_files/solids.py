@@ -1,0 +1,243 @@
+"""Polygons of what is solid at one altitude: parts and cells of files, placed in the plane; and simpler outlines.
+
+A part is solid where it reaches into the band from altitude less to altitude plus the vertical clearance. Outlines only
+grow: notches are filled, nothing solid is ever cut away.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import shapely
+
+from harness.files.input_file import InputError
+from harness.files.wording import counted
+from harness.world_files.height_field import HeightField, window_of
+from harness.world_files.parts import BoolArray, Box, Datum, FloatArray, Part, Raster
+from harness.world_files.plane import Mapping
+
+MAX_RUNS: Final = 400_000
+"""A mask with more runs of cells along its rows is refused."""
+LONGEST_EDGE_CELLS: Final = 64
+"""Outlines of cells are bent into the plane with a point at least this often: to a hundredth of a cell."""
+MOST_GROWTH: Final = 0.005
+"""Share of a polygon's area that filling its notches may add."""
+PASSES: Final = 3
+STRAIGHT_M: Final = 1e-9
+"""A corner so near to the line through its neighbours is none."""
+
+
+class Solid(NamedTuple):
+    """A polygon in the plane, and the heights between which it is solid somewhere."""
+
+    shape: Any
+    low_m: float
+    high_m: float
+
+
+class Layer(NamedTuple):
+    """The heights above mean sea level in which the aircraft may be, and what is known of the ground below.
+
+    That is terrain of the files, and the height where there is none. Zones with limits above ground are cut to the area
+    `known_in` where there is terrain.
+    """
+
+    low_m: float
+    high_m: float
+    field: HeightField | None
+    flat_m: float | None
+    known_in: Box
+
+
+def sliced_parts(parts: Sequence[Part], mapping: Mapping, layer: Layer, box: Box) -> list[Solid]:
+    """What of the parts of one file is solid in a layer, in the plane and near a box."""
+    if not parts:
+        return []
+    shapes = mapping.geometries(np.array([part.footprint for part in parts], dtype=object))
+    window = shapely.box(*box)
+    near = np.array([part.keep_in for part in parts]) | shapely.intersects(shapes, window)
+    near &= np.isfinite(shapely.bounds(shapes)).all(axis=1)
+    solid: list[Solid] = []
+    unknown: list[str] = []
+    for index in np.flatnonzero(near).tolist():
+        part = parts[index]
+        shape = shapely.difference(window, shapes[index]) if part.keep_in else shapes[index]
+        found = _solid(part, shape, layer)
+        solid += found or ()
+        unknown += [part.name or "one without a name"] * (found is None)
+    if unknown:
+        raise InputError(
+            f"has {counted(len(unknown), 'part')} with limits above ground ({', '.join(dict.fromkeys(unknown))[:60]}), "
+            "and the ground there is not known; give a terrain file too, or ground_m (--ground-m)"
+        )
+    return solid
+
+
+def clipped(solids: Sequence[Solid], box: Box) -> list[Solid]:
+    """Valid polygons of what lies in a box, each with the heights of what it is a piece of."""
+    window = shapely.box(*box)
+    valid = np.array([each.shape for each in solids], dtype=object)
+    bad = ~shapely.is_valid(valid)
+    valid[bad] = shapely.make_valid(valid[bad], method="structure", keep_collapsed=False)
+    across = ~shapely.contains_properly(window, valid)
+    valid[across] = shapely.intersection(valid[across], window)
+    pieces, of = shapely.get_parts(valid, return_index=True)
+    return [
+        Solid(piece, *solids[index][1:])
+        for piece, index in zip(pieces, of.tolist(), strict=True)
+        if piece.geom_type == "Polygon" and piece.area > 0
+    ]
+
+
+def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
+    """A part as far as it reaches into the layer, where its limits make it largest; None: the ground is not known."""
+    bottom, top, on_ground = part.bottom, part.top, Datum.GROUND in (part.bottom.datum, part.top.datum)
+    if (bottom.datum is Datum.SEA and bottom.height_m > layer.high_m) or (
+        top.datum is Datum.SEA and top.height_m < layer.low_m
+    ):
+        return []  # whatever the ground
+    if on_ground and layer.field is not None and not part.rigid:
+        shape = shapely.intersection(shape, shapely.box(*layer.known_in))
+        if shape.is_empty:
+            return []
+    heights, corner = _ground_below(part, shape, layer) if on_ground else (np.zeros((1, 1)), (0.0, 0.0))
+    if not (heights.size and np.isfinite(heights).all()):
+        return None
+    lows, tops = (each.height_m + heights * (each.datum is Datum.GROUND) for each in (bottom, top))
+    solid = Solid(shape, float(lows.min()), float(tops.max()))
+    mask = (lows <= layer.high_m) & (tops >= layer.low_m)
+    if part.rigid:  # it stands level, as low and as high as its limits are anywhere
+        mask = np.array([[solid.low_m <= layer.high_m]]) & (solid.high_m >= layer.low_m)
+    if layer.field is None or len(np.unique(mask)) == 1:
+        return [solid] * bool(mask.all())
+    spacing = layer.field.spacing_m
+    placed = shapely.transform(outlines(mask), lambda p: p * spacing + corner)
+    return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]
+
+
+def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, tuple[float, float]]:
+    """Heights of the ground below a part, NaN where it is not known; and the first corner of their cells.
+
+    Of what is rigid they are those at its corners, of which some may lie outside of the terrain; else those of the
+    nodes whose cells (the node in the middle) cover it.
+    """
+    heights, corner = np.array([[math.nan]]), (0.0, 0.0)
+    if ground.field is not None and part.rigid:
+        heights = ground.field.at(*shapely.get_coordinates(shape).T)
+        heights = heights[np.isfinite(heights)]
+    elif ground.field is not None:
+        first, step = np.array(ground.field.corner_m), np.array(ground.field.spacing_m)
+        low, high = np.floor((shapely.bounds(shape).reshape(2, 2) - first) / step + 0.5)
+        x, y = (np.arange(low[k], high[k] + 1.0) * step[k] + first[k] for k in (0, 1))
+        heights = ground.field.at(*np.meshgrid(x, y))
+        corner = tuple((first + (low - 0.5) * step).tolist())
+    if ground.flat_m is not None:
+        heights = np.where(np.isfinite(heights), heights, ground.flat_m)
+    return heights, corner
+
+
+def outlines(mask: BoolArray) -> list[Any]:
+    """Polygons (with holes) round the cells that are set.
+
+    The cell in column i and row j of a (rows, columns) mask covers i to i + 1 and j to j + 1.
+    """
+    change = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    rows, begins = np.nonzero(change == 1)
+    ends = np.nonzero(change == -1)[1]
+    if len(rows) > MAX_RUNS:
+        raise InputError(f"has {len(rows):,} runs of solid cells in the area; give it with larger cells")
+    if not len(rows):
+        return []
+    # Runs of the same columns in rows that follow each other are one box.
+    order = np.lexsort((rows, ends, begins))
+    rows, begins, ends = rows[order], begins[order], ends[order]
+    goes_on = (np.diff(rows) == 1) & (np.diff(begins) == 0) & (np.diff(ends) == 0)
+    first = np.flatnonzero(np.append(True, ~goes_on))
+    last = np.append(first[1:], len(rows)) - 1
+    boxes = shapely.box(begins[first], rows[first], ends[first], rows[last] + 1)
+    return list(shapely.get_parts(shapely.simplify(shapely.union_all(boxes), 0.0)))
+
+
+def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -> list[Any]:
+    """Outlines in the plane of those cells of a raster that are solid, (rows, columns), and lie near a box."""
+    rows, columns = window_of(raster, mapping, box)
+
+    def place(points: FloatArray) -> FloatArray:
+        x, y = raster.places(points[:, 0] + columns.start, points[:, 1] + rows.start)
+        return np.column_stack(mapping.to_plane(x, y))
+
+    shapes = np.array(outlines(solid[rows, columns]), dtype=object)
+    dense = shapely.segmentize(shapes, LONGEST_EDGE_CELLS) if mapping.crs else shapes
+    return list(shapely.transform(dense, place))
+
+
+def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
+    """Polygons with fewer corners that cover the given ones, which are valid.
+
+    A corner that points into the solid is left out where the notch that it makes is not deeper than the tolerance,
+    small notches first, until `MOST_GROWTH` of the polygon's area has been added; corners on a straight line are
+    left out as well. Each of at most `PASSES` passes moves an edge by no more than the tolerance.
+    """
+    given = shapely.orient_polygons(np.array(polygons, dtype=object))
+    convex = shapely.area(shapely.convex_hull(given)) <= shapely.area(given) * (1.0 + 1e-12)
+    grown = [_grown(polygon, tolerance_m) for polygon in given[~convex]]
+    pieces = shapely.get_parts(np.concatenate((given[convex], np.array(grown, dtype=object))))
+    return [each for each in pieces if each.geom_type == "Polygon" and each.area > 0]
+
+
+def _grown(polygon: Any, tolerance_m: float) -> Any:
+    """A polygon with its notches filled."""
+    budget = MOST_GROWTH * polygon.area / PASSES
+    before = rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
+    for _ in range(PASSES):
+        rings = [_filled(ring, tolerance_m, budget) for ring in rings]
+    if sum(map(len, rings)) == sum(map(len, before)):
+        return polygon
+    grown = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) >= 4])
+    if not grown.is_valid:
+        grown = shapely.make_valid(grown, method="structure", keep_collapsed=False)
+    # By rounding, or for what stands in a notch, it may not cover the polygon.
+    return grown if shapely.covers(grown, polygon) else shapely.union(grown, polygon)
+
+
+def _filled(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatArray:
+    """One pass over a closed ring with the solid on its left; corners next to one another are not both left out."""
+    points = ring[:-1]
+    turn, base, on, forward = _bends(points)
+    straight = forward & (np.abs(turn) <= STRAIGHT_M * on)
+    if 3 <= len(points) - straight.sum() < len(points):
+        points = points[~straight]
+        turn, base, on, forward = _bends(points)
+    if len(points) <= 4:
+        return np.vstack((points, points[:1]))
+    notch = (turn < 0) & (np.abs(turn) / np.maximum(base, 1e-12) <= tolerance_m)
+    kept = points[~_apart(np.where(notch, 0.5 * np.abs(turn), np.inf), budget_m2)]
+    return np.vstack((kept, kept[:1])) if len(kept) >= 3 else ring
+
+
+def _bends(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Of each corner of a closed ring: twice the area that it adds, the base from neighbour to neighbour, the edge on.
+
+    The area is negative in a notch; the last is whether the ring goes on forwards.
+    """
+    before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+    into, on, base = points - before, after - points, after - before
+    turn = into[:, 0] * on[:, 1] - into[:, 1] * on[:, 0]
+    return turn, np.hypot(base[:, 0], base[:, 1]), np.hypot(on[:, 0], on[:, 1]), (into * on).sum(axis=1) > 0
+
+
+def _apart(cost: FloatArray, budget: float) -> BoolArray:
+    """Which to leave out: the cheapest first, never two neighbours, until the budget is used up."""
+    drop = np.zeros(len(cost), dtype=np.bool_)
+    spent = 0.0
+    for index in np.argsort(cost, kind="stable").tolist():
+        price = float(cost[index])
+        if not np.isfinite(price) or spent + price > budget:
+            break
+        if not (drop[index - 1] or drop[(index + 1) % len(cost)]):
+            drop[index] = True
+            spent += price
+    return drop
