@@ -77,7 +77,7 @@ ONLY_IN = {
     "distributed": ("harness/campaign/workers.py",),
     "gymnasium": ("harness/learning/environments.py", "harness/front_door/wayproof/environments.py"),
     "datafusion": ("harness/recording/catalog.py",),
-    "aerofiles": ("harness/run_files/igc_path.py",),
+    "aerofiles": ("harness/run_files/drawn_lines.py",),
     "numba": (
         "planner/compiled.py",
         "planner/kernel_cache.py",

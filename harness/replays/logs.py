@@ -15,7 +15,7 @@ import numpy as np
 from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
-from harness.run_files.igc_path import NEEDS_LOGS
+from harness.run_files.drawn_lines import NEEDS_LOGS
 
 MAX_BYTES: Final = 1_000_000_000
 LONGEST_S: Final = 1e7

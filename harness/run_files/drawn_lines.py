@@ -1,23 +1,26 @@
-"""Drawn lines and recorded tracks of maps and GPS tools: CSV, GeoJSON (RFC 7946), KML, GPX 1.1.
+"""Drawn lines and recorded tracks: CSV, GeoJSON (RFC 7946), KML, GPX 1.1, and IGC of gliders' loggers.
 
-Each file has exactly one line, the path. Polygons are fences; what else is there is counted in notes.
+Each file has exactly one line, the path; what else is there is counted in notes. IGC: FAI, Technical Specification for
+GNSS Flight Recorders.
 """
 
 from __future__ import annotations
 
 import csv
+import io
+import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from harness.files import kml
 from harness.files.input_file import InputError
 from harness.files.kml import Point
-from harness.files.mavlink.fences import Fence
 from harness.files.values import finite, listed, parsed_json, shown
 from harness.files.wording import counted
-from harness.run_files.fences import Fences
 
 LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))
 """Columns of CSV: a place in the local plane."""
@@ -27,54 +30,42 @@ ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")
 """Columns of an altitude above mean sea level."""
 ABOVE_GROUND: Final = "altitude_agl_m"
 """Column of an altitude above ground."""
-MOST_NAMED: Final = 4
-"""Columns that are not read and that a note names."""
 PARTS: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
 """What a geometry of several parts is made of."""
 COLLECTIONS: Final = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
-MEANINGS: Final = ("exclusion", "inclusion", "none")
-"""What a feature's property `fence` says of its polygons: to stay out of (the default), inside of, or neither."""
 ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
 """Values of KML's altitudeMode; with any other the altitude means nothing. The last is the default."""
 
+FLYING_MPS: Final = 12.0
+"""Before the first fix and after the last at this ground speed the aircraft rolls, or stands."""
+FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
+"""No glider flies faster than these over the ground, and up or down: a fix that is so far from both its neighbours is
+an error of the receiver."""
+MOST_BROKEN: Final = 0.05
+"""A file of which a larger share of fixes cannot be read is refused."""
+DATE: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)
+EARTH_M: Final = 6_371_000.0
+NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 
-@dataclass(frozen=True)
-class PathAsRead:
-    """A path as its file has it.
+FloatArray = NDArray[np.float64]
+
+
+class PathAsRead(NamedTuple):
+    """A line as its file has it.
 
     Attributes:
-        local: positions are east and north in metres; else latitude and longitude in degrees.
-        positions: one a point.
-        altitudes_m: above mean sea level, one a point; none where the file has none.
-        above_ground: the altitudes are above the ground instead.
-        fences: areas that come with it, their positions as those of the points.
+        where: file and name of the line, for faults.
+        points: latitude, longitude (deg; where `local` east, north in metres), and altitude (m) or None.
         notes: what else is in the file and does not change the path, a line each.
+        above_ground: the altitudes are above the ground, not the sea.
+        local: the points lie in the local plane.
     """
 
-    local: bool
-    positions: tuple[tuple[float, float], ...]
-    altitudes_m: tuple[float, ...]
+    where: str
+    points: list[Point]
+    notes: list[str]
     above_ground: bool = False
-    fences: Fences = field(default_factory=Fences)
-    notes: tuple[str, ...] = ()
-
-
-def _of_points(
-    points: Sequence[Point],
-    where: str,
-    fences: Sequence[Fence],
-    notes: Sequence[str],
-    above_ground: bool = False,
-) -> PathAsRead:
-    """A path in degrees."""
-    heights = tuple(altitude for *_, altitude in points if altitude is not None)
-    if heights and len(heights) != len(points):
-        raise InputError(
-            f"{where}: has an altitude at {len(heights)} of {len(points)} points; give all or none"
-        )
-    positions = tuple((latitude, longitude) for latitude, longitude, _ in points)
-    above_ground &= bool(heights)
-    return PathAsRead(False, positions, heights, above_ground, Fences(tuple(fences)), tuple(notes))
+    local: bool = False
 
 
 def _beside(others: Mapping[str, int]) -> list[str]:
@@ -88,28 +79,17 @@ def read_csv(text: str, source: str) -> PathAsRead:
     """The path of a CSV file: a header, and a point a row; blank lines and comments after # are passed over."""
     (line, header), *filled = _filled(text, source) or [(1, [])]
     header = [name.strip().lower() for name in header]
-    names, heights = _columns(header, f"{source}:{line}")
-    wanted = (*names, *heights)
-    found = []
+    names = _columns(header, f"{source}:{line}")
+    points: list[Point] = []
     for number, row in filled:
         if len(row) != len(header):
             raise InputError(f"{source}:{number}: has {len(row)} cells, the header {len(header)}")
         cells = dict(zip(header, row, strict=True))
-        found.append([finite(cells[name].strip(), f"{source}:{number}: {name}") for name in wanted])
-    return PathAsRead(
-        names in LOCAL,
-        tuple((row[0], row[1]) for row in found),
-        tuple(row[2] for row in found if heights),
-        above_ground=heights == [ABOVE_GROUND],
-        notes=_other_columns([name for name in header if name not in wanted]),
-    )
-
-
-def _other_columns(header: Sequence[str]) -> tuple[str, ...]:
-    """What is said of columns that are not read."""
-    others = [shown(name) or "one without a name" for name in header]
-    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
-    return (f"columns passed over: {', '.join(others[:MOST_NAMED])}{more}",) if others else ()
+        first, second, *height = (finite(cells[name].strip(), f"{source}:{number}: {name}") for name in names)
+        points.append((first, second, height[0] if height else None))
+    others = ", ".join(name or "one without a name" for name in header if name not in names)
+    notes = [f"columns passed over: {shown(others)}"] if others else []
+    return PathAsRead(source, points, notes, names[2:] == [ABOVE_GROUND], tuple(names[:2]) in LOCAL)
 
 
 def _filled(text: str, source: str) -> list[tuple[int, list[str]]]:
@@ -121,110 +101,75 @@ def _filled(text: str, source: str) -> list[tuple[int, list[str]]]:
         raise InputError(f"{source}: is not CSV ({error})") from error
 
 
-def _columns(header: list[str], where: str) -> tuple[tuple[str, str], list[str]]:
+def _columns(header: list[str], where: str) -> list[str]:
     """The columns of the place, and that of the altitude where there is one."""
-    names = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
-    if names is None:
+    pair = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
+    if pair is None:
         raise InputError(
             f"{where}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
             "latitude_deg,longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas"
         )
-    heights = [name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]
-    for name in (*names, *heights):
+    names = [*pair, *[name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]]
+    for name in names:
         if header.count(name) > 1:
             raise InputError(f"{where}: {name}: stands {header.count(name)} times; must stand once")
-    return names, heights
-
-
-class _Shape(NamedTuple):
-    """A geometry of one part of GeoJSON: where it stands, and what its feature says that it is."""
-
-    key: str
-    kind: str
-    coordinates: Any
-    meaning: str | None
+    return names
 
 
 def read_geojson(text: str, source: str) -> PathAsRead:
     """The path of a GeoJSON file: its one LineString."""
-    shapes = list(_shapes(parsed_json(text, source), source, "", None))
-    lines = [shape for shape in shapes if shape.kind == "LineString"]
+    shapes = list(_shapes(parsed_json(text, source), source, ""))
+    lines = [(key, line) for key, kind, line in shapes if kind == "LineString"]
     if len(lines) != 1:
         raise InputError(f"{source}: has {len(lines)} LineStrings; must have exactly one, the path")
-    fenced = [shape for shape in shapes if shape.kind == "Polygon" and shape.meaning != "none"]
-    others = Counter(shape.kind for shape in shapes if shape not in (lines[0], *fenced))
-    where = f"{source}: {lines[0].key}"
-    fences = [_fence(shape, source) for shape in fenced]
-    return _of_points(_places(lines[0].coordinates, where), where, fences, _beside(others))
+    where, points = f"{source}: {lines[0][0]}", []
+    for number, point in enumerate(listed(lines[0][1], where, " of [longitude, latitude]")):
+        at = f"{where}[{number}]"
+        if not isinstance(point, list) or len(point) not in (2, 3):
+            raise InputError(f"{at}: must be [longitude, latitude] or [longitude, latitude, altitude]")
+        longitude, latitude, *altitude = (finite(value, at) for value in point)
+        points.append((latitude, longitude, altitude[0] if altitude else None))
+    others = Counter(kind for _, kind, _ in shapes if kind != "LineString")
+    return PathAsRead(where, points, _beside(others))
 
 
-def _shapes(node: Any, source: str, key: str, meaning: str | None) -> Iterator[_Shape]:
-    """All geometries of one part of a GeoJSON object."""
+def _shapes(node: Any, source: str, key: str) -> Iterator[tuple[str, str, Any]]:
+    """Key, type and coordinates of all geometries of one part of a GeoJSON object."""
     node = node if isinstance(node, dict) else {}
     kind, before = str(node.get("type") or ""), f"{key}." if key else ""
     if kind == "Feature":
         if node.get("geometry") is not None:  # else it lies nowhere
-            meaning = _meaning(node.get("properties"), f"{source}: {before}properties.fence")
-            yield from _shapes(node["geometry"], source, f"{before}geometry", meaning)
+            yield from _shapes(node["geometry"], source, f"{before}geometry")
     elif kind in COLLECTIONS:
         key = f"{before}{COLLECTIONS[kind]}"
         for number, part in enumerate(listed(node.get(COLLECTIONS[kind]), f"{source}: {key}")):
-            yield from _shapes(part, source, f"{key}[{number}]", meaning)
+            yield from _shapes(part, source, f"{key}[{number}]")
     elif kind in PARTS:
         key = f"{before}coordinates"
         for number, part in enumerate(listed(node.get("coordinates"), f"{source}: {key}")):
-            yield _Shape(f"{key}[{number}]", PARTS[kind], part, meaning)
+            yield f"{key}[{number}]", PARTS[kind], part
     elif kind in PARTS.values():
-        yield _Shape(f"{before}coordinates", kind, node.get("coordinates"), meaning)
+        yield f"{before}coordinates", kind, node.get("coordinates")
     else:
         told, where = f"the type {shown(kind)}" if kind else "no type", f"{source}: {key}".removesuffix(": ")
         raise InputError(f"{where}: has {told}; must be a GeoJSON LineString")
 
 
-def _meaning(properties: Any, where: str) -> str | None:
-    meaning = properties.get("fence") if isinstance(properties, dict) else None
-    if meaning is not None and meaning not in MEANINGS:
-        raise InputError(f"{where}: is {shown(str(meaning))!r}; must be one of {', '.join(MEANINGS)}")
-    return meaning
-
-
-def _fence(shape: _Shape, source: str) -> Fence:
-    where = f"{source}: {shape.key}"
-    rings = listed(shape.coordinates, where, " of rings, each a list of [longitude, latitude]")
-    places = [[place[:2] for place in _places(ring, f"{where}[{k}]")] for k, ring in enumerate(rings)]
-    name = shape.key.replace(".coordinates", "").replace(".geometry", "")
-    return Fence(name, shape.meaning == "inclusion", tuple(map(tuple, places)))
-
-
-def _places(coordinates: Any, where: str) -> list[Point]:
-    found: list[Point] = []
-    for number, point in enumerate(listed(coordinates, where, " of [longitude, latitude]")):
-        at = f"{where}[{number}]"
-        if not isinstance(point, list) or len(point) not in (2, 3):
-            raise InputError(f"{at}: must be [longitude, latitude] or [longitude, latitude, altitude]")
-        longitude, latitude, *altitude = (finite(value, at) for value in point)
-        found.append((latitude, longitude, altitude[0] if altitude else None))
-    return found
-
-
 def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
     """The path of a KML file: its one LineString or gx:Track, with the altitudes that their mode gives a meaning."""
     found = kml.read_kml(data, source, most)
-    source = found.source
     if len(found.lines) != 1:
         told = f" ({', '.join(line.name for line in found.lines[:4])})" if found.lines else ""
-        raise InputError(f"{source}: has {len(found.lines)} lines{told}; must have exactly one, the path")
+        raise InputError(
+            f"{found.source}: has {len(found.lines)} lines{told}; must have exactly one, the path"
+        )
     (line,) = found.lines
-    points, notes = line.rings[0], _beside(found.others)
+    points, notes = list(line.rings[0]), _beside({**found.others, "Polygon": len(found.polygons)})
     if line.mode not in (ABSOLUTE, RELATIVE):
         if any(altitude for *_, altitude in points):
             notes.append(f"altitudes passed over: their altitudeMode is {shown(line.mode or CLAMPED)}")
-        points = tuple((latitude, longitude, None) for latitude, longitude, _ in points)
-    fences = [
-        Fence(each.name, False, tuple(tuple(point[:2] for point in ring) for ring in each.rings))
-        for each in found.polygons
-    ]
-    return _of_points(points, f"{source}: {line.name}", fences, notes, line.mode == RELATIVE)
+        points = [(latitude, longitude, None) for latitude, longitude, _ in points]
+    return PathAsRead(f"{found.source}: {line.name}", points, notes, line.mode == RELATIVE)
 
 
 def read_gpx(text: str, source: str) -> PathAsRead:
@@ -242,7 +187,88 @@ def read_gpx(text: str, source: str) -> PathAsRead:
         points.append((latitude, longitude, finite(height, f"{where}: ele") if height else None))
     segments = sum(1 for _ in kml.named(lines[0], "trkseg"))
     notes = [f"{segments} segments of the track joined by straight lines"] if segments > 1 else []
-    notes += _beside(
-        {"route": len(routes) if tracks else 0, "waypoint": sum(1 for _ in kml.named(root, "wpt"))}
-    )
-    return _of_points(points, f"{source}: {shown(kml.text_of(lines[0], 'name') or tag)}", (), notes)
+    waypoints = sum(1 for _ in kml.named(root, "wpt"))
+    notes += _beside({"route": len(routes) if tracks else 0, "waypoint": waypoints})
+    return PathAsRead(f"{source}: {shown(kml.text_of(lines[0], 'name') or tag)}", points, notes)
+
+
+def read_igc(text: str, source: str) -> PathAsRead:
+    """The fixes of a flight, from the takeoff to the landing, at their GNSS altitude; InputError without a flight.
+
+    Where the logger has no GNSS altitude (0 or no 3-D fix), all of it is at the pressure altitude.
+    """
+    fixes, broken = _fixes(text, source)
+    placed = fixes[np.abs(fixes[:, :2]).max(axis=1) > 1e-9]
+    leaps, over = _leaps(placed[:-1], placed[1:]), _leaps(placed[:-2], placed[2:])
+    right = placed[~np.pad(leaps[:-1] & leaps[1:] & ~over, 1)] if len(placed) > 2 else placed
+    speed_mps = _away_m(right[:-1], right[1:]) / np.maximum(np.diff(right[:, 4]), 1e-9)
+    moving = np.flatnonzero(speed_mps >= FLYING_MPS)
+    flown = right[moving[0] : moving[-1] + 2] if len(moving) else right[:0]
+    if len(flown) < 2:
+        raise InputError(f"{source}: has {len(fixes)} fixes, none of them in flight; must be a flight")
+    altitudes, note = flown[:, 2], "GNSS altitudes of the logger taken as above the sea"
+    known = altitudes != 0
+    if not known.all() and flown[:, 3].any():
+        altitudes, note = flown[:, 3], "pressure altitudes of the logger taken as above the sea"
+        known = np.full(len(flown), True)
+    has_some = known.sum() >= 2
+    if not has_some:
+        known, note = np.full(len(flown), True), "its logger has no altitudes"
+    counts = {
+        "fixes without an altitude passed over: the logger has no barometer": len(flown) - int(known.sum()),
+        "B records that cannot be read passed over": broken,
+        "fixes too far from both neighbours passed over": len(placed) - len(right),
+        "fixes on the ground not flown": len(right) - len(flown),
+        "fixes without a position passed over": len(fixes) - len(placed),
+    }
+    rows = zip(flown[known, :2].tolist(), altitudes[known].tolist(), strict=True)
+    points = [(*place, altitude if has_some else None) for place, altitude in rows]
+    return PathAsRead(source, points, [note, *(f"{count} {what}" for what, count in counts.items() if count)])
+
+
+def _away_m(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Distances over the ground from fixes to others."""
+    north, east = np.radians((after - before)[:, :2]).T
+    east = np.remainder(east + np.pi, 2.0 * np.pi) - np.pi
+    away: FloatArray = EARTH_M * np.hypot(north, east * np.cos(np.radians(after[:, 0])))
+    return away
+
+
+def _leaps(before: FloatArray, after: FloatArray) -> NDArray[np.bool_]:
+    """Whether no glider gets from fixes to others in the time between them."""
+    elapsed = after[:, 4] - before[:, 4]
+    # An altitude of 0 is none.
+    rise = np.where(before[:, 2] * after[:, 2] != 0, after[:, 2] - before[:, 2], 0.0)
+    fast = (_away_m(before, after) > FASTEST_MPS * elapsed) | (np.abs(rise) > STEEPEST_MPS * elapsed)
+    found: NDArray[np.bool_] = fast & (elapsed > 0.0)
+    return found
+
+
+def _fixes(text: str, source: str) -> tuple[FloatArray, int]:
+    """(n, 5) fixes, and how many more cannot be read.
+
+    A row is latitude, longitude (deg), GNSS altitude (m), 0 without a 3-D fix, pressure altitude or 0, and time (s).
+    """
+    try:
+        from aerofiles.igc import Reader
+    except ImportError as error:
+        raise InputError(f"{source}: {NEEDS_LOGS} ({error.name})") from error
+    if not text.lstrip("\ufeff").startswith("A"):
+        raise InputError(f"{source}:1: must begin with an A record, the logger's number; is no IGC file")
+    if not DATE.search(text):
+        raise InputError(f"{source}: has no date (an HFDTE record); must have one before the first fix")
+    try:
+        read = Reader(skip_duplicates=True).read(io.StringIO(text))  # of a broken line it keeps the error
+    except Exception as error:  # whatever its parser meets
+        raise InputError(f"{source}: is not IGC ({type(error).__name__}: {error})") from error
+    broken, fixes = read["fix_records"]
+    if len(broken) > MOST_BROKEN * len(fixes):
+        raise InputError(
+            f"{source}: has {len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}; must be at "
+            f"most {MOST_BROKEN:.0%}"
+        )
+    rows: list[tuple[float, ...]] = []
+    for fix in fixes:
+        height = 0.0 if fix.get("validity") == "V" else fix["gps_alt"] or 0.0
+        rows.append((fix["lat"], fix["lon"], height, fix["pressure_alt"] or 0.0, fix["datetime"].timestamp()))
+    return np.array(rows, dtype=np.float64).reshape(-1, 5), len(broken)

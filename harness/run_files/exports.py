@@ -1,17 +1,14 @@
 """A run in the files of other tools: missions of QGroundControl and of MAVLink ground stations, GeoJSON, KML.
 
-Commands and frames of missions: https://mavlink.io/en/messages/common.html; the plan: QGroundControl's developer guide,
-Plan file format. A mission is the path's points as waypoints at the altitude that the run held; takeoff, landing and
-fences are left to whoever flies it.
+A mission is the path's points as waypoints at the altitude that the run held; takeoff, landing and fences are left to
+whoever flies it. Its commands and frames: https://mavlink.io/en/messages/common.html.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
-from datetime import datetime, timedelta
-from typing import Final
+from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,6 +17,7 @@ from aircraft.frames import LocalPlane
 from harness.files.errors import RunFolderError
 from harness.files.mavlink.commands import WAYPOINT
 from harness.flight.record import FloatArray, IntArray
+from harness.run_files.given_path import needed
 from harness.run_files.run_folder import Run
 from harness.run_files.run_tables import PlanRow
 from harness.scenario.scenario import Scenario, parse_scenario
@@ -40,19 +38,16 @@ ABSOLUTE: Final = 2
 PX4, FIXED_WING = 12, 1
 
 
-@dataclass(frozen=True, eq=False)
-class ExportedPath:
+class ExportedPath(NamedTuple):
     """A path on the WGS84 ellipsoid, "flown" or "planned": (n, 2) geodetic latitude and longitude, rounded for a file.
 
-    Altitudes (n,) are above mean sea level; times (n,) are simulated, since the date at which the run was started.
+    Altitudes (n,) are above mean sea level.
     """
 
     what: str
     scenario: Scenario
     degrees: FloatArray
     altitude_m: FloatArray
-    time_s: FloatArray
-    started: datetime
 
 
 def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
@@ -74,9 +69,7 @@ def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
 
 
 def _path_of(run: Run, what: str) -> ExportedPath:
-    """The path of a run with no more points than it takes (Douglas and Peucker, 1973)."""
-    import shapely
-
+    """The path of a run with no more points than it takes."""
     scenario = parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"), as_flown=True)
     track, altitude_m = run.track, run.track.up_m
     points, rows = np.column_stack((track.east_m, track.north_m)), np.arange(len(track))
@@ -84,14 +77,11 @@ def _path_of(run: Run, what: str) -> ExportedPath:
         points, rows = planned_points(run)
         altitude_m = np.full(len(track), scenario.mission.altitude_m)
     if len(points) > 1:
-        numbered = shapely.LineString(np.column_stack((points, np.arange(len(points)))))
-        simple = shapely.simplify(numbered, TOLERANCE_M, preserve_topology=False)
-        kept = shapely.get_coordinates(simple, include_z=True)[:, 2].astype(np.int64)
+        kept = needed(points, TOLERANCE_M)
         points, rows = points[kept], rows[kept]
     plane = LocalPlane(scenario.area.origin.latitude_deg, scenario.area.origin.longitude_deg)
     degrees = np.array([plane.geodetic(*point) for point in points.tolist()]).reshape(-1, 2).round(DIGITS)
-    started = datetime.fromisoformat(str(run.manifest["started_utc"]))
-    return ExportedPath(what, scenario, degrees, altitude_m[rows].round(3), track.time_s[rows], started)
+    return ExportedPath(what, scenario, degrees, altitude_m[rows].round(3))
 
 
 def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
@@ -123,9 +113,6 @@ def plan_text(path: ExportedPath) -> str:
     held = path.scenario.mission.altitude_m
     items = [
         {
-            "AMSLAltAboveTerrain": None,
-            "Altitude": held,
-            "AltitudeMode": ABSOLUTE,
             "autoContinue": True,
             "command": WAYPOINT,
             "doJumpId": number,
@@ -170,21 +157,14 @@ def waypoints_text(path: ExportedPath) -> str:
 def geojson_text(path: ExportedPath) -> str:
     """A LineString after RFC 7946, its altitudes above mean sea level.
 
-    Across the antimeridian it goes on beyond 180 degrees, so that no line leads round the earth. Times of single points
-    are lists in `coordinateProperties`, as Mapbox's togeojson has it.
+    Across the antimeridian it goes on beyond 180 degrees, so that no line leads round the earth.
     """
     latitude, longitude = path.degrees.T
     places = np.column_stack((np.unwrap(longitude, period=360.0).round(DIGITS), latitude, path.altitude_m))
-    dates = [path.started + timedelta(seconds=time) for time in path.time_s.tolist()]
-    times = [each.isoformat(timespec="milliseconds").replace("+00:00", "Z") for each in dates]
+    airspeed_mps = path.scenario.aircraft.airspeed_mps
     feature = {
         "type": "Feature",
-        "properties": {
-            "name": path.scenario.name,
-            "what": path.what,
-            "airspeed_mps": path.scenario.aircraft.airspeed_mps,
-            "coordinateProperties": {"times": times, "time_s": path.time_s.round(3).tolist()},
-        },
+        "properties": {"name": path.scenario.name, "what": path.what, "airspeed_mps": airspeed_mps},
         "geometry": {"type": "LineString", "coordinates": places.tolist()},
     }
     return json.dumps({"type": "FeatureCollection", "features": [feature]}) + "\n"

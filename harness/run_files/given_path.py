@@ -1,8 +1,7 @@
 """A path as somebody gives it, made into what guidance can follow: lines, and an arc at every corner.
 
-Every corner of a polyline is flown by: an arc touches both legs and passes the corner inside. Where the points
-sample a curve, the arcs are as wide as the points leave room for and give the curve back; where legs are long,
-an arc has the turn radius of the aircraft. What is left is the corner that had to be cut.
+Where the points sample a curve, the arcs are as wide as the points leave room for and give the curve back; where legs
+are long, an arc has the turn radius of the aircraft.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ WIND_SAMPLES: Final = 9
 class Tightest:
     """How tightly corners are rounded at the most, one value each or (m,) point by point.
 
-    By the least radius of the aircraft in calm air, how far off a corner may be passed, and the wind over the airspeed,
+    The least radius is that of calm air, the limit how far off a corner may be passed. The wind is over the airspeed,
     east + i north where it blows to.
     """
 
@@ -60,16 +59,12 @@ class Tightest:
 
 @dataclass(frozen=True)
 class CutCorner:
-    """A corner that the turn radius does not let an aircraft fly through, and where it is.
+    """A corner that the turn radius does not let an aircraft fly through, by its number in the path as given, from 0.
 
-    Attributes:
-        waypoint: its number in the path as given, the first being 0.
-        turn_deg: the turn asked for, positive to the left.
-        radius_m: of the arc that is flown instead; 0 where a loiter's circle is joined without one.
-        cut_m: how far from the corner that arc passes.
-        arc_length_m: distance along the flown path to the place that belongs to the corner.
-        half_m: the flown path is off the two legs for no longer than this before and after that place.
-        allowed_cut_m: how far off it may be passed, where the path is judged.
+    The turn asked for is positive to the left. The arc that is flown instead has the radius, 0 where a loiter's circle
+    is joined without one, and passes the corner at `cut_m`. The place that belongs to the corner is `arc_length_m`
+    along the flown path, which is off the two legs for at most `half_m` before and after. Where the path is judged, the
+    corner may be passed at `allowed_cut_m`.
     """
 
     waypoint: int
@@ -91,10 +86,10 @@ class FlyBy:
         waypoints_m: (k, 2) those of the points given that are needed.
         segments: (n, 6) as in `planner.interface.Path`.
         corners: those that are cut by more than was left free, in order.
-        kept: (k,) which of the points given those are.
+        kept: (k,) which of the points given the waypoints are.
         stations_m: (k,) arc length of `segments` that belongs to each.
-        given_m: (m, 3) the polyline once more, with the points where arcs touch it: east, north, and the arc length of
-            `segments` that belongs there. Along a leg both grow alike; an arc is shared out over what it cuts off.
+        given_m: (m, 3) the polyline with the points where arcs touch it: east, north, and the arc length of `segments`
+            that belongs there; an arc is shared out over what it cuts off.
     """
 
     waypoints_m: FloatArray
@@ -128,7 +123,7 @@ def fly_by(
     to what they need. Corners sharper than `PAST_RAD` are flown past the next leg and back onto it, the turn beginning
     one radius before the corner. With `every`, corners are told however little they are cut.
     """
-    kept = _needed(points_m)
+    kept = needed(points_m)
     least, free = (np.broadcast_to(each, len(points_m))[kept][1:-1] for each in (radius_m, free_cut_m))
     points = points_m[kept]
     place = points[:, 0] + 1j * points[:, 1]
@@ -178,14 +173,8 @@ def fly_by(
 class _Shapes(NamedTuple):
     """How corners are rounded, each (k,), lengths in radii of the turn.
 
-    Attributes:
-        past: flown past the next leg and back onto it.
-        before: where the turn begins before the corner.
-        after: where it ends after it.
-        cut: how far it passes the corner.
-        furthest: how far it is off the two legs at the most.
-        corner: where along it the place is that belongs to the corner.
-        back_turn: angle (rad) by which it turns too far, and back.
+    A corner that is flown `past` has a turn by `back_turn` (rad) too far, and back. Turns begin and end so far before
+    and after the corner, pass it at `cut`, are off the legs by `furthest`, and belong to it at the length `corner`.
     """
 
     past: NDArray[np.bool_]
@@ -256,7 +245,7 @@ def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_tur
     return rows
 
 
-def _needed(points_m: FloatArray) -> NDArray[np.int64]:
+def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np.int64]:
     """Indices of the points without which the polyline would be another (Douglas and Peucker, 1973)."""
     import shapely
 
@@ -264,7 +253,7 @@ def _needed(points_m: FloatArray) -> NDArray[np.int64]:
     numbered = shapely.LineString(np.column_stack((points_m, np.arange(len(points_m)))))
     apart = shapely.get_coordinates(shapely.remove_repeated_points(numbered, SAME_PLACE_M), include_z=True)
     pieces = [shapely.LineString(apart[i : i + AT_ONCE + 1]) for i in range(0, len(apart) - 1, AT_ONCE)]
-    simple = [shapely.simplify(piece, SAME_LINE_M, preserve_topology=False) for piece in pieces]
+    simple = [shapely.simplify(piece, tolerance_m, preserve_topology=False) for piece in pieces]
     kept = [shapely.get_coordinates(piece, include_z=True)[1:, 2] for piece in simple]
     return np.concatenate(([0], *kept)).astype(np.int64)
 

@@ -6,7 +6,6 @@ What is read is put into the local plane; positions in degrees lie in a plane ab
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,16 +18,17 @@ from harness.files.input_file import InputError, decoded, read_data
 from harness.files.mavlink.fences import Place
 from harness.files.mavlink.items import HOME, WPL
 from harness.files.wording import counted
-from harness.run_files.drawn_lines import PathAsRead, read_csv, read_geojson, read_gpx, read_kml
+from harness.run_files.drawn_lines import PathAsRead, read_csv, read_geojson, read_gpx, read_igc, read_kml
 from harness.run_files.fences import Fences, in_plane
 from harness.run_files.given_path import SAME_PLACE_M, FloatArray
-from harness.run_files.igc_path import read_igc
-from harness.run_files.mission.mission_files import read_plan, read_waypoints
+from harness.run_files.mission.mission_files import PLAN, read_plan, read_waypoints
 from harness.run_files.mission.program import Program
 from harness.scenario.sections import ALTITUDES_M
 
 MAX_BYTES: Final = 64_000_000
 MAX_SPAN_M: Final = 500e3
+ON_EARTH_DEG: Final = (85.0, 360.0)
+"""Latitudes and longitudes are at most this, to either side."""
 LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
     ".csv": read_csv,
     ".geojson": read_geojson,
@@ -40,14 +40,10 @@ LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
 KML: Final = (".kml", ".kmz")
 MISSIONS: Final[dict[str, Callable[[str, str], Program]]] = {
     ".plan": read_plan,
-    ".mission": read_plan,
     ".waypoints": read_waypoints,
     ".txt": read_waypoints,
 }
 """Readers of missions, likewise."""
-JSON_ENDINGS: Final = (".json", ".txt", ".mission")
-PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"|"groundStation"\s*:\s*"MissionPlanner"')
-"""What stands in every plan of QGroundControl, or mission of Mission Planner in JSON, whatever the name of its file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +65,12 @@ class PathAsGiven:
     altitudes_m: FloatArray = field(default_factory=lambda: np.zeros(0))
     above_ground: bool = False
     mission: Program | None = None
-    fences: Fences = field(default_factory=Fences)
     notes: tuple[str, ...] = ()
+
+    @property
+    def fences(self) -> Fences:
+        """Those of the mission, in the plane."""
+        return Fences() if self.mission is None else self.mission.fences
 
     @property
     def drawn(self) -> bool:
@@ -95,47 +95,56 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
         raise InputError(f"{path}: is none of {', '.join(every)}; save the path as one of them")
     data = read_data(path, MAX_BYTES, "a path")
     if suffix in KML:
-        found = read_kml(data, source, MAX_BYTES)
-    elif suffix == ".igc":  # loggers write names in Latin-1
-        found = read_igc(data.decode("latin-1"), source)
-    else:
-        text = decoded(data, source, "a path")
-        mission = _mission_reader(text, suffix)
-        if mission is not None:
-            return _of_mission(mission(text, source), source, origin_deg)
-        found = LINES[suffix](text, source)
-    if len(found.positions) < 2:
-        raise InputError(f"{path}: has {counted(len(found.positions), 'point')}; a path has at least 2")
-    names = [f"point {number}" for number in range(len(found.positions))]
-    origin, place = (None, _as_it_is) if found.local else _plane(found.positions, names, origin_deg, source)
-    points = np.array([place(position) for position in found.positions])
-    altitudes = np.array(() if any_altitude else found.altitudes_m)
-    _check_points(points, () if found.above_ground else altitudes.tolist(), source)
-    fences = _fences(found.fences, origin, place, source)
-    return PathAsGiven(source, points, origin, altitudes, found.above_ground, None, fences, found.notes)
-
-
-def _mission_reader(text: str, suffix: str) -> Callable[[str, str], Program] | None:
-    """The reader of a mission, told by what stands in it, else by its name; None of a drawn line."""
+        return _of_line(read_kml(data, source, MAX_BYTES), source, any_altitude, origin_deg)
+    if suffix == ".igc":  # loggers write names in Latin-1
+        return _of_line(read_igc(data.decode("latin-1"), source), source, any_altitude, origin_deg)
+    text = decoded(data, source, "a path")
+    mission = MISSIONS.get(suffix)
     if text.startswith(WPL):
-        return read_waypoints
-    if suffix in JSON_ENDINGS and PLAN.search(text):
-        return read_plan
-    return MISSIONS.get(suffix)
+        mission = read_waypoints
+    elif suffix in (".json", ".txt") and PLAN.search(text):
+        mission = read_plan
+    if mission is not None:
+        return _of_mission(mission(text, source), source, origin_deg)
+    return _of_line(LINES[suffix](text, source), source, any_altitude, origin_deg)
+
+
+def _of_line(found: PathAsRead, source: str, any_altitude: bool, origin_deg: Place | None) -> PathAsGiven:
+    count = len(found.points)
+    if count < 2:
+        raise InputError(f"{source}: has {counted(count, 'point')}; a path has at least 2")
+    heights = [altitude for *_, altitude in found.points if altitude is not None]
+    if heights and len(heights) != count:
+        raise InputError(
+            f"{found.where}: has an altitude at {len(heights)} of {count} points; give all or none"
+        )
+    positions = [(first, second) for first, second, _ in found.points]
+    if found.local:
+        origin, points = None, np.array(positions)
+    else:
+        origin, place = _plane(positions, [f"point {k}" for k in range(count)], origin_deg, source)
+        points = np.array(list(map(place, positions)))
+    altitudes = np.array(() if any_altitude else heights)
+    above_ground = found.above_ground and bool(heights)
+    _check_points(points, () if above_ground else altitudes.tolist(), source)
+    return PathAsGiven(source, points, origin, altitudes, above_ground, notes=tuple(found.notes))
 
 
 def _of_mission(flown: Program, source: str, origin_deg: Place | None) -> PathAsGiven:
     placed = [(f"item {step.item}", step.position) for step in flown.steps if step.position is not None]
     names, positions = zip(*placed, strict=True)
     origin, place = _plane(positions, names, origin_deg, source)
-    points = np.array([place(position) for position in positions])
+    points = np.array(list(map(place, positions)))
     _check_span(points, source)
+    for fence in flown.fences.every:
+        _check_degrees([fence.name] * len(fence.places), fence.places, source)
+    fences, notes = in_plane(flown.fences, place, source), flown.notes
     steps = tuple(replace(step, position=step.position and place(step.position)) for step in flown.steps)
-    notes, fences = flown.notes, _fences(flown.fences, origin, place, source)
     if not flown.has_home and any(step.height_m is not None and step.above == HOME for step in flown.steps):
         notes = (*notes, "has no home: altitudes above home are counted from the sea")
-    mission = replace(flown, steps=steps)
-    return PathAsGiven(source, points, origin, mission=mission, fences=fences, notes=notes)
+    return PathAsGiven(
+        source, points, origin, mission=replace(flown, steps=steps, fences=fences), notes=notes
+    )
 
 
 def given_points(points: Any) -> PathAsGiven:
@@ -153,20 +162,11 @@ def given_points(points: Any) -> PathAsGiven:
     return PathAsGiven("path", points, None, altitudes)
 
 
-def _as_it_is(place: Place) -> Place:
-    return place
-
-
 def _plane(
     positions: Sequence[Place], names: Sequence[str], origin: Place | None, source: str
 ) -> tuple[Place, Callable[[Place], Place]]:
     """Latitude and longitude of the origin, and what puts a position into the plane."""
-    for name, position in zip(names, positions, strict=True):
-        if not _on_earth(position):
-            raise InputError(
-                f"{source}: {name} is at latitude {position[0]:g}, longitude {position[1]:g}; must be degrees "
-                "within 85 and 360 (local metres can be given as CSV with the columns x_m,y_m)"
-            )
+    _check_degrees(names, positions, source)
     latitude, longitude = origin or positions[0]
     if abs(longitude) > 180.0:
         longitude = math.remainder(longitude, 360.0)
@@ -174,8 +174,13 @@ def _plane(
     return (latitude, longitude), lambda place: plane.plane(*place)
 
 
-def _on_earth(place: Place) -> bool:
-    return abs(place[0]) <= 85.0 and abs(place[1]) <= 360.0
+def _check_degrees(names: Sequence[str], places: Sequence[Place], source: str) -> None:
+    for name, (latitude, longitude) in zip(names, places, strict=True):
+        if not (abs(latitude) <= ON_EARTH_DEG[0] and abs(longitude) <= ON_EARTH_DEG[1]):
+            raise InputError(
+                f"{source}: {name} is at latitude {latitude:g}, longitude {longitude:g}; must be degrees within 85 "
+                "and 360 (local metres can be given as CSV with the columns x_m,y_m)"
+            )
 
 
 def _check_points(points: FloatArray, altitudes_m: Sequence[float], source: str) -> None:
@@ -198,15 +203,3 @@ def _check_span(points: FloatArray, source: str) -> None:
     if reach > MAX_SPAN_M:
         most = f"{MAX_SPAN_M / 1e3:.0f} km"
         raise InputError(f"{source}: reaches {reach / 1e3:,.6g} km; must stay within {most} of its origin")
-
-
-def _fences(fences: Fences, origin: Place | None, place: Callable[[Place], Place], source: str) -> Fences:
-    """Fences in the local plane."""
-    for fence in fences.every if origin is not None else ():
-        for position in fence.places:
-            if not _on_earth(position):
-                raise InputError(
-                    f"{source}: {fence.name}: has latitude {position[0]:g}, longitude {position[1]:g}; must be degrees "
-                    "within 85 and 360"
-                )
-    return in_plane(fences, place, source)

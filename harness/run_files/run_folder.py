@@ -15,11 +15,10 @@ import os
 import platform
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.files.errors import RunFolderError
@@ -71,7 +70,7 @@ class Run:
     metrics: Mapping[str, Any]
 
 
-class RunFolder:
+class RunFolder(AbstractContextManager["RunFolder"]):
     """A run folder being written. Use as a context manager; `finish` makes it complete.
 
     Left without `finish` (an error, Ctrl-C), the folder stays marked incomplete.
@@ -91,14 +90,10 @@ class RunFolder:
         sources: Sequence[Mapping[str, str]] = (),
         turn_radius_m: float | None = None,
     ) -> RunFolder:
-        """Makes the folder, marked incomplete, with scenario and manifest; removes a former run's files.
+        """Makes the folder, marked incomplete, with scenario as flown and manifest; removes a former run's files.
 
-        The scenario is that as flown, all defaults filled in. The manifest has the command line, path and SHA-256 of
-        each file that obstacles were made of, and the smallest radius that a plan may ask for.
-
-        Raises:
-            RunFolderError: the path is a file, a folder with other things in it or that another process is
-                writing to, or cannot be written.
+        `sources` has path and SHA-256 of each file that obstacles were made of. A RunFolderError says that the path is
+        a file, a folder with other things in it or that another process is writing to, or cannot be written.
         """
         manifest = {
             "schema": SCHEMA,
@@ -138,9 +133,7 @@ class RunFolder:
     def finish(self, track: Track, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
         """Writes track, plans and metrics, then marks the run complete: last, after the recording is closed.
 
-        Raises:
-            RunFolderError: the track has no rows.
-            ValueError: a metric is not finite (JSON has no such number).
+        A RunFolderError says that the track has no rows, a ValueError that a metric is not finite.
         """
         if not len(track):
             raise RunFolderError(f"the run in {self.path} has no track: nothing was flown")
@@ -161,22 +154,14 @@ class RunFolder:
         """Writes track and plans, of a flight that was broken off perhaps: the run stays marked incomplete."""
         import pyarrow.parquet as pq
 
-        # At once: whatever is written while flying costs the flight its place in the caches.
         rows = track_table(track)
-        split = {
-            "use_dictionary": False,
-            "use_byte_stream_split": [each for each in rows.column_names if each != WHOLE],
-        }
+        columns = [each for each in rows.column_names if each != WHOLE]
+        split = {"use_dictionary": False, "use_byte_stream_split": columns}
         for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):
             with replacing(self.path / name) as file:
                 pq.write_table(table, file, compression=COMPRESSION, **how)
 
-    def __enter__(self) -> RunFolder:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._lock.release()
 
 
@@ -188,11 +173,7 @@ def tables(path: Path) -> tuple[pa.Table, pa.Table]:
 
 
 def load_run(path: Path) -> Run:
-    """Reads a complete run back.
-
-    Raises:
-        RunFolderError: it is no run folder, its run is incomplete, or a file of it is missing or damaged.
-    """
+    """Reads a complete run back; a RunFolderError says that it is none, incomplete, or misses or has damaged files."""
     manifest = read_index(path / MANIFEST, SCHEMA)
     if manifest is None:
         _there(path)
@@ -223,8 +204,13 @@ def load_run(path: Path) -> Run:
 
 
 WRONG_CONTENT: Final = (
-    *(RecursionError, AttributeError, LookupError, TypeError),
-    *(ValueError, ArithmeticError, MemoryError),
+    AttributeError,
+    LookupError,
+    TypeError,
+    ValueError,
+    ArithmeticError,
+    MemoryError,
+    RecursionError,
 )
 """What reading values raises that are not what they should be."""
 

@@ -32,14 +32,9 @@ if TYPE_CHECKING:
 class PlanRow:
     """One row of `plans.parquet`: a plan, in effect from a simulated time on.
 
-    Attributes:
-        status: how the planner's call ended, a value of `planner.interface.PlanStatus`.
-        compute_ms: processor time of the call that found it.
-        waypoints_m: (k, 2) east, north.
-        path_m: (m, 2) dense polyline, east, north.
-        segments: (n, 6) the same path exactly, as in `planner.interface.Path`.
-        loiter: whether its last segment is a full circle, flown for ever.
-        reason: the planner's sentence on it; empty in folders of older versions.
+    The status is a value of `planner.interface.PlanStatus`. Waypoints are (k, 2), the dense polyline `path_m` (m, 2)
+    east and north, segments (n, 6) the same path exactly, as in `planner.interface.Path`. A last segment that is a
+    `loiter` is flown for ever. The reason is empty in folders of older versions.
     """
 
     plan_index: int
@@ -94,7 +89,7 @@ def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
             "waypoints": _lists(get("plan.waypoints_m"), 2),
             "path": _lists(polylines(get("segments")), 2),
             "segments": _lists(get("segments"), 6),
-            "loiter": _truths(get("loiter")),
+            "loiter": _numbers(get("loiter"), np.int8).cast(pa.bool_()),
             "length_m": _numbers(get("plan.path.length_m")),
             "max_curvature_1pm": _numbers(get("plan.path.max_curvature_1pm")),
         }
@@ -118,15 +113,6 @@ def _numbers(values: ArrayLike, dtype: DTypeLike = np.float64) -> pa.Array:
 
     array: NDArray[Any] = np.ascontiguousarray(values, dtype)
     return pa.Array.from_buffers(pa.from_numpy_dtype(array.dtype), len(array), [None, pa.py_buffer(array)])
-
-
-def _truths(values: ArrayLike) -> pa.Array:
-    """A column of true and false."""
-    import pyarrow as pa
-
-    array = np.asarray(values, np.bool_)
-    bits = np.packbits(array, bitorder="little")
-    return pa.Array.from_buffers(pa.bool_(), len(array), [None, pa.py_buffer(bits)])
 
 
 def _texts(values: Sequence[str]) -> pa.Array:

@@ -8,21 +8,19 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-Row = tuple[float, float, float, float, float, float]
+from aircraft.route import arc_point
+from harness.run_files.given_path import SHORTEST_M, FloatArray, Row
+
 Pose = tuple[complex, complex]
 """A place and a direction."""
 
-SHORTEST_M: Final = 1e-6
 NEAR: Final = 1e-9
 ON_CIRCLE_M: Final = 0.01
 """A place no further from a circle lies on it."""
-SAME_DIRECTION: Final = 1e-5
-"""Directions that differ by less, in radians, are no corner."""
 
 
 class Circle(NamedTuple):
@@ -71,45 +69,29 @@ class Circle(NamedTuple):
         return ((self.side * cmath.phase((leave - self.center) / here)) % math.tau) * self.radius_m
 
 
-def line(begin: complex, ahead: complex, length_m: float) -> list[Row]:
-    """A straight segment; none where it is too short to be one."""
-    if length_m <= SHORTEST_M:
-        return []
-    return [(begin.real, begin.imag, ahead.real, ahead.imag, 0.0, length_m)]
-
-
-def arc(pose: Pose, side: int, radius_m: float, angle_rad: float) -> list[Row]:
-    """An arc; none where it is too short to be one."""
-    if angle_rad * radius_m <= SHORTEST_M:
-        return []
+def segment(pose: Pose, bend_1pm: float, length_m: float) -> list[Row]:
+    """A line, or an arc with a bend, positive to the left; none where it is too short to be one."""
     begin, ahead = pose
-    return [(begin.real, begin.imag, ahead.real, ahead.imag, side / radius_m, angle_rad * radius_m)]
+    row = (begin.real, begin.imag, ahead.real, ahead.imag, bend_1pm, length_m)
+    return [row] if length_m > SHORTEST_M else []
 
 
 def end_of(row: Row) -> Pose:
     """Where a segment ends."""
-    begin, ahead, bend, length = complex(*row[:2]), complex(*row[2:4]), row[4], row[5]
-    if bend == 0.0:
-        return begin + length * ahead, ahead
-    turned = ahead * cmath.exp(1j * bend * length)
-    return begin + (turned - ahead) / (1j * bend), turned
+    east, north, ahead_east, ahead_north = arc_point(row, row[5])
+    return complex(east, north), complex(ahead_east, ahead_north)
 
 
-def length_of(rows: Sequence[Row]) -> float:
-    """Length of a way."""
-    return sum(row[5] for row in rows)
-
-
-def sampled(row: Row, pieces: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places along a segment, east + i north, both ends among them, and how far along it each is."""
+def sampled(row: Row, pieces: int) -> FloatArray:
+    """(pieces + 1, 3) east, north and distance along a segment, both ends among them."""
     along = np.linspace(0.0, row[5], pieces + 1)
-    return np.array([end_of((*row[:5], part))[0] for part in along.tolist()]), along
+    return np.array([(*arc_point(row, part)[:2], part) for part in along.tolist()])
 
 
 def onto(pose: Pose, circle: Circle, turn_m: float) -> list[Row]:
     """The shorter way from a pose onto a circle: straight on as far as it takes, one turn, a line that touches it."""
     ways = (_onto(pose, circle, turn_m, turn) for turn in (1, -1))
-    return min((way for way in ways if way is not None), key=length_of)
+    return min((way for way in ways if way is not None), key=lambda way: sum(row[5] for row in way))
 
 
 def _onto(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[Row] | None:
@@ -133,4 +115,8 @@ def _onto(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[Row] | N
     out = apart / abs(apart) * cmath.exp(-1j * math.asin(sine))
     swept = (turn * cmath.phase(out / ahead)) % math.tau
     leave = pivot - 1j * turn * turn_m * out
-    return [*line(begin, ahead, on), *arc((start, ahead), turn, turn_m, swept), *line(leave, out, straight)]
+    return [
+        *segment(pose, 0.0, on),
+        *segment((start, ahead), turn / turn_m, swept * turn_m),
+        *segment((leave, out), 0.0, straight),
+    ]

@@ -1,10 +1,11 @@
-"""Missions with their fences: .plan files of QGroundControl, the JSON of Mission Planner, and plain text ("QGC WPL").
+"""Missions with their fences: .plan files of QGroundControl, and plain text ("QGC WPL").
 
 The plan's format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
@@ -24,8 +25,8 @@ TRANSECTS: Final = "TransectStyleComplexItem"
 """The mapping in which a survey has its items."""
 RELATIVE, ABSOLUTE = 3, 0
 """MAV_FRAME of altitudes above home and above the sea."""
-MOST_TOLD: Final = 10
-"""Numbers of items that a note has at most."""
+PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')
+"""What stands in every plan of QGroundControl, whatever the name of its file."""
 PLACE: Final = "[latitude, longitude, altitude]"
 Home = Sequence[float | None]
 """Latitude, longitude and altitude of home; None each where the file does not say."""
@@ -37,11 +38,8 @@ def _mission(
     """A mission with what is to be said of items that wait and of rally points."""
     waiting = [str(each.number) for each in items if each.autocontinue_off and each.command in commands.FLOWN]
     if waiting:
-        told = ", ".join(waiting[:MOST_TOLD]) + (", ..." if len(waiting) > MOST_TOLD else "")
-        notes.append(
-            f"item{'' if len(waiting) == 1 else 's'} {told}: autocontinue is off: PX4 waits there to be told to go on; "
-            "flown on, as ArduPilot does"
-        )
+        told = f"{'item' if len(waiting) == 1 else 'items'} {', '.join(waiting)}: autocontinue is off"
+        notes.append(f"{told}: PX4 waits there to be told to go on; flown on, as ArduPilot does")
     if rally:
         told = "a return to launch is flown to home, not to the nearest of them"
         notes.append(f"{counted(rally, 'rally point')} passed over: {told}")
@@ -69,15 +67,11 @@ def read_waypoints(text: str, source: str) -> Program:
     flown = [item for item in items if item.command not in commands.APART]
     rally = sum(item.command == commands.RALLY_POINT for item in items)
     if not flown and items:
-        kinds = (len(items) - rally, "fence item"), (rally, "rally point")
-        held = " and ".join(counted(each, name) for each, name in kinds if each)
-        raise InputError(
-            f"{source}: has no items to fly to, but {held}; `wayproof world` takes fences, and `check` takes "
-            "them beside a mission"
-        )
-    return _mission(
-        source, flown, home, Fences(item_fences(items, _place(home)), inside_all=True), rally, notes
-    )
+        held = f"{counted(len(items) - rally, 'fence item')} and {counted(rally, 'rally point')}"
+        remedy = "`wayproof world` takes fences, and `check` takes them beside a mission"
+        raise InputError(f"{source}: has no items to fly to, but {held}; {remedy}")
+    fences = Fences(item_fences(items, _place(home)), inside_all=True)
+    return _mission(source, flown, home, fences, rally, notes)
 
 
 def _home_item(items: list[Item], notes: list[str]) -> Home:
@@ -109,17 +103,24 @@ def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
 
 
 def read_plan(text: str, source: str) -> Program:
-    """The mission of a .plan, with its fences; Mission Planner's has no `fileType`."""
+    """The mission of a .plan, with its fences."""
     plan = parsed_json(text, source)
-    plan = plan if isinstance(plan, dict) else {}
+    if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
+        raise InputError(
+            f'{source}: is not a plan of QGroundControl; must have "fileType": "Plan" (of Mission Planner, save '
+            "the mission as .waypoints)"
+        )
     mission = plan.get("mission")
-    if plan.get("fileType") not in ("Plan", None if mission else "Plan"):
-        raise InputError(f'{source}: is not a plan of QGroundControl; must have "fileType": "Plan"')
     if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
         raise InputError(f"{source}: mission.items: is missing; it is required")
     notes: list[str] = []
     home = _home(mission.get("plannedHomePosition"), f"{source}: mission.plannedHomePosition", notes)
-    items = _every_item(mission["items"], f"{source}: mission.items", notes)
+    items: list[Item] = []
+    for number, each in enumerate(mission["items"]):
+        items += _items(each, f"{source}: mission.items[{number}]", len(items) + 1, notes)
+    if len({item.number for item in items}) < len(items):
+        items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
+        notes.append("a doJumpId is there twice: items are counted from 1 instead")
     geofence, rally = plan.get("geoFence") or {}, plan.get("rallyPoints") or {}
     fences = Fences(plan_fences(geofence, f"{source}: "), commands.inside_all(mission.get("firmwareType")))
     if geofence.get("breachReturn") is not None:
@@ -135,17 +136,6 @@ def _home(home: Any, where: str, notes: list[str]) -> Home:
         notes.append("its home has no altitude: altitudes above home are counted from the sea")
         home = [*home[:2], 0.0]
     return numbers(home, where, PLACE, (3,))
-
-
-def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item]:
-    """The items of a plan, numbered as there unless a number comes twice."""
-    items: list[Item] = []
-    for number, each in enumerate(given):
-        items += _items(each, f"{where}[{number}]", len(items) + 1, notes)
-    if len({item.number for item in items}) < len(items):
-        items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
-        notes.append("a doJumpId is there twice: items are counted from 1 instead")
-    return items
 
 
 def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
@@ -178,8 +168,7 @@ def _simple(item: Any, where: str, number: int) -> Item:
     given = [None if each is None else finite(each, f"{where}.params[{k}]") for k, each in enumerate(params)]
     command, frame = (whole(item.get(name), f"{where}.{name}") for name in ("command", "frame"))
     values = filled(given, command, frame, lambda index: f"{where}.params[{index}]: is null")
-    jump_id = item.get("doJumpId")
-    number = jump_id if isinstance(jump_id, int) and not isinstance(jump_id, bool) else number
+    number = item["doJumpId"] if type(item.get("doJumpId")) is int else number
     return Item(where, number, command, frame, values, item.get("autoContinue") is False)
 
 
@@ -189,10 +178,7 @@ def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[I
         numbers(item.get(each), f"{where}.{each}", PLACE, (3,))
         for each in ("landingApproachCoordinate", "landCoordinate")
     )
-    relative = item.get("altitudesAreRelative", True)
-    if not isinstance(relative, bool):
-        raise InputError(f"{where}.altitudesAreRelative: must be true or false")
-    frame = RELATIVE if relative else ABSOLUTE
+    frame = ABSOLUTE if item.get("altitudesAreRelative") is False else RELATIVE
     radius = abs(finite(item.get("loiterRadius", 0.0), f"{where}.loiterRadius"))
     turning = item.get("useLoiterToAlt", True) is not False
     side = radius if item.get("loiterClockwise", True) else -radius

@@ -43,19 +43,12 @@ class Loiter:
 
 @dataclass(frozen=True)
 class MissionStep:
-    """One thing that is flown.
+    """One thing that is flown, by the number and the name of its item.
 
-    Attributes:
-        item: the number of its item.
-        name: what the item is called.
-        position: latitude and longitude, later east and north; None: where the step before ends.
-        height_m: altitude; None: that of the step before.
-        above: what it is above: `sea`, `home` or `ground`.
-        acceptance_m: how far off it may be passed; 0 where the file does not say.
-        airspeed_mps: commanded from the begin of this step on; None: as before; 0: that of the flight before
-            any change.
-        loiter: circles about the position.
-        landing: the flight ends on the way down to it.
+    The position is latitude and longitude, later east and north; None: where the step before ends. The height, of the
+    step before where None, is `above` `sea`, `home` or `ground`. An acceptance of 0 is not given. The airspeed is
+    commanded from the begin of this step on; None: as before; 0: that of the flight before any change. A loiter circles
+    about the position; a flight ends on the way down to a landing.
     """
 
     item: int
@@ -86,15 +79,10 @@ class Told:
 
 @dataclass(frozen=True)
 class Program:
-    """What a mission makes an aeroplane fly.
+    """What a mission makes an aeroplane fly: its steps, and what became of every item, in the order of the file.
 
-    Attributes:
-        steps: in order.
-        items: what became of every item, in the order of the file.
-        home_altitude_m: above mean sea level.
-        has_home: whether home has a position.
-        fences: that come with it.
-        notes: on what else does, a line each.
+    The altitude of home, which may have no position, is above mean sea level. Fences come with it, and notes on what
+    else does.
     """
 
     steps: tuple[MissionStep, ...]
@@ -113,10 +101,10 @@ class Program:
 def program(
     source: str, items: Sequence[Item], home: tuple[float, float] | None, home_altitude_m: float
 ) -> Program:
-    """Goes through the items of a mission; home is latitude and longitude."""
+    """Goes through the items of a mission, whose numbers differ; home is latitude and longitude."""
     if not items:
         raise InputError(f"{source}: has no mission items; there is nothing to fly")
-    run = _Run(source, items, home)
+    run = _Run(items, home)
     run.go()
     if len(run.steps) < 2:
         told = f" ({run.steps[0].name}, item {run.steps[0].item})" if run.steps else ""
@@ -133,7 +121,7 @@ Flown = tuple[MissionStep | None, str]
 class _Run:
     """A mission while it is gone through."""
 
-    def __init__(self, source: str, items: Sequence[Item], home: tuple[float, float] | None) -> None:
+    def __init__(self, items: Sequence[Item], home: tuple[float, float] | None) -> None:
         self.items, self.home = items, home
         self.steps: list[MissionStep] = []
         self.told: dict[int, Told] = {}
@@ -142,9 +130,6 @@ class _Run:
         self._airspeed_mps: float | None = None
         self._closing = False  # an endless jump back was taken: the flight ends at the next step
         self._over = False
-        twice = [item.number for place, item in enumerate(items) if self.index[item.number] != place]
-        if twice:
-            raise InputError(f"{source}: item {twice[0]} is there twice; numbers must differ")
 
     def go(self) -> None:
         """Goes through it to its end."""
@@ -189,16 +174,12 @@ class _Run:
             self._taken[item.number] = done + 1
             self._tell(item, FLOWN, f"{to}, {counted(repeats, 'time')}")
             return target if done < repeats else at + 1
-        first_flown = self._first_flown(target)
-        if first_flown is not None and self.told.get(first_flown.number, Told(0, "", "")).what == FLOWN:
+        flown = [each.number for each in self.items[target:] if each.command in commands.FLOWN]
+        if flown and flown[0] in self.told and self.told[flown[0]].what == FLOWN:
             self._closing = True
-            to += f" without end: flown up to item {first_flown.number} again"
+            to += f" without end: flown up to item {flown[0]} again"
         self._tell(item, FLOWN, to)
         return target
-
-    def _first_flown(self, at: int) -> Item | None:
-        """The first item from a place on that is flown."""
-        return next((item for item in self.items[at:] if item.command in commands.FLOWN), None)
 
     def _do(self, item: Item) -> None:
         if item.command == commands.CHANGE_SPEED:
@@ -281,20 +262,17 @@ class _Run:
             return None, "has no position, and nothing is before it"
         first, second, third, _ = item.params[:4]
         signed = second if item.command == commands.LOITER_TO_ALTITUDE else third
-        turns: float | None = None
-        time_s: float | None = None
-        why = ""
+        radius = _bounded(item, "loiters with a radius of", abs(signed), MOST_RADIUS_M, "m")
+        circle, why = Loiter(radius if radius > SIDE_ALONE_M else 0.0, signed >= 0.0), ""
         if item.command == commands.LOITER_TURNS:
             turns = _bounded(item, "loiters", max(first, 0.0), MOST_TURNS, "turns")
-            why = f"{turns:g} turn{'' if turns == 1.0 else 's'}"
+            circle, why = replace(circle, turns=turns), f"{turns:g} turn{'' if turns == 1.0 else 's'}"
         elif item.command == commands.LOITER_TIME:
             time_s = _bounded(item, "loiters for", max(first, 0.0), MOST_LOITER_S, "s")
-            why = f"{time_s:g} s"
+            circle, why = replace(circle, time_s=time_s), f"{time_s:g} s"
         elif item.command == commands.LOITER_UNLIMITED:
-            turns, why = 1.0, "one turn is flown, and the flight ends"
-        radius = _bounded(item, "loiters with a radius of", abs(signed), MOST_RADIUS_M, "m")
-        radius = radius if radius > SIDE_ALONE_M else 0.0
-        return self._step(item, loiter=Loiter(radius, signed >= 0.0, turns, time_s)), why
+            circle, why = replace(circle, turns=1.0), "one turn is flown, and the flight ends"
+        return self._step(item, loiter=circle), why
 
     def _land(self, item: Item) -> Flown:
         if item.position is None:

@@ -1,7 +1,7 @@
-"""The route that an aeroplane flies on a mission: lines and arcs, with altitude and airspeed along them.
+"""The route of a mission as fixed-wing autopilots fly it: lines and arcs, with altitude and airspeed along them.
 
-As fixed-wing autopilots fly: waypoints are flown by, the altitude goes from one to the next along the leg (ArduPilot's
-glide slope, PX4's first-order hold), circles are joined and left along tangents.
+Waypoints are flown by, the altitude goes from one to the next along the leg (ArduPilot's glide slope, PX4's first-order
+hold), circles are joined and left along tangents.
 """
 
 from __future__ import annotations
@@ -20,19 +20,8 @@ from aircraft.guidance.waypoints import MissionLeg
 from aircraft.interface import Route
 from harness.files.input_file import InputError
 from harness.files.mavlink.items import GROUND
-from harness.run_files.given_path import PAST_RAD, SAME_PLACE_M, CutCorner, FloatArray, FlyBy
-from harness.run_files.mission.circle import (
-    SAME_DIRECTION,
-    SHORTEST_M,
-    Circle,
-    Pose,
-    Row,
-    arc,
-    end_of,
-    length_of,
-    onto,
-    sampled,
-)
+from harness.run_files.given_path import PAST_RAD, SAME_PLACE_M, CutCorner, FloatArray, FlyBy, Row
+from harness.run_files.mission.circle import Circle, Pose, end_of, onto, sampled, segment
 from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.vertices import (
     Flying,
@@ -53,6 +42,8 @@ ARC_RAD: Final = math.pi / 2
 """Longest arc of a circle in one segment."""
 SAMPLE_M: Final = 5.0
 """Points along circles are this close together, where a track is compared with them."""
+SAME_DIRECTION: Final = 1e-5
+"""Directions that differ by less, in radians, are no corner."""
 PAST_RADII: Final = 3.0
 """A turn of more than `PAST_RAD` goes past the next leg and is back on it after no more than so many radii."""
 
@@ -159,19 +150,26 @@ class _Build:
         entry = before if climbs else altitude
         self._altitude_m = before
         pose = self._join(item, circle, turn_m, entry)
-        length = self._around_m(loiter, circle, altitude)
-        target = self._target(number, circle)
+        if loiter.turns is not None:
+            length = loiter.turns * math.tau * circle.radius_m
+        else:
+            length = self._climbing_m(altitude) if loiter.time_s is None else loiter.time_s * self._mps
+        target, after = None, next(iter(self._steps[number + 1 : number + 2]), None)
+        if after is not None and after.place is not None:
+            # It goes on round the same centre.
+            again = after.loiter is not None and abs(after.place - center) < SAME_PLACE_M
+            target = None if again else after.place
         length += circle.further_m(pose[0], target, length)
         self._speeds.append((self._length_m, self._asked_mps, self._mps))
         self._altitudes.append((self._length_m, entry))
-        swept = length / circle.radius_m
+        swept, bend_1pm = length / circle.radius_m, circle.side / circle.radius_m
         if length > SAME_PLACE_M:
-            route = Route(np.array(arc(pose, circle.side, circle.radius_m, math.tau)), loiter=True)
+            route = Route(np.array(segment(pose, bend_1pm, math.tau * circle.radius_m)), loiter=True)
             around, centre_m = (self._length_m, self._length_m + length), (center.real, center.imag)
             self._legs.append(MissionLeg(route, around, centre_m=centre_m, swept_rad=swept))
         pieces = max(math.ceil(swept / ARC_RAD), 1)
         for _ in range(pieces):
-            pose = self._append(arc(pose, circle.side, circle.radius_m, swept / pieces)) or pose
+            pose = self._append(segment(pose, bend_1pm, length / pieces)) or pose
         self._altitudes.append((self._length_m, altitude))
         self._passed.append((item, None, self._length_m))
         self._altitude_m = altitude
@@ -179,12 +177,6 @@ class _Build:
             turn = onto(pose, Circle(target, 0.0, 1), turn_m)
             pose = self._turn(turn[: len(turn) - (turn[-1][4] == 0.0)]) or pose
         self._add(Vertex(pose[0], altitude, None))
-
-    def _around_m(self, loiter: Loiter, circle: Circle, altitude: float) -> float:
-        """How far a loiter goes round its circle."""
-        if loiter.turns is not None:
-            return loiter.turns * math.tau * circle.radius_m
-        return self._climbing_m(altitude) if loiter.time_s is None else loiter.time_s * self._mps
 
     def _join(self, item: int, circle: Circle, turn_m: float, altitude: float) -> Pose:
         """Gets onto a circle."""
@@ -199,23 +191,19 @@ class _Build:
             self.flush()
             assert self._pose is not None
             self._turn([] if circle.has(self._pose) else onto(self._pose, circle, turn_m))
-        else:
-            self._begin_on(circle, here)
+        else:  # the route begins on the circle
+            edge = circle.edge(here if here not in (None, circle.center) else circle.center + 1j)
+            self._run, self._pose = [], (edge, circle.direction(edge))
         assert self._pose is not None
         self._passed.append((None, self._pose[0], self._length_m))
         return self._pose
-
-    def _begin_on(self, circle: Circle, here: complex | None) -> None:
-        """The route begins on a circle."""
-        edge = circle.edge(here if here not in (None, circle.center) else circle.center + 1j)
-        self._run, self._pose = [], (edge, circle.direction(edge))
 
     def _turns_to(self, place: complex) -> bool:
         """Whether a line to a place begins with a turn, as where a circle was just left."""
         if len(self._run) > 1 or self._pose is None:
             return False
         way = place - self._pose[0]
-        return abs(way) > SHORTEST_M and abs(way / abs(way) - self._pose[1]) > SAME_DIRECTION
+        return abs(way - abs(way) * self._pose[1]) > SAME_DIRECTION * abs(way)
 
     def _join_from_far(self, item: int, circle: Circle, edge: complex, altitude: float) -> Pose:
         """Gets onto a circle as autopilots do that head for its centre: there is a corner where they join it."""
@@ -235,38 +223,17 @@ class _Build:
         angle = abs(cmath.phase(way / heading))
         return abs(way) < turn_m * (PAST_RADII if angle > PAST_RAD else math.tan(0.5 * angle))
 
-    def _target(self, number: int, circle: Circle) -> complex | None:
-        """What the aircraft turns to as it leaves a circle; None where it goes on round it or straight."""
-        step = next(iter(self._steps[number + 1 : number + 2]), None)
-        if step is None or step.place is None or step.loiter is None:
-            return step.place if step else None
-        place = step.place
-        if abs(place - circle.center) < SAME_PLACE_M:
-            return None
-        # From circle to circle along a common tangent: both ends are found in turns.
-        wide_m = step.loiter.radius_m or self._flying.turn_radius_m(self._mps)
-        other = Circle(place, wide_m, -1 if step.loiter.clockwise else 1)
-        aim: complex = place
-        for _ in range(0 if self._flying.heads_for_centres else 50):
-            leave = circle.left_to(aim)
-            touch = None if leave is None else other.joined_from(leave)
-            if touch is None:
-                break
-            aim = touch
-        return aim
-
     def _turn(self, rows: Sequence[Row]) -> Pose | None:
         """Adds a way that is flown as it is, whatever the law."""
         if rows:
-            along = (self._length_m, self._length_m + length_of(rows))
+            along = (self._length_m, self._length_m + sum(row[5] for row in rows))
             self._legs.append(MissionLeg(Route(np.array(rows)), along))
         return self._append(rows)
 
     def _append(self, rows: Sequence[Row]) -> Pose | None:
         """Adds lines and arcs as they are."""
         for row in rows:
-            places, along = sampled(row, math.ceil(row[5] / SAMPLE_M))
-            self._given.append(np.column_stack((places.real, places.imag, self._length_m + along)))
+            self._given.append(np.add(sampled(row, math.ceil(row[5] / SAMPLE_M)), (0.0, 0.0, self._length_m)))
             self.rows.append(row)
             self._length_m += row[5]
             self._pose = end_of(row)
@@ -283,7 +250,7 @@ class _Build:
         if np.hypot(*(points - points[0]).T).max() > SAME_PLACE_M:
             way = rounded(run, self._flying)
             stations = begins_m + way.stations_of(points)
-            self._given.append(way.given_m + np.array((0.0, 0.0, begins_m)))
+            self._given.append(np.add(way.given_m, (0.0, 0.0, begins_m)))
             self._corners += [
                 replace(
                     each, waypoint=run[each.waypoint].item or 0, arc_length_m=each.arc_length_m + begins_m

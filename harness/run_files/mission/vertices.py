@@ -34,17 +34,11 @@ def corner_limit_m(acceptance_m: float, corner_m: float | None) -> float:
 class Flying:
     """What a mission is flown with.
 
-    Attributes:
-        airspeed_mps: before the mission says otherwise.
-        airspeed_range_mps: what the aircraft holds.
-        turn_radius_m: for a turn at an airspeed that leaves the aircraft bank in hand.
-        climb_mps: fastest climb and descent at an airspeed.
-        free_cut_m: a corner may be passed at this distance only to make its arc wider.
-        ground: height of the ground; None: not known, then it is taken to be as high as home.
-        least_radius_m: of a turn at the bank limit at an airspeed, in calm air.
-        heads_for_centres: a loiter is flown to as far as its circle on the line to its centre; else along a tangent.
-        corner_m: how far off every corner may be passed; None: as its item says, else `CORNER_M`.
-        wind_mps: east + i north where the wind blows to.
+    The airspeed is that before the mission says otherwise, the range what the aircraft holds. Functions of the airspeed
+    are the turn radius with bank in hand, the fastest climb and descent, and the least radius, at the bank limit in
+    calm air. A corner may be passed at `free_cut_m` only to make its arc wider, and at `corner_m`, by default as its
+    item says, at the most. Without `ground` it is as high as home. Where it `heads_for_centres`, the aircraft flies
+    towards the centre of a loiter up to its circle, else along a tangent. The wind is east + i north where it blows to.
     """
 
     airspeed_mps: float
@@ -62,12 +56,9 @@ class Flying:
 class Vertex(NamedTuple):
     """A place that is flown to, east + i north, at an altitude above mean sea level.
 
-    Attributes:
-        item: number of its item; None where it has none, as where a circle is joined.
-        acceptance_m: how far off it may be passed; 0 where its item does not say.
-        agl_m: height above ground that is held on the way to it; None: the altitude is linear.
-        centre: of the circle that it lies on, for which the aircraft heads.
-        asked_mps: airspeed that the mission asks for on the way to it, not always that which is flown.
+    Where a circle is joined it has no item. An acceptance of 0 is that of an item that does not say. A height above
+    ground (`agl_m`) is held on the way to it, else the altitude is linear. The centre is that of the circle that it
+    lies on and for which the aircraft heads. The mission asks for `asked_mps` on the way to it.
     """
 
     place: complex
@@ -82,15 +73,10 @@ class Vertex(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MissionRoute:
-    """A mission as it is flown.
+    """A mission as it is flown: lines and arcs, whose corners have the numbers of their items, altitude and airspeed.
 
-    Attributes:
-        way: lines and arcs; its corners have the numbers of their items.
-        profile: altitude and airspeed along it.
-        asked_mps: the airspeeds that the mission asks for, as those of the profile; the aircraft may not hold them.
-        marks: item and arc length where each is reached.
-        notes: what was assumed, a line each.
-        legs: the mission leg by leg, for a law that flies to its waypoints.
+    The mission asks for the airspeeds `asked_mps`, which the aircraft may not hold. Marks are item and arc length where
+    each is reached, legs are for a law that flies to waypoints, notes say what was assumed.
     """
 
     way: FlyBy
@@ -119,12 +105,12 @@ def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:
 
     Places that only mark where a circle is joined or left are passed.
     """
-    legs = []
-    for (begin, end), along in zip(pairwise(run), pairwise(stations_m.tolist()), strict=True):
-        if abs(end.place - begin.place) > SAME_PLACE_M:
-            acceptance_m = 0.0 if end.item is None else end.acceptance_m or None
-            legs.append(straight((begin.place, end.place), along, acceptance_m, end.centre))
-    return legs
+    pairs = zip(pairwise(run), pairwise(stations_m.tolist()), strict=True)
+    return [
+        straight((a.place, b.place), along, 0.0 if b.item is None else b.acceptance_m or None, b.centre)
+        for (a, b), along in pairs
+        if abs(b.place - a.place) > SAME_PLACE_M
+    ]
 
 
 def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, before_m: float) -> float:

@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 from collections.abc import Callable
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -22,7 +21,7 @@ from aircraft.frames import LocalPlane
 from harness.cli.app import main
 from harness.flight.record import FloatArray
 from harness.run_files.exports import FORMATS, planned_points
-from harness.run_files.path_files import PathAsGiven, read_path
+from harness.run_files.path_files import read_path
 from harness.run_files.run_folder import Run, load_run
 from harness.scenario.scenario import parse_scenario
 from harness.scenario.sections import Origin
@@ -32,12 +31,12 @@ Export = Callable[..., str]
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A flight far from the origin of its plane, where the meridians lean, in wind."""
+    """A flight across 180 degrees, far from the origin of its plane, where the meridians lean, in wind."""
     folder = tmp_path_factory.mktemp("export")
     (folder / "far.yaml").write_text(
         "schema: wayproof/scenario/1\n"
         "name: far\n"
-        "area: {bounds_m: [80000, 60000, 88000, 68000], origin: {latitude_deg: 61.0, longitude_deg: 179.5}}\n"
+        "area: {bounds_m: [80000, 60000, 88000, 68000], origin: {latitude_deg: 61.0, longitude_deg: 178.45}}\n"
         "obstacles: [{circle: {center_m: [83500, 63600], radius_m: 400}}]\n"
         "mission: {start_m: [81000, 61000], goal_m: [86000, 66000], altitude_m: 450}\n"
         "environment: {wind: {speed_mps: 5, from_deg: 200}}\n"
@@ -139,13 +138,7 @@ def test_geojson_is_read_by_geojson(what: str, export: Export, run: Run) -> None
     longitude, latitude, altitude = zip(*feature.geometry.coordinates, strict=True)
     assert_same_line(in_plane(run, list(latitude), list(longitude)), line_of(run, what))
     assert np.array(altitude) == pytest.approx(450.0, abs=1.0)
-    figures = feature.properties.pop("coordinateProperties")
     assert feature.properties == {"name": "far", "what": what, "airspeed_mps": 25.0}
-    assert {len(column) for column in figures.values()} == {len(longitude)}
-    assert figures["time_s"] == sorted(figures["time_s"])
-    started = datetime.fromisoformat(str(run.manifest["started_utc"]))
-    since = [(datetime.fromisoformat(date) - started).total_seconds() for date in figures["times"]]
-    assert since == pytest.approx(figures["time_s"], abs=2e-3)
 
 
 @pytest.mark.parametrize("what", ["flown", "planned"])
@@ -193,7 +186,7 @@ def test_what_its_user_should_know_is_said(
     copy = tmp_path / "copy"
     shutil.copytree(run.folder, copy)
     place = "area.origin is 47, 8, as where a scenario gives none: the file lies there\n"
-    text = run.scenario_yaml.replace("latitude_deg: 61.0", "latitude_deg: 47.0").replace("179.5", "8.0")
+    text = run.scenario_yaml.replace("latitude_deg: 61.0", "latitude_deg: 47.0").replace("178.45", "8.0")
     assert parse_scenario(text).area.origin == Origin()
     (copy / "scenario.yaml").write_text(text)
     ended: dict[str, Any] = {"outcome": "collision", "reason": "inside an obstacle by 2.4 m"}
@@ -225,42 +218,20 @@ def test_a_folder_without_a_run_and_a_file_without_a_folder_are_refused(
     assert "a.kml: cannot be written" in capsys.readouterr().err
 
 
-@pytest.fixture(scope="module")
-def crossing(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A flight from 1.5 km west of 180 degrees to 1.5 km east of it, round an obstacle that lies on it."""
-    folder = tmp_path_factory.mktemp("crossing")
-    (folder / "w.yaml").write_text(
-        "schema: wayproof/scenario/1\nname: taveuni\n"
-        "area: {bounds_m: [-2500, -2000, 2500, 2000], origin: {latitude_deg: -16.8, longitude_deg: 180.0}}\n"
-        "obstacles: [{circle: {center_m: [0, 100], radius_m: 500}}]\n"
-        "mission: {start_m: [-1500, 0], goal_m: [1500, 0]}\n"
-    )
-    assert (
-        main(["fly", str(folder / "w.yaml"), "--out", str(folder / "run"), "--no-recording", "--quiet"]) == 0
-    )
-    return load_run(folder / "run")
-
-
 @pytest.mark.parametrize("form", list(FORMATS))
-def test_longitudes_are_within_half_a_turn(form: str, crossing: Run, tmp_path: Path) -> None:
-    out = tmp_path / f"path.{form}"
-    assert main(["export", str(crossing.folder), "--format", form, "--out", str(out)]) == 0
-    read = read_path(out)
-    plane = plane_of_path(read)
+def test_longitudes_are_within_half_a_turn(form: str, export: Export, run: Run) -> None:
+    text = Path(export(form)).read_text()
+    read = read_path(Path(export(form)))
+    assert read.origin_deg is not None
+    plane = LocalPlane(*read.origin_deg)
     degrees = np.transpose([plane.geodetic(*point) for point in read.points_m.tolist()]).tolist()
-    assert_same_line(in_plane(crossing, *degrees), line_of(crossing, "flown"))
+    assert_same_line(in_plane(run, *degrees), line_of(run, "flown"))
     if form == "geojson":  # it goes on beyond 180 degrees instead
-        (feature,) = geojson.loads(out.read_text()).features
+        (feature,) = geojson.loads(text).features
         west, _, east, _ = shapely.geometry.shape(feature.geometry).bounds
-        assert east - west < 0.03
+        assert east - west < 0.2
         return
-    numbers = re.findall(r"-?1[78]\d\.\d{6,}", out.read_text())
+    numbers = re.findall(r"-?1[78]\d\.\d{6,}", text)
     assert len(numbers) > 10
     assert {float(number) > 0.0 for number in numbers} == {True, False}
     assert max(abs(float(number)) for number in numbers) <= 180.0
-
-
-def plane_of_path(path: PathAsGiven) -> LocalPlane:
-    """The plane of a path in degrees."""
-    assert path.origin_deg is not None
-    return LocalPlane(*path.origin_deg)

@@ -60,23 +60,8 @@ FLIGHT = [
 ]
 
 
-def test_a_line_of_kml_with_its_altitudes_and_fences(tmp_path: Path) -> None:
-    path = tmp_path / "a.kml"
-    path.write_text(kml(more=ZONE + "<Placemark><Point><coordinates>8,47</coordinates></Point></Placemark>"))
-    given = read_path(path)
-    assert (given.origin_deg, given.altitudes_m.tolist()) == ((47.0, 8.0), [500.0, 520.0, 540.0])
-    (fence,) = given.fences.every
-    assert (fence.name, fence.inclusion, len(fence.rings[0])) == ("zone", False, 4)
-    assert given.notes == ("1 Point beside the path passed over",)
-
-
-def kmz(doc: str | bytes | None = None, **others: str | bytes) -> bytes:
-    """An archive with a doc.kml, or none; in the names of others __ stands for a dot and ___ for a slash."""
-    named = {name.replace("___", "/").replace("__", "."): content for name, content in others.items()}
-    return archive_of({**named, **({} if doc is None else {"doc.kml": doc})})
-
-
-def archive_of(files: dict[str, str | bytes]) -> bytes:
+def kmz(files: dict[str, str | bytes]) -> bytes:
+    """An archive of files by their names."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
@@ -88,16 +73,17 @@ def archive_of(files: dict[str, str | bytes]) -> bytes:
 def test_a_line_of_kmz_is_that_of_its_kml(name: str, tmp_path: Path) -> None:
     """An archive called .kml is one, too; what macOS adds to archives has the endings of files and no content."""
     path = tmp_path / name
-    path.write_bytes(archive_of({"__MACOSX/._line.kml": b"\0", "._a.kml": b"\0", "line.kml": kml(more=ZONE)}))
+    more = ZONE + "<Placemark><Point><coordinates>8,47</coordinates></Point></Placemark>"
+    path.write_bytes(kmz({"__MACOSX/._line.kml": b"\0", "._a.kml": b"\0", "line.kml": kml(more=more)}))
     given = read_path(path)
     assert (given.origin_deg, given.altitudes_m.tolist()) == ((47.0, 8.0), [500.0, 520.0, 540.0])
-    assert ([fence.name for fence in given.fences.every], given.notes) == (["zone"], ())
+    assert given.notes == ("1 Point beside the path passed over", "1 Polygon beside the path passed over")
     path.write_text(kml())
     assert read_path(path).altitudes_m.tolist() == [500.0, 520.0, 540.0]
 
 
 def locked() -> bytes:
-    data = bytearray(kmz(kml()))
+    data = bytearray(kmz({"doc.kml": kml()}))
     data[6] |= 1
     data[data.index(b"PK\1\2") + 8] |= 1
     return bytes(data)
@@ -106,14 +92,14 @@ def locked() -> bytes:
 @pytest.mark.parametrize(
     ("data", "sentence"),
     [
-        (kmz(a__kml=kml(), b__kml=kml()), ": is a ZIP archive with 2 .kml files (a.kml, b.kml); must have one"),
-        (kmz(image__png=b"1"), ": is a ZIP archive without a .kml file"),
-        (kmz(kml())[:-9], ": is a damaged ZIP archive; get it again"),
-        (kmz(b" " * 64_000_001), ": unpacks to more than 64 MB; must be one .kml file"),
+        (kmz({"a.kml": kml(), "b.kml": kml()}), ": is a ZIP archive with 2 .kml files (a.kml, b.kml); must have one"),
+        (kmz({"image.png": b"1"}), ": is a ZIP archive without a .kml file"),
+        (kmz({"doc.kml": kml()})[:-9], ": is a damaged ZIP archive; get it again"),
+        (kmz({"doc.kml": b" " * 64_000_001}), ": unpacks to more than 64 MB; must be one .kml file"),
         (locked(), ": is a ZIP archive that cannot be unpacked (File 'doc.kml' is encrypted, password required for"),
-        (kmz(b"\0"), " (doc.kml):1: is not whole XML"),
-        (kmz(kml()[:-20]), " (doc.kml):2: is not whole XML"),
-        (kmz(kml("8,47,5 8.1,far,5")), " (doc.kml): way: point 1: is 'far'; must be a finite number"),
+        (kmz({"doc.kml": b"\0"}), " (doc.kml):1: is not whole XML"),
+        (kmz({"doc.kml": kml()[:-20]}), " (doc.kml):2: is not whole XML"),
+        (kmz({"doc.kml": kml("8,47,5 8.1,far,5")}), " (doc.kml): way: point 1: is 'far'; must be a finite number"),
         (b"PK\3\4", ": is a damaged ZIP archive; get it again"),
     ],
 )  # fmt: skip

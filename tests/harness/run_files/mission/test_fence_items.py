@@ -47,7 +47,7 @@ def test_a_fence_about_home(tmp_path: Path) -> None:
     assert (circle.inclusion, circle.center, circle.radius_m) == (True, (47.0, 8.0), 50.0)
     path = tmp_path / "fence.txt"
     path.write_text("QGC WPL 110\n0 0 0 5005 50 0 0 0 0 0 0 0\n")
-    with pytest.raises(InputError, match="no items to fly to, but 1 fence item"):
+    with pytest.raises(InputError, match="no items to fly to, but 1 fence item and 0 rally points"):
         read_path(path)
     with pytest.raises(InputError, match="is a fence about home, which has no position"):
         read_world(path, None, Reading())
@@ -119,7 +119,7 @@ def test_items_are_counted_by_lines_where_their_numbers_leave_it_open() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (wpl(*RALLY), "has no items to fly to, but 2 rally points"),
+        (wpl(*RALLY), "has no items to fly to, but 0 fence items and 2 rally points"),
         (wpl(*INSIDE, *RALLY[:1]), "no items to fly to, but 4 fence items and 1 rally point; `wayproof"),
         (wpl(*WAYPOINTS, *INSIDE[:3]), ":5: item 3 begins a fence of 4 corners, of which 3 follow"),
         (wpl(*WAYPOINTS, (5003, 0.0, 47.0, 8.0)), ":5: item 3 is a fence of radius 0 m"),
