@@ -13,6 +13,7 @@ from harness.flight.record import Track
 from harness.run_files.fences import Fences
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.world import World
+from tests.harness.conftest import track as make_track
 
 MakeTrack = Callable[..., Track]
 BOUNDS = (-1e4, -1e4, 1e4, 1e4)
@@ -23,7 +24,7 @@ def box(name: str, inclusion: bool, west: float, south: float, east: float, nort
 
 
 @pytest.fixture
-def northward(make_track: MakeTrack) -> Callable[[World], Track]:
+def northward() -> Callable[[World], Track]:
     """1 km to the north, a row every 2.5 m."""
 
     def flown(world: World) -> Track:

@@ -12,6 +12,7 @@ import shapely
 from harness.analysis.deviation import allowed_m, deviation, distances_m
 from harness.flight.record import FloatArray, Track
 from harness.run_files.given_path import CutCorner
+from tests.harness.conftest import track as make_track
 
 MakeTrack = Callable[..., Track]
 
@@ -40,7 +41,7 @@ def test_another_leg_of_the_path_does_not_count() -> None:
     assert distances_m(back, way, 3000.0).tolist() == [0.0, 0.0]
 
 
-def test_a_track_is_measured_both_ways(make_track: MakeTrack) -> None:
+def test_a_track_is_measured_both_ways() -> None:
     """The path has a spike of 500 m that the track leaves out: all rows are on the path, the spike is 500 m away."""
     given = np.array([(0.0, 0.0, 0.0), (0.0, 1000.0, 1000.0), (500.0, 1000.0, 1000.0), (0.0, 1000.0, 1000.0)])
     given = np.concatenate((given, [(0.0, 2000.0, 2000.0)]))
@@ -52,14 +53,14 @@ def test_a_track_is_measured_both_ways(make_track: MakeTrack) -> None:
     assert found.by_row_m[100] < 1e-9
 
 
-def test_what_was_not_flown_yet_is_not_compared(make_track: MakeTrack) -> None:
+def test_what_was_not_flown_yet_is_not_compared() -> None:
     found = deviation(make_track(401), line((0.0, 0.0), (0.0, 1000.0), (5000.0, 1000.0)), 10.0, 400.0)
     assert found.figures() == pytest.approx({"p95": 0.0, "max": 0.0}, abs=1e-9)
     before = make_track(3, arc_length_m=math.nan, plan_index=-1)
     assert deviation(before, line((0.0, 0.0), (0.0, 1.0)), 1.0, 1.0).figures() == {"p95": None, "max": None}
 
 
-def test_a_corner_may_be_cut_by_its_own_figure(make_track: MakeTrack) -> None:
+def test_a_corner_may_be_cut_by_its_own_figure() -> None:
     track = make_track(401)
     corners = [
         CutCorner(1, 0.0, along_m, 90.0, 80.0, 33.0, along_m, half_m, allowed_cut)

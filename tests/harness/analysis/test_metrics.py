@@ -17,7 +17,10 @@ from harness.analysis.metrics import (
 )
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
 from planner.interface import Path
+from tests.harness.conftest import plan as make_plan
+from tests.harness.conftest import track as make_track
 
+STRAIGHT = make_plan([(0.0, 0.0, 0.0, 1.0, 0.0, 5000.0)])
 LIMITS = FlightLimits(300.0, 200.0, math.radians(45), turn_radius_m=110.0, max_cross_track_m=20.0)
 KEYS = {
     "shield", "outcome", "reason", "flown_length_m", "planned_length_m", "flight_time_s", "min_clearance_m",
@@ -33,7 +36,7 @@ def flight(track: Track, *plans: AcceptedPlan, outcome: Outcome = Outcome.REACHE
     return Flight(track, plans, outcome, "because", (1.0, 2.0, 3.0), 10.0, 0.5)
 
 
-def test_figures_of_a_straight_flight(make_track: Callable[..., Track], straight_plan: AcceptedPlan) -> None:
+def test_figures_of_a_straight_flight() -> None:
     track = make_track(
         101,
         up_m=np.repeat([299.0, 301.0], [1, 100]),
@@ -42,7 +45,7 @@ def test_figures_of_a_straight_flight(make_track: Callable[..., Track], straight
         load_factor=np.repeat([1.0, 1.4], [100, 1]),
         roll_command_deg=np.repeat([0.0, -45.0], [100, 1]),
     )
-    figures = metrics(flight(track, straight_plan), LIMITS)
+    figures = metrics(flight(track, STRAIGHT), LIMITS)
     assert set(figures) == KEYS
     assert (figures["outcome"], figures["reason"]) == ("reached", "because")
     assert figures["flown_length_m"] == pytest.approx(250.0)
@@ -63,11 +66,9 @@ def test_figures_of_a_straight_flight(make_track: Callable[..., Track], straight
     assert figures["digest"] == digest(track)
 
 
-def test_the_least_height_above_ground_is_over_what_is_known(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
+def test_the_least_height_above_ground_is_over_what_is_known() -> None:
     track = make_track(10, altitude_above_ground_m=np.repeat([120.0, np.nan, 80.0], [4, 3, 3]))
-    assert metrics(flight(track, straight_plan), LIMITS)["min_altitude_above_ground_m"] == 80.0
+    assert metrics(flight(track, STRAIGHT), LIMITS)["min_altitude_above_ground_m"] == 80.0
 
 
 def test_smoothness_of_planned_and_flown_agree_on_a_circle(
@@ -80,7 +81,7 @@ def test_smoothness_of_planned_and_flown_agree_on_a_circle(
     assert figures["planned"]["bending_energy_1pm"] == pytest.approx(1500.0 / 500.0**2, rel=1e-3)
 
 
-def test_what_does_not_exist_is_null(make_track: Callable[..., Track]) -> None:
+def test_what_does_not_exist_is_null() -> None:
     track = make_track(30, plan_index=-1, cross_track_m=np.nan, arc_length_m=np.nan, clearance_m=np.inf)
     empty = replace(flight(track, outcome=Outcome.PLANNER_FAILED), compute_ms=(), wall_s=0.0)
     figures = metrics(empty, LIMITS)
@@ -94,14 +95,12 @@ def test_what_does_not_exist_is_null(make_track: Callable[..., Track]) -> None:
     assert json.loads(json.dumps(figures, allow_nan=False)) == figures
 
 
-def test_flight_without_a_track_has_no_metrics(make_track: Callable[..., Track]) -> None:
+def test_flight_without_a_track_has_no_metrics() -> None:
     with pytest.raises(ValueError, match="without a track"):
         metrics(flight(make_track(0)), LIMITS)
 
 
-def test_planned_length_survives_frequent_replanning(
-    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> None:
+def test_planned_length_survives_frequent_replanning() -> None:
     """A new plan every second, each from where the aircraft is: nothing is lost between them."""
     rows = np.arange(1001)
     track = make_track(1001, plan_index=rows // 10, arc_length_m=2.5 * (rows % 10))
@@ -111,7 +110,7 @@ def test_planned_length_survives_frequent_replanning(
 
 
 def test_planned_length_counts_every_round_of_a_loiter_and_nothing_beyond_an_end(
-    make_track: Callable[..., Track], circle_plan: AcceptedPlan
+    circle_plan: AcceptedPlan,
 ) -> None:
     once = circle_plan.plan.path
     assert once is not None
@@ -142,40 +141,32 @@ def test_lost_returns_are_shares_of_what_beams_met() -> None:
     assert lost_returns(None) == {"share": None, "max": None}
 
 
-def test_a_plan_is_as_late_as_the_scan_it_knew_is_old(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
-    plans = [replace(straight_plan, time_s=2.0 * late, scan_s=late) for late in (0.5, 2.5)]
-    unsensed = replace(straight_plan, time_s=9.0)
+def test_a_plan_is_as_late_as_the_scan_it_knew_is_old() -> None:
+    plans = [replace(STRAIGHT, time_s=2.0 * late, scan_s=late) for late in (0.5, 2.5)]
+    unsensed = replace(STRAIGHT, time_s=9.0)
     delays = metrics(flight(make_track(30), *plans, unsensed), LIMITS)["plan_delay_s"]
     assert delays == {"p50": 1.5, "p99": pytest.approx(2.48), "max": 2.5}
 
 
-def test_a_jump_of_the_believed_position_is_from_row_to_row(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
+def test_a_jump_of_the_believed_position_is_from_row_to_row() -> None:
     """A steady drift is none, however far it leads; what is not known is left out."""
     rows = np.arange(101)
     off_m = 0.2 * rows - np.where(rows >= 60, 30.0, 0.0)
     north_m = make_track(101).north_m + np.where(rows == 80, np.nan, 0.0)
     believed = {"believed_up_m": 300.0, "believed_course_deg": 0.0, "believed_cross_track_m": 0.0}
     track = make_track(101, believed_east_m=off_m, believed_north_m=north_m, **believed)
-    assert metrics(flight(track, straight_plan), LIMITS)["navigation_jump_m"] == pytest.approx(29.8)
+    assert metrics(flight(track, STRAIGHT), LIMITS)["navigation_jump_m"] == pytest.approx(29.8)
 
 
 @pytest.mark.parametrize(("clearance_m", "violation_s"), [(200.0, 0.0), (199.9, 4.9)])
-def test_exactly_the_wanted_clearance_is_no_violation(
-    clearance_m: float, violation_s: float, make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
-    figures = metrics(flight(make_track(50, clearance_m=clearance_m), straight_plan), LIMITS)
+def test_exactly_the_wanted_clearance_is_no_violation(clearance_m: float, violation_s: float) -> None:
+    figures = metrics(flight(make_track(50, clearance_m=clearance_m), STRAIGHT), LIMITS)
     assert figures["clearance_violation_s"] == pytest.approx(violation_s)
 
 
-def test_a_contact_between_two_rows_is_below_the_wanted_clearance(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
+def test_a_contact_between_two_rows_is_below_the_wanted_clearance() -> None:
     """What is thinner than the way from row to row: both rows may be clear of it."""
-    hit = replace(flight(make_track(50, clearance_m=250.0), straight_plan), contact_m=-0.5)
+    hit = replace(flight(make_track(50, clearance_m=250.0), STRAIGHT), contact_m=-0.5)
     figures = metrics(hit, LIMITS)
     assert figures["min_clearance_m"] == -0.5
     assert figures["clearance_violation_s"] == pytest.approx(0.1)

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -17,8 +16,10 @@ from harness.analysis.smoothness import (
     smoothness,
     stations_in_effect,
 )
-from harness.flight.record import AcceptedPlan, Track
+from harness.flight.record import AcceptedPlan
 from planner.interface import Path, Plan, PlanStatus
+from tests.harness.conftest import plan as make_plan
+from tests.harness.conftest import track as make_track
 
 
 def profile(*pieces: tuple[float, float]) -> Profile:
@@ -53,21 +54,12 @@ def test_clothoid_in_closed_form() -> None:
     assert figures.max_curvature_rate_1pm2 == pytest.approx(rate, rel=1e-6)
 
 
-def test_line_into_arc_has_the_rate_of_the_window() -> None:
-    figures = smoothness(profile((300.0, 0.0), (200.0, 0.01), (300.0, 0.0)), 25.0)
-    assert figures.max_curvature_rate_1pm2 == pytest.approx(0.01 / 25.0)
-    reverse = smoothness(profile((300.0, 0.01), (300.0, -0.01)), 25.0)
-    assert reverse.max_curvature_rate_1pm2 == pytest.approx(0.02 / 25.0)
-
-
-def test_flown_course_through_north_does_not_jump(make_track: Callable[..., Track]) -> None:
+def test_flown_course_through_north_does_not_jump() -> None:
     course = np.where(np.arange(100) % 2, 359.999, 0.001)
     assert smoothness(flown_profile(make_track(100, course_deg=course)), 25.0).heading_change_deg < 0.5
 
 
-def test_planned_counts_only_what_was_in_effect(
-    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> None:
+def test_planned_counts_only_what_was_in_effect() -> None:
     """1000 m of a line whose arc is never reached, then 500 m of an arc of 1000 m radius."""
     plans = [
         make_plan([(0, 0, 0, 1, 0.0, 1500.0), (0, 1500, 0, 1, 0.01, 100.0)]),
@@ -83,9 +75,7 @@ def test_planned_counts_only_what_was_in_effect(
     assert figures.max_curvature_rate_1pm2 == pytest.approx(0.001 / 25.0)
 
 
-def test_planned_corner_is_turned_over_the_window(
-    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> None:
+def test_planned_corner_is_turned_over_the_window() -> None:
     """A polyline with a right angle: heading 90 deg, energy (pi / 2)^2 / w, curvature (pi / 2) / w."""
     polyline = make_plan([(0, 0, 0, 1, 0.0, 100.0), (0, 100, -1, 0, 0.0, 400.0)])
     figures = smoothness(planned_profile(make_track(101), [polyline], 25.0), 25.0)
@@ -117,9 +107,7 @@ def test_polyline_with_a_corner_turns_it_over_the_window() -> None:
 
 
 @pytest.mark.parametrize("end_turn", [0.0, 0.3])
-def test_the_turn_onto_a_new_plan_counts(
-    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan], end_turn: float
-) -> None:
+def test_the_turn_onto_a_new_plan_counts(end_turn: float) -> None:
     """North for 1000 m, the last part of it an arc, then a plan that begins at 0.5 rad to the right."""
     arc = (end_turn / 100.0, 100.0)
     out = 0.5
@@ -136,9 +124,7 @@ def test_the_turn_onto_a_new_plan_counts(
 
 
 @pytest.mark.parametrize(("loiter", "turned_rad"), [(True, 300.0 / 40.0), (False, math.tau)])
-def test_planned_goes_on_past_the_end(
-    make_track: Callable[..., Track], loiter: bool, turned_rad: float
-) -> None:
+def test_planned_goes_on_past_the_end(loiter: bool, turned_rad: float) -> None:
     """300 m along a circle of 251 m circumference, flown for ever or left at its end."""
     path = Path(np.array([[0, 0, 0, 1, 1 / 40.0, math.tau * 40.0]]), loiter)
     plan = AcceptedPlan(0, 0.0, 1.0, Plan(PlanStatus.FOUND, "", path=path))
@@ -146,7 +132,7 @@ def test_planned_goes_on_past_the_end(
     assert figures.heading_change_deg == pytest.approx(math.degrees(turned_rad))
 
 
-def test_rows_before_the_first_plan_do_not_count(make_track: Callable[..., Track]) -> None:
+def test_rows_before_the_first_plan_do_not_count() -> None:
     index = np.repeat([-1, 0], 50)
     station = np.where(index < 0, np.nan, 10.0 + 2.5 * (np.arange(100) - 50))
     assert stations_in_effect(make_track(100, plan_index=index, arc_length_m=station)) == [(0, 10.0, 132.5)]

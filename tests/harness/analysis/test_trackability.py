@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,9 +9,12 @@ import pytest
 
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.trackability import legs
-from harness.flight.record import AcceptedPlan, FloatArray, Track
+from harness.flight.record import FloatArray, Track
 from harness.run_files.given_path import CutCorner
+from tests.harness.conftest import plan as make_plan
+from tests.harness.conftest import track as make_track
 
+STRAIGHT = make_plan([(0.0, 0.0, 0.0, 1.0, 0.0, 5000.0)])
 LIMITS = FlightLimits(300.0, 50.0, math.radians(45), turn_radius_m=110.0, max_cross_track_m=5.0)
 OFF = np.where(np.abs(np.arange(201) - 100) < 20, 6.0, 0.0)
 
@@ -24,19 +26,15 @@ def test_the_navigation_margin_comes_on_top_of_the_cross_track_limit_and_of_no_o
 
 
 @pytest.mark.parametrize(("error_m", "trackable"), [(5.0, True), (-5.0, True), (5.1, False), (-5.1, False)])
-def test_leg_is_trackable_up_to_the_threshold(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan, error_m: float, trackable: bool
-) -> None:
+def test_leg_is_trackable_up_to_the_threshold(error_m: float, trackable: bool) -> None:
     error = np.minimum(np.arange(201) / 100.0, 1.0) * error_m
-    (leg,) = legs(make_track(201, cross_track_m=error), [straight_plan], LIMITS)
+    (leg,) = legs(make_track(201, cross_track_m=error), [STRAIGHT], LIMITS)
     assert (leg.start_s, leg.end_s, leg.max_cross_track_m) == (0.0, 20.0, abs(error_m))
     assert leg.trackable is trackable
     assert leg.cause == (None if trackable else "tracking error")
 
 
-def test_each_plan_is_a_leg_and_short_ones_join_a_neighbour(
-    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> None:
+def test_each_plan_is_a_leg_and_short_ones_join_a_neighbour() -> None:
     """Plans flown for 10 s, 2 s, 3 s, 10 s and 1 s, after 1 s without any."""
     index = np.repeat([-1, 0, 1, 2, 3, 4], [10, 100, 20, 30, 100, 10])
     plans = [make_plan([(0, 0, 0, 1, 0.0, 5000.0)], index=i) for i in range(5)]
@@ -44,24 +42,17 @@ def test_each_plan_is_a_leg_and_short_ones_join_a_neighbour(
     assert [(leg.start_s, leg.end_s) for leg in judged] == [(1.0, 10.9), (11.0, 26.9)]
 
 
-def test_one_short_plan_is_still_judged(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
-    (leg,) = legs(make_track(10, cross_track_m=9.0), [straight_plan], LIMITS)
+def test_one_short_plan_is_still_judged() -> None:
+    (leg,) = legs(make_track(10, cross_track_m=9.0), [STRAIGHT], LIMITS)
     assert leg.trackable is False
 
 
-def test_without_a_plan_there_is_no_leg(make_track: Callable[..., Track]) -> None:
+def test_without_a_plan_there_is_no_leg() -> None:
     assert legs(make_track(100, plan_index=-1), [], LIMITS) == ()
 
 
 @pytest.mark.parametrize(("course_deg", "cause"), [(0.0, "turn radius too tight"), (90.0, "bank limit")])
-def test_a_first_plan_that_leads_off_sideways_is_a_corner(
-    make_track: Callable[..., Track],
-    make_plan: Callable[..., AcceptedPlan],
-    course_deg: float,
-    cause: str,
-) -> None:
+def test_a_first_plan_that_leads_off_sideways_is_a_corner(course_deg: float, cause: str) -> None:
     """The plan leads east. Who flies north when it takes effect is asked for a right angle on the spot."""
     off = np.minimum(np.arange(151) / 2.0, 40.0)
     track = make_track(
@@ -75,9 +66,7 @@ def test_a_first_plan_that_leads_off_sideways_is_a_corner(
     assert legs(track, [east], LIMITS)[0].cause == cause
 
 
-def test_cause_is_a_corner_that_is_overshot(
-    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> None:
+def test_cause_is_a_corner_that_is_overshot() -> None:
     """The aircraft flies on past a right angle at 250 m; the nearest point of the plan stays there."""
     corner = make_plan([(0, 0, 0, 1, 0.0, 250.0), (0, 250, 1, 0, 0.0, 900.0)])
     along = np.minimum(25.0 * np.arange(151) / 10.0, 250.0)
@@ -109,10 +98,10 @@ WIDE = replace(
     ],
 )  # fmt: skip
 def test_altitude_airspeed_and_load_factor_have_limits_too(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan, columns: dict[str, Any], cause: str | None
+    columns: dict[str, Any], cause: str | None
 ) -> None:
     """Speed is judged over 20 s and load factor over 1 s: not gust by gust."""
-    (leg,) = legs(make_track(601, **columns), [straight_plan], WIDE)
+    (leg,) = legs(make_track(601, **columns), [STRAIGHT], WIDE)
     assert leg.cause == cause
     assert leg.trackable is (cause is None)
 
@@ -135,14 +124,12 @@ def as_given(track: Track, corners: list[CutCorner], off_m: FloatArray, allowed_
     )
 
 
-def test_corners_end_legs_and_belong_to_the_leg_that_they_end(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
+def test_corners_end_legs_and_belong_to_the_leg_that_they_end() -> None:
     corners = [passed(500.0, 49.0, 1), passed(1000.0, 51.0, 2)]
     track = make_track(601)
     off = np.where(np.abs(track.arc_length_m - 1000.0) < 30.0, 51.0, 3.0)
     given = as_given(track, corners, off, 50.0)
-    judged = legs(track, [straight_plan], LIMITS, given=given)
+    judged = legs(track, [STRAIGHT], LIMITS, given=given)
     assert [
         (leg.end_s, leg.waypoint, leg.corner_cut_m, leg.max_deviation_m, leg.cause) for leg in judged
     ] == [
@@ -152,7 +139,7 @@ def test_corners_end_legs_and_belong_to_the_leg_that_they_end(
     ]
     # What lies beyond a corner counts as well, however near the track is to the arcs that were made of the path.
     beyond = as_given(track, corners, np.where(track.arc_length_m > 1100.0, 51.0, 3.0), 50.0)
-    tracked = [leg.trackable for leg in legs(track, [straight_plan], LIMITS, given=beyond)]
+    tracked = [leg.trackable for leg in legs(track, [STRAIGHT], LIMITS, given=beyond)]
     assert tracked == [True, True, False]
 
 
@@ -165,17 +152,13 @@ def test_corners_end_legs_and_belong_to_the_leg_that_they_end(
         (-3.0, 1.0, "tracking error"),
     ],
 )  # fmt: skip
-def test_cause_is_the_wind_where_the_drift_is_downwind(
-    make_track: Callable[..., Track], straight_plan: AcceptedPlan, heading_deg: float, side: float, cause: str
-) -> None:
+def test_cause_is_the_wind_where_the_drift_is_downwind(heading_deg: float, side: float, cause: str) -> None:
     """Course north with the nose to the left: the wind blows from the left and drifts to the right."""
     track = make_track(201, cross_track_m=side * OFF, heading_deg=heading_deg % 360.0)
-    assert legs(track, [straight_plan], LIMITS)[0].cause == cause
+    assert legs(track, [STRAIGHT], LIMITS)[0].cause == cause
 
 
-def test_lost_control_is_on_the_last_leg(
-    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
-) -> None:
+def test_lost_control_is_on_the_last_leg() -> None:
     plans = [make_plan([(0, 0, 0, 1, 0.0, 5000.0)], index=i) for i in range(2)]
     track = make_track(200, plan_index=np.repeat([0, 1], 100))
     judged = legs(track, plans, LIMITS, "rolled over: roll 80 deg")
@@ -194,7 +177,7 @@ def test_lost_control_is_on_the_last_leg(
     ],
 )  # fmt: skip
 def test_a_navigation_error_is_told_where_the_true_error_is_largest(
-    believed_m: FloatArray, cause: str, make_track: Callable[..., Track], straight_plan: AcceptedPlan
+    believed_m: FloatArray, cause: str
 ) -> None:
     """A true error that grows to 14 m in altitude, or beside the plan, while the aircraft believes to be there."""
     off_m = np.linspace(0.0, 14.0, 201)
@@ -204,5 +187,5 @@ def test_a_navigation_error_is_told_where_the_true_error_is_largest(
         {"up_m": 300.0 + off_m, "believed_up_m": 300.0 + believed_m, "believed_cross_track_m": 0.0},
         {"cross_track_m": off_m, "believed_up_m": 300.0, "believed_cross_track_m": believed_m},
     ):
-        (leg,) = legs(make_track(201, **believed, **columns), [straight_plan], limits)
+        (leg,) = legs(make_track(201, **believed, **columns), [STRAIGHT], limits)
         assert leg.cause == cause

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
@@ -17,31 +17,25 @@ from harness.scenario import shipped
 from harness.scenario.kinds import guidance_kinds, planner_kinds
 
 
-def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
-    wanted = {
-        "scenarios": tuple(shipped.shipped_scenarios()),
-        "campaigns": tuple(shipped.shipped_campaigns()),
-    }
-    for what, named in wanted.items():
-        assert main(["list", what]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        assert tuple(line.split()[0] for line in lines) == named
-        assert all(len(line.split()) > 3 for line in lines)
-
-
-@pytest.mark.parametrize("what", ["scenarios", "campaigns"])
-def test_rows_go_on_below_themselves_in_a_narrow_terminal(
-    what: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("what", "named"), [("scenarios", shipped.shipped_scenarios), ("campaigns", shipped.shipped_campaigns)]
+)
+def test_shipped_files_are_listed_and_rows_go_on_below_themselves_in_a_narrow_terminal(
+    what: str,
+    named: Callable[[], Mapping[str, Path]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["list", what]) == 0
     piped = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in piped] == list(named())
+    assert all(len(line.split()) > 3 for line in piped)
     assert any(len(line) > 80 for line in piped)
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     assert main(["list", what]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert max(map(len, shown)) <= 80
-    assert [line.split()[0] for line in shown if line[0] != " "] == [line.split()[0] for line in piped]
     assert " ".join(shown).split() == " ".join(piped).split()
 
 

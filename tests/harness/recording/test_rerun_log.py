@@ -407,14 +407,11 @@ def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -
     assert [entry.application_id for entry in reader.recordings()] == ["wayproof"]
     layout = [chunk.entity_path for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks()]
     assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 14
-
-
-def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight]) -> None:
-    entities = read(recording[0])
+    entities = read(path)
     times = [
-        time for entity in entities if "sim_time" in entities[entity] for time in seconds(entities, entity)
+        time for entity, rows in entities.items() if "sim_time" in rows for time in seconds(entities, entity)
     ]
-    assert (min(times), max(times)) == (0.0, 100.0)
+    assert (min(times), max(times)) == (0.0, 100.0), "nothing lies before zero or after the end"
 
 
 def test_overlay_keeps_every_track_and_one_world(tmp_path: Path) -> None:
@@ -473,12 +470,17 @@ def test_overlaid_runs_have_names_of_their_own(folders: list[str], names: list[s
     assert run_names([Path(folder) for folder in folders]) == names
 
 
-def test_view_says_what_is_missing(tmp_path: Path) -> None:
+def test_view_says_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(RunFolderError, match=r"has no flight\.rrd"):
         open_viewer([tmp_path])
     (tmp_path / "flight.rrd").write_bytes(b"not a recording")
     with pytest.raises(RunFolderError, match="recording"):
         open_viewer([tmp_path, tmp_path], web=True)
+    for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(screen, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(ViewerError, match=r"no screen.*wayproof view --web"):
+        open_viewer([tmp_path])
 
 
 @pytest.mark.flights
@@ -509,16 +511,6 @@ def test_a_comparison_is_viewed_as_its_overlay(
     shutil.copytree(overlay.parent, tmp_path / "turned")
     with pytest.raises(RunFolderError, match=r"compares several scenarios; name one of .*overlay\.rrd, "):
         open_viewer([tmp_path], web=True)
-
-
-def test_view_says_that_there_is_no_screen(
-    recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    monkeypatch.setattr(sys, "platform", "linux")
-    with pytest.raises(ViewerError, match=r"no screen.*wayproof view --web"):
-        open_viewer([recording[0].parent])
 
 
 @pytest.mark.flights
