@@ -62,7 +62,7 @@ class Campaign(Section):
     """What is flown: scenario files or folders of them, from the campaign file on, or names that `wayproof list
     scenarios` prints. Default: none, the worlds are flown with every default."""
     worlds: Annotated[tuple[WorldSpec, ...], Strict(False)] = ()
-    """Generators; each makes area.bounds_m, obstacles, mission.start_m and mission.goal_m in place of the scenario's.
+    """Forests; each makes area.bounds_m, obstacles, mission.start_m and mission.goal_m in place of the scenario's.
     Default: the scenarios' own worlds."""
     planners: Annotated[tuple[Annotated[PlannerSpec, _bare(PlannerSpec, "kind")], ...], Strict(False)] = ()
     """Kinds, or a kind with keys of `planner`. Default: the scenario's own planner."""
@@ -86,7 +86,7 @@ class Campaign(Section):
     def _can_be_flown(self) -> Campaign:
         if not (self.scenarios or self.worlds):
             raise KeyFault((), "has neither scenarios nor worlds; must have at least one of them")
-        labels = [world.name for world in self.worlds]
+        labels = [world.label for world in self.worlds]
         if index := _repeated(labels):
             raise KeyFault(("worlds", index), f"is called {labels[index]} as another; give each a label")
         taken: dict[Loc, str] = {}

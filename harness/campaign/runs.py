@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -48,7 +48,7 @@ class PlannedRun:
 
     Attributes:
         case: runs of one case fly the same world with the same seed and draws.
-        world: name of its file, or of the generator.
+        world: name of its file, or label of the forest.
         varied: grid and drawn values, and those of its entries, by key path; lists and mappings as JSON text.
     """
 
@@ -164,7 +164,7 @@ class CampaignRuns:
             number,
             place.case,
             base.name,
-            campaign.worlds[place.world].name if campaign.worlds else base.file,
+            campaign.worlds[place.world].label if campaign.worlds else base.file,
             self.planners[place.entries[0] if campaign.planners else place.base],
             self.aircraft[place.entries[1] if campaign.aircraft else place.base],
             self._seed(place.case),
@@ -262,16 +262,9 @@ class CampaignRuns:
 
     def _generated(self, case: int, index: int) -> list[_Change]:
         """The generated world of a case."""
-        spec = self.campaign.worlds[index]
-        world = generated(spec, self._seed(case, WORLD))
-        origin: Loc = ("worlds", index, spec.generator)
+        made = generated(self.campaign.worlds[index], self._seed(case, WORLD))
+        origin: Loc = ("worlds", index, "forest")
         line = self.file.root.line_of(origin)
-        made: Mapping[Loc, Any] = {
-            ("area", "bounds_m"): world.bounds_m,
-            ("obstacles",): world.obstacles,
-            ("mission", "start_m"): world.start_m,
-            ("mission", "goal_m"): world.goal_m,
-        }
         return [_Change(loc, node_of(plain, line), origin) for loc, plain in made.items()]
 
     def _grid_axis(self, name: str) -> _Axis:
