@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from harness.api.paths import check, replay
     from harness.api.results import CampaignResult, ComparisonResult, FlightResult
     from harness.api.stepping import SteppedFlight, make
-    from harness.files.crash import PlannerError
-    from harness.files.errors import WriteError
+    from harness.files.errors import PlannerError, WriteError
     from harness.files.input_file import InputError
     from harness.flight.stepped import Status
     from harness.scenario.scenario import Scenario, dump_scenario, load_scenario

@@ -68,7 +68,6 @@ ONLY_IN = {
         "harness/world_files/free_room.py",
     ),
     "pyproj": (
-        "harness/scenario/checks.py",
         "harness/world_files/plane.py",
         "harness/world_files/readers/footprints.py",
     ),

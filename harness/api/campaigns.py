@@ -41,8 +41,7 @@ def compare(
     import pyarrow as pa
 
     from harness.comparison.comparison import fly_and_compare
-    from harness.scenario.given import is_source
-    from harness.scenario.kinds import GUIDANCE, PLANNER
+    from harness.scenario.kinds import GUIDANCE, PLANNER, is_source
 
     loaded = _loaded([scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios)
     told = [each.name for each in loaded]
@@ -71,7 +70,7 @@ def _loaded(given: Sequence[Scenario | str | Path]) -> list[Scenario]:
 
 def _named(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
     """The kinds that names mean; those given as FILE.py:NAME or MODULE:NAME are imported."""
-    from harness.scenario.given import registered
+    from harness.scenario.kinds import registered
 
     if isinstance(names, str) or not names or not all(isinstance(each, str) for each in names):
         raise InputError(

@@ -14,8 +14,7 @@ from harness.api.metrics import Metrics
 from harness.api.results import FlightResult
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
-from harness.scenario.given import registered
-from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart
+from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, registered
 from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
 from harness.scenario.validation import KeyFault
 

@@ -23,8 +23,8 @@ from harness.flight.observer import Observer, Progress
 from harness.flight.record import Flight
 from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import atmosphere, fly_to_folder, jsbsim_aircraft, make_loop
+from harness.scenario.performance import start_conditions
 from harness.scenario.scenario import Scenario
-from harness.scenario.start import start_conditions
 
 ROUNDS = 5
 """Each is one flight without and one with the recording; one round more goes before them and does not count."""

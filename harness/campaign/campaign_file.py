@@ -15,8 +15,7 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node, fault_line, node_of
 from harness.scenario.files_resolved import file_beside
 from harness.scenario.generators import WorldSpec
-from harness.scenario.given import is_source
-from harness.scenario.kinds import planner_kinds
+from harness.scenario.kinds import is_source, planner_kinds
 from harness.scenario.resolving import model_or_folder
 from harness.scenario.sections import AircraftSpec, PlannerSpec, Section
 from harness.scenario.shipped import shipped_scenarios

@@ -12,11 +12,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from harness.analysis.metric import ERROR, Claim, holds
 from harness.campaign.results import metric_cells, time_cells
-from harness.files.crash import PlannerError, sentence, trace
-from harness.files.errors import RunFolderError, WriteError
+from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence, trace
 from harness.report.chapters import optimum_of
-from harness.scenario.given import registered_source
-from harness.scenario.kinds import GUIDANCE, PLANNER
+from harness.scenario.kinds import GUIDANCE, PLANNER, registered_source
 from harness.scenario.scenario import Scenario, unpacked
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from harness.analysis.registry import METRICS as FIGURES
 from harness.files.strict_yaml import InputError
 from harness.flight.record import FloatArray
 from harness.run_files.run_folder import RECORDING
-from harness.scenario.given import own_words
+from harness.scenario.kinds import own_words
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -26,8 +26,7 @@ from harness.campaign.sampling import takes_whole_numbers
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError, Loc, Node, Scalar, fault_line, key_path, loc_of, node_of
 from harness.scenario.generators import generated
-from harness.scenario.overrides import overridden, with_key
-from harness.scenario.scenario import Scenario, packed, scenario_from, unpacked
+from harness.scenario.scenario import Scenario, overridden, packed, scenario_from, unpacked, with_key
 from harness.scenario.validation import KeyFaults, in_lines
 
 SEED, WORLD, DRAW = range(3)

@@ -25,8 +25,7 @@ from harness.files.strict_yaml import COMMAND_LINE, InputError, node_of
 from harness.run.path_check import PathCheck, origin_of
 from harness.run.path_check import asked as path_check
 from harness.run_files.path_files import PathAsGiven, given_points, read_path
-from harness.scenario.overrides import Given, changed, overridden
-from harness.scenario.scenario import Scenario
+from harness.scenario.scenario import Given, Scenario, changed, overridden
 from harness.scenario.shipped import scenario_path, shipped_scenarios
 
 DEFAULT_AIRCRAFT: Final = "aerosonde"

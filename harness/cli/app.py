@@ -137,7 +137,7 @@ def _report(error: Exception) -> int:
     elif not isinstance(error, RunFolderError):
         # Rooms that take long to import.
         from aircraft.model_files import AircraftError
-        from harness.files.crash import PlannerError, sentence
+        from harness.files.errors import PlannerError, sentence
         from harness.scenario.kinds import PluginError
 
         if not isinstance(error, AircraftError | PlannerError | PluginError):

@@ -55,7 +55,7 @@ def falsify(
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
     from harness.falsify.breaking_point import FALSIFIED, INDEX, vary_of
     from harness.falsify.breaking_point import falsify as search
-    from harness.scenario.given import own_words
+    from harness.scenario.kinds import own_words
 
     ranges = [range_of(text) for text in vary]
 

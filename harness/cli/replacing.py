@@ -145,8 +145,7 @@ def _setting(text: str) -> tuple[str, str]:
 
 def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:
     """The kind that --planner or --guidance means: FILE.py:NAME and MODULE:NAME are imported and known as NAME."""
-    from harness.scenario.given import registered
-    from harness.scenario.kinds import GUIDANCE, PLANNER
+    from harness.scenario.kinds import GUIDANCE, PLANNER, registered
     from harness.scenario.sections import SHIELDED
 
     part = PLANNER if name == "planner" else GUIDANCE
@@ -163,7 +162,7 @@ def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:
 
 def sources(*names: str | None) -> tuple[str, ...]:
     """Those of some names that are FILE.py:NAME or MODULE:NAME: a process that flies has to import them too."""
-    from harness.scenario.given import is_source
+    from harness.scenario.kinds import is_source
     from harness.scenario.sections import SHIELDED
 
     return tuple(name.removesuffix(SHIELDED) for name in names if name is not None and is_source(name))

@@ -24,8 +24,7 @@ from typing import Any, Final, Literal, TypeAlias
 from harness.analysis.metric import Claim, holds
 from harness.campaign.folder import claim_folder
 from harness.campaign.sampling import takes_whole_numbers
-from harness.files.crash import sentence
-from harness.files.errors import WriteError
+from harness.files.errors import WriteError, sentence
 from harness.files.strict_yaml import InputError, as_spelt, loc_of
 from harness.files.whole_file import replace_text
 from harness.scenario.scenario import Scenario, dump_scenario

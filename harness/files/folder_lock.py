@@ -1,8 +1,4 @@
-"""One writer at a time in a folder. A killed process leaves no lock.
-
-Why not filelock: it holds a file beside what is to be written, which stays behind in the user's folder, and cannot ask
-whether somebody holds a folder that may only be read.
-"""
+"""One writer at a time in a folder. A killed process leaves no lock, and no file stays behind in the user's folder."""
 
 from __future__ import annotations
 
@@ -17,11 +13,8 @@ class FolderLock:
     """Holds a folder, which must exist, for this process (flock(2) on the folder itself) until it is released.
 
     With a name, a file of that name in it is held in its place, made where missing: on a network file system (NFS) only
-    what is open for writing can be held.
-
-    Raises:
-        RunFolderError: another process, or another lock of this one, holds it.
-        OSError: the folder cannot be opened.
+    what is open for writing can be held. A RunFolderError says that another process, or another lock of this one, holds
+    it; an OSError that the folder cannot be opened.
     """
 
     def __init__(self, path: Path, name: str | None = None) -> None:

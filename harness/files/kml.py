@@ -1,7 +1,6 @@
 """Shapes of KML files (OGC 12-007r2), plain or packed as KMZ.
 
-Read with Python's XML parser: GDAL makes zero of a coordinate that is no number. Elements are told by their names,
-whatever the namespace: these files carry several.
+Elements are told by their names, whatever the namespace: these files carry several.
 """
 
 from __future__ import annotations
@@ -12,15 +11,13 @@ from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
-from harness.files.input_file import InputError
-from harness.files.values import finite, shown
+from harness.files.input_file import InputError, finite, shown
 from harness.files.zip_archive import unpacked
 
-LINES: Final = ("LineString", "Track")
 OTHERS: Final = frozenset(
     ["Point", "Model", "NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay", "LinearRing"]
 )
-GIVEN_UP: Final = ("altitudeOffset", "MultiTrack")
+GIVEN_UP: Final = ("altitudeOffset", "Track", "MultiTrack")
 """Elements of Google's extension that are refused by name."""
 COMMA: Final = re.compile(r"\s*,\s*")
 
@@ -43,7 +40,7 @@ class Shape(NamedTuple):
 
 
 class Kml(NamedTuple):
-    """What a KML file has: lines, polygons, and how many of what else; its name for faults."""
+    """Lines and polygons of a KML file, and how many of what else it has; its name for faults."""
 
     source: str
     lines: list[Shape]
@@ -64,32 +61,25 @@ def read_kml(data: bytes, source: str, most: int) -> Kml:
             raise InputError(f"{source}: {error}" if source else str(error)) from error
         source = f"{source} ({name})" if source else ""
     root = parsed_xml(data, source, "kml")
-    found = Kml(source, [], [], Counter(kind for each in root.iter() if (kind := name_of(each)) in OTHERS))
+    lines, polygons = [], []
     for number, each in enumerate(named(root, "Placemark"), start=1):
         name = shown(text_of(each, "name") or f"Placemark {number}")
         where = f"{source}: {name}" if source else name
-        _take(each, name, where, found)
-    found.others["LinearRing"] -= sum(len(each.rings) for each in found.polygons)
-    return found
-
-
-def _take(placemark: Element, name: str, where: str, found: Kml) -> None:
-    """Adds the lines and polygons of a Placemark to what was found."""
-    kept = {item.get("name", ""): text_of(item, "value") for item in named(placemark, "Data")}
-    kept |= {item.get("name", ""): (item.text or "").strip() for item in named(placemark, "SimpleData")}
-    for line in (line for kind in LINES for line in named(placemark, kind)):
-        points = _points(line, where, "point")
-        found.lines.append(Shape(name, text_of(line, "altitudeMode"), (points,), kept))
-    for area in named(placemark, "Polygon"):
-        found.polygons.append(Shape(name, text_of(area, "altitudeMode"), _rings(area, where), kept))
-
-
-def _rings(area: Element, where: str) -> tuple[tuple[Point, ...], ...]:
-    """The boundaries of a polygon, the outer one first."""
-    rings = [ring for kind in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(area, kind)]
-    if not rings:
-        raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
-    return tuple(_points(ring, where, "corner") for ring in rings)
+        kept = {item.get("name", ""): text_of(item, "value") for item in named(each, "Data")}
+        kept |= {item.get("name", ""): (item.text or "").strip() for item in named(each, "SimpleData")}
+        lines += [
+            Shape(name, text_of(line, "altitudeMode"), (_points(line, where, "point"),), kept)
+            for line in named(each, "LineString")
+        ]
+        for area in named(each, "Polygon"):
+            rings = [ring for kind in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(area, kind)]
+            if not rings:
+                raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
+            corners = tuple(_points(ring, where, "corner") for ring in rings)
+            polygons.append(Shape(name, text_of(area, "altitudeMode"), corners, kept))
+    others = Counter(kind for each in root.iter() if (kind := name_of(each)) in OTHERS)
+    others["LinearRing"] -= sum(len(each.rings) for each in polygons)
+    return Kml(source, lines, polygons, others)
 
 
 def parsed_xml(data: bytes, source: str, root: str) -> Element:
@@ -133,16 +123,12 @@ def text_of(element: Element, name: str) -> str:
 
 
 def _points(element: Element, where: str, what: str) -> tuple[Point, ...]:
-    """Points of a line, one element each in a gx:Track; blanks round a comma do not part positions."""
-    if name_of(element) == "Track":
-        rows = [(each.text or "").split() for each in named(element, "coord")]
-    else:
-        rows = [part.split(",") for part in COMMA.sub(",", text_of(element, "coordinates")).split()]
-    return tuple(_point(row, f"{where}: {what} {number}") for number, row in enumerate(rows))
-
-
-def _point(row: list[str], where: str) -> Point:
-    if len(row) not in (2, 3):
-        raise InputError(f"{where}: is {shown(','.join(row))!r}; must be longitude,latitude[,altitude]")
-    longitude, latitude, *altitude = (finite(each, where) for each in row)
-    return latitude, longitude, altitude[0] if altitude else None
+    """Points of a line or a ring; blanks round a comma do not part positions."""
+    points: list[Point] = []
+    for number, text in enumerate(COMMA.sub(",", text_of(element, "coordinates")).split()):
+        at, cells = f"{where}: {what} {number}", text.split(",")
+        if len(cells) not in (2, 3):
+            raise InputError(f"{at}: is {shown(text)!r}; must be longitude,latitude[,altitude]")
+        longitude, latitude, *altitude = (finite(each, at) for each in cells)
+        points.append((latitude, longitude, altitude[0] if altitude else None))
+    return tuple(points)

@@ -18,11 +18,9 @@ _starting = threading.Lock()
 def without_main() -> Iterator[None]:
     """Processes that are begun in the block, by `spawn`, do not import the `__main__` of this one.
 
-    Python lets a spawned process import it, for functions that are defined there. Ours need none, and a script that
-    calls us at its top, without `if __name__ == "__main__":`, would begin processes without end.
-
-    An interrupt, which reaches the whole process group, is blocked in them from their first moment on: the parent
-    decides what it means.
+    Else a script that calls us at its top, without `if __name__ == "__main__":`, would begin processes without end. An
+    interrupt, which reaches the whole process group, is blocked in them from their first moment on: the parent decides
+    what it means.
     """
     with _starting:
         resource_tracker.ensure_running()  # unblocks the interrupt when it begins its own process

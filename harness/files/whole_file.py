@@ -1,7 +1,7 @@
 """Files that are replaced whole: whoever reads one finds the old content or all of the new.
 
-Every output is written to a fresh file in its folder, which then takes its name. Links and what a killed process left
-are replaced, never followed; a pipe or a device is refused at once.
+Every output is written to a fresh file in its folder, which then takes its name. A link is replaced, never followed; a
+pipe or a device is refused at once.
 """
 
 from __future__ import annotations

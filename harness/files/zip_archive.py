@@ -1,7 +1,4 @@
-"""Takes the one file that is meant out of a ZIP archive that somebody gives, without trust: it may be a bomb, or torn.
-
-The texts of faults name no file.
-"""
+"""The one file that is meant in a ZIP archive that may be a bomb, or torn; the texts of faults name no file."""
 
 from __future__ import annotations
 
@@ -17,12 +14,16 @@ from harness.files.input_file import InputError
 from harness.files.wording import counted, printable
 
 DAMAGES: Final = (
-    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error),
-    *(EOFError, OSError, ValueError, IndexError),
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    struct.error,
+    EOFError,
+    OSError,
+    ValueError,
+    IndexError,
 )
 """What Python's unpacking raises of damaged archives."""
-TOLD: Final = 3
-"""Names of files that a fault has at most, each of at most 60 characters."""
 
 
 def unpacked(data: bytes, ending: str, most: int) -> tuple[str, bytes]:
@@ -59,15 +60,11 @@ def member_path(path: Path, ending: str, most: int) -> str:
 def _chosen(names: list[str], ending: str) -> str:
     """The one file of an archive with an ending."""
     own = [name for name in names if not name.lower().startswith("__macosx/")]  # macOS adds forks of files
-    held = [
-        each for each in own if each.lower().endswith(ending) and not each.rpartition("/")[2].startswith("._")
-    ]
+    held = [each for each in own if each.lower().endswith(ending) and not Path(each).name.startswith("._")]
     if len(held) == 1:
         return held[0]
     if not held:
         raise InputError(f"is a ZIP archive without a {ending} file")
-    told = ", ".join(printable(name)[:60] for name in held[:TOLD]) + (", ..." if len(held) > TOLD else "")
-    raise InputError(
-        f"is a ZIP archive with {counted(len(held), f'{ending} file')} ({told}); must have one: unpack it and give the "
-        "file that is meant"
-    )
+    told = ", ".join(printable(name)[:60] for name in held[:3]) + (", ..." if len(held) > 3 else "")
+    many = f"is a ZIP archive with {counted(len(held), f'{ending} file')} ({told})"
+    raise InputError(f"{many}; must have one: unpack it and give the file that is meant")

@@ -10,7 +10,7 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Final, NamedTuple
 
-from harness.files.crash import sentence, trace
+from harness.files.errors import sentence, trace
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport

@@ -12,7 +12,7 @@ from aircraft.guidance.altitude import Vertical
 from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput
 from aircraft.guidance.progress import measures_itself
 from aircraft.interface import FlightModel
-from harness.files.crash import sentence, trace
+from harness.files.errors import sentence, trace
 from harness.flight.navigation import StateEstimator
 from harness.flight.observer import PROGRESS_EVERY_S, Caution, Observer, Progress, RowObserver
 from harness.flight.plans import Plans

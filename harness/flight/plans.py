@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
-from harness.files.crash import in_a_line, sentence, trace
+from harness.files.errors import in_a_line, sentence, trace
 from harness.flight.asked_planner import Answer, AskedPlanner, PlannerFailedError
 from harness.flight.observer import NOMINAL, Caution, Observer, ShieldState
 from harness.flight.record import AcceptedPlan, Outcome

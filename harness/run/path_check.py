@@ -25,8 +25,7 @@ from harness.run_files.path_files import PathAsGiven
 from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of
 from harness.scenario.obstacles import WorldFile
-from harness.scenario.overrides import overridden, with_key
-from harness.scenario.scenario import Scenario, load_scenario, validated
+from harness.scenario.scenario import Scenario, load_scenario, overridden, validated, with_key
 
 if TYPE_CHECKING:
     from harness.world_files.expansion import FileSpec

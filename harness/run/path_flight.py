@@ -26,11 +26,10 @@ from harness.run_files.given_path import FloatArray, FlyBy, Tightest, fly_by
 from harness.run_files.mission.route import CLIMB_SHARE, mission_route
 from harness.run_files.mission.vertices import Flying, Ground, without_steps
 from harness.run_files.path_files import PathAsGiven
-from harness.scenario.craft import airframe_of
-from harness.scenario.performance import performance_of
+from harness.scenario.parts import airframe_of
+from harness.scenario.performance import performance_of, steady_wind_mps
 from harness.scenario.scenario import Scenario
 from harness.scenario.sections import ALTITUDES_M
-from harness.scenario.start import steady_wind_mps
 from harness.scenario.validation import KeyFault
 from planner.interface import Path, Plan, PlanRequest, PlanStatus
 

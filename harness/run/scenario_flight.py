@@ -28,11 +28,9 @@ from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
-from harness.scenario.craft import airframe_of, flown_airframe
-from harness.scenario.parts import law_of, planner_of
-from harness.scenario.performance import mission_of, performance_of, wind_mps_of
+from harness.scenario.parts import airframe_of, flown_airframe, law_of, planner_of
+from harness.scenario.performance import air_of, mission_of, performance_of, start_conditions, wind_mps_of
 from harness.scenario.scenario import Scenario, dump_scenario
-from harness.scenario.start import air_of, start_conditions
 from harness.world.ground import Ground
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World

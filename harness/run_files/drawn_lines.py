@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.files import kml
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, finite, listed, parsed_json, shown
 from harness.files.kml import Point
-from harness.files.values import finite, listed, parsed_json, shown
 from harness.files.wording import counted
 
 LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))
@@ -156,7 +155,7 @@ def _shapes(node: Any, source: str, key: str) -> Iterator[tuple[str, str, Any]]:
 
 
 def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
-    """The path of a KML file: its one LineString or gx:Track, with the altitudes that their mode gives a meaning."""
+    """The path of a KML file: its one LineString, with the altitudes that their mode gives a meaning."""
     found = kml.read_kml(data, source, most)
     if len(found.lines) != 1:
         told = f" ({', '.join(line.name for line in found.lines[:4])})" if found.lines else ""

@@ -1,8 +1,7 @@
-"""Obstacles of a scenario that are files, made into polygons and ground: the one place where that is done."""
+"""Obstacles of a scenario that are files, made into polygons and ground."""
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,26 +55,18 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
 
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:
-    """What the key `file` asks for."""
+    """What the key `file` asks for; the file lies beside the scenario file, or from here."""
     from harness.world_files.expansion import FileSpec
 
     keys = {name: getattr(file, name) for name in WorldFile.model_fields if name != "path"}
-    return FileSpec(_path(file.path, folder), **keys)
+    return FileSpec(file_beside(file.path, folder) or Path(file.path), **keys)
 
 
-def _path(text: str, folder: Path | None) -> Path:
-    """The file: beside the scenario file, or from here; `package:path` lies in an installed package."""
-    package, colon, inner = text.partition(":")
-    if colon and package.isidentifier() and (spec := importlib.util.find_spec(package)) is not None:
-        return Path((spec.submodule_search_locations or [""])[0]) / inner
-    return (file_beside(text, folder) if folder is not None else None) or Path(text)
-
-
-def file_beside(text: str, folder: Path) -> Path | None:
+def file_beside(text: str, folder: Path | None) -> Path | None:
     """The file that lies so from a folder; None where there is none."""
     try:
-        beside = folder / Path(text).expanduser()
-        return beside if beside.exists() else None
+        beside = None if folder is None else folder / Path(text).expanduser()
+        return beside if beside and beside.exists() else None
     except (OSError, RuntimeError):  # too long, or the home of nobody
         return None
 
@@ -92,12 +83,10 @@ def _parts(source: Source, active_s: Interval | None) -> list[Obstacle]:
     for index, count in zip(of.tolist(), shapely.get_num_coordinates(rings).tolist(), strict=True):
         begin, end = end, end + count
         found[index].append(tuple(corners[begin : end - 1]))
-    rest = {"circle": None, "file": None, "velocity_mps": None}
     parts = []
     for (outline, *holes), heights_m in zip(found, source.heights_m, strict=True):
         polygon = Polygon.model_construct(vertices_m=outline, holes_m=tuple(holes) or None)
-        part = Obstacle.model_construct(polygon=polygon, active_s=active_s, heights_m=heights_m, **rest)
-        parts.append(part)
+        parts.append(Obstacle.model_construct(polygon=polygon, active_s=active_s, heights_m=heights_m))
     return parts
 
 

@@ -1,23 +1,31 @@
 """Planners and guidance laws by name: built-in ones, those of other distributions, and those given to this process.
 
-Another distribution adds one by an entry point in the group `wayproof.planners` or `wayproof.guidance` that names a
-`PlannerKind` or a `GuidanceKind`.
+Another distribution adds one by an entry point, in a group as below, that names a `PlannerKind` or a `GuidanceKind`. A
+kind may be given in Python; a class or function that makes the part for one flight, from what it may know (a planner
+from the mission, a law from the limits of the aircraft) or from nothing; or the part itself, an object with the part's
+methods.
 """
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import inspect
 import sys
 from collections.abc import Callable
 from contextlib import redirect_stdout
-from dataclasses import dataclass, field
-from functools import cache
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from dataclasses import dataclass, field, replace
+from functools import cache, lru_cache
+from importlib.metadata import EntryPoints, entry_points
+from pathlib import Path
 from typing import Any
 
 from aircraft.guidance.registry import BUILT_IN as LAWS
 from aircraft.guidance.registry import GuidanceKind
 from planner.registry import BUILT_IN as PLANNERS
 from planner.registry import PlannerKind
+
+REMEDY = "mend or uninstall that distribution"
 
 
 class PluginError(ImportError):
@@ -41,13 +49,28 @@ class LoopPart:
     registered: dict[str, Any] = field(default_factory=dict)
     """The kinds that this process, and no other, knows by name."""
 
+    def outside(self) -> dict[str, tuple[Any, str | None]]:
+        """Kinds of other distributions, with name and version of these; a PluginError says which cannot be had."""
+        found: dict[str, tuple[Any, str | None]] = {}
+        for point in _entry_points(entry_points, self.group, tuple(sys.path)):
+            owner = f"{point.dist.name} {point.dist.version}" if point.dist else None
+            whose = f"({point.value}) of {owner or 'another distribution'}"
+            told = f"the {self.noun} of entry point {point.name!r} {whose}"
+            try:
+                with redirect_stdout(sys.stderr):
+                    kind = point.load()
+            except Exception as error:
+                reason = " ".join(f"{type(error).__name__}: {error}".split())
+                raise PluginError(f"{told} cannot be loaded: {reason}; {REMEDY}") from error
+            if not isinstance(kind, self.kind):
+                raise PluginError(f"{told} is no {self.kind.__name__}; {REMEDY}")
+            found.setdefault(kind.kind, (kind, owner))
+        return found
+
     def installed(self) -> dict[str, Any]:
-        """The kinds that every process finds, by name, built-in ones first; a PluginError says which cannot be had."""
-        kinds = {kind.kind: kind for kind in self.built_in}
-        for point in _outside(entry_points, self.group, tuple(sys.path)):
-            outside = self._loaded(point)
-            kinds.setdefault(outside.kind, outside)
-        return kinds
+        """The kinds that every process finds, by name, built-in ones first."""
+        built_in = {kind.kind: kind for kind in self.built_in}
+        return {**built_in, **{name: kind for name, (kind, _) in self.outside().items()}, **built_in}
 
     def known(self) -> dict[str, Any]:
         """All kinds by name: the installed ones, and those that this process has registered."""
@@ -63,33 +86,15 @@ class LoopPart:
         self.registered[kind.kind] = kind
 
     def distribution_of(self, name: str) -> str | None:
-        """Name and version of the other distribution that a kind comes from; None for a built-in one."""
-        if name not in (kind.kind for kind in self.built_in):
-            for point in _outside(entry_points, self.group, tuple(sys.path)):
-                if point.dist is not None and self._loaded(point).kind == name:
-                    return f"{point.dist.name} {point.dist.version}"
-        return None
-
-    def _loaded(self, point: EntryPoint) -> Any:
-        """What an entry point of another distribution names."""
-        owner = f"{point.dist.name} {point.dist.version}" if point.dist else "another distribution"
-        told = f"the {self.noun} of entry point {point.name!r} ({point.value}) of {owner}"
-        remedy = "mend or uninstall that distribution"
-        try:
-            with redirect_stdout(sys.stderr):
-                outside = point.load()
-        except Exception as error:
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
-            raise PluginError(f"{told} cannot be loaded: {reason}; {remedy}") from error
-        if not isinstance(outside, self.kind):
-            raise PluginError(f"{told} is no {self.kind.__name__}; {remedy}")
-        return outside
+        """Name and version of the other distribution that a kind comes from; None for any other kind."""
+        built_in = any(kind.kind == name for kind in self.built_in)
+        return None if built_in else self.outside().get(name, (None, None))[1]
 
 
 @cache
-def _outside(find: Callable[..., EntryPoints], group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+def _entry_points(find: Callable[..., EntryPoints], group: str, path: tuple[str, ...]) -> EntryPoints:
     """Entry points of other distributions; to look for them takes as long as all else of reading a scenario."""
-    return tuple(find(group=group))
+    return find(group=group)
 
 
 PLANNER = LoopPart("planner", PlannerKind, PLANNERS, "wayproof.planners", ("plan(request)",), "mission")
@@ -105,3 +110,148 @@ def planner_kinds() -> dict[str, PlannerKind]:
 def guidance_kinds() -> dict[str, GuidanceKind]:
     """All guidance laws by name."""
     return GUIDANCE.known()
+
+
+Kind = PlannerKind | GuidanceKind
+
+
+@dataclass(frozen=True)
+class NoKeys:
+    """The own keys of a part that has none."""
+
+    def resolved(self, told: object) -> NoKeys:
+        """Itself."""
+        return self
+
+
+def is_source(name: str) -> bool:
+    """Whether a name is FILE.py:NAME or MODULE:NAME, and not a kind."""
+    return ":" in name
+
+
+def own_words(planner: str | None, law: str | None) -> list[str]:
+    """Words of a command that name a planner and a guidance law that no file may name."""
+    parts = {"--planner": planner, "--guidance": law}
+    return [word for option, name in parts.items() if name and is_source(name) for word in (option, name)]
+
+
+def registered(given: object, part: LoopPart = PLANNER) -> str:
+    """Registers what was given, unless it has been; returns the name by which scenarios of this process know it.
+
+    A text is a kind, or FILE.py:NAME or MODULE:NAME. A ValueError, one sentence, says why it cannot be used.
+    """
+    if isinstance(given, str):
+        return registered_source(given, part) if is_source(given) else given
+    try:
+        kind = _same_kind_of(given, part)
+    except TypeError:  # it cannot be hashed
+        kind = kind_of(given, part)
+    if part.known().get(kind.kind) != kind:
+        part.register(kind)
+    return kind.kind
+
+
+def registered_source(source: str, part: LoopPart = PLANNER) -> str:
+    """Imports what FILE.py:NAME or MODULE:NAME names and registers it under that name, without the file's folder."""
+    place, _, name = source.rpartition(":")
+    module = _imported(place, source)
+    if not name.isidentifier() or not hasattr(module, name):
+        own = (each for each, value in vars(module).items() if _is_own(value, module.__name__))
+        there = ", ".join(own)
+        raise ValueError(f"{place} has no {name or 'name'}; it has {there or 'no class or function'}")
+    kind = replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}")
+    part.register(kind)
+    return kind.kind
+
+
+def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
+    """What was given, as the registry of its part has it; a ValueError says why it cannot be used."""
+    if isinstance(given, PlannerKind | GuidanceKind) and type(given) is part.kind:
+        return given
+    made: Callable[[Any, Any], Any] = lambda _keys, _told: given  # noqa: E731
+    if isinstance(given, type) or (callable(given) and not _is_part(given, part)):
+        made = _maker(given, part)
+    elif not _is_part(given, part):
+        raise ValueError(
+            f"a {part.noun} must be a kind, a class, a function or an object with the method "
+            f"{' and '.join(part.methods)}; this is a {type(given).__name__}"
+        )
+    summary = (inspect.getdoc(given) or f"a {part.noun} given in Python").splitlines()[0]
+    kind: Kind = part.kind(_name(given), summary, NoKeys, made)
+    return kind
+
+
+_same_kind_of = lru_cache(maxsize=64)(kind_of)
+"""The same kind for the same object: what was measured of it holds on."""
+
+
+def _is_part(given: object, part: LoopPart) -> bool:
+    return all(callable(getattr(given, each.partition("(")[0], None)) for each in part.methods)
+
+
+def _name(given: Any) -> str:
+    name: str = getattr(given, "__qualname__", type(given).__qualname__).replace("<locals>.", "")
+    module = getattr(given, "__module__", "__main__")
+    return name if module == "__main__" else f"{module}:{name}"
+
+
+def _maker(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], Any]:
+    """Calls what was given with what it may know, where it takes that; else with nothing."""
+    try:
+        parameters = inspect.signature(given).parameters
+    except (TypeError, ValueError):  # made in C: it does not say
+        parameters = inspect.signature(lambda told: told).parameters
+    plain = [each for each in parameters.values() if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
+    needed = [each.name for each in plain if each.default is each.empty]
+    if len(needed) > 1:
+        told = f"{_name(given)} needs {', '.join(needed)}; must need the {part.factory_parameter} alone, or nothing"
+        raise ValueError(told)
+
+    def make(_keys: Any, told: Any) -> Any:
+        keys = {part.factory_parameter: told} if part.factory_parameter in parameters and not needed else {}
+        made = given(told) if needed else given(**keys)
+        if not _is_part(made, part):
+            lacks = f"which has no method {' and '.join(part.methods)}"
+            raise TypeError(f"{_name(given)} makes a {type(made).__name__}, {lacks}")
+        return made
+
+    return make
+
+
+def _imported(place: str, source: str) -> Any:
+    """The module that a place names: a file, beside which lies what it imports, or a module by its name."""
+    path = Path(place)
+    if path.suffix == ".py" and not path.is_file():
+        raise ValueError(f"{place}: no such file; give FILE.py:NAME")
+    try:
+        with redirect_stdout(sys.stderr):
+            return _executed(path.resolve()) if path.suffix == ".py" else importlib.import_module(place)
+    except (Exception, SystemExit) as error:
+        if isinstance(error, ModuleNotFoundError) and error.name in (place, place.partition(".")[0]):
+            told = f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME"
+            raise ValueError(told) from error
+        told = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        raise ValueError(f"{place} cannot be imported: {told}") from error
+
+
+def _executed(path: Path) -> Any:
+    """The module of a source file."""
+    name = f"given_{path.stem}"  # a name of its own: the file may be called planner.py
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _is_own(value: object, module: str) -> bool:
+    """Whether a module's class or function was made there."""
+    made_there = callable(value) and getattr(value, "__module__", None) == module
+    return made_there or isinstance(value, PlannerKind | GuidanceKind)

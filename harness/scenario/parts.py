@@ -1,4 +1,4 @@
-"""Planner and guidance law of a scenario: the own keys of their kinds, checked, and the parts for one flight."""
+"""The parts of the loop that a scenario names: its aircraft, planner and guidance law, and these two's own keys."""
 
 from __future__ import annotations
 
@@ -6,28 +6,79 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
 
 from pydantic import Field, ValidationError, create_model
 
 from aircraft.guidance.registry import GuidanceKind
-from harness.files.crash import PlannerError, sentence
-from harness.scenario.craft import airframe_of, limits_of
-from harness.scenario.given import Kind, is_source
-from harness.scenario.kinds import GUIDANCE, PLANNER, guidance_kinds, planner_kinds
+from harness.files.errors import PlannerError, sentence
+from harness.scenario.kinds import GUIDANCE, PLANNER, Kind, guidance_kinds, is_source, planner_kinds
 from harness.scenario.sections import AircraftSpec, GuidanceSpec, PartSpec, PlannerSpec, Section
 from harness.scenario.validation import KeyFault, KeyFaults, unknown_key
-from planner.compiled import compile_all
+from planner.compiled import begin_compiling, compile_all
 from planner.kernel_cache import seal
 from planner.registry import PlannerKind
 from planner.shield.shield import Shield
 
 if TYPE_CHECKING:
+    from aircraft.airframe import Airframe
     from aircraft.envelope import LawCard
-    from aircraft.guidance.interface import GuidanceLaw
+    from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
     from planner.interface import Mission, Planner
+
+SURVEY_BYTES: Final = 11_000
+"""To survey an aircraft takes about as long as to compile so much byte code, the guidance law's compiling included."""
+
+
+@cache
+def _prepare(model: str) -> None:
+    """Has the planners compiled while an aircraft is surveyed that has not been before, as on a new machine."""
+    from aircraft.airframes import AircraftError, is_surveyed
+
+    try:
+        surveyed = is_surveyed(model)
+    except AircraftError:
+        return  # The survey says more of it.
+    if not surveyed:
+        seal()
+        planner_kinds()  # What is imported is compiled.
+        begin_compiling(SURVEY_BYTES)
+
+
+def airframe_of(spec: AircraftSpec) -> Airframe:
+    """The airframe of a scenario, with its servos and its autopilot; an AircraftError says why it cannot be flown."""
+    from aircraft.actuators import Actuator, Actuators
+    from aircraft.airframe import DERIVED, AutopilotKeys
+    from aircraft.airframes import airframe
+
+    _prepare(spec.model)
+    servos, autopilot = spec.actuators, DERIVED
+    if spec.autopilot is not None:
+        own = spec.autopilot.model_dump()
+        autopilot = AutopilotKeys(latency_s=own.pop("state_latency_s") or 0.0, **own)
+    if servos is None:
+        return airframe(spec.model) if autopilot == DERIVED else airframe(spec.model, None, autopilot)
+    actuator = Actuator(servos.lag_s, servos.rate_limit_degps, servos.deadband_deg)
+    return airframe(spec.model, Actuators.alike(actuator), autopilot)
+
+
+def flown_airframe(spec: AircraftSpec) -> Airframe:
+    """The same, with a model that deviates from what figures, limits and gains are of."""
+    from aircraft.deviation import Deviation
+
+    frame = airframe_of(spec)
+    if spec.deviation is None:
+        return frame
+    shares = {name: value or 0.0 for name, value in spec.deviation}
+    return replace(frame, files=replace(frame.files, deviation=Deviation(**shares)))
+
+
+def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
+    """What guidance may ask of an aircraft that flies at its airspeed."""
+    return airframe_of(aircraft).guidance_limits(aircraft.airspeed_mps)
+
 
 AnyKind = TypeVar("AnyKind", PlannerKind, GuidanceKind)
 
@@ -181,9 +232,8 @@ def _keys_section(kind: Kind) -> type[Section]:
     keys: dict[str, Any] = {}
     for each in fields(kind.config):
         told = each.metadata
-        unit = {"unit": told["unit"]} if "unit" in told else None
         described: dict[str, Any] = {name: told.get(key) for name, key in _BOUNDS}
-        described |= {"default": each.default, "description": f"{told['doc']}.", "json_schema_extra": unit}
+        described |= {"default": each.default, "description": f"{told['doc']}."}
         keys[each.name] = (hints[each.name], Field(**described))
     return create_model(f"{kind.kind} keys", __base__=Section, **keys)
 

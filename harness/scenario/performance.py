@@ -1,18 +1,22 @@
-"""What a scenario's aircraft can do, and what its planner is told of it and of the mission."""
+"""What a scenario's aircraft can do, how its flight begins, and what its planner is told of both."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
-from aircraft.start import profile_share
-from harness.scenario.craft import airframe_of
+from aircraft.frames import LocalPlane
+from aircraft.start import Atmosphere, StartConditions, VerticalGusts, profile_share
 from harness.scenario.keys import ScenarioKeys
-from harness.scenario.parts import card_of
+from harness.scenario.parts import airframe_of, card_of, flown_airframe
 from harness.scenario.sections import Bounds
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
     from aircraft.interface import Performance
+    from aircraft.model_files import ModelFiles
     from planner.interface import Mission
 
 LEAST_CLEARANCE: Final = 0.02
@@ -99,3 +103,113 @@ def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: f
         xmax - tracking_m * (xmax - max(east) >= near_m),
         ymax - tracking_m * (ymax - max(north) >= near_m),
     )
+
+
+INSIDE_M: Final = 1e-3
+"""A flight begins no nearer to the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
+SURVEYED_M: Final = 300.0
+"""Altitude above the sea at which an aircraft's range of airspeeds is measured."""
+NEAR_M: Final = (50.0, 1000.0)
+MIDDLE: Final = 1.05
+"""Between the altitudes `NEAR_M` an aircraft flies level at an airspeed that is by this factor within the range
+measured at `SURVEYED_M`: the density of the air differs by 7 % at most, which moves the ends of the range by less. It
+need not be trimmed. Near the ground the wheels may touch it."""
+STEP_M: Final = 50.0
+"""The highest altitude of level flight is told to this."""
+
+
+def start_conditions(scenario: ScenarioKeys) -> StartConditions:
+    """Where and how a scenario's flight begins: a hair inside the area where the start lies on its boundary.
+
+    A given path may begin outside the area; then the flight does, too.
+    """
+    mission, (xmin, ymin, xmax, ymax) = scenario.mission, scenario.area.bounds_m
+    east, north = mission.start_m
+    if xmin <= east <= xmax and ymin <= north <= ymax:
+        inside_m = min(INSIDE_M, 0.5 * (xmax - xmin), 0.5 * (ymax - ymin))
+        east = min(max(east, xmin + inside_m), xmax - inside_m)
+        north = min(max(north, ymin + inside_m), ymax - inside_m)
+    course_rad = math.radians(mission.course_deg)
+    return StartConditions(east, north, mission.altitude_m, course_rad, scenario.aircraft.airspeed_mps)
+
+
+def steady_wind_mps(scenario: ScenarioKeys) -> tuple[float, float]:
+    """East and north of the wind at time 0, at the height at which it is measured."""
+    wind = scenario.environment.wind
+    return _towards(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0)
+
+
+def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
+    """The air of a scenario, its turbulence from a seed."""
+    air = scenario.environment
+    wind, vertical = air.wind, air.vertical_gusts
+    changes = wind.changes if wind else ()
+    return Atmosphere(
+        *steady_wind_mps(scenario),
+        turbulence=air.turbulence.model if air.turbulence and air.gusts else None,
+        intensity=air.gusts,
+        seed=seed,
+        changes=tuple((time_s, *_towards(speed, degrees)) for time_s, speed, degrees in changes),
+        measured_at_m=wind.measured_at_m if wind else None,
+        vertical_gusts=VerticalGusts(**dict(vertical)) if vertical else None,
+    )
+
+
+def _towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
+    """East and north of a wind that blows from a direction."""
+    blows = math.radians(from_deg) + math.pi
+    return speed_mps * math.sin(blows), speed_mps * math.cos(blows)
+
+
+def check_level_flight(scenario: ScenarioKeys) -> None:
+    """Raises a KeyFault if the aircraft cannot fly level at the altitude.
+
+    It is trimmed as the flight would trim it, unless its survey shows that it flies level.
+    """
+    from aircraft.airframes import AircraftError
+
+    start, origin = start_conditions(scenario), scenario.area.origin
+    place = origin.latitude_deg, origin.longitude_deg
+    try:
+        wind = air_of(scenario).wind_at(0.0, scenario.mission.altitude_m)
+        heading_rad = start.heading_rad(Atmosphere(*wind))
+        frame = flown_airframe(scenario.aircraft)
+        slowest, fastest = frame.airspeed_range_mps
+        near = NEAR_M[0] <= start.altitude_m <= NEAR_M[1]
+        if near and MIDDLE * slowest <= start.airspeed_mps <= fastest / MIDDLE:
+            return
+        fault = _fault(frame.files, place, start, heading_rad)
+    except (AircraftError, ValueError) as error:
+        raise KeyFault(("aircraft", "model"), str(error)) from error
+    if fault is None:
+        return
+
+    def flies(altitude_m: float) -> bool:
+        return _fault(frame.files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
+
+    if not flies(SURVEYED_M):
+        raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
+    good, bad = SURVEYED_M, start.altitude_m
+    while abs(good - bad) > STEP_M:
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if flies(middle) else (good, middle)
+    steps = math.floor(good / STEP_M) if bad > good else math.ceil(good / STEP_M)
+    told = f"{'at most' if bad > good else 'at least'} {STEP_M * steps:g}"
+    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {told}: {fault}")
+
+
+@lru_cache(maxsize=512)
+def _fault(
+    files: ModelFiles, place: tuple[float, float], start: StartConditions, heading_rad: float
+) -> str | None:
+    """Why there is no level flight; None where there is."""
+    from aircraft.jsbsim_loading import load, trim
+    from aircraft.model_files import TrimError
+
+    plane = LocalPlane(*place)
+    true_rad = heading_rad + plane.convergence_rad(start.east_m, start.north_m)
+    try:
+        trim(load(files), files.name, plane, start, true_rad)
+    except TrimError as error:
+        return str(error)
+    return None

@@ -20,19 +20,12 @@ MAX_COORDINATE_M: Final = 1e6
 ALTITUDES_M: Final = (5, 20_000)
 SHIELDED: Final = "+shield"
 """What a planner's name ends with that is flown with the shield."""
-_UNITS: Final = {
-    "m": "m", "mps": "m/s", "s": "s", "hz": "Hz", "deg": "deg", "degps": "deg/s", "1pkm2": "1/km2", "cell": "m"
-}  # fmt: skip
-"""Unit of a key by the last part of its name."""
 DERIVED: Final[Any] = None
 """The default of a key that follows from others, as its docstring says; `resolving.resolve` fills it in."""
 
 
 class Section(BaseModel):
-    """A mapping of the file: frozen, no unknown key, no conversion of types, finite numbers only.
-
-    The docstring below a key is its description in the JSON Schema; its unit is told by its name.
-    """
+    """A mapping of the file; the docstring below a key is its description in the JSON Schema."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
@@ -42,7 +35,7 @@ class Section(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: Any, handler: Any) -> Any:
-        """The JSON Schema, with what each key means and the unit of every number."""
+        """The JSON Schema, with what each key means."""
         schema = handler(core_schema)
         meanings = {name: told for each in reversed(cls.__mro__) for name, told in _docstrings(each).items()}
         for name, own in handler.resolve_ref_schema(schema).get("properties", {}).items():
@@ -50,10 +43,6 @@ class Section(BaseModel):
             own.setdefault("description", meanings.get(name) or meanings.get(f"{name}_"))
             if own.get("default", 0) is None or isinstance(own.get("default"), dict):
                 del own["default"]
-            kinds = {each.get("type") for each in own.get("anyOf", [own])}
-            unit = _UNITS.get(name.rpartition("_")[2], "1" if kinds & {"number", "integer"} else None)
-            if unit and not kinds & {None, "string", "object"}:
-                own.setdefault("unit", unit)
         return schema
 
 
@@ -117,9 +106,8 @@ class Area(Section):
     def _span_an_area(cls, bounds_m: Bounds) -> Bounds:
         xmin, ymin, xmax, ymax = bounds_m
         if not (xmin < xmax and ymin < ymax):
-            raise ValueError(
-                f"is {list(bounds_m)}; must be [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax"
-            )
+            wanted = "[xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax"
+            raise ValueError(f"is {list(bounds_m)}; must be {wanted}")
         return bounds_m
 
 

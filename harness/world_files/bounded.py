@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
-from harness.files.input_file import InputError, open_regular
-from harness.files.values import parsed_json
+from harness.files.input_file import InputError, open_regular, parsed_json
 
 MAX_BYTES: Final = 400_000_000
 """Largest file that is read in pieces, or whose numbers take little more room than its bytes."""

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, finite, listed, numbers
 from harness.files.mavlink.commands import CIRCLES, CORNERS, HOME_CIRCLE
 from harness.files.mavlink.items import Item
-from harness.files.values import finite, listed, numbers
 
 if TYPE_CHECKING:
     from shapely import Geometry

@@ -9,9 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, finite, whole
 from harness.files.mavlink import commands
-from harness.files.values import finite, whole
 
 SEA, HOME, GROUND = "sea", "home", "ground"
 MISSION: Final = 2

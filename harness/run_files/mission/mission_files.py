@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, finite, listed, numbers, parsed_json, shown, whole
 from harness.files.mavlink import commands
 from harness.files.mavlink.fences import item_fences, plan_fences
 from harness.files.mavlink.items import FRAMES, HOME, MISSION, SEA, WPL, Item, filled, wpl_items
-from harness.files.values import finite, listed, numbers, parsed_json, shown, whole
 from harness.files.wording import counted
 from harness.run_files.fences import Fences
 from harness.run_files.mission.program import Program, program

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from harness.files.input_file import InputError
-from harness.files.values import numbers
+from harness.files.input_file import InputError, numbers
 from harness.files.wording import counted
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Limit, Part, Reading

@@ -15,9 +15,9 @@ from aircraft.interface import FlightModel
 from harness.run import scenario_flight as run
 from harness.run.scenario_flight import atmosphere, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run
+from harness.scenario.performance import start_conditions
 from harness.scenario.scenario import Scenario, load_scenario
 from harness.scenario.shipped import scenario_path
-from harness.scenario.start import start_conditions
 
 
 def shipped(name: str, **overrides: str) -> Scenario:

@@ -30,10 +30,6 @@ def ring(coordinates: str, name: str = "innerBoundaryIs") -> str:
 
 
 ZONE = f"<Placemark><name>zone</name><Polygon>{ring(SQUARE, 'outerBoundaryIs')}</Polygon></Placemark>"
-TRACK = (
-    "<Placemark><gx:Track><altitudeMode>absolute</altitudeMode><when>2026-01-01T00:00:00Z</when>"
-    "<gx:coord>8 47 500</gx:coord><gx:coord>8.01 47 510</gx:coord></gx:Track></Placemark>"
-)
 
 
 def gpx(body: str) -> str:
@@ -126,13 +122,6 @@ def test_altitudes_of_kml_count_from_what_their_mode_says(tmp_path: Path) -> Non
     assert read_path(path).notes == ("altitudes passed over: their altitudeMode is relativeToSeaFloor",)
 
 
-def test_a_track_of_kml(tmp_path: Path) -> None:
-    path = tmp_path / "a.kml"
-    path.write_text(kml().replace("<Placemark><name>way</name>", "<!--").replace("</Placemark>", "-->", 1))
-    path.write_text(path.read_text().replace("</Folder>", f"{TRACK}</Folder>"))
-    assert read_path(path).altitudes_m.tolist() == [500.0, 510.0]
-
-
 def test_a_track_of_gpx_goes_before_routes_and_waypoints(tmp_path: Path) -> None:
     path = tmp_path / "a.gpx"
     route = f"<rte>{point('rtept', 46.0)}{point('rtept', 46.1)}</rte>"
@@ -189,6 +178,7 @@ def test_a_flight_of_a_logger_without_a_barometer_is_not_flown_at_the_sea(tmp_pa
     [
         ("a.kml", kml(more="<Placemark><name>other</name><LineString/></Placemark>"), ": has 2 lines (way, other)"),
         ("a.kml", kml(more="<gx:MultiTrack/>"), ": has gx:MultiTrack, which is not read"),
+        ("a.kml", kml(more="<Placemark><gx:Track/></Placemark>"), ": has gx:Track, which is not read; save it"),
         ("a.kml", kml().replace("<coord", "<gx:altitudeOffset>9</gx:altitudeOffset><coord"), ": has gx:altitudeOffset"),
         ("a.kml", kml("8,47 8.1"), ": way: point 1: is '8.1'; must be longitude,latitude[,altitude]"),
         ("a.kml", kml("8,47,5 8.1,47"), ": way: has an altitude at 1 of 2 points"),

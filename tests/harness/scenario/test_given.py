@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.scenario.given import NoKeys, registered
-from harness.scenario.kinds import PLANNER, planner_kinds
+from harness.scenario.kinds import PLANNER, NoKeys, planner_kinds, registered
 from planner.interface import Mission, Plan, PlanRequest, PlanStatus
 from planner.registry import BUILT_IN, PlannerKind
 

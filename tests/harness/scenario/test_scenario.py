@@ -282,7 +282,7 @@ def described_keys(schema: dict[str, Any], defs: dict[str, Any]) -> list[tuple[s
     return found
 
 
-def test_the_schema_describes_every_key_with_its_unit_and_default() -> None:
+def test_the_schema_describes_every_key_with_its_default() -> None:
     schema = scenario_schema()
     keys = described_keys(schema, schema["$defs"])
     assert len(keys) > 45
@@ -290,8 +290,6 @@ def test_the_schema_describes_every_key_with_its_unit_and_default() -> None:
         assert key.get("description"), name
         told = key.get("default") is not None or "default:" in key["description"].lower()
         assert key["needed"] or told or "$ref" in str(key) or "properties" in str(key), name
-        if name.endswith(("_m", "_mps", "_s", "_deg", "_hz")):
-            assert key["unit"] == {"mps": "m/s", "hz": "Hz"}.get(name.rsplit("_")[-1], name.rsplit("_")[-1])
     assert schema["required"] == ["schema", "name", "area", "mission"]
 
 
