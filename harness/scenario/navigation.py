@@ -18,16 +18,20 @@ Offset = Annotated[float, Field(ge=-MAX_ERROR_M, le=MAX_ERROR_M)]
 SIGMAS: Final = 3.0
 """The planner's margin covers so many sigma of the position error: 98.9 % of all errors in the plane are smaller."""
 
-_PERFECT: Final[dict[str, Any]] = {
-    **{
-        "position_sigma_m": 0.0,
-        "velocity_sigma_mps": 0.0,
-        "heading_sigma_deg": 0.0,
-        "airspeed_sigma_mps": 0.0,
-    },
-    **{"altitude_sigma_m": 0.0, "drift_share": 0.0, "latency_s": 0.0},
+_ZERO: Final = (
+    *(
+        "position_sigma_m",
+        "velocity_sigma_mps",
+        "heading_sigma_deg",
+        "airspeed_sigma_mps",
+        "altitude_sigma_m",
+    ),
+    *("drift_share", "latency_s"),
+)
+_PERFECT: Final[dict[str, Any]] = dict.fromkeys(_ZERO, 0.0) | {
     "position_correlation_s": 1100.0,  # [BM], 1 / k_GPS of the Gauss-Markov table
-    **{"position_bias_m": (0.0, 0.0), "outages_s": ()},
+    "position_bias_m": (0.0, 0.0),
+    "outages_s": (),
 }
 _GNSS: Final[dict[str, Any]] = _PERFECT | {
     "position_sigma_m": 4.7,  # [BM], nominal errors: 11.5 m at 95 %; [SPS] has 8 m on average, at worst 15 m
@@ -117,20 +121,14 @@ class Navigation(Section):
 
 
 def planning_margin_m(
-    navigation: Navigation,
-    speed_mps: float,
-    time_limit_s: float,
-    k: float = SIGMAS,
-    unseen_m: float = math.inf,
-    clearance_m: float = 0.0,
-    turn_radius_m: float = 0.0,
+    navigation: Navigation, speed_mps: float, time_limit_s: float, clearance_m: float, turn_radius_m: float
 ) -> float:
     """What clearance must have on top, so that the true aircraft keeps it where the believed one does (m).
 
-    `k` sigma of the position error, its bias, what is flown at `speed_mps`, wind included, while the state grows old,
+    `SIGMAS` of the position error, its bias, what is flown at `speed_mps`, wind included, while the state grows old,
     and the drift of the longest outage, up to `time_limit_s`. The map drifts as the aircraft does: what stands in it is
-    off only by what was drifted since it was last seen, no longer ago than `unseen_m` flown. Of an error with two
-    normal components of one sigma, 1 - exp(-k^2 / 2) lies within k sigma.
+    off only by what was drifted since it was last seen, half a turn ago at most. Of an error with two normal components
+    of one sigma, 1 - exp(-k^2 / 2) lies within k sigma.
 
     A heading error turns the scan: an edge at distance d is misplaced by d times the error, square to where it is seen.
     The map places an edge anew whenever it is seen from 0.7 of the distance (`harness.mapping.obstacle_map`), the last
@@ -138,8 +136,8 @@ def planning_margin_m(
     aircraft of turn radius R that turns aside by the error e, left and right, flies 4 R e: the longer way counts.
     """
     lasting_s = [min(end, time_limit_s) - min(begin, time_limit_s) for begin, end in navigation.outages_s]
-    drift_m = navigation.drift_share * min(speed_mps * max(lasting_s, default=0.0), unseen_m)
-    turned_rad = k * math.radians(navigation.heading_sigma_deg)
+    unseen_m = min(speed_mps * max(lasting_s, default=0.0), math.pi * turn_radius_m)
+    turned_rad = SIGMAS * math.radians(navigation.heading_sigma_deg)
     turned_m = turned_rad * max(clearance_m, 4.0 * turn_radius_m * turned_rad)
-    known_m = k * navigation.position_sigma_m + math.hypot(*navigation.position_bias_m)
-    return known_m + navigation.latency_s * speed_mps + drift_m + turned_m
+    known_m = SIGMAS * navigation.position_sigma_m + math.hypot(*navigation.position_bias_m)
+    return known_m + navigation.latency_s * speed_mps + navigation.drift_share * unseen_m + turned_m

@@ -15,7 +15,14 @@ from pydantic import Field, ValidationError, create_model
 from aircraft.guidance.registry import GuidanceKind
 from harness.files.errors import PlannerError, sentence
 from harness.scenario.kinds import GUIDANCE, PLANNER, Kind, guidance_kinds, is_source, planner_kinds
-from harness.scenario.sections import AircraftSpec, GuidanceSpec, PartSpec, PlannerSpec, Section
+from harness.scenario.sections import (
+    MAX_COORDINATE_M,
+    AircraftSpec,
+    GuidanceSpec,
+    PartSpec,
+    PlannerSpec,
+    Section,
+)
 from harness.scenario.validation import KeyFault, KeyFaults, unknown_key
 from planner.compiled import begin_compiling, compile_all
 from planner.kernel_cache import seal
@@ -29,7 +36,7 @@ if TYPE_CHECKING:
     from planner.interface import Mission, Planner
 
 SURVEY_BYTES: Final = 11_000
-"""To survey an aircraft takes about as long as to compile so much byte code, the guidance law's compiling included."""
+"""To survey an aircraft takes about as long as to compile this much byte code, the guidance law's included."""
 
 
 @cache
@@ -98,8 +105,7 @@ def _code_of_others(fault: Callable[[str], Exception]) -> Iterator[None]:
 def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False) -> PlannerSpec:
     """The planner's section with its own keys checked and every default filled in from what it is told.
 
-    That of a run folder (`as_flown`) is complete: a planner given by a source file, or in Python, need not be here. A
-    KeyFault says that there is no such planner or key, or that keys contradict each other or the mission.
+    That of a run folder (`as_flown`) is complete: a planner given by a source file, or in Python, need not be here.
     """
     if as_flown and spec.kind not in planner_kinds():
         return spec
@@ -123,10 +129,7 @@ def is_here(spec: GuidanceSpec) -> bool:
 
 
 def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
-    """The planner for one flight, from a section that `resolved_planner` returned; nothing is left to compile in it.
-
-    A PlannerError says what its constructor raised, or that the run of its scenario was read back and it is not here.
-    """
+    """The planner for one flight, compiled; a PlannerError says what its constructor raised, or that it is not here."""
     compile_all()
     kind = planner_kinds().get(spec.kind)
     if kind is None:
@@ -153,10 +156,7 @@ def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
 
 
 def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
-    """How the law tracks with the aircraft, flown unless that is known; None: as the aircraft's survey says.
-
-    A KeyFault says that the law does not track with this aircraft, or what it raised.
-    """
+    """How the law tracks with the aircraft, flown unless that is known; None: as the aircraft's survey says."""
     from aircraft.airframes import AircraftError
     from aircraft.law_cards import law_card
 
@@ -167,15 +167,9 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     at = ("guidance", "kind")
     with _code_of_others(lambda said: KeyFault(at, f"{spec.kind}: it cannot be flown: {said}")):
         try:
-            return law_card(
-                airframe_of(aircraft),
-                kind,
-                config,
-                aircraft.airspeed_mps,
-                waypoints=waypoints,
-                acceptance_radius_m=spec.acceptance_radius_m,
-                before_flying=seal,
-            )
+            flown = {"waypoints": waypoints, "acceptance_radius_m": spec.acceptance_radius_m}
+            frame, speed_mps = airframe_of(aircraft), aircraft.airspeed_mps
+            return law_card(frame, kind, config, speed_mps, **flown, before_flying=seal)
         except AircraftError as error:
             raise KeyFault(at, str(error)) from error
 
@@ -192,11 +186,11 @@ def _named(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKin
     """The kind that a section names."""
     if spec.kind in kinds:
         return kinds[spec.kind]
+    told = f"is {spec.kind[:40]!r}; must be one of {', '.join(kinds)}"
     if is_source(spec.kind):
         name = spec.kind[:80]
         told = f"is {name!r}, which no file may name: code is only run for --{section} {name}, or in Python"
-        raise KeyFault((section, "kind"), told)
-    raise KeyFault((section, "kind"), f"is {spec.kind[:40]!r}; must be one of {', '.join(kinds)}")
+    raise KeyFault((section, "kind"), told)
 
 
 def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[str, Any]:
@@ -231,21 +225,19 @@ def _keys_section(kind: Kind) -> type[Section]:
     hints = get_type_hints(kind.config)
     keys: dict[str, Any] = {}
     for each in fields(kind.config):
-        told = each.metadata
-        described: dict[str, Any] = {name: told.get(key) for name, key in _BOUNDS}
-        described |= {"default": each.default, "description": f"{told['doc']}."}
+        described: dict[str, Any] = {name: each.metadata.get(key) for name, key in _BOUNDS}
+        if each.name.endswith("_m") and described["le"] is None:
+            described["le"] = MAX_COORDINATE_M
+        described |= {"default": each.default, "description": f"{each.metadata['doc']}."}
         keys[each.name] = (hints[each.name], Field(**described))
     return create_model(f"{kind.kind} keys", __base__=Section, **keys)
 
 
 def with_own_keys(schema: dict[str, Any]) -> dict[str, Any]:
     """The JSON Schema of a scenario with a choice for each kind of planner and of guidance law, its own keys in it."""
-    for name, spec, kinds in (
-        ("planner", "PlannerSpec", PLANNER.installed()),
-        ("guidance", "GuidanceSpec", GUIDANCE.installed()),
-    ):
+    for name, spec, part in (("planner", "PlannerSpec", PLANNER), ("guidance", "GuidanceSpec", GUIDANCE)):
         shared = schema["$defs"].pop(spec)
-        choices = [_choice(shared, kind) for kind in kinds.values()]
+        choices = [_choice(shared, kind) for kind in part.installed().values()]
         schema["properties"][name] = {"description": shared["description"], "anyOf": choices}
     return schema
 
@@ -256,11 +248,10 @@ def _choice(shared: dict[str, Any], kind: Kind) -> dict[str, Any]:
     usual = kind.kind == named["default"]
     if not usual:
         del named["default"]
-    return {
-        "title": kind.kind,
-        "description": kind.summary,
-        "type": "object",
-        "additionalProperties": False,
+    keys = {
         "properties": {**shared["properties"], "kind": named, **own},
         "required": [] if usual else ["kind"],
     }
+    return {
+        "title": kind.kind, "description": kind.summary, "type": "object", "additionalProperties": False, **keys
+    }  # fmt: skip

@@ -61,9 +61,7 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
     """What a planner is told before the flight; what the aircraft can do is looked up unless it is given.
 
     The clearance is `planner.clearance_m` and, on top, the margin for the error of the believed position. It is no less
-    than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size. The same margin is kept from
-    the border of the area, as far as start and goal lie within it. The tracking error is kept as well, but from a side
-    that start or goal is near to.
+    than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size.
     """
     from planner.interface import Mission
 
@@ -91,7 +89,7 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
 def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: float) -> Bounds:
     """The area's bounds moved in by a margin, but not past start and goal, and by the tracking error.
 
-    The latter is not kept from sides that start or goal is nearer to than `near_m`.
+    The latter is not kept from sides to which start or goal is nearer than `near_m`.
     """
     xmin, ymin, xmax, ymax = scenario.area.bounds_m
     east, north = zip(scenario.mission.start_m, scenario.mission.goal_m, strict=True)
@@ -112,17 +110,13 @@ SURVEYED_M: Final = 300.0
 NEAR_M: Final = (50.0, 1000.0)
 MIDDLE: Final = 1.05
 """Between the altitudes `NEAR_M` an aircraft flies level at an airspeed that is by this factor within the range
-measured at `SURVEYED_M`: the density of the air differs by 7 % at most, which moves the ends of the range by less. It
-need not be trimmed. Near the ground the wheels may touch it."""
+measured at `SURVEYED_M`: the density of the air differs by 7 % at most. It need not be trimmed."""
 STEP_M: Final = 50.0
 """The highest altitude of level flight is told to this."""
 
 
 def start_conditions(scenario: ScenarioKeys) -> StartConditions:
-    """Where and how a scenario's flight begins: a hair inside the area where the start lies on its boundary.
-
-    A given path may begin outside the area; then the flight does, too.
-    """
+    """Where and how a flight begins: a hair inside the area where its start lies on the boundary."""
     mission, (xmin, ymin, xmax, ymax) = scenario.mission, scenario.area.bounds_m
     east, north = mission.start_m
     if xmin <= east <= xmax and ymin <= north <= ymax:
@@ -162,10 +156,7 @@ def _towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
 
 
 def check_level_flight(scenario: ScenarioKeys) -> None:
-    """Raises a KeyFault if the aircraft cannot fly level at the altitude.
-
-    It is trimmed as the flight would trim it, unless its survey shows that it flies level.
-    """
+    """Raises a KeyFault if the aircraft cannot fly level at the altitude, trimmed as for the flight where need be."""
     from aircraft.airframes import AircraftError
 
     start, origin = start_conditions(scenario), scenario.area.origin

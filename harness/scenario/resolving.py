@@ -1,8 +1,7 @@
 """From what a scenario file says to a complete scenario: defaults that follow from other keys or from the aircraft.
 
-`resolve` reads top to bottom in the order in which defaults depend on one another. To learn what an aircraft can do
-under a guidance law it may have to be flown, which is then kept on disk, and it is trimmed as its flight begins.
-Reading a file (`ScenarioKeys`) does neither.
+`resolve` reads top to bottom in the order in which defaults depend on one another. What an aircraft can do under a
+guidance law may have to be flown, which is then kept on disk.
 """
 
 from __future__ import annotations
@@ -53,10 +52,9 @@ def resolve(
     simulation = keys.simulation.filled(rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
     mission = _ends_in_plane(keys.mission, keys.area)
     aircraft = keys.aircraft.model_copy(update={"model": model_or_folder(keys.aircraft.model, folder)})
-    card = aircraft.model_copy(update={"actuators": None, "autopilot": None})
-    nominal = _airframe(card, "model")
+    nominal = _airframe(aircraft.model_copy(update={"actuators": None, "autopilot": None}))
     keys = with_servos(keys.updated(simulation=simulation, mission=mission, aircraft=aircraft), nominal)
-    aircraft = keys.aircraft.filled(airspeed_mps=_airframe(keys.aircraft, "actuators").cruise_mps)
+    aircraft = keys.aircraft.filled(airspeed_mps=_airframe(keys.aircraft).cruise_mps)
     keys = with_day(keys.updated(aircraft=aircraft), nominal)
     aircraft, latency_s = keys.aircraft, keys.navigation.latency_s
     if latency_s or aircraft.autopilot is not None:
@@ -77,20 +75,15 @@ def resolve(
         time_limit_s=_rounded_up(10 * slowest_s + 60, 60),
     )
     planner = keys.planner.filled(clearance_m=_rounded_up(radius_m, 10))
+    clearance_m = planner.clearance_m
     sensor = sensor.filled(
         range_m=_rounded_up(10 * radius_m, 100),
         beam_deg=sensor.field_of_view_deg / sensor.rays,
-        least_width_m=max(planner.clearance_m, LEAST_CLEARANCE * radius_m),
+        least_width_m=max(clearance_m, LEAST_CLEARANCE * radius_m),
     )
     fastest_mps = aircraft.airspeed_mps + wind_mps
-    margin_m = planning_margin_m(
-        keys.navigation,
-        fastest_mps,
-        mission.time_limit_s,
-        unseen_m=math.pi * radius_m,
-        clearance_m=planner.clearance_m,
-        turn_radius_m=radius_m,
-    )
+    limit_s = mission.time_limit_s
+    margin_m = planning_margin_m(keys.navigation, fastest_mps, limit_s, clearance_m, radius_m)
     navigation = keys.navigation.filled(margin_m=margin_m)
     weight_lb = airframe_of(aircraft).mass_kg / POUND_KG
     limits = keys.trackability.filled(
@@ -99,29 +92,26 @@ def resolve(
         airspeed_mps=0.1 * aircraft.airspeed_mps,
         load_factor=min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0)),
     )
-    scenario = scenario.updated(
-        mission=mission, sensor=sensor, planner=planner, navigation=navigation, trackability=limits
-    )
+    parts = {"mission": mission, "sensor": sensor, "planner": planner, "navigation": navigation}
+    scenario = scenario.updated(**parts, trackability=limits)
 
     check_local_plane(scenario.area)
     if not as_flown:
         check_level_flight(scenario)
     scenario, names = with_files_expanded(scenario, folder)
     if ends_checked:
-        check_start_and_goal(scenario.area, scenario.obstacles, mission, planner.clearance_m, names)
-        tightest_m = fastest_mps**2 / (
-            GRAVITY_MPS2 * math.tan(limits_of(aircraft).bank_limit_rad)
-        )  # downwind
-        check_start_leads_in(scenario.area, mission, tightest_m)
+        check_start_and_goal(scenario.area, scenario.obstacles, mission, clearance_m, names)
+        sideways_mps2 = GRAVITY_MPS2 * math.tan(limits_of(aircraft).bank_limit_rad)
+        check_start_leads_in(scenario.area, mission, fastest_mps**2 / sideways_mps2)  # downwind
     told = mission_of(scenario, performance)
     return scenario.updated(planner=resolved_planner(planner, told, as_flown))
 
 
 def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
     """A mission whose start and goal are in metres, where they were given in degrees."""
-    ends = {name: getattr(mission, name) for name in ("start", "goal")}
-    given = {f"{name}_m": plane_point(place, area) for name, place in ends.items() if place}
-    return mission.model_copy(update={"start": None, "goal": None, **given}) if given else mission
+    ends = {"start_m": mission.start, "goal_m": mission.goal}
+    given = {name: plane_point(place, area) for name, place in ends.items() if place}
+    return mission.model_copy(update={"start": None, "goal": None, **given})
 
 
 def model_or_folder(model: str, folder: Path | None) -> str:
@@ -139,14 +129,18 @@ def model_or_folder(model: str, folder: Path | None) -> str:
     return model
 
 
-def _airframe(spec: AircraftSpec, key: str) -> Airframe:
-    """The airframe of a scenario; where there is none, that is the fault of a key."""
+def _airframe(spec: AircraftSpec) -> Airframe:
+    """The airframe of a scenario; where there is none, the fault is of the key without which there is one."""
     from aircraft.airframes import AircraftError
 
     try:
         return airframe_of(spec)
     except AircraftError as error:
-        raise KeyFault(("aircraft", key), str(error)) from error
+        for key in ("autopilot", "actuators"):
+            if getattr(spec, key) is not None:
+                _airframe(spec.model_copy(update={key: None}))
+                raise KeyFault(("aircraft", key), str(error)) from error
+        raise KeyFault(("aircraft", "model"), str(error)) from error
 
 
 def _rounded_up(value: float, step: int) -> float:
@@ -176,10 +170,9 @@ def check_local_plane(area: Area) -> None:
 def check_start_and_goal(
     area: Area, obstacles: Sequence[Obstacle], mission: MissionSpec, clearance_m: float, names: Sequence[str]
 ) -> None:
-    """Raises a KeyFault unless start and goal lie in the area and, as far as it can be told, clear of obstacles.
+    """Raises a KeyFault unless start and goal lie in the area and clear of obstacles, which messages call by `names`.
 
-    The start must be clear of what is there at time 0, the goal of what is there for ever; a moving or timed
-    obstacle may lie on the goal. `names` are what messages call each obstacle.
+    The start must be clear of what is there at time 0, the goal of what is there for ever.
     """
     xmin, ymin, xmax, ymax = area.bounds_m
     ends = {"start_m": mission.start_m, "goal_m": mission.goal_m}
@@ -207,10 +200,7 @@ def check_start_and_goal(
 
 
 def _distance_to(obstacle: Obstacle, point: Point, wanted_m: float) -> float:
-    """Distance in metres from a point to the edge of an obstacle where the file puts it; negative inside.
-
-    It is +inf where a polygon's upright box alone says that it is more than is wanted: of 100,000 obstacles most are.
-    """
+    """Distance in metres from a point to the edge of an obstacle, negative inside; inf if its box is far away."""
     if obstacle.circle:
         return math.dist(point, obstacle.circle.center_m) - obstacle.circle.radius_m
     assert obstacle.polygon
@@ -219,10 +209,8 @@ def _distance_to(obstacle: Obstacle, point: Point, wanted_m: float) -> float:
         return math.inf
     import shapely
 
-    polygon, place = (
-        shapely.Polygon(obstacle.polygon.vertices_m, obstacle.polygon.holes_m),
-        shapely.Point(point),
-    )
+    place = shapely.Point(point)
+    polygon = shapely.Polygon(obstacle.polygon.vertices_m, obstacle.polygon.holes_m)
     return float(shapely.distance(polygon, place) or -shapely.distance(polygon.boundary, place))
 
 

@@ -62,22 +62,21 @@ def test_faults_name_line_key_and_what_would_be_right(keys: str, sentence: str) 
 
 
 @pytest.mark.parametrize(
-    ("keys", "k", "margin_m"),
+    ("keys", "margin_m"),
     [
-        ({"kind": "perfect"}, 3.0, 0.0),
-        ({"kind": "gnss"}, 3.0, 14.1),
-        ({"kind": "gnss", "position_bias_m": [3, -4]}, 2.0, 9.4 + 5.0),
+        ({"kind": "perfect"}, 0.0),
+        ({"kind": "gnss"}, 14.1),
+        ({"kind": "gnss", "position_bias_m": [3, -4]}, 14.1 + 5.0),
         # The longest of the outages, and no longer than the flight: 0.03 x 25 m/s x 60 s, and x 40 s.
-        ({"kind": "gnss", "outages_s": [[0, 60], [70, 100]]}, 3.0, 14.1 + 45.0),
-        ({"kind": "gnss", "outages_s": [[960, 1060]]}, 3.0, 14.1 + 30.0),
-        ({"kind": "dead_reckoning"}, 3.0, 0.01 * 25.0 * 1000.0),
+        ({"kind": "gnss", "outages_s": [[0, 60], [70, 100]]}, 14.1 + 45.0),
+        ({"kind": "gnss", "outages_s": [[960, 1060]]}, 14.1 + 30.0),
+        ({"kind": "dead_reckoning"}, 0.01 * math.pi * 1000.0),  # half a turn of 1 km
     ],
 )  # fmt: skip
-def test_the_margin_is_sigmas_bias_and_the_longest_outage(
-    keys: dict[str, Any], k: float, margin_m: float
-) -> None:
-    navigation = Navigation.model_validate(keys)
-    assert planning_margin_m(navigation, 25.0, 1000.0, k) == pytest.approx(margin_m)
+def test_the_margin_is_sigmas_bias_and_the_longest_outage(keys: dict[str, Any], margin_m: float) -> None:
+    sure_of_heading = {} if keys["kind"] == "perfect" else {"heading_sigma_deg": 0.0}
+    navigation = Navigation.model_validate({**keys, **sure_of_heading})
+    assert planning_margin_m(navigation, 25.0, 1000.0, 300.0, 1000.0) == pytest.approx(margin_m)
 
 
 @pytest.mark.parametrize(
@@ -92,5 +91,5 @@ def test_the_margin_has_what_the_heading_misplaces_an_edge_by_before_the_plan_is
     heading_deg: float, clearance_m: float, radius_m: float, along_m: float
 ) -> None:
     navigation = Navigation(kind="rtk", heading_sigma_deg=heading_deg)
-    margin_m = planning_margin_m(navigation, 25.0, 1000.0, clearance_m=clearance_m, turn_radius_m=radius_m)
+    margin_m = planning_margin_m(navigation, 25.0, 1000.0, clearance_m, radius_m)
     assert margin_m == pytest.approx(3.0 * 0.017 + 3.0 * math.radians(heading_deg) * along_m)
