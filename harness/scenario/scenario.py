@@ -6,6 +6,7 @@ defaults that depend on other keys or on the aircraft, and refuses keys that con
 
 from __future__ import annotations
 
+import json
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,20 +23,16 @@ from harness.scenario.parts import with_own_keys
 from harness.scenario.resolving import resolve
 from harness.scenario.sections import GuidanceSpec, PlannerSpec, Section
 from harness.scenario.shipped import scenario_path
-from harness.scenario.validation import KeyFault, KeyFaults
+from harness.scenario.validation import KeyFaults
 
 OWN_KEYS: Final[Mapping[Loc, type[Section]]] = {
-    ("planner", "kind"): PlannerSpec,
-    ("guidance", "kind"): GuidanceSpec,
-}
+    ("planner", "kind"): PlannerSpec, ("guidance", "kind"): GuidanceSpec
+}  # fmt: skip
 """Kinds whose own keys stand in a section, and the section's type, which has the keys of all kinds."""
 
 
 def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
-    """A scenario's keys with some replaced, as `load_scenario` takes them.
-
-    An InputError says that one is not a key path, has no value or leads nowhere.
-    """
+    """A scenario's keys with some replaced, as `load_scenario` takes them; their faults name the command line."""
     for name, text in overrides:
         loc = _loc(name, "command line")
         if not text.strip():
@@ -45,10 +42,7 @@ def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
 
 
 def with_key(root: Node, loc: Loc, new: Node) -> Node:
-    """A scenario's keys with one replaced; a new kind of planner or guidance drops the own keys of the one before.
-
-    An InputError says that there is no such key, as far as it can be told without the scenario's types.
-    """
+    """A scenario's keys with one replaced; a new kind of planner or guidance drops the own keys of the one before."""
     shared, section = OWN_KEYS.get(loc), root.at(loc[:1])
     if shared and section and isinstance(section.value, dict) and section.plain().get("kind") != new.value:
         common = {name: node for name, node in section.value.items() if name in shared.model_fields}
@@ -57,19 +51,14 @@ def with_key(root: Node, loc: Loc, new: Node) -> Node:
 
 
 class Given(NamedTuple):
-    """What a scenario was made of, before any default was derived or any file expanded."""
+    """The keys that a scenario was made of, by attribute, without derived defaults; and its file's folder, if any."""
 
     sections: Mapping[str, Any]
-    """The keys that were given, by their attributes; sections without the defaults that follow from others."""
     folder: Path | None
-    """Of the scenario file; None where there was none."""
 
 
 def changed(given: Given, keys: Mapping[str, Any]) -> Node:
-    """The keys that a scenario was given, and no default, with some changed; None takes a key away.
-
-    An InputError says that it is no mapping, or one is not a key path, or leads nowhere.
-    """
+    """The keys that a scenario was given, and no default, with some changed; None takes a key away."""
     if not isinstance(keys, Mapping) or not all(isinstance(name, str) for name in keys):
         raise InputError('with_: must be given a mapping of key paths, such as {"planner.clearance_m": 60}')
     plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}
@@ -101,28 +90,15 @@ def _plain(value: Any) -> Any:
 
 
 class Scenario(ScenarioKeys):
-    """One flight, completely described; flying it twice gives the same track bit for bit.
+    """One flight, completely described, nothing left to a default; flying it twice gives the same track bit for bit.
 
-    Attributes equal the keys of the file, except `schema_`, which is `schema` there. `load_scenario` and the like make
-    it; nothing in it is left to a default.
+    Attributes equal the keys of the file, except `schema_`, which is `schema` there.
     """
 
-    @classmethod
-    def of(
-        cls, keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
-    ) -> Scenario:
-        """The complete scenario of some keys, as `resolve` has it; a KeyFault says why there is none."""
-        complete = resolve(keys, folder, ends_checked, as_flown)
-        scenario = cls.model_construct(keys.model_fields_set, **dict(complete))
-        object.__setattr__(scenario, "_given", Given(keys.given, folder))
-        return scenario
-
     def with_(self, keys: Mapping[str, Any]) -> Scenario:
-        """This scenario with some keys changed, checked anew; defaults that follow from others are derived anew.
+        """A copy with some keys changed, checked anew; defaults that follow from others are derived anew.
 
-        A key counts as given where the scenario's file, or an earlier `with_`, named it; all others follow. A new
-        `planner.kind` drops the own keys of the planner before. This scenario stays as it is. An InputError names the
-        key that cannot be flown.
+        A new `planner.kind` drops the own keys of the planner before. An InputError names the key that cannot be flown.
 
         Args:
             keys: values by key path, as `{"seed": 3, "obstacles[0].circle.radius_m": 50}`; plain values, numpy's, or
@@ -156,11 +132,7 @@ def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -
 def parse_scenario(
     text: str, source: str = "scenario", as_flown: bool = False, folder: Path | None = None
 ) -> Scenario:
-    """Reads a scenario from YAML text; an InputError calls it `source`, and files are looked for in `folder` first.
-
-    One of a run folder (`as_flown`) is complete: start and goal are not checked again, and a planner or guidance law
-    that was given by a source file, or in Python, need not be here.
-    """
+    """Reads a scenario from YAML text; arguments and faults are those of `validated`."""
     return validated(strict_yaml.parse(text, source), source, folder, not as_flown, as_flown)
 
 
@@ -182,7 +154,7 @@ def packed(scenario: Scenario) -> bytes:
 
 def unpacked(kept: bytes) -> Scenario:
     """What `packed` was given."""
-    return Scenario.of(ScenarioKeys.model_validate_json(zlib.decompress(kept)))
+    return scenario_from(json.loads(zlib.decompress(kept)))
 
 
 def scenario_schema() -> dict[str, Any]:
@@ -197,7 +169,8 @@ def validated(
     """A scenario from what was read, every default filled in; an InputError calls it `source`.
 
     The folder of an aircraft, and files of obstacles, are sought in `folder` first. With `ends_checked` start and goal
-    must keep the clearance from obstacles and lie in the area. `as_flown` is as `parse_scenario` takes it.
+    must keep the clearance from obstacles and lie in the area. One of a run folder (`as_flown`) is complete: a planner
+    or guidance law that was given by a source file, or in Python, need not be here.
     """
     try:
         return scenario_from(root.plain(), folder, ends_checked, as_flown)
@@ -210,8 +183,10 @@ def scenario_from(
 ) -> Scenario:
     """The same from plain values, as YAML has them; KeyFaults say why they are no scenario."""
     try:
-        return Scenario.of(ScenarioKeys.model_validate(plain), folder, ends_checked, as_flown)
+        keys = ScenarioKeys.model_validate(plain)
     except ValidationError as error:
         raise KeyFaults.of(error, ScenarioKeys) from error
-    except KeyFault as error:
-        raise KeyFaults([(error.loc, str(error))]) from error
+    complete = resolve(keys, folder, ends_checked, as_flown)
+    scenario = Scenario.model_construct(keys.model_fields_set, **dict(complete))
+    object.__setattr__(scenario, "_given", Given(keys.given, folder))
+    return scenario

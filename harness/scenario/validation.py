@@ -21,7 +21,6 @@ NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"
 """Pattern of a name that a folder may be called after."""
 
 _PATTERNS: Final = {NAME_PATTERN: "have only a-z, 0-9, '.', '_' and '-', and not only dots"}
-_MAPPING: Final = "is {shown}; must be a mapping `key: value`"
 _SENTENCES: Final = {
     "missing": "is missing; it is required",
     "literal_error": "is {shown}; must be {expected}",
@@ -33,21 +32,13 @@ _SENTENCES: Final = {
     "string_type": "is {shown}; must be text; put it in quotes",
     "bool_type": "is {shown}; must be true or false",
     **dict.fromkeys(("tuple_type", "list_type"), "is {shown}; must be a list"),
-    **dict.fromkeys(("model_type", "dict_type", "model_attributes_type"), _MAPPING),
+    **dict.fromkeys(("model_type", "dict_type"), "is {shown}; must be a mapping `key: value`"),
     "greater_than": "is {shown}; must be greater than {gt:.12g}",
     "greater_than_equal": "is {shown}; must be at least {ge:.12g}",
     "less_than": "is {shown}; must be less than {lt:.12g}",
     "less_than_equal": "is {shown}; must be at most {le:.12g}",
 }
 """What is wrong, and what would be right, by the type of pydantic's error and with what it tells of it."""
-
-
-class KeyFault(ValueError):
-    """The key at `loc` contradicts others."""
-
-    def __init__(self, loc: Loc, sentence: str) -> None:
-        super().__init__(sentence)
-        self.loc = loc
 
 
 class KeyFaults(ValueError):
@@ -68,7 +59,7 @@ class KeyFaults(ValueError):
             loc, cause = details["loc"], details.get("ctx", {}).get("error")
             last = short.get(loc[:-1]) if details["type"] == "missing" else None
             if last is not None:  # numbers of a list that is too short
-                given, wanted = str(list(last["input"]))[:80], int(last["loc"][-1]) + 1
+                given, wanted = str([*last["input"]])[:80], int(last["loc"][-1]) + 1
                 found.append((loc[:-1], f"is {given}; must have {wanted} numbers"))
             elif isinstance(cause, KeyFault):
                 found.append(((*loc, *cause.loc), str(cause)))
@@ -79,9 +70,16 @@ class KeyFaults(ValueError):
 
     def in_file(self, root: Node, source: str) -> InputError:
         """The same with file, line and key, at most `MAX_FAULTS` lines."""
-        return in_lines(
-            [fault_line(source, root.line_of(loc), loc, said) for loc, said in self.every], source
-        )
+        lines = [fault_line(source, root.line_of(loc), loc, said) for loc, said in self.every]
+        return in_lines(lines, source)
+
+
+class KeyFault(KeyFaults):
+    """The key at `loc` contradicts others."""
+
+    def __init__(self, loc: Loc, sentence: str) -> None:
+        super().__init__([(loc, sentence)])
+        self.loc = loc
 
 
 def in_lines(every: Sequence[str], source: str) -> InputError:
