@@ -1,8 +1,7 @@
 """`conditions: ideal | typical | rough`: what kind of day it is, and the figures that are drawn for it from the seed.
 
 A day fills in what a scenario leaves out of its navigation, its servos, its air and the deviations of its aircraft.
-Where every figure comes from stands in `aircraft/README.md`. Nothing is drawn anew in a run folder's scenario, where
-all keys stand.
+The sources of all figures stand in `aircraft/README.md`.
 """
 
 from __future__ import annotations
@@ -16,14 +15,7 @@ from aircraft.start import profile_share
 from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.navigation import Navigation
-from harness.scenario.sections import (
-    MOST_SHARE,
-    MOST_SHIFT_M,
-    ActuatorsSpec,
-    AircraftSpec,
-    DeviationSpec,
-    UncertaintySpec,
-)
+from harness.scenario.sections import MOST_SHARE, MOST_SHIFT_M, ActuatorsSpec, DeviationSpec, UncertaintySpec
 
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe
@@ -36,15 +28,14 @@ MOST_SIGMAS: Final = 3.0
 """What is drawn from a normal distribution is at most so many sigma from its mean."""
 WIND_FROM_M: Final = 10.0
 """Height over ground at which winds are measured (WMO)."""
-CHANGE_EVERY_S: Final = 300.0
-CHANGING_FOR_S: Final = 7200.0
+CHANGE_EVERY_S, CHANGES = 300.0, 24
 """The wind has another speed and direction every five minutes, for two hours; then it stays."""
 GUST_LENGTH_M: Final = 100.0
 """Length of a discrete vertical gust: twice a gradient distance of 50 m, amid the 9 to 107 m of CS 25.341."""
 
 
 class Day(NamedTuple):
-    """The figures of one kind of day; their sources stand in `aircraft/README.md`."""
+    """The figures of one kind of day."""
 
     wind_mps: float | tuple[float, float]
     """Mean of the wind speed 10 m over ground, Rayleigh distributed, or the ends of a uniform one."""
@@ -113,7 +104,7 @@ def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
         air = _air(keys, day, _stream(keys.seed, CONDITIONS_STREAM))
         keys = keys.updated(environment=air, navigation=_navigation(keys, day))
     uncertainty = _uncertainty(keys.uncertainty, day, frame.mass_kg)
-    deviation = _deviation(keys.aircraft, uncertainty, _stream(keys.seed, DEVIATION_STREAM))
+    deviation = _deviation(keys.aircraft.deviation, uncertainty, _stream(keys.seed, DEVIATION_STREAM))
     aircraft = keys.aircraft.model_copy(update={"deviation": deviation})
     return keys.updated(aircraft=aircraft, uncertainty=uncertainty)
 
@@ -127,16 +118,11 @@ def _air(keys: ScenarioKeys, day: Day, rng: np.random.Generator) -> Environment:
     else:
         mean_mps = float(rng.rayleigh(day.wind_mps / math.sqrt(math.pi / 2.0)))
     mean_mps, from_deg = min(mean_mps, most_mps), float(rng.uniform(0.0, 360.0))
-    count = round(CHANGING_FOR_S / CHANGE_EVERY_S)
-    swings = rng.standard_normal((count, 2)).clip(-MOST_SIGMAS, MOST_SIGMAS)
-    changes = tuple(
-        (
-            CHANGE_EVERY_S * (number + 1),
-            round(min(mean_mps * (1.0 + day.speed_change * speed), most_mps), 3),
-            round((from_deg + day.direction_change_deg * turn) % 360.0, 2),
-        )
-        for number, (speed, turn) in enumerate(swings.tolist())
-    )
+    changes = []
+    for number, (speed, turn) in enumerate(_clipped(rng, (CHANGES, 2)), start=1):
+        speed_mps = min(mean_mps * (1.0 + day.speed_change * speed), most_mps)
+        towards_deg = (from_deg + day.direction_change_deg * turn) % 360.0
+        changes.append((CHANGE_EVERY_S * number, round(speed_mps, 3), round(towards_deg, 2)))
     first = {"speed_mps": round(mean_mps, 3), "from_deg": round(from_deg, 2)}
     gusts = VerticalGustsSpec(
         speed_mps=day.vertical_gust_mps,
@@ -145,7 +131,7 @@ def _air(keys: ScenarioKeys, day: Day, rng: np.random.Generator) -> Environment:
         start_s=round(float(rng.uniform(0.0, every_s)), 2),
     )
     return keys.environment.filled(
-        wind=Wind(**first, measured_at_m=WIND_FROM_M, changes=changes),
+        wind=Wind(**first, measured_at_m=WIND_FROM_M, changes=tuple(changes)),
         turbulence=Turbulence(intensity=day.turbulence),
         vertical_gusts=gusts,
     )
@@ -157,9 +143,8 @@ def _navigation(keys: ScenarioKeys, day: Day) -> Navigation:
     named = {name: getattr(given, name) for name in given.model_fields_set}
     if "kind" not in named:
         return Navigation(**day.navigation | named)
-    return (
-        given if given.kind == "perfect" else Navigation(**{"latency_s": day.navigation["latency_s"]} | named)
-    )
+    latency = {"latency_s": day.navigation["latency_s"]}
+    return given if given.kind == "perfect" else Navigation(**latency | named)
 
 
 def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float) -> UncertaintySpec | None:
@@ -170,22 +155,26 @@ def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float)
 
 
 def _deviation(
-    aircraft: AircraftSpec, uncertainty: UncertaintySpec | None, rng: np.random.Generator
+    given: DeviationSpec | None, uncertainty: UncertaintySpec | None, rng: np.random.Generator
 ) -> DeviationSpec | None:
-    """What is drawn for one flight, on top of nothing that the scenario names itself."""
+    """What is drawn for one flight where the scenario names nothing itself."""
     names = list(DeviationSpec.model_fields)
     if uncertainty is None:
-        return aircraft.deviation and aircraft.deviation.filled(**dict.fromkeys(names, 0.0))
-    drawn = rng.standard_normal(len(names)).clip(-MOST_SIGMAS, MOST_SIGMAS).tolist()
+        return given and given.filled(**dict.fromkeys(names, 0.0))
     values = {}
-    for name, each in zip(names, drawn, strict=True):
+    for name, each in zip(names, _clipped(rng, len(names)), strict=True):
         most = MOST_SHIFT_M if name == "centre_of_gravity_m" else MOST_SHARE
         values[name] = min(max(round((getattr(uncertainty, name) or 0.0) * each, 6), -most), most)
-    return (aircraft.deviation or DeviationSpec()).filled(**values)
+    return (given or DeviationSpec()).filled(**values)
 
 
 def _stream(seed: int, number: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
+
+
+def _clipped(rng: np.random.Generator, shape: int | tuple[int, int]) -> list[Any]:
+    drawn: list[Any] = rng.standard_normal(shape).clip(-MOST_SIGMAS, MOST_SIGMAS).tolist()
+    return drawn
 
 
 def told(scenario: ScenarioKeys) -> str:

@@ -11,7 +11,7 @@ from aircraft.frames import LocalPlane
 from aircraft.start import Atmosphere, StartConditions, VerticalGusts, profile_share
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.parts import airframe_of, card_of, flown_airframe
-from harness.scenario.sections import Bounds
+from harness.scenario.sections import Bounds, DeviationSpec
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
@@ -111,6 +111,9 @@ NEAR_M: Final = (50.0, 1000.0)
 MIDDLE: Final = 1.05
 """Between the altitudes `NEAR_M` an aircraft flies level at an airspeed that is by this factor within the range
 measured at `SURVEYED_M`: the density of the air differs by 7 % at most. It need not be trimmed."""
+NEAR_SHARE, NEAR_SHIFT = 0.25, 0.01
+"""Nor if its deviations are at most this share, and the shift of its centre of gravity this over the cube root of the
+mass (m/kg^1/3)."""
 STEP_M: Final = 50.0
 """The highest altitude of level flight is told to this."""
 
@@ -167,6 +170,7 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
         frame = flown_airframe(scenario.aircraft)
         slowest, fastest = frame.airspeed_range_mps
         near = NEAR_M[0] <= start.altitude_m <= NEAR_M[1]
+        near = near and _is_as_surveyed(scenario.aircraft.deviation, frame.mass_kg)
         if near and MIDDLE * slowest <= start.airspeed_mps <= fastest / MIDDLE:
             return
         fault = _fault(frame.files, place, start, heading_rad)
@@ -175,9 +179,11 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     if fault is None:
         return
 
-    def flies(altitude_m: float) -> bool:
-        return _fault(frame.files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
+    def flies(altitude_m: float, files: ModelFiles = frame.files) -> bool:
+        return _fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
 
+    if scenario.aircraft.deviation and flies(start.altitude_m, airframe_of(scenario.aircraft).files):
+        raise KeyFault(("aircraft", "deviation"), f"must be smaller: {fault}")
     if not flies(SURVEYED_M):
         raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
     good, bad = SURVEYED_M, start.altitude_m
@@ -187,6 +193,12 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     steps = math.floor(good / STEP_M) if bad > good else math.ceil(good / STEP_M)
     told = f"{'at most' if bad > good else 'at least'} {STEP_M * steps:g}"
     raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {told}: {fault}")
+
+
+def _is_as_surveyed(deviation: DeviationSpec | None, mass_kg: float) -> bool:
+    """Whether what is flown deviates so little from its model that the survey of this tells of level flight."""
+    most = {"centre_of_gravity_m": NEAR_SHIFT * mass_kg ** (1.0 / 3.0)}
+    return all(abs(each or 0.0) <= most.get(name, NEAR_SHARE) for name, each in deviation or ())
 
 
 @lru_cache(maxsize=512)
