@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import tomllib
-import venv
 import zipfile
 from importlib.metadata import version
 from pathlib import Path
@@ -131,28 +130,3 @@ def test_everything_needed_is_pinned() -> None:
 def test_rerun_is_held_to_one_minor_version() -> None:
     major, minor, _ = version("rerun-sdk").split(".")
     assert f"rerun-sdk>={major}.{minor},<{major}.{int(minor) + 1}" in PROJECT["dependencies"]
-
-
-@pytest.mark.slow
-def test_wheel_installs_and_flies_in_a_fresh_environment(wheel: Path, tmp_path: Path) -> None:
-    venv.create(tmp_path / "env", with_pip=True)
-    programs = tmp_path / "env" / "bin"
-    plain = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    (tmp_path / "empty").mkdir()
-    for command in (
-        [programs / "pip", "install", "-q", "-c", ROOT / "constraints.txt", wheel],
-        [programs / "wayproof", "fly", "paper_circles"],
-    ):
-        run = subprocess.run(
-            [str(part) for part in command],
-            cwd=tmp_path / "empty",
-            env=plain,
-            capture_output=True,
-            text=True,
-            timeout=600,
-            check=False,
-        )
-        assert run.returncode == 0, run.stderr
-    assert "reached: inside the goal circle" in run.stdout
-    folder = tmp_path / "empty" / "runs" / "paper_circles" / "rolling_window-aerosonde-1"
-    assert (folder / "flight.rrd").stat().st_size > 100_000

@@ -14,7 +14,6 @@ import pytest
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 from tests.faults.command import FOREST, start
-from tests.longer import longer
 
 GIB = 2**30
 HEAD = """\
@@ -69,13 +68,10 @@ def test_a_hundred_thousand_are_flown(world: Callable[[int], str], tmp_path: Pat
 HUGE: dict[str, Callable[[], str]] = {
     "numbers in a list": lambda: HEAD + "obstacles: [" + "1, " * 5_000_000 + "1]\n",
     "wrong obstacles": lambda: HEAD + "obstacles:\n" + "- circl: {}\n" * 600_000,
-    "half wrong obstacles": lambda: circles(50_000) + "  - {}\n" * 50_000,
     "keys": lambda: HEAD + "".join(f"k{n}: 1\n" for n in range(1_000_000)),
     "lines": lambda: "ab\n" * 10_000_000,
-    "a key": lambda: HEAD + "? " + "a" * 20_000_000 + "\n: 1\n",
     "a value": lambda: HEAD.replace("absurd", "a" * 20_000_000),
     "brackets": lambda: "a: " + "[" * 30_000_000,
-    "an anchor": lambda: "a: &" + "a" * 20_000_000 + " 1\n",
     "more than is read": lambda: "#" * 40_000_000,
 }
 
@@ -97,24 +93,22 @@ def test_a_huge_file_is_refused_soon(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "sentence"),
     [
-        ("area.bounds_m", "[0, 0, 1e9, 1e9]", "at most 1000000"),
-        ("mission.time_limit_s", "1e12", "at most 10000000"),
         ("sensor.rays", "1000000000", "at most 100000"),
         ("sensor.rays", "9" * 60, "must be"),
         ("sensor.rate_hz", "1e9", "at most 120"),
         ("sensor.rate_hz", "1e-9", "must be at least"),
-        ("sensor.range_m", "1e12", "at most 1000000"),
         ("sensor.range_m", "1e-9", "too short"),
-        ("sensor.latency_s", "1e9", "at most 60"),
-        ("obstacles[0].circle.radius_m", "1e12", "at most 1000000"),
-        ("mission.altitude_m", "1e9", "at most 20000"),
-        ("planner.compute_latency_s", "1e9", "at most 60"),
+        ("planner.margin_m", "1e9", "at most 1000000"),
+        ("aircraft.autopilot", "{roll_rate_limit_degps: 0.5}", "autopilot: aerosonde cannot be held"),
+        (
+            "aircraft.deviation.centre_of_gravity_m",
+            "3",
+            "deviation: must be smaller: aerosonde cannot be trimmed",
+        ),
         ("aircraft.airspeed_mps", "1e-9", "cannot hold"),
         ("aircraft.model", "/", "must be the folder of one aircraft"),
         ("aircraft.model", "../../../../../../../../etc", "JSBSim model"),
         ("aircraft.model", "~nobody-of-this-name", "unknown aircraft"),
-        ("name", "../../etc", "must have only a-z"),
-        ("name", "a/b", "must have only a-z"),
         ("planner.kind", "../x", "must be one of"),
     ],
 )
@@ -129,21 +123,17 @@ def test_a_value_beyond_reason_is_refused(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        *longer(
-            [
-                ("sensor.rays", "100000"),
-                ("obstacles[0].circle.radius_m", "1e-9"),
-                ("area.bounds_m", "[-2.8e5, -2.8e5, 2.8e5, 2.8e5]"),
-                ("sensor.rate_hz", "120"),
-                ("sensor.rate_hz", "0.01"),
-                ("sensor.range_m", "1e6"),
-                ("planner.clearance_m", "0"),
-                ("seed", "9007199254740992"),
-            ]
-        )
+        ("sensor.rays", "100000"),
+        ("obstacles[0].circle.radius_m", "1e-9"),
+        ("area.bounds_m", "[-2.8e5, -2.8e5, 2.8e5, 2.8e5]"),
+        ("sensor.rate_hz", "120"),
+        ("sensor.rate_hz", "0.01"),
+        ("sensor.range_m", "1e6"),
+        ("planner.clearance_m", "0"),
     ],
 )
 def test_the_outermost_values_are_flown(key: str, value: str, tmp_path: Path) -> None:

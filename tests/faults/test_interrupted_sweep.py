@@ -1,16 +1,19 @@
-"""A campaign on a disk that is full or takes nothing, two at once, a scenario changed: a line, nothing lost."""
+"""A campaign on a full disk, two at once, a scenario changed, standard files closed: a line, nothing lost."""
 
 from __future__ import annotations
 
 import json
+import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 
 from harness.run_files.run_folder import load_run
-from tests.faults.command import CAMPAIGN_FILES, run, run_here, start, wait_until
+from tests.faults.command import CAMPAIGN_FILES, ROOT, run, run_here, start, wait_until
 
 SWEEP = ("sweep", "campaign.yaml", "--out", "out", "--workers", "1", "--quiet")
 
@@ -109,3 +112,53 @@ def test_a_scenario_changed_and_deleted_in_mid_campaign(place: Path, unbroken: b
     scenario.write_text(CAMPAIGN_FILES["short.yaml"])
     assert run_here(place, *SWEEP, "--resume") == (0, "", "")
     assert results(place) == unbroken
+
+
+@pytest.mark.flights
+def test_a_sweep_with_closed_standard_files_flies_every_run(place: Path) -> None:
+    shell = f"cd {place} && PYTHONPATH={ROOT} {sys.executable} -m harness sweep campaign.yaml --out out <&- >&- 2>&-"
+    assert subprocess.run(["sh", "-c", shell], timeout=240).returncode == 0
+    assert pq.read_table(place / "out" / "results.parquet")["outcome"].to_pylist() == ["reached"] * 3
+
+
+INTERRUPTS = """
+import os
+import signal
+import sys
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        child = "--multiprocessing-fork" in sys.orig_argv
+        if name == os.environ["INTERRUPT_AT"] and child == bool(os.environ["IN_CHILD"]):
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Finder())
+"""
+"""A module that Python imports when it starts: interrupts the process when it comes to import another module."""
+
+
+@pytest.mark.flights
+@pytest.mark.parametrize(
+    ("module", "child", "status"),
+    [
+        ("harness.cli.app", "", 130),
+        ("harness.campaign.runs", "", 130),
+        ("harness.campaign.results", "yes", 0),
+    ],
+)
+def test_an_interrupt_while_modules_are_imported_leaves_no_traceback(
+    place: Path, module: str, child: str, status: int
+) -> None:
+    (place / "sitecustomize.py").write_text(INTERRUPTS)
+    keys = {"PYTHONPATH": f"{place}:{ROOT}", "INTERRUPT_AT": module, "IN_CHILD": child}
+    words = ["sweep", "campaign.yaml", "--out", "out", "--quiet", "--workers", "1"]
+    done = subprocess.run(
+        [sys.executable, "-m", "harness", *words],
+        cwd=place,
+        env={**os.environ, **keys},
+        capture_output=True,
+        text=True,
+        timeout=240,
+    )
+    assert (done.returncode, "Traceback" in done.stderr) == (status, False)
