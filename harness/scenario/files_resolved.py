@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -55,10 +56,13 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
 
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:
-    """What the key `file` asks for; the file lies beside the scenario file, or from here."""
+    """What the key `file` asks for: beside the scenario file, or from here; `package:path` in an installed package."""
     from harness.world_files.expansion import FileSpec
 
     keys = {name: getattr(file, name) for name in WorldFile.model_fields if name != "path"}
+    package, colon, inner = file.path.partition(":")
+    if colon and package.isidentifier() and (spec := importlib.util.find_spec(package)) is not None:
+        return FileSpec(Path((spec.submodule_search_locations or [""])[0]) / inner, **keys)
     return FileSpec(file_beside(file.path, folder) or Path(file.path), **keys)
 
 

@@ -87,7 +87,7 @@ class WorldFile(Section):
     """What of a file of terrain, buildings, airspace, fences or occupancy is solid at the mission's altitude."""
 
     path: Annotated[str, Field(min_length=1, max_length=1000)]
-    """The file, from the scenario's folder or from here."""
+    """The file, from the scenario's folder or from here; package:path lies in an installed Python package."""
     kind: KindName | None = None
     """Its kind, or what it holds: terrain, buildings, airspace, fences or occupancy. Default: told from the file."""
     vertical_clearance_m: Annotated[float, Field(ge=0, le=10_000)] = 10.0
