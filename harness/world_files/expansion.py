@@ -100,7 +100,7 @@ def expanded(
         with blaming(index):
             contents = loaded_file(spec)
             if contents.crs is not None and any(spec.shift_m):
-                raise WorldFileError("has its place on earth, which shift_m does not move; leave shift_m out")
+                raise InputError("has its place on earth, which shift_m does not move; leave shift_m out")
             loaded.append((contents, Mapping(contents.crs, place, spec.shift_m)))
             _check_place(*loaded[-1], box)
     field, notes = height_field([(each.terrain, at) for each, at in loaded if each.terrain is not None], box)
