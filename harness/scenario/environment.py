@@ -59,12 +59,8 @@ class GroundSpec(Section):
         (rows, columns), lowest_m = field.heights_m.shape, float(np.floor(np.nanmin(field.heights_m)))
         step_m = max(STEP_M, float(np.nanmax(field.heights_m) - lowest_m) / 60_000)
         nodes = {"corner_m": field.corner_m, "spacing_m": field.spacing_m, "rows": rows, "columns": columns}
-        heights = {
-            "lowest_m": lowest_m,
-            "step_m": step_m,
-            "heights": packed(field.heights_m, lowest_m, step_m),
-        }
-        return cls.model_construct(**nodes, **heights)
+        heights = packed(field.heights_m, lowest_m, step_m)
+        return cls.model_construct(**nodes, lowest_m=lowest_m, step_m=step_m, heights=heights)
 
 
 class SourceSpec(Section):
