@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,25 +27,17 @@ from harness.bench.tracking import (
 )
 from harness.cli.bench import tracking_rows
 from harness.cli.terminal import print_table
-from tests.harness.bench.courses_table import AIRCRAFT
 from tests.routes import route_point
 
-AIRFRAMES = Path(__file__).parents[3] / "aircraft" / "airframes.yaml"
 CALM = CASES[0]
+MEASURED = ("aerosonde", "c172p", "T38")
+"""Aircraft of which aircraft/MEASURED.md has the figures in all air."""
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
 def test_the_aerosonde_keeps_what_is_promised(case: Case) -> None:
     flown = tracked("aerosonde", case, [1])
     assert flown.within(case.limits), flown
-
-
-@pytest.mark.flights
-def test_two_courses_are_flown_no_better_than_the_worse_one() -> None:
-    one, two = (tracked("aerosonde", CALM, [seed]) for seed in (4, 5))
-    both = tracked("aerosonde", CALM, [4, 5])
-    assert both == one.worse(two)
-    assert both.within(CALM.limits)
 
 
 @pytest.mark.flights
@@ -64,19 +55,13 @@ def test_courses_of_every_verified_aircraft(name: str) -> None:
     for case in CASES:
         if (name, case.intensity) == ("f15", "severe"):
             continue  # it sinks to the sea
-        flown = tracked(name, case, range(1, 21 if name in AIRCRAFT else 3))
+        flown = tracked(name, case, range(1, 21 if name in MEASURED else 3))
         assert flown.within(case.limits.times(LIMIT_FACTORS[name])), (case.name, flown)
 
 
 @pytest.mark.flights
 def test_verified_are_those_that_have_limits() -> None:
     assert {name for name in aircraft_names() if airframe(name).verified} == set(LIMIT_FACTORS)
-
-
-@pytest.mark.parametrize("airspeed", [20.0, 30.0])
-def test_away_from_cruise(airspeed: float) -> None:
-    flown = tracked("aerosonde", CALM, [4], airspeed)
-    assert flown.within(Tracking(0.2, 0.5, 0.3, 0.0)), flown
 
 
 def test_stays_within_the_error_that_planning_allows_for() -> None:
@@ -105,13 +90,6 @@ def test_courses_are_joined_and_turn_as_they_should(seed: int) -> None:
     for row, station in zip(route.segments[1:], stations[1:], strict=True):
         assert row[:4] == pytest.approx(route_point(route, station - 1e-9), abs=1e-6)
     assert not np.array_equal(course(seed + 1, 100.0).segments, route.segments)
-
-
-def test_wind_has_its_share_of_the_airspeed_and_a_direction_of_its_own() -> None:
-    air = [CASES[2].atmosphere(25.0, seed) for seed in (1, 2)]
-    assert [each.wind_mps for each in air] == pytest.approx([12.5, 12.5])
-    assert air[0].wind_east_mps != air[1].wind_east_mps
-    assert CASES[3].atmosphere(25.0, 1).turbulence == "tustin"
 
 
 def test_limits_are_for_every_figure() -> None:
