@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import aircraft
 from aircraft.airframes import airframe
-from aircraft.autopilot import Derivatives, Gains, derivatives, gains
+from aircraft.autopilot import Derivatives, derivatives, gains
 from aircraft.injection import with_autopilot
 from aircraft.jsbsim_loading import linearised, trimmed
 from aircraft.model_files import model_files
@@ -38,12 +37,6 @@ AEROSONDE = Derivatives(
     xa=8.76,
     xdt=31.07,
 )
-
-
-def test_roll_errors_ask_for_no_more_rate_than_the_ailerons_give() -> None:
-    for lda in (14.0, 57.11):
-        placed = gains(replace(AEROSONDE, lda=lda))
-        assert placed.roll_rate_limit * placed.aileron_p_forward == pytest.approx(0.8)
 
 
 def test_feed_forwards_cancel_the_moments_of_a_steady_turn() -> None:
@@ -95,13 +88,6 @@ def test_gains_follow_from_the_model_at_cruise() -> None:
     assert frame.gains.elevator_q == pytest.approx(0.724, rel=0.01)
 
 
-def test_every_gain_is_a_property_of_the_system() -> None:
-    system = ElementTree.parse(Path(aircraft.__path__[0], "systems", "autopilot.xml")).getroot()
-    declared = {(node.text or "").strip() for node in system.findall("property")}
-    wanted = set(Gains(**dict.fromkeys((f.name for f in fields(Gains)), 0.0)).properties())
-    assert wanted == {name for name in declared if name.startswith("wayproof/gain/")}
-
-
 def model_file(folder: Path, text: str) -> Path:
     """A model file in a folder of its own, with one neighbour."""
     home = folder / "toy"
@@ -113,9 +99,9 @@ def model_file(folder: Path, text: str) -> Path:
 
 
 def test_injection_puts_the_system_first_and_drives_every_throttle(tmp_path: Path) -> None:
-    path = model_file(
-        tmp_path, "<fdm_config><system/><propulsion><engine/><engine/></propulsion></fdm_config>"
-    )
+    """A model writes no files of its own: its output goes."""
+    engines = "<propulsion><engine/><engine/></propulsion>"
+    path = model_file(tmp_path, f"<fdm_config><output/><input/><system/>{engines}</fdm_config>")
     with with_autopilot(path) as folder:
         root = ElementTree.parse(folder / "toy" / "toy.xml").getroot()
         assert (folder / "toy" / "engine.xml").read_text(encoding="utf-8") == "<engine/>"
@@ -123,6 +109,7 @@ def test_injection_puts_the_system_first_and_drives_every_throttle(tmp_path: Pat
     outputs = [node.text for node in root[0].iter("output")]
     assert outputs.count("fcs/throttle-cmd-norm") == 1
     assert outputs.count("fcs/throttle-cmd-norm[1]") == 1
+    assert (root.find("output"), root.find("input")) == (None, None)
     assert not folder.exists()
     assert "wayproof" not in path.read_text(encoding="utf-8")
 

@@ -34,16 +34,6 @@ def model_of(
     return JsbsimModel(frame, StartConditions(*at, 300.0, course, frame.cruise_mps), PLANE, atmosphere)
 
 
-def test_state_has_the_throttle_that_holds_the_airspeed() -> None:
-    slow, fast = (
-        JsbsimModel(
-            airframe("aerosonde"), StartConditions(0.0, 0.0, 300.0, 0.0, speed), LocalPlane(47.0, 8.0)
-        )
-        for speed in (20.0, 30.0)
-    )
-    assert 0.0 < slow.state().throttle < fast.state().throttle < 1.0
-
-
 def test_a_model_that_is_not_used_any_more_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     """The thread that loaded it does not hold it."""
 
