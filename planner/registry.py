@@ -11,8 +11,9 @@ from functools import partial
 from typing import Any
 
 from planner.baselines import bendy_ruler, bug, dubins_tree, mppi, tangent_bug, vfh_plus
-from planner.baselines.walk import PointConfig, Walker
+from planner.baselines.walk import Walker
 from planner.interface import Mission, Planner
+from planner.keys import MarginConfig
 from planner.paper import config as paper_config
 from planner.paper import rolling as paper
 from planner.rolling_window import config as rolling_window_config
@@ -56,15 +57,15 @@ BUILT_IN = (
         for kind, config, make, summary in (
             ("improved_bug", paper_config.ImprovedBugConfig, paper.ImprovedBug,
              "the paper's improved BUG, literally: it sees its window only, and can be caught"),
-            ("bug1", PointConfig, bug.Bug1,
+            ("bug1", MarginConfig, bug.Bug1,
              "Bug1 (Lumelsky, Stepanov): round every obstacle, and on from its point nearest to the goal"),
-            ("bug2", PointConfig, bug.Bug2,
+            ("bug2", MarginConfig, bug.Bug2,
              "Bug2 (Lumelsky, Stepanov): along the M-line, round obstacles until the line is met again"),
-            ("tangent_bug", PointConfig, tangent_bug.TangentBug,
+            ("tangent_bug", MarginConfig, tangent_bug.TangentBug,
              "TangentBug (Kamon, Rimon, Rivlin): by the edges in sight, along boundaries where caught"),
-            ("vfh_plus", vfh_plus.VfhPlusConfig, vfh_plus.VfhPlus,
+            ("vfh_plus", MarginConfig, vfh_plus.VfhPlus,
              "VFH+ (Ulrich, Borenstein): polar histogram masked by the turn radius; local, can be caught"),
-            ("bendy_ruler", bendy_ruler.BendyRulerConfig, bendy_ruler.BendyRuler,
+            ("bendy_ruler", MarginConfig, bendy_ruler.BendyRuler,
              "ArduPilot's BendyRuler, steered at the turn radius: probes bearings and a second line; local"),
             ("mppi", mppi.MppiConfig, mppi.Mppi,
              "MPPI (Williams et al.): weighted mean of sampled turns over a horizon; local, from a seed"),

@@ -3,12 +3,12 @@
 Written from its description in ArduPilot's documentation (`common-oa-bendyruler`) and of its parameters:
 
 1. Once a second, probe bearings every 5 degrees from the bearing of the goal outwards, left and right in turns: a
-   line of the length `lookahead_m` (OA_BR_LOOKAHEAD). The margin is the least distance of the line from an obstacle.
-2. Where the margin is larger than `margin_max_m` (OA_MARGIN_MAX), a second line is probed from its end: towards the
-   goal, and 45 degrees to the left and to the right of that. The first bearing of which one of these is clear too is
-   taken.
-3. A bearing that is more than `cont_angle_deg` (OA_BR_CONT_ANGLE) off the last one is taken only if the margin along
-   the last bearing is less than its margin over `cont_ratio` (OA_BR_CONT_RATIO).
+   line of the length OA_BR_LOOKAHEAD. The margin is the least distance of the line from an obstacle.
+2. Where the margin is larger than OA_MARGIN_MAX, here the clearance and `margin_m`, a second line is probed from its
+   end: towards the goal, and 45 degrees to the left and to the right of that. The first bearing of which one of these
+   is clear too is taken.
+3. A bearing that is more than OA_BR_CONT_ANGLE off the last one is taken only if the margin along
+   the last bearing is less than its margin over OA_BR_CONT_RATIO.
 4. Where no bearing is clear, the one with the largest margin is taken.
 
 ArduPilot's vehicles turn on the spot or nearly so. Here the bearing is steered to by a turn at the turn radius.
@@ -17,69 +17,30 @@ ArduPilot's vehicles turn on the spot or nearly so. Here the bearing is steered 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.baselines.steering import Steerer, ahead, off
-from planner.geometry.clearance import margin_of
 from planner.geometry.curves import Point, Pose
 from planner.interface import FloatArray, Mission
-from planner.keys import key
+from planner.keys import MarginConfig
 
 BEARING_STEP = math.radians(5.0)
 SECOND_BEARINGS = (0.0, math.radians(45.0), -math.radians(45.0))
 """Offsets from the bearing of the goal of the second line."""
-
-
-@dataclass(frozen=True)
-class BendyRulerConfig:
-    """Keys of `planner.kind: bendy_ruler`, ArduPilot's parameters but for their scale."""
-
-    lookahead_m: float | None = key(
-        None,
-        "OA_BR_LOOKAHEAD, length of a probed line; default: 8 turn radii, at most the sensor range",
-        "m",
-        above=0.0,
-    )
-    margin_max_m: float | None = key(
-        None,
-        "OA_MARGIN_MAX, distance that a line keeps from obstacles; default: the clearance and "
-        "the margin that other planners keep",
-        "m",
-        minimum=0.0,
-    )
-    cont_ratio: float = key(
-        1.5, "OA_BR_CONT_RATIO, how much larger the margin of a new bearing must be", minimum=1.0, maximum=2.0
-    )
-    cont_angle_deg: float = key(
-        75.0, "OA_BR_CONT_ANGLE, largest change of bearing without that", "deg", minimum=0.0, maximum=180.0
-    )
-
-    def resolved(self, mission: Mission) -> BendyRulerConfig:
-        """This config with every None replaced by its default for the mission.
-
-        Raises:
-            ValueError: the lines reach beyond the sensing range.
-        """
-        reach = mission.sensor_range_m
-        lookahead = min(8.0 * mission.turn_radius_m, reach) if self.lookahead_m is None else self.lookahead_m
-        if lookahead > reach:
-            raise ValueError(f"lookahead_m is {lookahead:g}, more than sensor.range_m {reach:g}")
-        margin = mission.clearance_m + margin_of(mission) if self.margin_max_m is None else self.margin_max_m
-        return replace(self, lookahead_m=lookahead, margin_max_m=margin)
+LOOKAHEAD_RADII = 8.0
+"""OA_BR_LOOKAHEAD, in turn radii: length of a probed line, at most the sensor range."""
+CONT_RATIO, CONT_ANGLE = 1.5, math.radians(75.0)
+"""OA_BR_CONT_RATIO and OA_BR_CONT_ANGLE, ArduPilot's defaults."""
 
 
 class BendyRuler(Steerer):
     """The planner for one flight."""
 
-    def __init__(self, config: BendyRulerConfig, mission: Mission) -> None:
-        self._config = config = config.resolved(mission)
-        assert config.lookahead_m is not None
-        assert config.margin_max_m is not None
-        self._margin_m = config.margin_max_m
-        near_m = 2.0 * config.lookahead_m + self._margin_m
-        super().__init__(mission, config.lookahead_m, near_m, BEARING_STEP)
+    def __init__(self, config: MarginConfig, mission: Mission) -> None:
+        lookahead_m = min(LOOKAHEAD_RADII * mission.turn_radius_m, mission.sensor_range_m)
+        self._margin_m = mission.clearance_m + config.margin(mission)
+        super().__init__(mission, lookahead_m, 2.0 * lookahead_m + self._margin_m, BEARING_STEP)
 
     def direction(self, pose: Pose, points_m: FloatArray) -> float:
         """The bearing that steps 1 to 4 of the method choose; without a clear one, that with the largest margin."""
@@ -113,10 +74,10 @@ class BendyRuler(Steerer):
     ) -> float:
         """Step 3: the last bearing where the new one is far off it and not that much better."""
         last = self.chosen
-        if last is None or abs(off(bearing, last)) <= math.radians(self._config.cont_angle_deg):
+        if last is None or abs(off(bearing, last)) <= CONT_ANGLE:
             return bearing
         along_last = self._margin_along(here, ahead(here, last, first_m), points_m)
-        keeps = along_last > self._margin_m and margin_m < self._config.cont_ratio * along_last
+        keeps = along_last > self._margin_m and margin_m < CONT_RATIO * along_last
         return last if keeps else bearing
 
     def _margin_along(self, a: Point, b: Point, points_m: FloatArray) -> float:

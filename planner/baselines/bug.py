@@ -23,9 +23,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.baselines.polyline import Mark, beside, length_of, mark_at, piece, stations
-from planner.baselines.walk import LEFT, Enclosed, PointConfig, Straight, Walker, WalkLeg, place_at_end
+from planner.baselines.walk import LEFT, Enclosed, Straight, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
+from planner.keys import MarginConfig
 
 PROGRESS_SHARE = 0.05
 """A leave point is nearer to the goal than the hit point by more than this share of the kept distance."""
@@ -157,7 +158,7 @@ class Bug1(Walker[BugState]):
 class Bug2(Bug1):
     """Bug2 for one flight."""
 
-    def __init__(self, config: PointConfig, mission: Mission) -> None:
+    def __init__(self, config: MarginConfig, mission: Mission) -> None:
         super().__init__(config, mission)
         self._start = mission.goal_m
 

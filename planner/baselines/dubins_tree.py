@@ -14,18 +14,17 @@ which no shorter way can lead. The shortest way is taken.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.baselines.steering import Replanner, Start
-from planner.geometry.clearance import margin_of
 from planner.geometry.curves import Point, Pose, Segment, along, between, turn_onto
 from planner.geometry.terrain import Terrain
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
-from planner.keys import key, margin_key
+from planner.keys import MarginConfig, key
 
 SHARES = (1.0, 0.125)
 """Shares of the margin that a tree keeps, tried in this order."""
@@ -35,16 +34,11 @@ HOLDING_S = 5.0
 
 
 @dataclass(frozen=True)
-class DubinsTreeConfig:
+class DubinsTreeConfig(MarginConfig):
     """Keys of `planner.kind: dubins_tree`."""
 
     iterations: int = key(300, "how many times the tree is grown", minimum=1, maximum=1_000_000)
     tree_seed: int = key(1, "seed of the samples", minimum=1, maximum=1_000_000)
-    margin_m: float | None = margin_key()
-
-    def resolved(self, mission: Mission) -> DubinsTreeConfig:
-        """This config with every None replaced by its default for the mission."""
-        return replace(self, margin_m=margin_of(mission) if self.margin_m is None else self.margin_m)
 
 
 class Node(NamedTuple):
@@ -65,9 +59,7 @@ class DubinsTree(Replanner):
 
     def __init__(self, config: DubinsTreeConfig, mission: Mission) -> None:
         super().__init__(mission)
-        config = config.resolved(mission)
-        assert config.margin_m is not None
-        self._iterations, self._margin_m = config.iterations, config.margin_m
+        self._iterations, self._margin_m = config.iterations, config.margin(mission)
         self._random = np.random.default_rng(config.tree_seed)
 
     def due(self, path: Path, left_m: float, age_s: float) -> bool:

@@ -16,17 +16,17 @@ The path is the rollout of the nominal controls. It is deterministic: the sample
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from planner.baselines.steering import Replanner, Start
-from planner.geometry.clearance import first_breach, inside_bounds, margin_of
+from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.curves import Pose, Segment, along
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.kernels.segments import to_nearest
-from planner.keys import key, margin_key
+from planner.keys import MarginConfig, key
 
 STEP_RADII = 0.5
 """Length of a step in turn radii."""
@@ -45,17 +45,12 @@ DRAWN = 24
 
 
 @dataclass(frozen=True)
-class MppiConfig:
+class MppiConfig(MarginConfig):
     """Keys of `planner.kind: mppi`."""
 
     samples: int = key(256, "K, sequences drawn in a round", minimum=8, maximum=10_000)
     steps: int = key(24, "steps of the horizon, half a turn radius each", minimum=4, maximum=200)
     seed: int = key(1, "the samples follow from it", minimum=0, maximum=2**31)
-    margin_m: float | None = margin_key()
-
-    def resolved(self, mission: Mission) -> MppiConfig:
-        """This config with every None replaced by its default for the mission."""
-        return replace(self, margin_m=margin_of(mission) if self.margin_m is None else self.margin_m)
 
 
 class Mppi(Replanner):
@@ -63,7 +58,7 @@ class Mppi(Replanner):
 
     def __init__(self, config: MppiConfig, mission: Mission) -> None:
         super().__init__(mission)
-        self._config = config.resolved(mission)
+        self._config, self._keep_m = config, mission.clearance_m + config.margin(mission)
         self._step_m = STEP_RADII * mission.turn_radius_m
         self._most_1pm = 1.0 / mission.turn_radius_m
         self._random = np.random.default_rng(self._config.seed)
@@ -139,8 +134,7 @@ class Mppi(Replanner):
 
     def costs(self, places: FloatArray, points_m: FloatArray) -> FloatArray:
         """(K,) costs in steps: the least sum of way and distance left, and what is too near or outside before that."""
-        mission, config = self.mission, self._config
-        assert config.margin_m is not None
+        mission, keep = self.mission, self._keep_m
         left = np.hypot(*np.moveaxis(places - mission.goal_m, 2, 0)) / self._step_m
         way = left + np.arange(1, places.shape[1] + 1)
         last = np.argmin(np.where(left < mission.goal_radius_m / self._step_m, way - 1e6, way), axis=1)
@@ -149,7 +143,6 @@ class Mppi(Replanner):
         xmin, ymin, xmax, ymax = mission.bounds_m
         x, y = places[:, :, 0], places[:, :, 1]
         outside = (x < xmin) | (x > xmax) | (y < ymin) | (y > ymax)
-        keep = mission.clearance_m + config.margin_m
         # Between the ends of a step, half a step apart from them, the way comes nearer by no more than this.
         sagitta = keep - math.sqrt(max(keep * keep - 0.25 * self._step_m**2, 0.25 * keep * keep))
         penalty = np.where(room < keep + sagitta, TOO_NEAR_COST, 0.0)

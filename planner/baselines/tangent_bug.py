@@ -26,9 +26,10 @@ import numpy as np
 
 from planner.baselines.grown import Tangent
 from planner.baselines.polyline import NOWHERE, Mark, length_of, mark_at, piece
-from planner.baselines.walk import LEFT, Enclosed, PointConfig, Walker, WalkLeg, place_at_end
+from planner.baselines.walk import LEFT, Enclosed, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
+from planner.keys import MarginConfig
 
 PROGRESS_SHARE = 0.05
 """What is to be nearer to the goal is nearer by this share of the kept distance."""
@@ -79,7 +80,7 @@ class TangentNode:
 class TangentBug(Walker[TangentBugState]):
     """The planner for one flight."""
 
-    def __init__(self, config: PointConfig, mission: Mission) -> None:
+    def __init__(self, config: MarginConfig, mission: Mission) -> None:
         super().__init__(config, mission)
         self._progress_m = PROGRESS_SHARE * self.keep_m
 

@@ -17,15 +17,25 @@ It looks no further than its window and remembers no way: it is caught in dead e
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from planner.baselines.steering import Steerer, off
-from planner.geometry.clearance import margin_of
 from planner.geometry.curves import Pose
 from planner.interface import BoolArray, FloatArray, Mission, PlanPicture, PlanRequest
-from planner.keys import key, margin_key
+from planner.keys import MarginConfig
+
+SECTORS = 72
+"""Sectors of the polar histogram."""
+WIDTH_RAD = math.tau / SECTORS
+"""Width of a sector."""
+
+WINDOW_RADII, WINDOW_CLEARANCES = 12.0, 6.0
+"""The radius of the active window is so many turn radii and clearances, at most the sensor range."""
+
+FREE_BELOW, BLOCKED_ABOVE = 0.05, 0.10
+"""Thresholds of the magnitude of a sector: 1 is an edge at the aircraft, 0 one at the window's rim."""
 
 WIDE_RAD = math.radians(80.0)
 """An opening as wide as this has two sides to choose from; of a narrower one the middle is taken."""
@@ -34,58 +44,18 @@ GOAL_WEIGHT, COURSE_WEIGHT, CHOICE_WEIGHT = 5.0, 2.0, 2.0
 """Weights mu 1 to 3 of the cost of a direction, as in the paper: mu 1 > mu 2 + mu 3 leads to the goal."""
 
 
-@dataclass(frozen=True)
-class VfhPlusConfig:
-    """Keys of `planner.kind: vfh_plus`."""
-
-    window_m: float | None = key(
-        None,
-        "radius of the active window, at most the sensor range; default: 12 turn radii and 6 "
-        "clearances, at most the sensor range",
-        "m",
-        above=0.0,
-    )
-    sectors: int = key(72, "sectors of the polar histogram", minimum=8, maximum=720)
-    free_below: float = key(
-        0.05,
-        "a sector is free below this magnitude; 1 is an edge at the aircraft, 0 one at the window's rim",
-        minimum=0.0,
-    )
-    blocked_above: float = key(0.10, "a sector is blocked above this magnitude", minimum=0.0)
-    margin_m: float | None = margin_key()
-
-    def resolved(self, mission: Mission) -> VfhPlusConfig:
-        """This config with every None replaced by its default for the mission.
-
-        Raises:
-            ValueError: the window is larger than the sensing range, or the thresholds are the wrong way round.
-        """
-        reach = 12.0 * mission.turn_radius_m + 6.0 * mission.clearance_m
-        window = min(reach, mission.sensor_range_m) if self.window_m is None else self.window_m
-        if window > mission.sensor_range_m:
-            raise ValueError(f"window_m is {window:g}, more than sensor.range_m {mission.sensor_range_m:g}")
-        if self.free_below > self.blocked_above:
-            raise ValueError(
-                f"free_below is {self.free_below:g}, more than blocked_above {self.blocked_above:g}"
-            )
-        margin = margin_of(mission) if self.margin_m is None else self.margin_m
-        return replace(self, window_m=window, margin_m=margin)
-
-
 class VfhPlus(Steerer):
     """The planner for one flight."""
 
     every_s = 0.0
 
-    def __init__(self, config: VfhPlusConfig, mission: Mission) -> None:
-        self._config = config = config.resolved(mission)
-        assert config.window_m is not None
-        assert config.margin_m is not None
-        self._width_rad = math.tau / config.sectors
-        super().__init__(mission, config.window_m, config.window_m, self._width_rad)
-        self._keep_m = mission.clearance_m + config.margin_m
-        self._bearings = self._width_rad * np.arange(config.sectors)
-        self._blocked: BoolArray = np.zeros(config.sectors, dtype=np.bool_)
+    def __init__(self, config: MarginConfig, mission: Mission) -> None:
+        reach_m = WINDOW_RADII * mission.turn_radius_m + WINDOW_CLEARANCES * mission.clearance_m
+        window_m = min(reach_m, mission.sensor_range_m)
+        super().__init__(mission, window_m, window_m, WIDTH_RAD)
+        self._keep_m = mission.clearance_m + config.margin(mission)
+        self._bearings = WIDTH_RAD * np.arange(SECTORS)
+        self._blocked: BoolArray = np.zeros(SECTORS, dtype=np.bool_)
         self._masked = self._blocked
 
     def direction(self, pose: Pose, points_m: FloatArray) -> float | None:
@@ -95,7 +65,7 @@ class VfhPlus(Steerer):
 
     def picture(self, request: PlanRequest) -> PlanPicture:
         """The guide vector, the window, and the free sectors."""
-        edges = self._bearings[~self._masked, None] + 0.5 * self._width_rad * np.array((-1.0, 1.0))
+        edges = self._bearings[~self._masked, None] + 0.5 * WIDTH_RAD * np.array((-1.0, 1.0))
         sectors = np.stack((np.cos(edges), np.sin(edges)), axis=2).reshape(-1, 4)
         return replace(super().picture(request), sectors=sectors)
 
@@ -108,8 +78,8 @@ class VfhPlus(Steerer):
         magnitude = 1.0 - np.square(distance / self.look_m)
         aside = np.abs(off(self._bearings[:, None], np.arctan2(dy, dx)))
         primary = (magnitude * (aside <= half)).sum(axis=1)
-        low, high = self._config.free_below, self._config.blocked_above
-        self._blocked = np.where(primary > high, True, np.where(primary < low, False, self._blocked))
+        between = np.where(primary < FREE_BELOW, False, self._blocked)
+        self._blocked = np.where(primary > BLOCKED_ABOVE, True, between)
         return self._blocked | self._outside(pose)
 
     def _outside(self, pose: Pose) -> BoolArray:
@@ -154,7 +124,7 @@ class VfhPlus(Steerer):
         """The directions worth choosing from."""
         if not masked.any():
             return [goal]
-        count, width = len(masked), self._width_rad
+        count, width = len(masked), WIDTH_RAD
         candidates: list[float] = []
         for first in np.flatnonzero(~masked & np.roll(masked, 1)).tolist():  # openings, counter-clockwise
             size = int(np.argmax(np.roll(masked, -first)))

@@ -21,10 +21,10 @@ import numpy as np
 
 from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import NOWHERE, Mark, beside, length_of, piece
-from planner.geometry.clearance import first_breach, margin_of
+from planner.geometry.clearance import first_breach
 from planner.geometry.curves import SHORTEST_M, Point, end_of, pose_at
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
-from planner.keys import margin_key
+from planner.keys import MarginConfig
 from planner.world_stability import WorldStability
 
 LEFT = -1.0
@@ -38,17 +38,6 @@ SAME_PLACE = 0.5
 stretches of a boundary that run the same way can be that near to each other."""
 
 WalkState = TypeVar("WalkState")
-
-
-@dataclass(frozen=True)
-class PointConfig:
-    """Keys of `planner.kind: bug1`, `bug2` and `tangent_bug`."""
-
-    margin_m: float | None = margin_key()
-
-    def resolved(self, mission: Mission) -> PointConfig:
-        """This config with every None replaced by its default for the mission."""
-        return replace(self, margin_m=margin_of(mission) if self.margin_m is None else self.margin_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +63,8 @@ class Enclosed:
 class Walker(ABC, Generic[WalkState]):
     """The frame of a planner whose vehicle is a point: when to walk anew, and from which state."""
 
-    def __init__(self, config: PointConfig, mission: Mission) -> None:
-        margin_m = config.resolved(mission).margin_m
-        assert margin_m is not None
+    def __init__(self, config: MarginConfig, mission: Mission) -> None:
+        margin_m = config.margin(mission)
         self.mission, self.goal, self.horizon_m = mission, mission.goal_m, mission.sensor_range_m
         self.known = GrownObstacles(mission, margin_m)
         self.keep_m = self.known.keep_m

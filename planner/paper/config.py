@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from planner.geometry.clearance import margin_of
 from planner.interface import Mission
-from planner.keys import key, margin_key
+from planner.keys import MarginConfig, key
 from planner.paper.model import most_units
 
 
 @dataclass(frozen=True)
-class ImprovedBugConfig:
+class ImprovedBugConfig(MarginConfig):
     """Keys of `planner.kind: improved_bug`."""
 
     planning_window_m: float | None = key(
@@ -33,7 +32,6 @@ class ImprovedBugConfig:
         0.25, "a sector is refined down to this angle; 360 takes its middle", "deg", above=0.0, maximum=360.0
     )
     route_optimisation: bool = key(True, "whether track points between which the way is free are cancelled")
-    margin_m: float | None = margin_key()
 
     def resolved(self, mission: Mission) -> ImprovedBugConfig:
         """This config with every None replaced by its default for the mission.
@@ -60,8 +58,7 @@ class ImprovedBugConfig:
                 f"step_m is {step:g}, too short to turn by course_unit_deg {self.course_unit_deg:g} at a radius of "
                 f"{radius:.0f} m; must be at least {math.ceil(least)}"
             )
-        margin = margin_of(mission) if self.margin_m is None else self.margin_m
-        return replace(self, planning_window_m=window, step_m=step, margin_m=margin)
+        return replace(self, planning_window_m=window, step_m=step, margin_m=self.margin(mission))
 
     @property
     def unit_rad(self) -> float:

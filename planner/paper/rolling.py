@@ -59,8 +59,7 @@ class ImprovedBug:
         """Section 3.3: U_1 about the aircraft, with the sensed edge points that are not too far to matter in it."""
         config, mission = self._config, self._mission
         assert config.planning_window_m is not None
-        assert config.margin_m is not None
-        keep_m = mission.clearance_m + config.margin_m
+        keep_m = mission.clearance_m + config.margin(mission)
         sensed = np.concatenate(
             (self._sensed(request.seen), *(each.points_m for each in request.seen.moving))
         )

@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from planner.geometry.clearance import margin_of
 from planner.geometry.joining import LEAD_S as LEAD_S
 from planner.interface import Mission
-from planner.keys import key, margin_key
+from planner.keys import MarginConfig, key
 from planner.shield.certificate import least_sensor_range_m
 
 
 @dataclass(frozen=True)
-class RollingWindowConfig:
+class RollingWindowConfig(MarginConfig):
     """Keys of `planner.kind: rolling_window`."""
 
     steps: int = key(16, "N, how many steps the search looks ahead", minimum=1, maximum=100)
     candidates: int = key(12, "n, how many candidates are kept at every step", minimum=1, maximum=100)
-    margin_m: float | None = margin_key()
     rolling_step_m: float | None = key(
         None,
         "distance flown before the window rolls, unless the plan is cut near by; default: 1/16 "
@@ -43,10 +41,5 @@ class RollingWindowConfig:
                 f"{mission.hold_radius_m:.0f} m with a clearance of {mission.clearance_m:g} m; "
                 f"must be at least {math.ceil(least)}, to see room for a safe turn ahead"
             )
-        return replace(
-            self,
-            margin_m=margin_of(mission) if self.margin_m is None else self.margin_m,
-            rolling_step_m=mission.sensor_range_m / 16.0
-            if self.rolling_step_m is None
-            else self.rolling_step_m,
-        )
+        step = mission.sensor_range_m / 16.0 if self.rolling_step_m is None else self.rolling_step_m
+        return replace(self, margin_m=self.margin(mission), rolling_step_m=step)

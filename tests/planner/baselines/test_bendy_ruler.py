@@ -8,17 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.baselines.bendy_ruler import BendyRuler, BendyRulerConfig
+from planner.baselines.bendy_ruler import BendyRuler
 from planner.contract import MISSION
 from planner.geometry.curves import Pose
+from planner.keys import MarginConfig
 
 HERE = (1000.0, 7000.0)
 EAST = replace(MISSION, goal_m=(19_000.0, 7000.0))
 
 
-def ruler(**keys: float) -> BendyRuler:
+def ruler() -> BendyRuler:
     """Lines of 1,200 m that keep 220 m."""
-    return BendyRuler(BendyRulerConfig(**keys), EAST)
+    return BendyRuler(MarginConfig(), EAST)
 
 
 def bearing(planner: BendyRuler, *points: tuple[float, float]) -> float:
@@ -59,10 +60,5 @@ def test_a_bearing_far_off_the_last_one_is_resisted() -> None:
     # Straight at the goal the margin is 260 m, along the last bearing 221 m: no better by half.
     points = ((600.0, 260.0), (600.0, -260.0), (300.0, 408.0))
     assert bearing(planner, *points) == pytest.approx(80.0)
-    planner._config = replace(planner._config, cont_angle_deg=90.0)
+    planner.chosen = math.radians(70.0)
     assert bearing(planner, *points) == 0.0
-
-
-def test_lines_beyond_the_sensor_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"lookahead_m is 7000, more than sensor.range_m 6000"):
-        BendyRulerConfig(lookahead_m=7000.0).resolved(MISSION)

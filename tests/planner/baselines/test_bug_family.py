@@ -19,11 +19,12 @@ from hypothesis import strategies as st
 from planner import contract
 from planner.baselines.bug import Bug1, Bug2
 from planner.baselines.tangent_bug import TangentBug
-from planner.baselines.walk import PointConfig, WalkLeg, connected
+from planner.baselines.walk import WalkLeg, connected
 from planner.contract import GivenMap
 from planner.geometry.clearance import margin_of
 from planner.geometry.curves import Point, pose_at
 from planner.interface import BoolArray, FloatArray, Mission, Plan, Planner, PlanRequest, PlanStatus
+from planner.keys import MarginConfig
 from planner.plan_checks import checked_plan
 from planner.world_stability import SETTLED_S
 from tests.longer import longer
@@ -48,9 +49,9 @@ START = (3000.0, 5000.0)
 SPACING = 50.0
 
 MAKE: dict[str, Callable[[Mission], Planner]] = {
-    "bug1": lambda mission: Bug1(PointConfig(), mission),
-    "bug2": lambda mission: Bug2(PointConfig(), mission),
-    "tangent_bug": lambda mission: TangentBug(PointConfig(), mission),
+    "bug1": lambda mission: Bug1(MarginConfig(), mission),
+    "bug2": lambda mission: Bug2(MarginConfig(), mission),
+    "tangent_bug": lambda mission: TangentBug(MarginConfig(), mission),
 }
 KINDS = tuple(MAKE)
 OF_CONTACT = ("bug1", "bug2")
