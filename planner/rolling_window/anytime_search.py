@@ -15,9 +15,10 @@ import numpy as np
 
 from planner.geometry.course import Course
 from planner.interface import FloatArray, Path
-from planner.rolling_window.local_planning import DOUBTFUL_SHARE, Attempt, LocalPlanning, Start
+from planner.rolling_window.local_planning import DOUBTFUL_SHARE, Attempt, LocalPlanning
 from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.route_optimisation import FlyableRoute
+from planner.shield.committed_plan import Start
 
 
 class _Found(NamedTuple):

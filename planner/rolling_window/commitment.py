@@ -12,11 +12,11 @@ from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, place_on
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
-from planner.rolling_window.local_planning import LocalPlanning, Start
+from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.window import guide_vector
 from planner.shield.certificate import Certified, Certifier, hold_centre
-from planner.shield.committed_plan import CommittedPlan
+from planner.shield.committed_plan import CommittedPlan, Start
 
 PROGRESS = 0.25
 """A new plan leads on if it gains at least this share of the hold radius along its course, and ends in a hold at least

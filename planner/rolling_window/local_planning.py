@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from planner.geometry.course import Course
-from planner.geometry.curves import Limits, Point, Pose, Segment, onward_in_turn
+from planner.geometry.curves import Limits, Point, onward_in_turn
 from planner.geometry.terrain import POINT_WORK, TANGENT_WORK, Terrain, WorkCount
 from planner.interface import FloatArray, Mission, Path
 from planner.memory import ObstacleMemory
@@ -19,6 +19,7 @@ from planner.rolling_window.multi_step_search import Candidate, search_candidate
 from planner.rolling_window.pose_search import search_poses
 from planner.rolling_window.route_optimisation import FlyableRoute, optimise
 from planner.rolling_window.window import Window
+from planner.shield.committed_plan import Start
 from planner.shield.escape import Room
 
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
@@ -62,16 +63,6 @@ class Attempt:
 
     distance_m: float
     margin_m: float
-
-
-@dataclass(frozen=True, eq=False)
-class Start:
-    """Where a new plan leaves the old one: pose and curvature (1/m) there, and the stretch (`prefix`) up to there."""
-
-    position: Point
-    pose: Pose
-    curvature: float = 0.0
-    prefix: list[Segment] = field(default_factory=list)
 
 
 Now = Callable[[], tuple[Start, Course | None]]

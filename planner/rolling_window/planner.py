@@ -23,16 +23,16 @@ from __future__ import annotations
 import math
 
 from planner.geometry.course import Course
-from planner.geometry.curves import along, on_loiter, place_on
+from planner.geometry.curves import on_loiter, place_on
 from planner.interface import FloatArray, MapView, Mission, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.plan_checks import start_tolerance_m
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proofs
 from planner.rolling_window.commitment import Commitment
-from planner.rolling_window.config import LEAD_S, RollingWindowConfig
+from planner.rolling_window.config import RollingWindowConfig
 from planner.rolling_window.dead_ends import GivingUp
-from planner.rolling_window.local_planning import LocalPlanning, Start
+from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.rolling_search import (
     WORK_WHILE_CUT,
     WORK_WHILE_MOVING,
@@ -43,11 +43,10 @@ from planner.rolling_window.rolling_search import (
     Work,
 )
 from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
-from planner.shield.committed_plan import CommittedPlan, PlanMonitor, flown_next
-from planner.shield.encounters import encounters
-from planner.shield.escape import Escapes, meets, room_m
-from planner.shield.evasion import Threats
-from planner.shield.intervention_log import InterventionLog, ShieldReport
+from planner.shield.certified_planner import CertifiedPlanner, lead_of
+from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start
+from planner.shield.escape import meets, room_m
+from planner.shield.intervention_log import ShieldReport
 
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
 NO_BETTER = "the plan in effect serves as well as any other"
@@ -57,7 +56,7 @@ NO_WAY_BARE = "no way is found"
 NO_WAY_ON = "no way on can be seen to be safe; the plan in effect goes on"
 
 
-class RollingWindow:
+class RollingWindow(CertifiedPlanner):
     """The planner for one flight.
 
     Shielded, it commits only to what is certified. Else it flies whole courses, and nothing where it has none.
@@ -65,29 +64,24 @@ class RollingWindow:
 
     def __init__(self, config: RollingWindowConfig, mission: Mission, shielded: bool = True) -> None:
         config, widest_m, mission = config.resolved(mission), mission.turn_radius_m, mission.spaced
-        assert config.margin_m is not None
         assert config.rolling_step_m is not None
-        self._shielded = shielded
-        self._log = InterventionLog()
-        self._mission, self._rolling_step_m = mission, config.rolling_step_m
-        self._memory = memory = ObstacleMemory(mission.clearance_m)
+        self._shielded, self._rolling_step_m = shielded, config.rolling_step_m
+        memory, lead_m = ObstacleMemory(mission.clearance_m), lead_of(mission)
         self._local = LocalPlanning(
-            mission, memory, margin_m=config.margin_m, steps=config.steps, candidates=config.candidates
+            mission, memory, margin_m=config.margin(mission), steps=config.steps, candidates=config.candidates
         )
-        self._start_tolerance_m = start_tolerance_m(mission)
-        self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
-        least_m = self._lead_m + 2.0 * widest_m
-        self._commitment = Commitment(mission, memory, self._local, least_m, shielded)
-        self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
-        self._giving_up = GivingUp(mission, memory)
-        self._escapes = Escapes(mission, memory, self._local.room)
-        self._monitor = PlanMonitor(
+        monitor = PlanMonitor(
             mission,
             keep_m=0.5 * (mission.clearance_m + self._local.room.path_keeps_m),
-            urgent_m=self._lead_m + 8.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps,
-            lead_m=self._lead_m,
+            urgent_m=lead_m + 8.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps,
+            lead_m=lead_m,
             step_m=config.rolling_step_m,
         )
+        super().__init__(mission, memory, self._local.room, monitor)
+        self._start_tolerance_m = start_tolerance_m(mission)
+        self._commitment = Commitment(mission, memory, self._local, lead_m + 2.0 * widest_m, shielded)
+        self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
+        self._giving_up = GivingUp(mission, memory)
         self._search = RollingSearch(
             mission,
             memory,
@@ -97,7 +91,6 @@ class RollingWindow:
             self._giving_up,
             self._proofs.no_way,
         )
-        self._threats: Threats | None = None  # while something moves or has just appeared
         self._loitered: CommittedPlan | None = None  # the plan whose turn was entered last
         self._served: tuple[object, ...] = ()  # by what the plan in effect served, as long as nothing is due
         self.state = PlanningState.ESCAPING
@@ -105,12 +98,7 @@ class RollingWindow:
     @property
     def report(self) -> ShieldReport | None:
         """What the shield did so far; None without it."""
-        return self._log.report if self._shielded else None
-
-    @property
-    def backup(self) -> str:
-        """Why the aircraft is on the backup; empty while it flies the course."""
-        return self._log.backup
+        return super().report if self._shielded else None
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
@@ -172,16 +160,11 @@ class RollingWindow:
 
     def _take_in(self, request: PlanRequest) -> FloatArray:
         """Takes in what was seen and flown since the last request; returns (k, 2) edge points that have come in."""
-        met = encounters(request, self._mission) if request.seen.moving else []
         self._giving_up.note_change(request.time_s, request.seen)
-        fresh_m = self._memory.take_in(request.seen, met)
+        fresh_m = self._sense(request)
         self._local.trail.add(request.position_m)
-        self._threats = self._escapes.threats(request)
-        gone = self._memory.cleared - self._search.gone
-        if self._monitor.take_effect(request.flown, self._memory.standing_m, gone):
+        if self._takes_effect(request, self._search.gone):
             self._giving_up.given_up_at_m = 0.0  # arc lengths are counted from the new plan's start
-        if self._monitor.plan is not None and self._monitor.plan.over(request.arc_length_m):
-            self._monitor.plan = None
         return fresh_m
 
     def _due(self, request: PlanRequest, plan: CommittedPlan, here_m: float, newly_cut: bool) -> bool:
@@ -209,7 +192,8 @@ class RollingWindow:
     def _roll(self, now: Situation) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
         left_behind = self._left_behind(now.request, now.plan, now.here_m)
-        start, ahead = self._start(now), None if left_behind else now.ahead
+        start = self._start(now.request, now.here_m, self._monitor.cut_m)
+        ahead = None if left_behind else now.ahead
         serving = ahead if math.isinf(self._monitor.cut_m) and not self._monitor.broken else None
         self._search.nearer = None
         if serving is not None and (serving.shortest or self._search.up_to_date) and not self._search.anew:
@@ -236,13 +220,6 @@ class RollingWindow:
     def _unsafe(self, now: Situation) -> bool:
         """Whether there is no safe plan in effect to think on."""
         return now.plan is None or self._monitor.urgent(now.plan, now.here_m)
-
-    def _start(self, now: Situation) -> Start:
-        """Where a new plan begins: a little ahead, on the one in effect or straight on from the aircraft."""
-        to_m, lead_m = self._monitor.cut_m, self._lead_m
-        prefix = flown_next(now.plan, now.request, now.here_m, lead_m, self._mission, to_m)
-        last = prefix[-1]
-        return Start(now.request.position_m, along(last, last[5]), last[4], prefix)
 
     def _follow(self, found: CommittedPlan) -> Plan:
         """Any state -> FOLLOWING: a new plan is committed to."""
@@ -307,22 +284,13 @@ class RollingWindow:
         self.state = PlanningState.ESCAPING
         if not self._shielded:
             return Plan(PlanStatus.NO_PATH, NO_WAY_BARE)
-        if now.plan is None:
-            escape = self._escapes.at_start(now.request, self._threats, self._lead_m)
-        else:
-            escape = self._escapes.from_plan(
-                now.request,
-                self._threats,
-                now.plan,
-                now.here_m,
-                until_m=min(self._monitor.cut_m, now.plan.loiter_entry_m),
-                prefix=self._start(now).prefix,
-                certain=self._giving_up.certain,
-                nearer=self._search.nearer,
-            )
-        self._monitor.broken = escape.broken
-        self._monitor.proposed = escape.committed or self._monitor.proposed
-        return escape.plan
+        return self._escaped(
+            now.request,
+            now.here_m,
+            certain=self._giving_up.certain,
+            to_m=self._monitor.cut_m,
+            nearer=self._search.nearer,
+        ).plan
 
     def _proved(self, now: Situation) -> tuple[bool, bool]:
         """Whether no way has room to turn, asked once enough was tried; whether no way is left but given-up ones."""

@@ -13,8 +13,8 @@ from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proof
 from planner.rolling_window.commitment import Commitment
 from planner.rolling_window.dead_ends import GivingUp
-from planner.rolling_window.local_planning import LocalPlanning, Start
-from planner.shield.committed_plan import CommittedPlan, PlanMonitor
+from planner.rolling_window.local_planning import LocalPlanning
+from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import room_m
 from planner.shield.evasion import Threats
 

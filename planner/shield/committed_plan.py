@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
-from planner.geometry.curves import Point, Pose, Segment, between, moved, onward, place_on
+from planner.geometry.curves import Point, Pose, Segment, along, between, moved, onward, place_on
 from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest
 
 COMPARED_TOGETHER = 16
@@ -63,24 +63,35 @@ class CommittedPlan:
         return Path(np.array([*between(self.path, arc_length_m, turn_at_m), *self.turn.segments.tolist()]))
 
 
-def flown_next(
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a new plan leaves the old one: pose and curvature (1/m) there, and the stretch (`prefix`) up to there."""
+
+    position: Point
+    pose: Pose
+    curvature: float = 0.0
+    prefix: list[Segment] = field(default_factory=list)
+
+
+def start_of(
     plan: CommittedPlan | None,
     request: PlanRequest,
     here_m: float,
     lead_m: float,
     mission: Mission,
     to_m: float = math.inf,
-) -> list[Segment]:
-    """What is flown in any case: the plan in effect for `lead_m`, not beyond `to_m`; without one, straight on."""
-    straight: list[Segment] = [(*request.position_m, *request.direction, 0.0, lead_m)]
-    if plan is None:
-        return straight
-    uncut_m = math.inf if plan.holds(here_m) else max(0.0, to_m - here_m)
-    flown = onward(plan.path, here_m, min(lead_m, uncut_m))
-    off_m = math.dist(place_on(plan.path, here_m)[0][:2], request.position_m)
-    if off_m > mission.off_path_m and flown:  # it bends as the plan does until it is told otherwise
-        return moved(flown, Pose(*request.position_m, *request.direction))
-    return flown or straight
+) -> Start:
+    """Where a new plan begins: `plan` is flown on for `lead_m`, not beyond `to_m`; without one, straight on."""
+    here, prefix = Pose(*request.position_m, *request.direction), []
+    if plan is not None:
+        uncut_m = math.inf if plan.holds(here_m) else max(0.0, to_m - here_m)
+        prefix = onward(plan.path, here_m, min(lead_m, uncut_m))
+        off_m = math.dist(place_on(plan.path, here_m)[0][:2], here[:2])
+        if off_m > mission.off_path_m and prefix:  # it bends as the plan does until it is told otherwise
+            prefix = moved(prefix, here)
+    prefix = prefix or [(*here, 0.0, lead_m)]
+    last = prefix[-1]
+    return Start(here[:2], along(last, last[5]), last[4], prefix)
 
 
 class PlanMonitor:

@@ -24,11 +24,9 @@ import numpy as np
 
 from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
-from planner.geometry.curves import Point, Pose, Segment, along, between, on_loiter, place_on, poses_at
-from planner.geometry.joining import LEAD_S
+from planner.geometry.curves import Point, Pose, between, on_loiter, place_on, poses_at
 from planner.geometry.terrain import WorkCount
 from planner.interface import (
-    FloatArray,
     Mission,
     NoWayToBegin,
     Path,
@@ -41,11 +39,9 @@ from planner.interface import (
 from planner.memory import ObstacleMemory
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.certificate import Certified, Certifier, hold_centre
-from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, flown_next
-from planner.shield.encounters import encounters
-from planner.shield.escape import Escapes, Room, meets, room_m
-from planner.shield.evasion import Threats
-from planner.shield.intervention_log import InterventionLog, ShieldReport
+from planner.shield.certified_planner import CertifiedPlanner, lead_of
+from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, Start
+from planner.shield.escape import Room, meets, room_m
 from planner.shield.refused_places import RefusedPlaces
 from planner.shield.tracking import MOST_RADII, Tracked, can_be_flown, tracked
 
@@ -73,46 +69,37 @@ class Adopted:
     certified_m: float = 0.0
 
 
-class Shield:
+class Shield(CertifiedPlanner):
     """A planner with a certified backup, for one flight."""
 
     def __init__(self, inner: Planner, mission: Mission) -> None:
-        self._inner, self._mission = inner, mission
-        self._memory = memory = ObstacleMemory(mission.clearance_m)
-        self._room = Room(mission, memory, mission.clearance_m, WorkCount())
-        self._escapes = Escapes(mission, memory, self._room)
-        self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
-        self._monitor = PlanMonitor(
+        memory = ObstacleMemory(mission.clearance_m)
+        monitor = PlanMonitor(
             mission,
             keep_m=BROKEN_SHARE * mission.clearance_m,
             urgent_m=math.inf,
-            lead_m=self._lead_m,
+            lead_m=lead_of(mission),
             step_m=mission.sensor_range_m,
         )
+        super().__init__(mission, memory, Room(mission, memory, mission.clearance_m, WorkCount()), monitor)
+        self._inner = inner
         self._adopted: Adopted | None = None  # what the plan in effect comes from
         self._proposed: Adopted | None = None
         self._own = Plan(PlanStatus.KEPT, "")  # the inner planner's last answer, as it gave it
         self._refused: Refused | None = None
         self._places, self._shown_s = RefusedPlaces(), -math.inf
-        self._threats: Threats | None = None
         self._ever_changed = False
-        self._log = InterventionLog()
-
-    @property
-    def report(self) -> ShieldReport:
-        """What the shield did so far."""
-        return self._log.report
-
-    @property
-    def backup(self) -> str:
-        """Why the aircraft is on the backup; empty while it flies the planner's path."""
-        return self._log.backup
 
     def plan(self, request: PlanRequest) -> Plan:
         """The longest part of the inner planner's path that is certified, or the backup."""
-        fresh_m = self._take_in(request)
+        fresh_m = self._sense(request)
+        self._ever_changed |= bool(request.seen.moving) or math.isfinite(request.seen.last_contradiction_s)
+        if self._takes_effect(request):
+            self._adopted = self._proposed
         effective, here_m = self._monitor.plan, request.arc_length_m
-        if effective is not None:
+        if effective is None:
+            self._adopted = None
+        else:
             here_m = on_loiter(effective.path, here_m)
             self._monitor.look(effective, here_m, request.position_m, fresh_m)
             self._monitor.broken |= meets(effective, here_m, self._mission, self._threats)
@@ -123,19 +110,6 @@ class Shield:
             self._monitor.proposed = found
             return found.plan
         return self._backup(request, here_m, answer)
-
-    def _take_in(self, request: PlanRequest) -> FloatArray:
-        """Takes in what was seen since the last request; returns (k, 2) edge points that have come in."""
-        met = encounters(request, self._mission) if request.seen.moving else []
-        self._ever_changed |= bool(request.seen.moving) or math.isfinite(request.seen.last_contradiction_s)
-        fresh_m = self._memory.take_in(request.seen, met)
-        self._threats = self._escapes.threats(request)
-        if self._monitor.take_effect(request.flown, self._memory.standing_m, self._memory.cleared):
-            self._adopted = self._proposed
-        plan = self._monitor.plan
-        if plan is not None and plan.over(request.arc_length_m):
-            self._monitor.plan = self._adopted = None
-        return fresh_m
 
     def _asked(self, request: PlanRequest, here_m: float) -> Plan:
         """The inner planner's answer, checked; a refusal where it raised, or where nobody could fly its answer."""
@@ -186,9 +160,9 @@ class Shield:
         mission = self._mission
         inner = adopted.plan.path
         assert inner is not None
-        prefix, pose, curvature = self._start(request, here_m)
-        from_m = 0.0 if new else _nearest_m(inner, pose[:2], adopted.certified_m)
-        track = self._flyable(request, prefix, pose, curvature, inner, from_m, new)
+        start = self._start(request, here_m)
+        from_m = 0.0 if new else _nearest_m(inner, start.pose[:2], adopted.certified_m)
+        track = self._flyable(request, start, inner, from_m, new)
         if track is None:
             if new:
                 self._refuse(request.position_m, "the path ends behind the aircraft")
@@ -236,21 +210,8 @@ class Shield:
         """Whether the aircraft is on the certified part of a plan, before its turn."""
         return self._monitor.plan is not None and not self._monitor.plan.holds(here_m)
 
-    def _start(self, request: PlanRequest, here_m: float) -> tuple[list[Segment], Pose, float]:
-        """What of the plan in effect is flown in any case, and the pose and curvature where a new one leaves it."""
-        prefix = flown_next(self._monitor.plan, request, here_m, self._lead_m, self._mission)
-        last = prefix[-1]
-        return prefix, along(last, last[5]), last[4]
-
     def _flyable(
-        self,
-        request: PlanRequest,
-        prefix: list[Segment],
-        pose: Pose,
-        curvature: float,
-        inner: Path,
-        from_m: float,
-        new: bool,
+        self, request: PlanRequest, start: Start, inner: Path, from_m: float, new: bool
     ) -> Tracked | None:
         """The inner path as it is, where it can be flown from the aircraft on; else a track of it."""
         here = Pose(*request.position_m, *request.direction)
@@ -258,11 +219,11 @@ class Shield:
             ends = np.concatenate(((0.0,), np.cumsum(inner.segments[:, 5])))
             return Tracked(inner, ends)
         most_m = min(MOST_RADII * self._room.limits.radius_m, self._mission.sensor_range_m)
-        track = tracked(pose, curvature, inner, from_m, self._room.limits, most_m)
+        track = tracked(start.pose, start.curvature, inner, from_m, self._room.limits, most_m)
         if track is None:
             return None
-        stations = np.concatenate((np.full(len(prefix), track.stations_m[0]), track.stations_m))
-        return Tracked(Path(np.array([*prefix, *track.path.segments.tolist()])), stations)
+        stations = np.concatenate((np.full(len(start.prefix), track.stations_m[0]), track.stations_m))
+        return Tracked(Path(np.array([*start.prefix, *track.path.segments.tolist()])), stations)
 
     def _gets_on(self, found: Certified, track: Tracked, adopted: Adopted, new: bool) -> bool:
         """Whether a certified part gains along the planner's path, and ends in another turn than that in effect."""
@@ -295,24 +256,13 @@ class Shield:
         """What is flown where the planner has nothing that is certified: the plan in effect, or an escape."""
         effective, time_s = self._monitor.plan, request.time_s
         why = self._refused.reason if self._refused is not None else answer.reason
-        if effective is None:
-            escape = self._escapes.at_start(request, self._threats, self._lead_m)
-            self._monitor.proposed, self._proposed = escape.committed, None
-            return escape.plan
-        if self._monitor.broken:
-            escape = self._escapes.from_plan(
-                request,
-                self._threats,
-                effective,
-                here_m,
-                until_m=min(self._monitor.cut_m, effective.loiter_entry_m),
-                prefix=self._start(request, here_m)[0],
-                certain=not (self._memory.ever_cleared or self._ever_changed),
-            )
-            self._monitor.broken = escape.broken
+        if effective is None or self._monitor.broken:
+            certain = not (self._memory.ever_cleared or self._ever_changed)
+            escape = self._escaped(request, here_m, certain=certain)
             if escape.committed is not None:
-                self._monitor.proposed, self._proposed = escape.committed, None
-            self._log.note(time_s, escape.plan.reason)
+                self._proposed = None
+            if effective is not None:
+                self._log.note(time_s, escape.plan.reason)
             return escape.plan
         if not effective.holds(here_m) or not effective.path.loiter:
             self._log.note(time_s, "")

@@ -14,7 +14,8 @@ from planner.geometry.curves import Pose
 from planner.interface import FloatArray, MapView, Mission
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
-from planner.rolling_window.local_planning import LocalPlanning, Start
+from planner.rolling_window.local_planning import LocalPlanning
+from planner.shield.committed_plan import Start
 from tests.planner.rolling_window.test_rolling_window import seen_at_once
 
 MakePoints = Callable[..., FloatArray]

@@ -15,9 +15,9 @@ from planner.geometry.curves import Pose, along
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.commitment import Commitment
-from planner.rolling_window.local_planning import LocalPlanning, Start
+from planner.rolling_window.local_planning import LocalPlanning
 from planner.shield.certificate import hold_centre
-from planner.shield.committed_plan import CommittedPlan
+from planner.shield.committed_plan import CommittedPlan, Start
 
 Known = Callable[[FloatArray], MapView]
 MakePoints = Callable[..., FloatArray]

@@ -11,7 +11,7 @@ import pytest
 from planner.geometry.course import Course
 from planner.geometry.curves import pose_at
 from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
-from planner.shield.committed_plan import CUT, CommittedPlan, PlanMonitor, flown_next
+from planner.shield.committed_plan import CUT, CommittedPlan, PlanMonitor, start_of
 from tests.planner.rolling_window.test_rolling_window import Seen
 
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
@@ -80,9 +80,9 @@ def test_what_is_left_has_the_straight_on_which_it_rolls() -> None:
 def test_a_new_plan_begins_on_the_one_in_effect_or_at_an_aircraft_that_is_not_near_it() -> None:
     for off_m, north in ((11.9, 0.0), (12.1, 12.1)):  # four tracking errors
         request = PlanRequest(0.0, (400.0, off_m), (1.0, 0.0), Seen(EDGES))
-        onward = flown_next(committed(3), request, 400.0, 300.0, MISSION)
+        onward = start_of(committed(3), request, 400.0, 300.0, MISSION).prefix
         assert onward == [pytest.approx((400.0, north, 1.0, 0.0, 0.0, 300.0))]
-    assert flown_next(None, request, 0.0, 300.0, MISSION) == [(400.0, 12.1, 1.0, 0.0, 0.0, 300.0)]
+    assert start_of(None, request, 0.0, 300.0, MISSION).prefix == [(400.0, 12.1, 1.0, 0.0, 0.0, 300.0)]
 
 
 def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside_its_course() -> None:

@@ -1,0 +1,90 @@
+"""What the shield and `rolling_window` share: certified plans are flown, and escapes where there is none."""
+
+from __future__ import annotations
+
+import math
+
+from planner.geometry.joining import LEAD_S
+from planner.interface import FloatArray, Mission, PlanRequest
+from planner.memory import ObstacleMemory
+from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start, start_of
+from planner.shield.encounters import encounters
+from planner.shield.escape import Escape, Escapes, Room
+from planner.shield.evasion import Threats
+from planner.shield.intervention_log import InterventionLog, ShieldReport
+
+
+def lead_of(mission: Mission) -> float:
+    """How much of the plan in effect is flown before a new one is, m."""
+    return mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
+
+
+class CertifiedPlanner:
+    """The certified plan in effect under its monitor, what is to be feared, and what is done without such a plan."""
+
+    def __init__(self, mission: Mission, memory: ObstacleMemory, room: Room, monitor: PlanMonitor) -> None:
+        self._mission, self._memory, self._room, self._monitor = mission, memory, room, monitor
+        self._lead_m = lead_of(mission)
+        self._escapes = Escapes(mission, memory, room)
+        self._threats: Threats | None = None  # while something moves or has just appeared
+        self._log = InterventionLog()
+
+    @property
+    def report(self) -> ShieldReport | None:
+        """What the shield did so far; None without it."""
+        return self._log.report
+
+    @property
+    def backup(self) -> str:
+        """Why the aircraft is on the backup; empty while it flies the planner's path."""
+        return self._log.backup
+
+    def _sense(self, request: PlanRequest) -> FloatArray:
+        """Remembers what was seen since the last request; returns (k, 2) edge points that have come in."""
+        met = encounters(request, self._mission) if request.seen.moving else []
+        fresh_m = self._memory.take_in(request.seen, met)
+        self._threats = self._escapes.threats(request)
+        return fresh_m
+
+    def _takes_effect(self, request: PlanRequest, cleared: int = 0) -> bool:
+        """Whether the plan proposed last has come into effect; `cleared` edge points were gone when it was found."""
+        monitor = self._monitor
+        took = monitor.take_effect(request.flown, self._memory.standing_m, self._memory.cleared - cleared)
+        if monitor.plan is not None and monitor.plan.over(request.arc_length_m):
+            monitor.plan = None
+        return took
+
+    def _start(self, request: PlanRequest, here_m: float, to_m: float = math.inf) -> Start:
+        """Where a new plan begins: a little ahead, on the one in effect or straight on from the aircraft."""
+        return start_of(self._monitor.plan, request, here_m, self._lead_m, self._mission, to_m)
+
+    def _escaped(
+        self,
+        request: PlanRequest,
+        here_m: float,
+        *,
+        certain: bool,
+        to_m: float = math.inf,
+        nearer: CommittedPlan | None = None,
+    ) -> Escape:
+        """What is flown where nothing is certified: a turn that keeps clear, or what does so longest.
+
+        Of the plan in effect no more than to the arc length `to_m` is flown in any case. See `Escapes.from_plan`.
+        """
+        monitor, effective = self._monitor, self._monitor.plan
+        if effective is None:
+            escape = self._escapes.at_start(request, self._threats, self._lead_m)
+        else:
+            escape = self._escapes.from_plan(
+                request,
+                self._threats,
+                effective,
+                here_m,
+                until_m=min(monitor.cut_m, effective.loiter_entry_m),
+                prefix=self._start(request, here_m, to_m).prefix,
+                certain=certain,
+                nearer=nearer,
+            )
+        monitor.broken = escape.broken
+        monitor.proposed = escape.committed or monitor.proposed
+        return escape
