@@ -35,39 +35,35 @@ class ObstacleMemory:
         self._forget()
 
     def _forget(self) -> None:
-        self._points = np.zeros((256, 2))
-        self._genuine = np.zeros(256, dtype=np.bool_)
-        self._count = self._refused = 0
+        self._points, self._genuine = NOTHING, np.zeros(0, dtype=np.bool_)
         self._labels: IntArray | None = None
         self._with_moving: FloatArray | None = None
 
     @property
     def known(self) -> int:
         """How many of the points stand still: the first ones, in the order in which they came in."""
-        return self._count
+        return len(self._points)
 
     @property
     def points_m(self) -> FloatArray:
         """(m, 2) edge points, those of what moves last; what comes in later does not change what was given."""
-        if not self._outlines:
-            return self._points[: self._count]
         if self._with_moving is None:
-            self._with_moving = np.concatenate((self._points[: self._count], *self._outlines))
+            moving = self._outlines
+            self._with_moving = np.concatenate((self._points, *moving)) if moving else self._points
         return self._with_moving
 
     @property
     def labels(self) -> IntArray:
         """(m,) the obstacle that each point belongs to; each that moves is one."""
         if self._labels is None:
-            self._labels = obstacles_of(self._points[: self._count], self.cell_m)
-        labels = self._labels
+            self._labels = obstacles_of(self._points, self.cell_m)
         numbers = [np.full(len(outline), FIRST_MOVING - i) for i, outline in enumerate(self._outlines)]
-        return np.concatenate((labels, *numbers)) if numbers else labels
+        return np.concatenate((self._labels, *numbers)) if numbers else self._labels
 
     @property
     def standing_m(self) -> FloatArray:
-        """(`known`, 2) the points of what stands still."""
-        return self.points_m[: self.known]
+        """(`known`, 2) the points of what stands still, refused places among them."""
+        return self._points
 
     @property
     def met_m(self) -> FloatArray:
@@ -77,13 +73,12 @@ class ObstacleMemory:
     @property
     def genuine_m(self) -> FloatArray:
         """(k, 2) those points that were seen to stand still, not refused."""
-        points = self._points[: self._count]
-        return points[self._genuine[: self._count]] if self._refused else points
+        return self._points if self._genuine.all() else self._points[self._genuine]
 
     @property
     def refused_m(self) -> FloatArray:
         """(k, 2) those points that were refused."""
-        return self._points[: self._count][~self._genuine[: self._count]] if self._refused else NOTHING
+        return self._points[~self._genuine]
 
     def refuse(self, place: tuple[float, float]) -> None:
         """Remembers a place as if there were an edge: it is not to be gone to again."""
@@ -91,7 +86,7 @@ class ObstacleMemory:
 
     def forgive(self) -> None:
         """Forgets what was refused."""
-        if self._refused:
+        if not self._genuine.all():
             self._keep_only(self.genuine_m, NOTHING)
 
     def take_in(self, seen: MapView, met: Sequence[FloatArray] | None = None) -> FloatArray:
@@ -105,14 +100,11 @@ class ObstacleMemory:
 
     def _alike(self, outlines: Sequence[FloatArray]) -> bool:
         """Whether what moves is where it was, but for a little."""
-        if len(outlines) != len(self._outlines):
-            return False
-        corners = [
-            np.abs(edge(new, axis=0) - edge(old, axis=0)).max()
+        return len(outlines) == len(self._outlines) and all(
+            np.abs(edge(new, axis=0) - edge(old, axis=0)).max() < MOVED * self.cell_m
             for new, old in zip(outlines, self._outlines, strict=True)
             for edge in (np.min, np.max)
-        ]
-        return bool(max(corners) < MOVED * self.cell_m)
+        )
 
     def _take_in(self, seen: MapView) -> FloatArray:
         fresh = seen.edges_since(self._revision)
@@ -126,24 +118,15 @@ class ObstacleMemory:
 
     def _keep_only(self, genuine_m: FloatArray, refused_m: FloatArray) -> None:
         """Begins anew with what is left; what was refused comes first, so that nothing else moves up."""
-        self.cleared += self._count - len(genuine_m) - len(refused_m)
+        self.cleared += self.known - len(genuine_m) - len(refused_m)
         self._forget()
-        for points, genuine in ((refused_m, False), (genuine_m, True)):
-            if len(points):
-                self._add(points, genuine)
+        self._add(refused_m, genuine=False)
+        self._add(genuine_m, genuine=True)
 
     def _add(self, fresh: FloatArray, genuine: bool) -> None:
-        total = self._count + len(fresh)
-        if total > len(self._points):
-            size = max(2 * len(self._points), total)
-            self._points = np.resize(self._points, (size, 2))
-            self._genuine = np.resize(self._genuine, size)
-        new = slice(self._count, total)
-        self._points[new] = fresh
-        self._genuine[new] = genuine
-        self._refused += 0 if genuine else len(fresh)
-        self._count, self._with_moving = total, None
-        self._labels = None
+        self._points = np.ascontiguousarray(np.concatenate((self._points, fresh)))
+        self._genuine = np.concatenate((self._genuine, np.full(len(fresh), genuine)))
+        self._labels = self._with_moving = None
 
 
 def obstacles_of(points_m: FloatArray, cell_m: float) -> IntArray:
