@@ -1,12 +1,10 @@
 """Safety by construction: how far a path may be committed to.
 
-Invariant: the path in effect ends in a full turn at the minimum radius, and path and turn lie in space that has been
-seen to be free, with the clearance kept from every edge seen. Whatever the unseen part of the world holds, the
-aircraft can fly the path it has into that turn and go on planning from there, for ever. Where no such turn leads on,
-the path may end in the goal circle instead, if it can be flown up to there: then the flight is over, and needs no
-turn. (Schouwenaars et al., "Receding horizon path planning with implicit safety guarantees", ACC 2004.) The turn is
-certified as a disc, not as a circle: a circle can enclose the tip of a wall. The disc is larger than the turn by a
-share of the clearance, for beside what is seen to its edge the hidden flank of something may begin.
+Invariant: the path in effect ends in a full turn at the minimum radius, and path and turn lie in space seen to be free,
+with the clearance kept from every edge seen: whatever the unseen part of the world holds, the aircraft can fly on for
+ever. Where no such turn leads on, the path may end in the goal circle instead. (Schouwenaars et al., "Receding horizon
+path planning with implicit safety guarantees", ACC 2004.) The turn is certified as a disc, for a circle can enclose the
+tip of a wall, and one larger than the turn: at the edge of what is seen the hidden flank of something may begin.
 """
 
 from __future__ import annotations
@@ -15,6 +13,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -79,11 +78,9 @@ class CertificateBroken(RuntimeError):
 
 @dataclass(frozen=True)
 class Certified:
-    """The part of a path that may be flown.
+    """The part of a path that may be flown: up to a turn, and the turn; or all of it, to the goal.
 
-    Attributes:
-        path: up to the turn, and the turn; or all of it, to the goal.
-        loiter_entry_m: arc length at which the turn begins, or the flight is over.
+    At the arc length `loiter_entry_m` the turn begins, or the flight is over.
     """
 
     path: Path
@@ -91,29 +88,21 @@ class Certified:
 
 
 class _Exit(NamedTuple):
-    """How a path is left for a full turn: by an arc to the other side, about a place ahead, or straight on.
+    """How a path is left for a full turn: by an arc to the other side, about a place ahead, or straight on."""
 
-    Attributes:
-        side: side of the full turn, 1: left.
-        angle_rad: angle of the arc, 0: straight on.
-        ahead_m, aside_m: centre of the turn, ahead of the place where the path is left and to its left.
-    """
-
-    side: float
-    angle_rad: float
-    ahead_m: float
-    aside_m: float
+    side: float  # of the full turn, 1: left
+    angle_rad: float  # of the arc, 0: straight on
+    ahead_m: float  # centre of the turn, ahead of the place where the path is left
+    aside_m: float  # and to its left
 
     @classmethod
     def about_place_ahead(cls, side: float, share: float, limits: Limits) -> _Exit:
         """The exit whose turn centre lies aside by a share of the radius: 2 R cos(a) - roll sin(a) = (1 + share) R."""
         radius, roll = limits.radius_m, 2.0 * limits.roll_m
-        angle = math.acos((1.0 + share) * radius / math.hypot(2.0 * radius, roll)) - math.atan2(
-            roll, 2.0 * radius
-        )
-        return cls(
-            side, angle, 2.0 * radius * math.sin(angle) + roll * math.cos(angle), side * share * radius
-        )
+        most = math.acos((1.0 + share) * radius / math.hypot(2.0 * radius, roll))
+        angle = most - math.atan2(roll, 2.0 * radius)
+        ahead_m = 2.0 * radius * math.sin(angle) + roll * math.cos(angle)
+        return cls(side, angle, ahead_m, side * share * radius)
 
     def lead(self, pose: Pose, limits: Limits) -> list[Segment]:
         """The arc and the straight to roll after it, or the straight."""
@@ -131,9 +120,8 @@ class Certifier:
         self._beside = BEYOND * clearance_m
         radius_m = limits.radius_m
         self._exits = [_Exit.about_place_ahead(side, share, limits) for share in ASIDE for side in SIDES]
-        self._exits += [
-            _Exit(side, 0.0, n * radius_m, side * radius_m) for n in STRAIGHT_ON for side in SIDES
-        ]
+        on = product(STRAIGHT_ON, SIDES)
+        self._exits += [_Exit(side, 0.0, n * radius_m, side * radius_m) for n, side in on]
         self._disc = _disc(disc_radius_m(radius_m, clearance_m), spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: MapView) -> float:
@@ -154,27 +142,18 @@ class Certifier:
         free_to = min(self.seen_free_to_m(path, seen), to_m)
         step = max(0.5 * self._limits.radius_m, free_to / MOST_ARC_LENGTHS)
         arc_lengths_m: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
-        for some in (
-            arc_lengths_m[i : i + ARC_LENGTHS_AT_ONCE]
-            for i in range(0, len(arc_lengths_m), ARC_LENGTHS_AT_ONCE)
-        ):
-            free = self._discs_free(path, some, seen).tolist()
-            for arc_length_m, sides_free in zip(some.tolist(), free, strict=True):
-                for side, disc_free in zip(SIDES, sides_free, strict=True):
-                    if disc_free:
-                        turn = self._turn(path, arc_length_m, side)
-                        if terrain.admits(Path(np.array(turn))):
-                            way = between(path, 0.0, arc_length_m)
-                            return Certified(Path(np.array([*way, *turn]), loiter=True), arc_length_m)
+        for i in range(0, len(arc_lengths_m), ARC_LENGTHS_AT_ONCE):
+            some = arc_lengths_m[i : i + ARC_LENGTHS_AT_ONCE]
+            for k, which in np.argwhere(self._discs_free(path, some, seen)).tolist():
+                arc_length_m = float(some[k])
+                turn = self._turn(path, arc_length_m, SIDES[which])
+                if terrain.admits(Path(np.array(turn))):
+                    way = between(path, 0.0, arc_length_m)
+                    return Certified(Path(np.array([*way, *turn]), loiter=True), arc_length_m)
         return None
 
     def certify_ahead(self, path: Path, seen: MapView, terrain: Terrain, to_m: float) -> Certified | None:
-        """The longest part of a path that can be left, ahead or straight on, for a turn that is seen to be free.
-
-        Through a gap narrower than a turn beside the path, this is the first turn that is seen: by an arc to one side
-        into a full turn to the other, about a place ahead, or beyond the gap, where the path bends behind something.
-        Arguments are those of `certify`.
-        """
+        """The same for a path that is left ahead or straight on: in or beyond a gap narrower than a turn beside it."""
         radius_m = self._limits.radius_m
         free_to = min(self.seen_free_to_m(path, seen), to_m)
         step = AHEAD_STEP * radius_m
@@ -206,10 +185,7 @@ class Certifier:
     def certify_up_to(
         self, over_m: float, path: Path, seen: MapView, bounds_m: tuple[float, float, float, float]
     ) -> Certified | None:
-        """All of a path, where it is seen to be free and stays within bounds up to the arc length `over_m`: the goal.
-
-        There is no turn to leave it for: what lies beside it has to be seen to be free as well, as beyond a turn.
-        """
+        """All of a path that is free, also beside it, and inside up to the arc length `over_m`, the goal."""
         flown = between(path, 0.0, over_m)
         if not flown or over_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
             return None
@@ -262,7 +238,7 @@ def disc_radius_m(radius_m: float, clearance_m: float) -> float:
 def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, reaction_s: float) -> float:
     """Sensing range without which not even a turn can be certified, m.
 
-    A turn beside the course reaches two radii to the side; beyond it lie the clearance, more than what is certified
-    of it, and what is flown within `reaction_s`: latency of sensor and planner, and the time to roll.
+    A turn beside the course reaches two radii to the side; beyond it lie the clearance and what is flown within
+    `reaction_s`: latency of sensor and planner, and the time to roll.
     """
     return 2.0 * DISC * radius_m + clearance_m + speed_mps * reaction_s

@@ -23,26 +23,20 @@ PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
 REPLAN_SHARE, CUT, GRAZED = 0.0625, 0.02, 0.005
-"""The next search begins after a share of the distance to what is wrong with the plan. `REPLAN_SHARE` is that share in
-general. `CUT`, which is smaller, holds where the course is cut: what cuts it may be a dead end. A course that the last
-search made longer by less than the share `GRAZED` is only grazed, and `REPLAN_SHARE` holds for it too."""
+"""The next search begins after this share of the distance to what is wrong with the plan: `CUT` where the course is
+cut, for that may be a dead end, but for a course that the last search made longer by less than the share `GRAZED`."""
 
 
 @dataclass(frozen=True, eq=False)
 class CommittedPlan:
-    """A plan in effect, and what it is the beginning of.
+    """A plan in effect, and what it is the beginning of."""
 
-    Attributes:
-        plan: as it was given to the loop.
-        path: its path: along the course, then into the turn; or the course, where that is flown to the goal.
-        course: the whole way.
-        loiter_entry_m: arc length at which the path leaves the course for the turn, or the flight is over.
-    """
-
-    plan: Plan
-    path: Path
-    course: Course
-    loiter_entry_m: float
+    plan: Plan  # as it was given to the loop
+    path: Path  # of the plan: along the course, then into the turn; or the course, where that is flown to the goal
+    course: Course  # the whole way
+    loiter_entry_m: (
+        float  # arc length at which the path leaves the course for the turn, or the flight is over
+    )
 
     @cached_property
     def turn(self) -> Path:
@@ -95,16 +89,7 @@ def start_of(
 
 
 class PlanMonitor:
-    """Compares edge points as they come in with the plan in effect, and tells when to search for another.
-
-    Attributes:
-        plan: the committed plan in effect, None without one.
-        proposed: the plan that was given to the loop last, until it is in effect.
-        cut_m: arc length at which the course comes too near to an edge point seen since; infinite where it does not.
-        broken: the certified part of the plan, or its turn, comes too near to something.
-        lengthened_m: so much longer than the course before it is the one that the last search found.
-        searched_at_m: arc length at which the last search was made.
-    """
+    """Compares edge points as they come in with the plan in effect, and tells when to search for another."""
 
     def __init__(
         self, mission: Mission, *, keep_m: float, urgent_m: float, lead_m: float, step_m: float
@@ -120,12 +105,12 @@ class PlanMonitor:
         self._waiting: list[FloatArray] = []
         self._nearest_m = math.inf
         self._since = COMPARED_TOGETHER  # requests since edge points were compared
-        self.plan: CommittedPlan | None = None
-        self.proposed: CommittedPlan | None = None
-        self.cut_m = math.inf
-        self.broken = False
-        self.lengthened_m = math.inf
-        self.searched_at_m = 0.0
+        self.plan: CommittedPlan | None = None  # in effect
+        self.proposed: CommittedPlan | None = None  # given to the loop last, until it is in effect
+        self.cut_m = math.inf  # arc length at which the course comes too near to an edge point seen since
+        self.broken = False  # the certified part of the plan, or its turn, comes too near to something
+        self.lengthened_m = math.inf  # how much longer the last search made the course
+        self.searched_at_m = 0.0  # arc length at which the last search was made
 
     def take_effect(self, flown: Plan | None, points_m: FloatArray, gone: int = 0) -> bool:
         """Begins to watch the plan proposed last, if it is the one that is flown now; returns whether it is."""

@@ -1,12 +1,10 @@
 """Where obstacles that move will be met.
 
-To an aircraft that flies at a steady speed, an obstacle that moves is in the way where both arrive at the same
-time: its outline, moved on by the time that the aircraft needs to get there, is planned around as if it stood
-still. (The collision cone of A. Chakravarthy and D. Ghose, "Obstacle avoidance in a dynamic environment", IEEE
-Trans. SMC 28, 1998, seen from the place of the encounter.) Each point of the outline has its own time. A way round
-takes longer than the straight line, and wind changes when one arrives: so each is drawn out over all the times in
-question. As the aircraft comes nearer these draw together. Assumed: an obstacle keeps its velocity, and it is no
-faster than `FASTEST` of the aircraft.
+An obstacle that moves is in the way where it and the aircraft arrive at the same time: its outline, moved on by the
+time that the aircraft needs to get there, is planned around as if it stood still. (The collision cone of A.
+Chakravarthy and D. Ghose, "Obstacle avoidance in a dynamic environment", IEEE Trans. SMC 28, 1998.) Ways round take
+longer and wind changes when one arrives: so each point of it is drawn out over all the times in question. Assumed: an
+obstacle keeps its velocity, and it is no faster than `FASTEST` of the aircraft.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """Evading: the way on that keeps clear longest, of what stands and of what moves, where none is safe.
 
 Ways are rolled out from a little ahead: a turn at the least radius to one side, one back to the other, straight on,
-and a full turn at the end. Each is judged by how near it comes to what was seen: to what moves where that will be when
-the aircraft is there. (The rollouts of D. Fox, W. Burgard and S. Thrun, "The dynamic window approach to collision
-avoidance", IEEE Robotics & Automation Magazine 4, 1997.) What is far ahead counts less, for it can be evaded later. The
-next scan asks anew.
+and a full turn at the end. Each is judged by how near it comes to what was seen, where that will be when the aircraft
+is there; what is far ahead counts less. (The rollouts of D. Fox, W. Burgard and S. Thrun, "The dynamic window approach
+to collision avoidance", IEEE Robotics & Automation Magazine 4, 1997.)
 """
 
 from __future__ import annotations
@@ -67,18 +66,14 @@ straight all second turns that lead into the same last turn are one way."""
 class Threats:
     """What is near: edges of what stands, and of what moves.
 
-    Attributes:
-        still_m: (n, 2) edge points.
-        moving: (k, 5) edge points now, and what is taken to lie behind them, their velocity, east, north, and how fast
-            they may come nearer beyond that.
-        speed_mps: of the aircraft.
-        step_m: ways are looked at so often.
+    A row of `moving` is an edge point now, or one of what is taken to lie behind, its velocity, and how fast it may
+    come nearer beyond that.
     """
 
-    still_m: FloatArray
-    moving: FloatArray
-    speed_mps: float
-    step_m: float
+    still_m: FloatArray  # (n, 2)
+    moving: FloatArray  # (k, 5)
+    speed_mps: float  # of the aircraft
+    step_m: float  # ways are looked at so often
 
     @classmethod
     def about(cls, request: PlanRequest, still_m: FloatArray, mission: Mission) -> Threats:
@@ -98,18 +93,14 @@ class Threats:
 
         With less than `least_m` it is not looked at to its end.
         """
-        arc_lengths_m = np.arange(0.0, AHEAD_S * self.speed_mps, self.step_m)
+        at_m = np.arange(0.0, AHEAD_S * self.speed_mps, self.step_m)
         if path.loiter:
             turn = float(path.segments[-1, 5])
             begin = path.length_m - turn
-            arc_lengths_m = np.where(
-                arc_lengths_m > begin, begin + (arc_lengths_m - begin) % turn, arc_lengths_m
-            )
-        places = np.ascontiguousarray(poses_at(path, arc_lengths_m)[:, :2])
-        window = (EARLIEST, LATEST, UNKNOWN_S)
-        return room_along(
-            places, *self._still, self.moving, self.step_m, self.speed_mps, least_m, later, *window
-        )
+            at_m = np.where(at_m > begin, begin + (at_m - begin) % turn, at_m)
+        places = np.ascontiguousarray(poses_at(path, at_m)[:, :2])
+        how = (self.step_m, self.speed_mps, least_m, later, EARLIEST, LATEST, UNKNOWN_S)
+        return room_along(places, *self._still, self.moving, *how)
 
     @cached_property
     def _still(self) -> Buckets:
@@ -145,18 +136,12 @@ def rolled_out(prefix: Sequence[Segment], limits: Limits) -> Iterator[Path]:
 
 
 def clearest(
-    ways: Iterable[Path],
-    bounds_m: tuple[float, float, float, float],
-    threats: Threats,
-    more_than_m: float,
+    ways: Iterable[Path], bounds_m: tuple[float, float, float, float], threats: Threats, more_than_m: float
 ) -> Path | None:
     """The way with the most room of those that stay in the area and have more than so much; None without one."""
     best: Path | None = None
     for way in ways:
-        if not inside_bounds(way, bounds_m):
-            continue
-        room_m = threats.room_m(way, more_than_m)
-        if room_m > more_than_m:
+        if inside_bounds(way, bounds_m) and (room_m := threats.room_m(way, more_than_m)) > more_than_m:
             best, more_than_m = way, room_m
     return best
 

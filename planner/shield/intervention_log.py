@@ -7,30 +7,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ShieldReport:
-    """Figures of a flight under a shield.
+    """Figures of a flight under a shield."""
 
-    Attributes:
-        interventions: how often the aircraft came from the planner's path onto the backup.
-        time_on_backup_s: time on the backup: in the turn that a plan ends with, or escaping.
-        refused_plans: paths of the planner of which no part that leads on could be certified.
-    """
-
-    interventions: int = 0
-    time_on_backup_s: float = 0.0
-    refused_plans: int = 0
+    interventions: int = 0  # how often the aircraft came from the planner's path onto the backup
+    time_on_backup_s: float = 0.0  # in the turn that a plan ends with, or escaping
+    refused_plans: int = 0  # paths of the planner of which no part that leads on could be certified
 
 
 class InterventionLog:
-    """Counts interventions as the planner is asked.
-
-    Attributes:
-        backup: why the aircraft is on the backup since `since_s`; empty while it flies the planner's path.
-    """
+    """Counts interventions as the planner is asked."""
 
     def __init__(self) -> None:
         self.refused_plans = 0
-        self.backup = ""
-        self.since_s = 0.0
+        self.backup = ""  # why the aircraft is on the backup; empty while it flies the planner's path
+        self.since_s = 0.0  # and since when
         self._interventions, self._on_backup_s, self._last_s = 0, 0.0, 0.0
 
     def note(self, time_s: float, backup: str) -> None:

@@ -1,8 +1,7 @@
 """The path of a planner as an aircraft can fly it: pursuit at the turn radius with a limited change of curvature.
 
-A path may have corners, or begin beside the aircraft. What is certified has to be what is flown: so the path is
-tracked first, by pure pursuit (R. C. Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-
-92-01, 1992), and the track is certified.
+A path may have corners, or begin beside the aircraft: it is tracked by pure pursuit (R. C. Coulter, "Implementation of
+the pure pursuit path tracking algorithm", CMU-RI-TR-92-01, 1992), and the track is what is certified and flown.
 """
 
 from __future__ import annotations
@@ -30,15 +29,10 @@ MOST_RADII = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """A path that can be flown, and how far along the planner's path it has come at each of its segments.
-
-    Attributes:
-        path: what is flown.
-        stations_m: (n + 1,) arc length of the planner's path, at the beginning of each segment and at the end.
-    """
+    """A path that can be flown, and how far along the planner's path it has come at each of its segments."""
 
     path: Path
-    stations_m: FloatArray
+    stations_m: FloatArray  # (n + 1,) of the planner's path, at the beginning of each segment and at the end
 
     def station_m(self, arc_length_m: float) -> float:
         """Arc length of the planner's path beside a place of the track."""
