@@ -62,15 +62,12 @@ class PlanStatus(Enum):
 class MovingEdges:
     """The seen edge of one obstacle that moves.
 
-    Attributes:
-        time_s: simulated time at which the obstacle was at these points.
-        points_m: (k, 2) edge points, in order from one end of the seen edge to the other; at least one.
-        velocity_mps: east and north; (0, 0) if it has just appeared and its velocity is not known yet.
+    At `time_s` the obstacle was at `points_m`, (k, 2), k > 0, in order from one end of the seen edge to the other.
     """
 
     time_s: float
     points_m: FloatArray
-    velocity_mps: tuple[float, float]
+    velocity_mps: tuple[float, float]  # east, north; (0, 0) if it has just appeared and is not known yet
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points_m", _frozen(self.points_m))
@@ -153,11 +150,9 @@ class Mission:
 
     @property
     def spaced(self) -> Mission:
-        """For a planner that leaves a straight to roll between any two turns: they may be tighter, and are steeper.
-
-        A steeper turn takes longer to roll into: about as its curvature grows.
-        """
+        """For a planner that leaves a straight to roll between any two turns: they may be tighter, and are steeper."""
         radius_m = self.least_spaced_radius_m or self.turn_radius_m
+        # A steeper turn takes longer to roll into: about as its curvature grows.
         roll_in_s = self.roll_in_s * self.turn_radius_m / radius_m
         return replace(self, turn_radius_m=radius_m, roll_in_s=roll_in_s)
 
@@ -176,14 +171,12 @@ class Mission:
 class Path:
     """Joined segments of constant curvature.
 
-    Attributes:
-        segments: (n, 6): start east, start north, unit tangent east, unit tangent north, curvature (1/m,
-            positive = left), length (m). Read-only.
-        loiter: the last segment is a full circle to be flown for ever.
+    A row of `segments`, (n, 6), read-only, is start east, start north, unit tangent east, unit tangent north, curvature
+    (1/m, positive = left) and length (m).
     """
 
     segments: FloatArray
-    loiter: bool = False
+    loiter: bool = False  # the last segment is a full circle to be flown for ever
 
     def __post_init__(self) -> None:
         rows = np.array(self.segments, dtype=np.float64, order="C").reshape(-1, 6)
@@ -202,8 +195,7 @@ class Path:
         lengths = np.hypot(*legs.T)
         if not len(lengths) or not lengths.all():
             raise ValueError("a path goes through at least two points, each different from the one before")
-        zero = np.zeros(len(legs))
-        return cls(np.column_stack((points[:-1], legs / lengths[:, np.newaxis], zero, lengths)))
+        return cls(np.column_stack((points[:-1], legs / lengths[:, None], 0.0 * lengths, lengths)))
 
     @cached_property
     def rows(self) -> list[list[float]]:
@@ -215,18 +207,6 @@ class Path:
     def length_m(self) -> float:
         """Length, one turn of a closing loiter circle included."""
         return float(self.segments[:, 5].sum())
-
-    @cached_property
-    def middles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Three (n,): east and north of the middle of each segment, and half its length: it reaches no further."""
-        rows = self.segments
-        half = 0.5 * rows[:, 5]
-        bend = 0.5 * rows[:, 4] * half
-        chord = half * np.sinc(bend / np.pi)
-        cos, sin = np.cos(bend), np.sin(bend)
-        east = rows[:, 0] + chord * (rows[:, 2] * cos - rows[:, 3] * sin)
-        north = rows[:, 1] + chord * (rows[:, 3] * cos + rows[:, 2] * sin)
-        return east, north, half
 
     @property
     def max_curvature_1pm(self) -> float:
@@ -271,26 +251,20 @@ class PlanRequest(NamedTuple):
 class PlanPicture:
     """A drawing of how a plan was found, for the recording; the loop never reads it.
 
-    Attributes:
-        guide_m: (2, 2) guide vector, from the aircraft to the point it aims at.
-        window_m: radius of the planning window (the paper's r1); 0: nothing bounds the search.
-        sectors: (k, 4) free sectors at the aircraft: unit vectors of the right and the left edge.
-        candidates: polylines (m, 2) that were compared, the chosen one first.
-        met_m: (j, 2) edge points of moving obstacles, at the places where the plan expects to meet them.
-
     Raises:
         ValueError: something has another shape, or is not finite.
     """
 
-    guide_m: FloatArray
-    window_m: float = 0.0
+    guide_m: FloatArray  # (2, 2) guide vector, from the aircraft to the point it aims at
+    window_m: float = 0.0  # radius of the planning window (the paper's r1); 0: nothing bounds the search
     sectors: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
-    candidates: tuple[FloatArray, ...] = ()
+    """(k, 4) free sectors at the aircraft: unit vectors of the right and the left edge."""
+    candidates: tuple[FloatArray, ...] = ()  # polylines (m, 2) that were compared, the chosen one first
     met_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    """(j, 2) edge points of moving obstacles, at the places where the plan expects to meet them."""
 
     def __post_init__(self) -> None:
-        drawn = {"guide_m": 2, "sectors": 4, "met_m": 2}
-        for name, columns in drawn.items():
+        for name, columns in (("guide_m", 2), ("sectors", 4), ("met_m", 2)):
             object.__setattr__(self, name, _drawn(name, getattr(self, name), columns))
         candidates = tuple(_drawn(f"candidates[{i}]", each, 2) for i, each in enumerate(self.candidates))
         object.__setattr__(self, "candidates", candidates)
@@ -325,13 +299,10 @@ class Plan:
     def __post_init__(self) -> None:
         object.__setattr__(self, "waypoints_m", _frozen(self.waypoints_m))
         if self.path is not None:
-            lengths = np.hypot(self.path.segments[:, 2], self.path.segments[:, 3])
-            wrong = np.flatnonzero(~(np.abs(lengths - 1.0) < NOT_UNIT))
-            if len(wrong):
-                raise ValueError(
-                    f"segment {wrong[0]} of a plan's path begins with a tangent of length "
-                    f"{lengths[wrong[0]]:.9g}; tangents are unit vectors"
-                )
+            lengths = np.hypot(*self.path.segments[:, 2:4].T)
+            for i in np.flatnonzero(~(np.abs(lengths - 1.0) < NOT_UNIT)).tolist():
+                told = f"begins with a tangent of length {lengths[i]:.9g}; tangents are unit vectors"
+                raise ValueError(f"segment {i} of a plan's path {told}")
 
 
 class Planner(Protocol):

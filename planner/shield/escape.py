@@ -42,21 +42,17 @@ IN_THE_WAY = "something is in the way; turning away"
 
 
 UNSEEN_SHARE = 0.9
-"""Share of the clearance. The aircraft flies straight on from the start for this distance before anything ahead has
-to be seen free: a sensor that loses returns needs several scans, and the start is clear of obstacles by the
-clearance."""
+"""Share of the clearance that is flown straight on from the start before anything ahead has to be seen free: a sensor
+that loses returns needs several scans, and the start is clear of obstacles by the clearance."""
 
 NO_ROOM = "there is no room for a turn at the start"
 NOT_SEEN = "nothing ahead of the aircraft has been seen to be free"
 
 
 class Room:
-    """The space of one flight.
+    """The space of one flight: `limits` of turns, and of the full turns that plans end in, `holds`.
 
-    Attributes:
-        limits: of turns.
-        holds: of the full turns that plans end in.
-        path_keeps_m: what paths keep from every edge point where there is room.
+    Paths keep `path_keeps_m` from every edge point where there is room.
     """
 
     def __init__(
@@ -73,34 +69,25 @@ class Room:
 
 
 class _Option(NamedTuple):
-    """One option of an escape.
+    """One option of an escape."""
 
-    Attributes:
-        path: what would be flown.
-        standing: what of it must keep its distance from everything that stands; None where that is known already.
-        reason: why it is flown, a sentence.
-        committed: the certified plan that it comes from, if it comes from one.
-    """
-
-    path: Path
-    standing: Path | None = None
-    reason: str = ""
-    committed: CommittedPlan | None = None
+    path: Path  # what would be flown
+    standing: Path | None = (
+        None  # what of it must keep clear of what stands; None where that is known already
+    )
+    reason: str = ""  # why it is flown, a sentence
+    committed: CommittedPlan | None = None  # the certified plan that it comes from
 
 
 @dataclass(frozen=True, eq=False)
 class Escape:
-    """The answer where nothing is certified.
-
-    Attributes:
-        plan: the answer.
-        committed: the new plan that it commits to; None where the plan in effect goes on.
-        broken: the plan in effect comes too near to something.
-    """
+    """The answer where nothing is certified."""
 
     plan: Plan
-    committed: CommittedPlan | None = None
-    broken: bool = True
+    committed: CommittedPlan | None = (
+        None  # the new plan that it commits to; None: the plan in effect goes on
+    )
+    broken: bool = True  # the plan in effect comes too near to something
 
 
 class Escapes:
@@ -114,10 +101,8 @@ class Escapes:
 
     def threats(self, request: PlanRequest) -> Threats | None:
         """What is near, while something moves or has just appeared: then what was certified may be met all the same."""
-        lately = (
-            len(request.seen.moving) > 0 or request.time_s - request.seen.last_contradiction_s < EVADING_S
-        )
-        return self._near(request) if lately else None
+        appeared = request.time_s - request.seen.last_contradiction_s < EVADING_S
+        return self._near(request) if appeared or len(request.seen.moving) > 0 else None
 
     def at_start(self, request: PlanRequest, threats: Threats | None, lead_m: float) -> Escape:
         """A turn before the first plan, where what is ahead was seen to be free at all.
@@ -130,9 +115,8 @@ class Escapes:
         ahead = Path(np.array([(*request.position_m, *request.direction, 0.0, onward_m)]))
         ways = list(rolled_out([(*request.position_m, *request.direction, 0.0, lead_m)], self._room.limits))
         least = self._standing(LOITER_SHARES[-1])
-        if divert_to_loiter(ahead, 0.0, onward_m, self._room.holds, least) is None and not any(
-            map(least.admits, ways)
-        ):
+        turn = divert_to_loiter(ahead, 0.0, onward_m, self._room.holds, least)
+        if turn is None and not any(map(least.admits, ways)):
             raise NoWayToBegin(NO_ROOM)
         pieces = math.ceil(onward_m / (0.25 * self._room.holds.radius_m))
         if not request.seen.seen_free(places_along(ahead, onward_m, pieces)).any():
@@ -252,9 +236,8 @@ class Escapes:
     ) -> _Option | None:
         """The option that keeps furthest from what is near, of those that keep a share of what is wanted.
 
-        More than what is wanted is no better; each must be clearer than those before it, and lie in space that was
-        `seen` to be free, if that is given. What is met is met, be it far ahead: with less to be kept, being far ahead
-        counts for less.
+        More than what is wanted is no better. Each must be clearer than those before it, and lie in space that was
+        `seen` to be free, if that is given. With less to be kept, being far ahead counts for less.
         """
         keeps_m = self._room.path_keeps_m
         best, least_m = None, share * keeps_m

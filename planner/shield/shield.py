@@ -1,18 +1,14 @@
 """The shield: any planner's path is flown only as far as a turn from there has been seen to be free.
 
-The inner planner is asked as ever. What it answers is made flyable (`planner.shield.tracking`), cut where it comes too
-near to something or leaves the area, and certified (`planner.shield.certificate`): the longest part that ends in a full
-turn seen to be free is flown. Where no part of it gets on, the certified plan in effect goes on, into its turn, and the
-planner is told why (`PlanRequest.refused`). What a planner raises, and an answer that no aircraft could fly, are
-refused as well.
+What the inner planner answers is made flyable (`tracking`), cut where it comes too near to something or leaves the
+area, and certified (`certificate`): the longest part that ends in a full turn seen to be free is flown. Where no part
+of it gets on, the certified plan in effect goes on, into its turn, and the planner is told why (`PlanRequest.refused`).
+What it raises, and an answer that no aircraft could fly, are refused as well. Safe does not mean that it converges: a
+planner that is caught in a trap stays in its turn there, and the reason says so.
 
 The same idea: gatekeeper (D. R. Agrawal, R. Chen, D. Panagou, arXiv 2211.14361), model predictive shielding (O.
 Bastani, arXiv 1905.10691), backup control barrier functions (T. Gurriet et al., "A scalable safety critical control
-framework for nonlinear systems", IEEE Access 8, 2020). A nominal path is committed to only together
-with a certified backup.
-
-Safe does not mean that it converges: a planner that is caught in a trap stays in its turn there, and the reason says
-so.
+framework for nonlinear systems", IEEE Access 8, 2020).
 """
 
 from __future__ import annotations
@@ -56,17 +52,11 @@ GOES_ON = "the certified plan in effect goes on"
 
 @dataclass(frozen=True, eq=False)
 class Adopted:
-    """A path of the inner planner, and how far along it has been certified.
+    """A path of the inner planner, and how far along it has been certified."""
 
-    Attributes:
-        plan: the planner's answer, checked.
-        own: the same as the object that the planner gave; it gets this one back as `PlanRequest.flown`.
-        certified_m: arc length of its path beside the turn that the plan in effect ends with.
-    """
-
-    plan: Plan
-    own: Plan
-    certified_m: float = 0.0
+    plan: Plan  # the planner's answer, checked
+    own: Plan  # the same as the object that the planner gave; it gets this one back as `PlanRequest.flown`
+    certified_m: float = 0.0  # arc length of its path beside the turn that the plan in effect ends with
 
 
 class Shield(CertifiedPlanner):
@@ -168,10 +158,9 @@ class Shield(CertifiedPlanner):
                 self._refuse(request.position_m, "the path ends behind the aircraft")
             return None
         way = track.path
-        keeps = np.minimum(
-            mission.clearance_m, np.hypot(*(self._memory.points_m - way.segments[0, :2]).T) - 1e-3
-        )
-        cut_m = min(first_breach(way, self._memory.points_m, keeps), first_exit_m(way, mission.bounds_m))
+        points = self._memory.points_m
+        keeps = np.minimum(mission.clearance_m, np.hypot(*(points - way.segments[0, :2]).T) - 1e-3)
+        cut_m = min(first_breach(way, points, keeps), first_exit_m(way, mission.bounds_m))
         certifier = Certifier(
             self._room.holds, mission.clearance_m, mission.sensor_range_m, 1.5 * request.seen.spacing_m
         )
@@ -188,15 +177,9 @@ class Shield(CertifiedPlanner):
                 self._refuse(place_on(way, free_m)[0][:2], why_not(free_m, cut_m))
             return None
         self._refused = None if new else self._refused
-        plan = replace(adopted.plan, path=found.path, status=PlanStatus.FOUND)
-        course = Course(
-            found.path,
-            (place_on(way, found.loiter_entry_m)[0][:2],),
-            self._memory.known,
-            True,
-            not found.path.loiter,
-        )
-        self._proposed = Adopted(adopted.plan, adopted.own, track.station_m(found.loiter_entry_m))
+        plan, nodes = replace(adopted.plan, path=found.path), (place_on(way, found.loiter_entry_m)[0][:2],)
+        course = Course(found.path, nodes, self._memory.known, True, not found.path.loiter)
+        self._proposed = replace(adopted, certified_m=track.station_m(found.loiter_entry_m))
         return CommittedPlan(plan, found.path, course, found.loiter_entry_m)
 
     def _both_hold(self, inner: Path, here_m: float) -> bool:
@@ -233,10 +216,8 @@ class Shield(CertifiedPlanner):
             circle = hold_centre(effective.path.segments[-1])
             if math.dist(hold_centre(found.path.segments[-1]), circle) < least_m:
                 return False
-        gained_m = track.station_m(found.loiter_entry_m) - (
-            track.stations_m[0] if new else adopted.certified_m
-        )
-        return bool(gained_m >= least_m)
+        before_m = track.stations_m[0] if new else adopted.certified_m
+        return bool(track.station_m(found.loiter_entry_m) - before_m >= least_m)
 
     def _to_goal(
         self, certifier: Certifier, request: PlanRequest, way: Path, cut_m: float
