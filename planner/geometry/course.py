@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,36 +15,24 @@ from planner.kernels.fans import encircled
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A path to the goal through what is known, unknown space taken as free.
+    """A path to the goal through what is known, unknown space taken as free."""
 
-    Attributes:
-        path: from where the aircraft was when it was found.
-        nodes: its track points, the goal last.
-        known: how many of the remembered edge points, of what stands still, it was found with.
-        shortest: none shorter was known. That stays so while nothing cuts it: more obstacles shorten no way.
-        to_goal: it leads to the goal, not only into a turn.
-    """
-
-    path: Path
-    nodes: tuple[Point, ...]
-    known: int
-    shortest: bool
-    to_goal: bool = True
+    path: Path  # from where the aircraft was when it was found
+    nodes: tuple[Point, ...]  # track points, the goal last
+    known: int  # how many of the remembered edge points, of what stands still, it was found with
+    shortest: (
+        bool  # none shorter was known; more obstacles shorten no way, so it stays so while nothing cuts it
+    )
+    to_goal: bool = True  # it leads to the goal, not only into a turn
 
     def ahead(self, arc_length_m: float) -> Course:
         """What is left of it from an arc length on."""
         segments = between(self.path, arc_length_m, self.path.length_m)
         if not segments:
             return self
-        _, arc_lengths_m = distances(self.path, np.array(self.nodes))
-        left = tuple(
-            node
-            for node, at in zip(self.nodes[:-1], arc_lengths_m[:-1].tolist(), strict=True)
-            if at > arc_length_m
-        )
-        return Course(
-            Path(np.array(segments)), (*left, self.nodes[-1]), self.known, self.shortest, self.to_goal
-        )
+        _, at_m = distances(self.path, np.array(self.nodes))
+        left = [node for node, at in zip(self.nodes[:-1], at_m.tolist(), strict=False) if at > arc_length_m]
+        return replace(self, path=Path(np.array(segments)), nodes=(*left, self.nodes[-1]))
 
     def same_side(self, nodes: Sequence[Point], points_m: FloatArray) -> bool:
         """Whether another way from here to the goal passes all that was known on the same side.

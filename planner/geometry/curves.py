@@ -21,7 +21,6 @@ Segment = tuple[float, float, float, float, float, float]
 SHORTEST_M = 1e-6
 """Segments shorter than this are left out of a path."""
 
-
 ON_TURN = 1e-6
 """A place is on a turn that is no further from it than this share of its radius."""
 
@@ -164,15 +163,12 @@ def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | Non
 
 
 class Limits(NamedTuple):
-    """How a curve may bend.
+    """How a curve may bend."""
 
-    Attributes:
-        radius_m: smallest radius.
-        roll_m: distance flown while rolling into a turn, the wind behind; straight between a left and a right turn.
-    """
-
-    radius_m: float
-    roll_m: float
+    radius_m: float  # smallest radius
+    roll_m: (
+        float  # flown while rolling into a turn, the wind behind; straight between a left and a right turn
+    )
 
     @classmethod
     def of(cls, mission: Mission) -> Limits:

@@ -1,8 +1,7 @@
 """Anytime search for a way to the goal: in portions of work, while the plan in effect is flown.
 
-The plan in effect ends in a turn that is seen to be free, so that there is time to think: a search that is not done
-within its portion goes on when the planner is asked next. How much is done in a portion is counted, never timed. What
-is found is fitted to where the aircraft has got to by then.
+A search that is not done within its portion, which is counted and never timed, goes on when the planner is asked next.
+What is found is fitted to where the aircraft has got to by then.
 """
 
 from __future__ import annotations
@@ -33,14 +32,7 @@ class _Found(NamedTuple):
 
 
 class AnytimeSearch:
-    """One search for ways to the goal, those that are wanted most first.
-
-    Attributes:
-        known: number of edge points, of what stands still, that it began with.
-        done: whether all ways have been looked for.
-        stuck: the first way that was found and could not be taken.
-        candidates: candidates looked at so far.
-    """
+    """One search for ways to the goal, those that are wanted most first."""
 
     def __init__(
         self,
@@ -54,10 +46,10 @@ class AnytimeSearch:
         self._start: Start | None = None
         self._flown: Course | None = None
         self._steps = self._searched()
-        self.known = known
-        self.done = False
-        self.stuck: Course | None = None
-        self.candidates: list[Candidate] = []
+        self.known = known  # number of edge points, of what stands still, that it began with
+        self.done = False  # all ways have been looked for
+        self.stuck: Course | None = None  # the first way that was found and could not be taken
+        self.candidates: list[Candidate] = []  # looked at so far
 
     def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
         """Ways found with one more portion of work."""
@@ -114,16 +106,16 @@ class AnytimeSearch:
             start, _ = self._now()
             route: FlyableRoute | None = each.route
             if start is not each.start:
-                route = self._local.fitted(start, each.attempt, each.route, each.points_m)
+                nodes = (start.pose[:2], *each.route.nodes)
+                route = self._local.fitted(start, each.attempt, nodes, each.points_m)
             if route is not None:
                 yield self._course(route, each.known, each.shortest)
 
     def _passed_over(self, found: list[_Found]) -> bool:
         """Whether a much shorter way could not be flown: further from obstacles it may have room for its turns."""
         least_m = min((each.route.path.length_m for each in found), default=0.0)
-        return least_m > (1.0 + DOUBTFUL_SHARE) * min(
-            (candidate.cost_m for candidate in self.candidates), default=math.inf
-        )
+        searched_m = min((candidate.cost_m for candidate in self.candidates), default=math.inf)
+        return least_m > (1.0 + DOUBTFUL_SHARE) * searched_m
 
     def _switches(self, route: FlyableRoute) -> bool:
         """Whether a way leaves obstacles on the other side than what is flown."""

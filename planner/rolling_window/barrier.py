@@ -1,12 +1,10 @@
 """Proof that no way exists: a closed chain of seen edges between start and goal.
 
-Two edge points nearer to each other than twice the clearance let nothing through between them: no point of the
-line that joins them is as far as the clearance from both. Nor is there a way between an edge point and the border of
-the area that is nearer to it than the clearance; what has to keep a distance from the border, too, like the middle of
-a turn, finds none where both together are more than what lies between. A closed chain of such lines, where the border
-closes chains outside of the area, that crosses the straight line from start to goal an odd number of times parts the
-two (Jordan curve theorem, modulo 2). Chains are kept as a forest with the parity of their crossings, so that the first
-link that closes an odd one is noticed: union-find with parity.
+Two edge points nearer to each other than twice the clearance let nothing through between them, nor do an edge point and
+the border of the area that is nearer to it than the clearance (and what is to be kept from the border). A closed chain
+of such lines that crosses the straight line from start to goal an odd number of times parts the two (Jordan curve
+theorem, modulo 2); the border closes chains outside of the area. Union-find with the parity of the crossings notices
+the first link that closes such a chain.
 """
 
 from __future__ import annotations
@@ -19,13 +17,11 @@ from planner.kernels.chains import link_all
 from planner.memory import ObstacleMemory
 
 PROVED_AT_ONCE = 500
-"""So many edge points at most are taken into a proof in one call; all at once where a proof is to be held against what
-is left after some were let go of (a millisecond for every 2,000 of them)."""
+"""So many edge points at most are taken into a proof in one call, but where it is to hold for what is left after some
+were let go of (a millisecond for every 2,000 of them)."""
 
 THIN = 0.1
-"""Points nearer to one that was taken in than this share of the clearance are left out. Fewer points prove less,
-but nothing that is not so."""
-
+"""Of points within this share of the clearance one is taken in. Fewer points prove less, but nothing that is not so."""
 
 SQUARES = 4096
 """Into so many lists nodes are put, by where they lie."""
@@ -82,9 +78,8 @@ class Proof:
         border_m: float = 0.0,
         with_refused: bool = False,
     ) -> None:
-        self._mission, self._memory = mission, memory
+        self._mission, self._memory, self._with_refused = mission, memory, with_refused
         self._keeps_m, self._border_m = keeps_m, border_m
-        self._with_refused = with_refused
         self._ends: tuple[Point, Point] | None = None
         self._begin()
 

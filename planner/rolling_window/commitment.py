@@ -39,8 +39,8 @@ class Commitment:
     ) -> None:
         # A turn entered sooner than `least_m` ahead is taken only where neither the goal nor a turn about a place
         # ahead is certified: in a pocket of narrow gaps those lead on.
-        self._shielded = shielded
-        self._mission, self._memory, self._local, self._least_m = mission, memory, local, least_m
+        self._mission, self._memory, self._local = mission, memory, local
+        self._least_m, self._shielded = least_m, shielded
 
     def commit(
         self,
@@ -73,13 +73,11 @@ class Commitment:
         certifier = self._certifier(1.5 * seen.spacing_m)
         terrain = self._local.room.terrain(self._mission.clearance_m + self._mission.tracking_error_m)
         certified = certifier.certify(course.path, seen, terrain, cut_m)
-        if certified is None or not self._leads_on(certified.loiter_entry_m, course):
-            certified = (
-                self._to_goal(certifier, course, seen, cut_m)
-                or certifier.certify_ahead(course.path, seen, terrain, cut_m)
-                or certified
-            )
-        return certified
+        enough_m = min(self._least_m, course.path.length_m - self._mission.goal_radius_m)
+        if certified is not None and certified.loiter_entry_m >= enough_m:
+            return certified
+        to_goal = self._to_goal(certifier, course, seen, cut_m)
+        return to_goal or certifier.certify_ahead(course.path, seen, terrain, cut_m) or certified
 
     def leads_on(self, found: CommittedPlan, start: Start, effective: CommittedPlan | None) -> bool:
         """Whether a certified plan gets anywhere: to the goal, or along its course to a hold elsewhere.
@@ -113,9 +111,6 @@ class Commitment:
         """The first place of a course that has not been seen to be free."""
         free_to_m = self._certifier(seen.spacing_m).seen_free_to_m(course.path, seen)
         return place_on(course.path, free_to_m)[0]
-
-    def _leads_on(self, loiter_entry_m: float, course: Course) -> bool:
-        return loiter_entry_m >= min(self._least_m, course.path.length_m - self._mission.goal_radius_m)
 
     def _to_goal(self, certifier: Certifier, course: Course, seen: MapView, cut_m: float) -> Certified | None:
         """All of a course that can be flown into the goal circle, however far off it the aircraft may be."""

@@ -1,7 +1,6 @@
-"""Places that a course led to and that could not be seen to be safe to enter, and when they are tried again.
+"""Places that could not be seen to be safe to enter: remembered like edge points, so that no course leads there.
 
-Such a place is refused: it is remembered like an edge point, so that no course leads there any more. What was refused
-is tried again where nothing else is left, and where something that moved may have been in the way.
+They are tried again where nothing else is left, and where something that moved may have been in the way.
 """
 
 from __future__ import annotations
@@ -28,15 +27,7 @@ to be safe from elsewhere on the turn, or at another look."""
 
 
 class GivingUp:
-    """Gives places up that the aircraft turned before, and tells what follows from searches that found no way.
-
-    Attributes:
-        stability: when something last moved or appeared.
-        effort: how often the work of a wide search is doubled; grows with every search that found nothing.
-        tried_again: what was given up has been tried again for want of another way.
-        given_up_at_m: arc length of the plan in effect at which a place was given up last.
-        whole_turn_m: length of a whole turn.
-    """
+    """Gives places up that the aircraft turned before, and tells what follows from searches that found no way."""
 
     def __init__(self, mission: Mission, memory: ObstacleMemory) -> None:
         self._mission, self._memory = mission, memory
@@ -44,10 +35,10 @@ class GivingUp:
         self._turned_before: list[Point] = []
         self._retry_s = math.inf
         self._retries = 0
-        self.given_up_at_m = 0.0
+        self.given_up_at_m = 0.0  # arc length of the plan in effect at which a place was given up last
         self.stability = WorldStability()
-        self.effort = 0
-        self.tried_again = False
+        self.effort = 0  # how often the work of a wide search is doubled; grows with every search in vain
+        self.tried_again = False  # what was given up has been tried again for want of another way
 
     def turned_twice(self, place: Point) -> bool:
         """Counts one more turn before a place; returns whether these are enough to give it up."""

@@ -26,29 +26,24 @@ SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin. Straight steps keep the first beyond the clearance, the curve through them the second;
 track points keep all of the margin."""
 
-LEAST_HUG = 0.005
-"""Share of the clearance by which track points lie further out than straight steps, even without a margin: a step
-along an edge ends where that distance is reached again."""
-
-LEAST_MARGIN = 0.4
-"""Share of the margin that is still kept where there is no room for all of it."""
+LEAST_HUG, LEAST_MARGIN = 0.005, 0.4
+"""Track points lie further out than straight steps by at least `LEAST_HUG` of the clearance. `LEAST_MARGIN` of the
+margin is still kept where there is no room for all of it."""
 
 MOST_TRACKS = 300
 """A search looks at so many candidates at most."""
 
 WIDER, FURTHER = 4, 60
-"""A wide search follows where N steps with n candidates each find no way. It has `WIDER` times as many of both and is
-led by the cost to go, so that the best come first; after the first it looks at only `FURTHER` steps more."""
+"""A wide search, where N steps with n candidates find no way, has `WIDER` times as many of both and is led by the cost
+to go, so that the best come first; after the first it looks at only `FURTHER` steps more."""
 
 DOUBTFUL_SHARE, MOST_AROUND = 0.1, 8
 """A way that is longer than the one flown by the share `DOUBTFUL_SHARE` is doubtful. Then the `MOST_AROUND` obstacles
 nearest to the start are looked at as well."""
 
-SWITCH = 0.03
-"""Hysteresis: the other way round an obstacle is taken only where it saves this share of the distance left."""
-
-RETRACE = 0.25
-"""It has to save, beside that, this share of what leads back along where the aircraft has been."""
+SWITCH, RETRACE = 0.03, 0.25
+"""Hysteresis: the other way round an obstacle is taken only where it saves the share `SWITCH` of the distance left, and
+the share `RETRACE` of what leads back along where the aircraft has been."""
 
 TRAIL_CLEARANCES = 4.0
 """Places within so many clearances of the flown trail count as where the aircraft has been."""
@@ -103,8 +98,7 @@ class LocalPlanning:
     def __init__(
         self, mission: Mission, memory: ObstacleMemory, *, margin_m: float, steps: int, candidates: int
     ) -> None:
-        self._mission, self._memory = mission, memory
-        self._margin_m = margin_m
+        self._mission, self._memory, self._margin_m = mission, memory, margin_m
         self._steps, self._candidates = steps, candidates
         self.work_count = WorkCount()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
@@ -177,7 +171,7 @@ class LocalPlanning:
                 reluctance_m = self._reluctance_m(candidate, course)
                 if candidate.cost_m + reluctance_m >= least_m:
                     continue
-                route = self._fit(start, attempt, candidate.nodes, points)
+                route = self.fitted(start, attempt, candidate.nodes, points)
                 if route is not None:
                     fitted.append((route.path.length_m + reluctance_m, route))
                 yield
@@ -185,28 +179,24 @@ class LocalPlanning:
         start, _ = now()
         if start is begun:
             return fitted[0][1] if fitted else None
-        routes = (self.fitted(start, attempt, route, points) for _, route in fitted)
+        ways = ((start.pose[:2], *route.nodes) for _, route in fitted)
+        routes = (self.fitted(start, attempt, way, points) for way in ways)
         return next((route for route in routes if route is not None), None)
-
-    def fitted(
-        self, start: Start, attempt: Attempt, route: FlyableRoute, points: FloatArray
-    ) -> FlyableRoute | None:
-        """A route found among (m, 2) points, from where the aircraft has got to; None where it cannot be flown."""
-        return self._fit(start, attempt, (start.pose[:2], *route.nodes), points)
 
     def _reluctance_m(self, candidate: Candidate, course: Course | None) -> float:
         """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""
+        switching = 0.0
         if course is not None:
             self.work_count.add(4, POINT_WORK, 4 * len(candidate.nodes) * course.known)
             if course.same_side(candidate.nodes, self._memory.points_m):
                 return 0.0
-        switching = 0.0 if course is None else SWITCH * candidate.cost_m
+            switching = SWITCH * candidate.cost_m
         return switching + RETRACE * self.trail.retraced_m(candidate.nodes)
 
-    def _fit(
+    def fitted(
         self, start: Start, attempt: Attempt, nodes: Sequence[Point], points: FloatArray
     ) -> FlyableRoute | None:
-        """The curve along a candidate, from where a plan would begin now."""
+        """The curve along track points found among (m, 2) points, from where a plan would begin now; None: none is."""
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         terrain = self._terrain(start, attempt, points)
         return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
@@ -238,7 +228,7 @@ class LocalPlanning:
         for end in range(len(candidate.nodes) - 1, 1, -1):
             start, _ = now()
             nodes = (start.pose[:2], *candidate.nodes[1:end])
-            route = self._fit(start, self._tight, nodes, self._memory.points_m)
+            route = self.fitted(start, self._tight, nodes, self._memory.points_m)
             if route is not None:
                 return route
             yield

@@ -102,10 +102,8 @@ def search_candidates(
         entry_m, labels = window.entered(here, goal)
         count += 1
         if not len(labels):
-            heapq.heappush(
-                queue,
-                (candidate.cost_m, count, depth, Candidate((*candidate.nodes, goal), candidate.cost_m, 0.0)),
-            )
+            whole = Candidate((*candidate.nodes, goal), candidate.cost_m, 0.0)
+            heapq.heappush(queue, (candidate.cost_m, count, depth, whole))
             continue
         if depth == steps:
             continue
@@ -128,11 +126,12 @@ def _steps(
     back_too: bool,
 ) -> Iterator[Candidate]:
     """The steps along some edges that lead anywhere in the area; those that lead away or back only if wanted."""
+    xmin, ymin, xmax, ymax = bounds_m
     for edge in edges:
-        child = (
-            _step(candidate, edge, goal, outer_m) if back_too or not _leads_away(candidate, edge) else None
-        )
-        if child is not None and _inside(child.nodes[-1], bounds_m):
+        if not back_too and _leads_away(candidate, edge):
+            continue
+        child = _step(candidate, edge, goal, outer_m)
+        if child is not None and xmin <= child.nodes[-1][0] <= xmax and ymin <= child.nodes[-1][1] <= ymax:
             yield child
 
 
@@ -157,14 +156,5 @@ def _step(candidate: Candidate, edge: SectorEdge, goal: Point, outer_m: float) -
     gx, gy, left = guide_vector(here, goal)
     off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
     left = distance_left_m(left, length, off_guide)
-    return Candidate(
-        (*candidate.nodes, (x, y)),
-        candidate.flown_m + length,
-        left,
-        edge if length == edge.hugged_m else None,
-    )
-
-
-def _inside(point: Point, bounds_m: tuple[float, float, float, float]) -> bool:
-    xmin, ymin, xmax, ymax = bounds_m
-    return xmin <= point[0] <= xmax and ymin <= point[1] <= ymax
+    hugged = edge if length == edge.hugged_m else None
+    return Candidate((*candidate.nodes, (x, y)), candidate.flown_m + length, left, hugged)

@@ -1,21 +1,18 @@
 """The rolling-window planner of the paper, made safe and convergent: a state machine over a committed plan.
 
-A course is searched N steps deep among the free sectors (`multi_step_search`, `local_planning`). Of it that part is put
-into effect (`commitment`) which ends in a turn seen to be free, or in the goal circle, and flown until the window rolls
-on. What is done about the plan in effect is one of five states (`PlanningState`), each entered by one method.
+A course is searched N steps deep among the free sectors (`multi_step_search`, `local_planning`). The part of it that
+ends in a turn seen to be free, or in the goal circle, is put into effect (`commitment`) and flown until the window
+rolls on. What is done about the plan in effect is one of five states (`PlanningState`), each entered by one method.
 
-Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there is a
-way, the course is a shortest one through what is known. Each course is flown until something seen contradicts it.
-Edge points lie on a finite grid, so that this can happen only finitely often, and a course that nothing
-contradicts ends at the goal. A place that the aircraft turned before twice is left out of further searches
-(`dead_ends`, `ObstacleMemory.refuse`), with what lies beside it: each covers a disc of the clearance or more, so
-that these are finitely many as well; they are tried again only where no other way is left, and then the widest are
-looked for first. A search in vain is repeated with twice the effort; where nothing is left open at all, the
-distances to go (`cost_to_go`) tell it at once. Where no way is left at the clearance, a closed chain of edges
-proves it; where none is left but those given up, one with room to turn everywhere must remain, or such a chain
-shows that there is none (`barrier`), and the flight ends. Assumed: a world that stands still, a sensor that sees every
-gap narrower than twice the clearance as one wall, and a way to the goal along which a disc of the turn radius can be
-moved at the clearance, within the area.
+Why it converges. The search takes unseen space as free, so the course is a shortest one through what is known, and is
+flown until something seen contradicts it. Edge points lie on a finite grid, so that happens finitely often, and a
+course that nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
+searches (`dead_ends`), with a disc of the clearance or more about it: these are finitely many as well. They are tried
+again only where no other way is left, the widest first. A search in vain is repeated with twice the effort. Where no
+way is left, a closed chain of edges proves it (`barrier`); where none is left but those given up, one with room to turn
+everywhere must remain, or such a chain shows that there is none, and the flight ends. Assumed: a world that stands
+still, a sensor that sees every gap narrower than twice the clearance as one wall, and a way to the goal along which a
+disc of the turn radius can be moved at the clearance, within the area.
 """
 
 from __future__ import annotations
@@ -33,15 +30,7 @@ from planner.rolling_window.commitment import Commitment
 from planner.rolling_window.config import RollingWindowConfig
 from planner.rolling_window.dead_ends import GivingUp
 from planner.rolling_window.local_planning import LocalPlanning
-from planner.rolling_window.rolling_search import (
-    WORK_WHILE_CUT,
-    WORK_WHILE_MOVING,
-    WORK_WHILE_SERVING,
-    WORK_WHILE_UNSAFE,
-    RollingSearch,
-    RollingStep,
-    Work,
-)
+from planner.rolling_window.rolling_search import RollingSearch, Work
 from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
 from planner.shield.certified_planner import CertifiedPlanner, lead_of
 from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start
@@ -82,15 +71,8 @@ class RollingWindow(CertifiedPlanner):
         self._commitment = Commitment(mission, memory, self._local, lead_m + 2.0 * widest_m, shielded)
         self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
         self._giving_up = GivingUp(mission, memory)
-        self._search = RollingSearch(
-            mission,
-            memory,
-            self._local,
-            self._commitment,
-            self._monitor,
-            self._giving_up,
-            self._proofs.no_way,
-        )
+        parts = (self._local, self._commitment, self._monitor, self._giving_up, self._proofs.no_way)
+        self._search = RollingSearch(mission, memory, *parts)
         self._loitered: CommittedPlan | None = None  # the plan whose turn was entered last
         self._served: tuple[object, ...] = ()  # by what the plan in effect served, as long as nothing is due
         self.state = PlanningState.ESCAPING
@@ -185,9 +167,9 @@ class RollingWindow(CertifiedPlanner):
 
     def _left_behind(self, request: PlanRequest, plan: CommittedPlan | None, here_m: float) -> bool:
         """Whether the plan in effect is so far off that none can go on from it, as after a jump of the position."""
-        if plan is None:
-            return False
-        return math.dist(place_on(plan.path, here_m)[0][:2], request.position_m) > self._start_tolerance_m
+        return plan is not None and (
+            math.dist(place_on(plan.path, here_m)[0][:2], request.position_m) > self._start_tolerance_m
+        )
 
     def _roll(self, now: Situation) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
@@ -200,9 +182,7 @@ class RollingWindow(CertifiedPlanner):
             self._search.stop()
             return self._prolong(now, start, serving)
         work = self._work(now, serving is not None)
-        found = self._search.go_on(
-            RollingStep(now.request, start, ahead, serving is not None, work, self._threats)
-        )
+        found = self._search.go_on(now.request, start, ahead, serving is not None, work, self._threats)
         if found is not None:
             return self._follow(found)
         if serving is not None:
@@ -212,10 +192,10 @@ class RollingWindow(CertifiedPlanner):
     def _work(self, now: Situation, serves: bool) -> Work:
         """How much is searched before this answer."""
         if now.request.seen.moving:
-            return WORK_WHILE_MOVING
+            return Work.WHILE_MOVING
         if self._unsafe(now):
-            return WORK_WHILE_UNSAFE
-        return WORK_WHILE_SERVING if serves else WORK_WHILE_CUT
+            return Work.WHILE_UNSAFE
+        return Work.WHILE_SERVING if serves else Work.WHILE_CUT
 
     def _unsafe(self, now: Situation) -> bool:
         """Whether there is no safe plan in effect to think on."""
@@ -262,12 +242,12 @@ class RollingWindow(CertifiedPlanner):
             return self._without_plan(now, search)
         if self._monitor.broken and (search.done or self._unsafe(now)):
             return self._escape(now)
-        no_room, only_given_up = self._proved(now)
+        proved = self._proved(now)
         if not search.done:
             return Plan(PlanStatus.NO_PATH, THINKING_ON, wants_more_time=True)
-        if search.stuck is None and self._proved_closed(now):
+        if search.stuck is None and self._proved_closed(now.request):
             return self._prove_no_way()
-        return self._give_up(now, now.plan, search, no_room=no_room, only_given_up=only_given_up)
+        return self._give_up(now, now.plan, search, *proved)
 
     def _without_plan(self, now: Situation, search: AnytimeSearch) -> Plan:
         """Before the first plan, or after one that was flown to its end: what is closed is told from a safe turn."""
@@ -275,7 +255,7 @@ class RollingWindow(CertifiedPlanner):
         if escape.status is PlanStatus.FOUND:
             return escape
         self._proved(now)
-        if search.stuck is None and self._proved_closed(now):
+        if search.stuck is None and self._proved_closed(now.request):
             return self._prove_no_way()
         return escape
 
@@ -300,21 +280,13 @@ class RollingWindow(CertifiedPlanner):
         tried = self._giving_up.effort_spent(edges_went, only_given_up)
         return tried and proofs.no_room_to_turn.closed(position), only_given_up
 
-    def _proved_closed(self, now: Situation) -> bool:
+    def _proved_closed(self, request: PlanRequest) -> bool:
         """Whether the world stands still and the edge points seen leave no way at all."""
-        request = now.request
-        return self._giving_up.stability.settled(request.time_s) and self._proofs.no_way.closed(
-            request.position_m
-        )
+        settled = self._giving_up.stability.settled(request.time_s)
+        return settled and self._proofs.no_way.closed(request.position_m)
 
     def _give_up(
-        self,
-        now: Situation,
-        plan: CommittedPlan,
-        search: AnytimeSearch,
-        *,
-        no_room: bool,
-        only_given_up: bool,
+        self, now: Situation, plan: CommittedPlan, search: AnytimeSearch, no_room: bool, only_given_up: bool
     ) -> Plan:
         """LOITERING -> GIVING_UP: a search was in vain; the plan in effect goes on, into its turn and round that.
 

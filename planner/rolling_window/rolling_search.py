@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from enum import Enum
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Point
@@ -22,49 +22,17 @@ BETTER = 0.005
 """A course that can still be flown is replaced only by one that is shorter by this share of the length that is left."""
 
 
-class Work(NamedTuple):
+class Work(Enum):
     """Counted work of a search when it begins, and each further time that the planner is asked; a unit is some 1 us."""
 
-    first: float
-    more: float
-
-
-WORK_WHILE_SERVING = Work(3000.0, 1000.0)
-"""Work while the plan in effect can still be flown: there is time."""
-
-WORK_WHILE_CUT = Work(5000.0, 2000.0)
-"""Work while an edge cuts the course ahead: the plan in effect leads into its turn."""
-
-WORK_WHILE_UNSAFE = Work(6000.0, 6000.0)
-"""Work while no safe plan is flown."""
-
-WORK_WHILE_MOVING = Work(12_000.0, 12_000.0)
-"""Work while something moves, when a late plan may meet it. Most searches end within it."""
-
-
-class RollingStep(NamedTuple):
-    """What a rolling step begins with."""
-
-    request: PlanRequest
-    start: Start
-    ahead: Course | None
-    serves: bool
-    work: Work
-    threats: Threats | None
+    WHILE_SERVING = (3000.0, 1000.0)  # the plan in effect can still be flown: there is time
+    WHILE_CUT = (5000.0, 2000.0)  # an edge cuts the course ahead: the plan in effect leads into its turn
+    WHILE_UNSAFE = (6000.0, 6000.0)  # no safe plan is flown
+    WHILE_MOVING = (12_000.0, 12_000.0)  # a late plan may meet what moves; most searches end within it
 
 
 class RollingSearch:
-    """Searches for a new committed plan, a portion of work at a time.
-
-    Attributes:
-        running: the search that is not done yet.
-        last: the last search that was at work.
-        known: how many edge points the last search that ended began with.
-        gone: how many edge points had been let go of when the last search began.
-        anew: a search is to be made though the course in effect serves: a way may have become free.
-        refused: how many courses have been found that no part of could be certified and led on.
-        nearer: a certified plan that the last search found but that would come too near to what moves.
-    """
+    """Searches for a new committed plan, a portion of work at a time."""
 
     def __init__(
         self,
@@ -79,13 +47,13 @@ class RollingSearch:
         self._mission = mission
         self._memory, self._local, self._commitment = memory, local, commitment
         self._monitor, self._giving_up, self._no_way = monitor, giving_up, no_way
-        self.running: AnytimeSearch | None = None
-        self.last: AnytimeSearch | None = None
-        self.known = 0
-        self.gone = 0
-        self.anew = False
-        self.refused = 0
-        self.nearer: CommittedPlan | None = None
+        self.running: AnytimeSearch | None = None  # the search that is not done yet
+        self.last: AnytimeSearch | None = None  # the one that was at work last
+        self.known = 0  # how many edge points the last search that ended began with
+        self.gone = 0  # how many edge points had been let go of when the last search began
+        self.anew = False  # a search is to be made though the course serves: a way may have become free
+        self.refused = 0  # how many courses were found of which no part that leads on could be certified
+        self.nearer: CommittedPlan | None = None  # certified, but too near to what moves
 
     @property
     def up_to_date(self) -> bool:
@@ -105,22 +73,32 @@ class RollingSearch:
         """Arc length at which a course comes too near to an edge point that it was not found with."""
         return self._monitor.cut_at(course, self._memory.standing_m, self._memory.cleared - self.gone)
 
-    def go_on(self, step: RollingStep) -> CommittedPlan | None:
-        """Searches with one portion of work, and returns the first certified plan that may be flown."""
+    def go_on(
+        self,
+        request: PlanRequest,
+        start: Start,
+        ahead: Course | None,
+        serves: bool,
+        work: Work,
+        threats: Threats | None,
+    ) -> CommittedPlan | None:
+        """Searches with one portion of work, and returns the first certified plan that may be flown.
+
+        `ahead` is what is left of the course in effect; `serves`: it can be flown on.
+        """
+        first, more = work.value
         begins = self.running is None
-        search = self.last = self.running or self._begun(step.request.position_m)
+        search = self.last = self.running or self._begun(request.position_m)
         self.running, nearest_m = search, -math.inf
-        for course in search.courses(step.start, step.ahead, step.work.first if begins else step.work.more):
-            if step.serves and course.path.length_m > self._worth_m(step.ahead):
+        for course in search.courses(start, ahead, first if begins else more):
+            if serves and course.path.length_m > self._worth_m(ahead):
                 search.done = True
                 break
-            found = self._commitment.commit(
-                step.request, step.start, course, search.candidates, self.cut_m(course)
-            )
-            if found is not None and self._commitment.leads_on(found, step.start, self._monitor.plan):
-                keeps_m = room_m(found.path, step.threats)
+            found = self._commitment.commit(request, start, course, search.candidates, self.cut_m(course))
+            if found is not None and self._commitment.leads_on(found, start, self._monitor.plan):
+                keeps_m = room_m(found.path, threats)
                 if keeps_m >= self._mission.clearance_m:
-                    self._end(search, step.ahead, course)
+                    self._end(search, ahead, course)
                     return found
                 if keeps_m > nearest_m:  # what moves may come to what is free now
                     nearest_m, self.nearer = keeps_m, found

@@ -1,10 +1,8 @@
 """The rolling window: what lies in it, the guide vector, and the fan-shaped sectors that obstacles cut.
 
-Definition 1 of the paper is the sensing range U, Definition 2 the guide vector alpha; section 3.3 has the
-planning window U_1 of radius r_1 <= r. Seen from a track point, an obstacle, grown by the distance to be kept
-from it, fills a fan of bearings. M and N are where its fan ends on the left and on the right: directions
-tangent to the obstacle. Between the fans lie the free sectors. Fans that overlap are merged, and an edge that
-something nearer hides is none.
+Seen from a track point, an obstacle, grown by the distance to be kept from it, fills a fan of bearings. M and N are
+where its fan ends on the left and on the right: directions tangent to the obstacle. Between the fans lie the free
+sectors. Fans that overlap are merged, and an edge that something nearer hides is none.
 """
 
 from __future__ import annotations
@@ -39,24 +37,15 @@ def guide_vector(position: Point, goal: Point) -> tuple[float, float, float]:
 
 
 class SectorEdge(NamedTuple):
-    """The edge of a free sector at a track point: M (the obstacle is on its right) or N (on its left).
+    """The edge of a free sector at a track point: M (the obstacle is on its right) or N (on its left)."""
 
-    Attributes:
-        ux, uy: unit vector along the edge, tangent to the obstacle.
-        touch_m: distance at which it touches the obstacle.
-        clear_m: distance up to which the direction is free; infinite where nothing is met.
-        side: 1 for M, -1 for N.
-        hugged_m: distance at which an outer distance from the obstacle is reached again; 0: never.
-        obstacle: label of the obstacle.
-    """
-
-    ux: float
+    ux: float  # unit vector along the edge, tangent to the obstacle
     uy: float
-    touch_m: float
-    clear_m: float
-    side: float
-    hugged_m: float
-    obstacle: int
+    touch_m: float  # distance at which it touches the obstacle
+    clear_m: float  # distance up to which the direction is free; infinite where nothing is met
+    side: float  # 1 for M, -1 for N
+    hugged_m: float  # distance at which an outer distance from the obstacle is reached again; 0: never
+    obstacle: int  # label
 
 
 _Obstacle = tuple[FloatArray, Cells]
