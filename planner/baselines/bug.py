@@ -5,11 +5,8 @@ environment", IEEE Transactions on Automatic Control 31(11), 1986; and "Path-pla
 mobile automaton moving amidst unknown obstacles of arbitrary shape", Algorithmica 2, 1987.
 
 Both move straight to the goal, or to a hit point on an obstacle, turn left and follow its boundary.
-
 Bug1 follows it back to the hit point, remembering the point Q nearest to the goal, and returns to Q by the shorter way.
-If the line from Q to the goal begins inside the obstacle, the goal is enclosed and cannot be reached. Its path is no
-longer than the distance to the goal and 1.5 times the perimeters of the obstacles met.
-
+If the line from Q to the goal begins inside the obstacle, the goal is enclosed and cannot be reached.
 Bug2 follows it until the M-line, the line from start to goal, is met at a point nearer to the goal than the hit point
 from which the line leads away from the obstacle: a leave point. If the hit point is met again, the goal is enclosed.
 """

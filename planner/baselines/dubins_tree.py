@@ -1,14 +1,12 @@
 """A tree of Dubins curves, grown anew whenever the way is blocked: RRT.
 
 S. M. LaValle and J. J. Kuffner, "Randomized kinodynamic planning", International Journal of Robotics Research 20(5),
-2001 (RRT); L. E. Dubins, "On curves of minimal length with a constraint on average curvature, and with prescribed
-initial and terminal positions and tangents", American Journal of Mathematics 79, 1957.
+2001 (RRT).
 
-A branch leads from a pose to a place: a turn at the turn radius and straight on, the shortest such curve to a place
-outside the turning circles on whatever course. What has not been seen is taken to be free. The tree grows for a number
-of iterations, not for a time, from a seed, so that the same flight is planned the same way. Every new branch tries the
-goal; from a way that is found the places that can be passed by are left out, and no place is tried any more through
-which no shorter way can lead. The shortest way is taken.
+A branch leads from a pose to a place: a turn at the turn radius and straight on, the shortest such curve (Dubins, 1957)
+to a place outside the turning circles on whatever course. What has not been seen is taken to be free. The tree grows
+for a number of iterations from a seed. Every new branch tries the goal; from a way that is found the places that can be
+passed by are left out, and no place is tried any more through which no shorter way can lead. The shortest way is taken.
 """
 
 from __future__ import annotations

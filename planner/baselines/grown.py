@@ -7,11 +7,12 @@ unites them. Their outline is simplified by less than the margin: neighbouring d
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+import shapely
 
-from planner.baselines.polyline import NOWHERE, piece
+from planner.baselines.polyline import NOWHERE, Tangent, piece
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, IntArray, MapView, Mission
 from planner.memory import ObstacleMemory
@@ -28,18 +29,6 @@ DENT_SHARE = 4.0
 """A line that touches an obstacle and meets it again within so many kept distances leads into a dent."""
 CELL_SHARE = 0.35
 """Points in one square of this share of the kept distance are grown as one, with what lies between them."""
-
-
-class Tangent(NamedTuple):
-    """Where a line from a place touches an obstacle: a corner, and its side: 1: it lies on the left of the line.
-
-    `seen`: nothing lies before it; `dent`: the line leads on to the same obstacle soon.
-    """
-
-    place: Point
-    side: float
-    seen: bool
-    dent: bool
 
 
 class GrownObstacles:
@@ -81,8 +70,6 @@ class GrownObstacles:
 
     def _unite(self) -> None:
         """Brings the obstacles up to date: only where a walk is asked for."""
-        import shapely
-
         if self._united == len(self._points_m):
             return
         if self._united < 0:
@@ -107,16 +94,12 @@ class GrownObstacles:
 
     def _hole(self) -> Any:
         """The area but for its border."""
-        import shapely
-
         goal, bounds = np.array(self._mission.goal_m), np.array(self._mission.bounds_m)
         inset = max(0.0, min(self._margin_m, float(np.abs(goal - bounds.reshape(2, 2)).min()) - 1e-3))
         return shapely.box(*(bounds + inset * np.array((1.0, 1.0, -1.0, -1.0))))
 
     def _grown(self, fresh: FloatArray) -> Any:
         """The union of the discs about (k, 2) points."""
-        import shapely
-
         # The goal itself may lie nearer to an edge than what is kept elsewhere.
         room = np.hypot(*(fresh - self._mission.goal_m).T) - 1e-3
         radii = np.clip(room, min(self._mission.clearance_m, self.keep_m), self.keep_m)
@@ -133,8 +116,6 @@ class GrownObstacles:
 
         A line that begins inside, as of an aircraft that cuts corners, and is out at once, does not enter there.
         """
-        import shapely
-
         self._unite()
         line = shapely.linestrings([a, b])
         met = np.flatnonzero(shapely.intersects(self._cores, line))
@@ -165,8 +146,6 @@ class GrownObstacles:
 
     def _nearest(self, place: Point) -> tuple[int, float]:
         """The ring next to a place, and how far it is."""
-        import shapely
-
         self._unite()
         away = shapely.distance(self._rings, shapely.Point(place))
         return int(np.argmin(away)), float(away.min())
@@ -176,8 +155,6 @@ class GrownObstacles:
 
         Side 1 has the obstacle on the left, -1 on the right.
         """
-        import shapely
-
         nearest, off = self._nearest(place)
         ring = self._rings[nearest]
         corners, at = shapely.get_coordinates(ring), ring.project(shapely.Point(place))
@@ -188,8 +165,6 @@ class GrownObstacles:
 
     def nearest_to_goal_m(self, place: Point) -> float:
         """How near to the goal the obstacle beside a place comes, as far as it is known; the border is none."""
-        import shapely
-
         self._unite()
         beside_m, here = TOUCH_SHARE * self.keep_m + self._margin_m, shapely.Point(place)
         # What the border joins are obstacles of their own.
@@ -200,8 +175,6 @@ class GrownObstacles:
 
     def tangents(self, place: Point, parts: set[int], reach_m: float) -> list[Tangent]:
         """Where lines from a place touch some obstacles within reach: at corners."""
-        import shapely
-
         self._unite()
         found: list[Tangent] = []
         for own, ring in zip(self._owners.tolist(), self._rings, strict=True):
@@ -226,8 +199,6 @@ class GrownObstacles:
 
     def encloses_nothing(self, outline: FloatArray) -> bool:
         """Whether no obstacle lies within a closed outline, but for a little beside it."""
-        import shapely
-
         shape = shapely.Polygon(outline).buffer(-TOUCH_SHARE * self.keep_m) if len(outline) > 2 else None
         return shape is None or not shapely.intersects(self._cores, shape).any()
 

@@ -78,17 +78,11 @@ class Mppi(Replanner):
         if math.isfinite(breach_m) or not inside_bounds(found, mission.bounds_m):
             self._nominal[:] = 0.0
             return self.stuck("the best rollout is blocked", request)
-        return Plan(
-            PlanStatus.FOUND,
-            f"mean of {self._config.samples} rollouts",
-            np.array([request.position_m, *(row[:2] for row in rows), along(rows[-1], rows[-1][5])[:2]]),
-            found,
-            partial(
-                PlanPicture,
-                np.array([request.position_m, mission.goal_m]),
-                candidates=tuple(np.array([request.position_m, *each]) for each in rollouts[:DRAWN]),
-            ),
-        )
+        here = request.position_m
+        waypoints = np.array([here, *(row[:2] for row in rows), along(rows[-1], rows[-1][5])[:2]])
+        drawn = tuple(np.array([here, *each]) for each in rollouts[:DRAWN])
+        picture = partial(PlanPicture, np.array([here, mission.goal_m]), candidates=drawn)
+        return Plan(PlanStatus.FOUND, f"mean of {self._config.samples} rollouts", waypoints, found, picture)
 
     def _move_on(self, flown_m: float) -> None:
         """Step 1: the nominal controls from a place on their rollout on; beyond it, straight."""
@@ -109,9 +103,8 @@ class Mppi(Replanner):
         """Steps 2 to 4; returns the rollouts of the last round, (K, steps, 2)."""
         count, steps = self._config.samples, self._config.steps
         for round_number in range(ROUNDS):
-            noise = (
-                self._random.normal(size=(count, steps)) * NOISE_SHARE * self._most_1pm / (1 + round_number)
-            )
+            drawn = self._random.normal(size=(count, steps))
+            noise = drawn * NOISE_SHARE * self._most_1pm / (1 + round_number)
             for i in range(1, steps):
                 noise[:, i] = CORRELATION * noise[:, i - 1] + math.sqrt(1.0 - CORRELATION**2) * noise[:, i]
             noise[0] = 0.0
@@ -148,9 +141,8 @@ class Mppi(Replanner):
         penalty = np.where(room < keep + sagitta, TOO_NEAR_COST, 0.0)
         penalty[(room < mission.clearance_m) | outside] = BLOCKED_COST
         before = np.arange(places.shape[1]) <= last[:, None]
-        return np.asarray(
-            np.take_along_axis(way, last[:, None], axis=1)[:, 0] + (penalty * before).sum(axis=1)
-        )
+        whole = np.take_along_axis(way, last[:, None], axis=1)[:, 0]
+        return np.asarray(whole + (penalty * before).sum(axis=1))
 
     def _path(self, pose: Pose) -> list[Segment]:
         """The nominal controls as arcs."""

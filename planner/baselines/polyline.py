@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,15 @@ class Mark:
     def reversed(self) -> Mark:
         """The same place passed the other way."""
         return Mark(self.place, -self.ux, -self.uy)
+
+
+class Tangent(NamedTuple):
+    """Where a line from a place touches an obstacle: a corner of it."""
+
+    place: Point
+    side: float  # 1: the obstacle lies on the left of the line, -1: on the right, 0: none is touched
+    seen: bool  # nothing lies before it
+    dent: bool  # the line leads on to the same obstacle soon
 
 
 def stations(way: FloatArray) -> FloatArray:

@@ -17,19 +17,12 @@ from planner.memory import ObstacleMemory
 
 
 class Start(NamedTuple):
-    """Where a new path leaves the one in effect.
-
-    Attributes:
-        pose: place and direction at which the new path leaves.
-        before: segments of the path in effect up to that place.
-        left_m: length that is left of the path in effect; 0 without one, and in a turn to hold in.
-        cut: whether an edge point lies nearer to the path in effect than the clearance.
-    """
+    """Where a new path leaves the one in effect."""
 
     pose: Pose
-    before: list[Segment]
-    left_m: float
-    cut: bool
+    before: list[Segment]  # of the path in effect up to that pose
+    left_m: float  # length that is left of the path in effect; 0 without one, and in a turn to hold in
+    cut: bool  # an edge point lies nearer to the path in effect than the clearance
 
 
 class Replanner(ABC):
@@ -72,18 +65,14 @@ class Replanner(ABC):
 class Steerer(Replanner):
     """A planner that chooses a direction, and has no path of its own: a turn onto it and straight on.
 
-    Args:
-        mission: the mission of the flight.
-        look_m: length of the path in the chosen direction.
-        near_m: only edge points within this distance of the aircraft count.
-        step_rad: angle between two neighbouring directions.
+    The path is `look_m` long; only edge points within `near_m` of the aircraft count; neighbouring directions are
+    `step_rad` apart.
     """
 
     def __init__(self, mission: Mission, look_m: float, near_m: float, step_rad: float) -> None:
         super().__init__(mission)
         self.look_m, self._near_m, self._step_rad = look_m, near_m, step_rad
-        self.chosen: float | None = None
-        """The direction chosen last, rad counter-clockwise from east."""
+        self.chosen: float | None = None  # the direction chosen last, rad counter-clockwise from east
 
     @abstractmethod
     def direction(self, pose: Pose, points_m: FloatArray) -> float | None:
@@ -118,14 +107,11 @@ class Steerer(Replanner):
             return self.stuck("no turn stays inside the area", request)
         turn[-1] = (*last[:5], min(last[5], room_m))
         bearing = math.atan2(target[1] - start.pose.north_m, target[0] - start.pose.east_m)
+        reason = f"steering {math.degrees(math.pi / 2 - bearing) % 360:.0f} degrees"
+        waypoints = np.array([request.position_m, *(row[:2] for row in turn[1:]), target])
         picture = self.picture(request)
-        return Plan(
-            PlanStatus.FOUND,
-            f"steering {math.degrees(math.pi / 2 - bearing) % 360:.0f} degrees",
-            np.array([request.position_m, *(row[:2] for row in turn[1:]), target]),
-            Path(np.array([*start.before, *turn])),
-            lambda: picture,
-        )
+        path = Path(np.array([*start.before, *turn]))
+        return Plan(PlanStatus.FOUND, reason, waypoints, path, lambda: picture)
 
 
 def ahead(place: Point, bearing: float, distance_m: float) -> Point:

@@ -1,8 +1,7 @@
 """TangentBug: straight to the goal, round obstacles by the edges in sight, along a boundary only where caught.
 
-I. Kamon, E. Rimon and E. Rivlin, "A new range-sensor based globally convergent navigation algorithm for mobile
-robots", IEEE International Conference on Robotics and Automation, 1996; and "TangentBug: a
-range-sensor-based navigation algorithm", International Journal of Robotics Research 17(9), 1998.
+I. Kamon, E. Rimon and E. Rivlin, "TangentBug: a range-sensor-based navigation algorithm", International Journal of
+Robotics Research 17(9), 1998.
 
 The local tangent graph has the goal, where it is in sight, or the end of what is free towards it; and the places
 V at which the edges of free sectors touch an obstacle within the sensing range.
@@ -24,8 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.baselines.grown import Tangent
-from planner.baselines.polyline import NOWHERE, Mark, length_of, mark_at, piece
+from planner.baselines.polyline import NOWHERE, Mark, Tangent, length_of, mark_at, piece
 from planner.baselines.walk import LEFT, Enclosed, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
@@ -68,13 +66,11 @@ TangentBugState = Toward | BoundaryFollowing | Enclosed
 
 @dataclass(frozen=True)
 class TangentNode:
-    """A place V of the local tangent graph, on which side it touches an obstacle (0: none), and whether at a dent."""
+    """A node V of the local tangent graph."""
 
-    place: Point
-    to_goal_m: float
-    way_m: float
-    side: float
-    dent: bool
+    at: Tangent
+    to_goal_m: float  # d(V, T)
+    way_m: float  # d(x, V) + d(V, T)
 
 
 class TangentBug(Walker[TangentBugState]):
@@ -124,10 +120,10 @@ class TangentBug(Walker[TangentBugState]):
     def walk(self, place: Point, state: TangentBugState) -> Iterator[WalkLeg[TangentBugState]]:
         """Steps 1 and 2 in turn."""
         if isinstance(state, BoundaryFollowing) and (node := self._leave(place, state)) is not None:
-            way, _ = self.straight(place, node.place)
+            way, _ = self.straight(place, node.at.place)
             state = Toward(state.followed_m)
             yield WalkLeg(state, way)
-            place = node.place
+            place = node.at.place
         while isinstance(state, Toward):
             line, met = self.straight(place, self.goal)
             if not met or length_of(line) >= self.mission.sensor_range_m:
@@ -158,10 +154,10 @@ class TangentBug(Walker[TangentBugState]):
         hiding = {self.known.first_hit(place, each.place)[1] for each in touched if not each.seen} - parts
         touched += self.known.tangents(place, hiding, reach)
         nodes = []
-        for each in [free, *(touch for touch in touched if touch.seen)]:
-            to_goal_m = math.dist(each.place, self.goal)
-            way_m = math.dist(place, each.place) + to_goal_m
-            nodes.append(TangentNode(each.place, to_goal_m, way_m, each.side, each.dent))
+        for touch in [free, *touched]:
+            to_goal_m = math.dist(touch.place, self.goal)
+            way_m = math.dist(place, touch.place) + to_goal_m
+            nodes += [TangentNode(touch, to_goal_m, way_m)] if touch.seen else []
         return nodes
 
     def _best(self, place: Point, nodes: list[TangentNode], limit_m: float) -> TangentNode | None:
@@ -169,18 +165,18 @@ class TangentBug(Walker[TangentBugState]):
         here = math.dist(place, self.goal)
         nearer = []
         for node in nodes:
-            to, goal = np.subtract(node.place, place), np.subtract(self.goal, place)
-            nearer_m = math.inf if math.dist(place, node.place) < self.keep_m else here
-            if node.side and to @ goal > 0.0 and node.to_goal_m < min(limit_m, nearer_m):
+            to, goal = np.subtract(node.at.place, place), np.subtract(self.goal, place)
+            nearer_m = math.inf if math.dist(place, node.at.place) < self.keep_m else here
+            if node.at.side and to @ goal > 0.0 and node.to_goal_m < min(limit_m, nearer_m):
                 nearer.append(node)
-        return min(nearer, key=lambda node: (node.dent, node.way_m), default=None)
+        return min(nearer, key=lambda node: (node.at.dent, node.way_m), default=None)
 
     def _slide(self, place: Point, node: TangentNode) -> FloatArray:
         """To a node and along the obstacle while that leads nearer to the goal and the goal is behind it."""
-        way, met = self.straight(place, node.place)
-        if met and length_of(way) < math.dist(place, node.place) - self._progress_m:
+        way, met = self.straight(place, node.at.place)
+        if met and length_of(way) < math.dist(place, node.at.place) - self._progress_m:
             return way
-        along = self.known.boundary(node.place, node.side, self.horizon_m)
+        along = self.known.boundary(node.at.place, node.at.side, self.horizon_m)
         to_goal = np.hypot(*(along - self.goal).T).tolist()
         last = 0
         while last < len(along) - 1 and to_goal[last + 1] <= to_goal[last]:
@@ -195,8 +191,8 @@ class TangentBug(Walker[TangentBugState]):
 
         d_followed is of this boundary alone: else a round of it would prove nothing.
         """
-        nodes = [node for node in self._nodes(place) if node.side]
-        side = min(nodes, key=lambda node: node.way_m).side if nodes else LEFT
+        nodes = [node for node in self._nodes(place) if node.at.side]
+        side = min(nodes, key=lambda node: node.way_m).at.side if nodes else LEFT
         first = mark_at(self.known.boundary(hit, side, self.keep_m), 0.0)
         on_boundary = math.dist(place, hit) < self._progress_m
         return BoundaryFollowing(first, side, hit, 0.0, on_boundary, self._nearest_m(hit))

@@ -97,10 +97,8 @@ class VfhPlus(Steerer):
         masked = blocked.copy()
         for side in (1.0, -1.0):  # left, right
             radius = self.mission.turn_radius_m
-            x, y = (
-                pose.east_m - side * radius * pose.tangent_north,
-                pose.north_m + side * radius * pose.tangent_east,
-            )
+            x = pose.east_m - side * radius * pose.tangent_north
+            y = pose.north_m + side * radius * pose.tangent_east
             touching = np.hypot(near[:, 0] - x, near[:, 1] - y) < radius + self._keep_m
             bearing = side * off(np.arctan2(near[:, 1] - pose.north_m, near[:, 0] - pose.east_m), course)
             ahead = bearing[touching & (bearing >= 0.0)]

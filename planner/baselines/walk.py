@@ -1,11 +1,10 @@
 """What the planners of the BUG family share: the walk of a point that can turn on the spot.
 
-A walk is what the algorithm would do from here on if nothing but what has been seen were there: straight lines
-and stretches of boundary, each with the state of the algorithm on it. It stays right until a new edge point
-comes too near to what is left of it, because a boundary changes only where a new disc covers it. So it is
-taken up again, from the state reached by then, when the aircraft has come to such a place: a BUG knows an
-obstacle only on contact. While something moves, and for some minutes after (`planner.world_stability`), the algorithm
-begins anew where it would say that the goal is enclosed; once as well where edges have been taken back.
+A walk is what the algorithm would do from here on if nothing but what has been seen were there: straight lines and
+stretches of boundary, each with the state of the algorithm on it. Where a new edge point comes too near to it, it is
+taken up again from the state reached by then: a BUG knows an obstacle only on contact. While something moves, and for
+some minutes after (`planner.world_stability`), the algorithm begins anew where it would say that the goal is enclosed;
+once as well where edges have been taken back.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import NOWHERE, Mark, beside, length_of, piece
 from planner.geometry.clearance import first_breach
 from planner.geometry.curves import SHORTEST_M, Point, end_of, pose_at
@@ -35,7 +33,7 @@ BREACH_SHARE = 0.25
 
 SAME_PLACE = 0.5
 """Places on a boundary passed in one sense and nearer than this share of the kept distance are the same: no two
-stretches of a boundary that run the same way can be that near to each other."""
+stretches that run the same way can be that near to each other."""
 
 WalkState = TypeVar("WalkState")
 
@@ -64,6 +62,8 @@ class Walker(ABC, Generic[WalkState]):
     """The frame of a planner whose vehicle is a point: when to walk anew, and from which state."""
 
     def __init__(self, config: MarginConfig, mission: Mission) -> None:
+        from planner.baselines.grown import GrownObstacles
+
         margin_m = config.margin(mission)
         self.mission, self.goal, self.horizon_m = mission, mission.goal_m, mission.sensor_range_m
         self.known = GrownObstacles(mission, margin_m)
@@ -109,10 +109,10 @@ class Walker(ABC, Generic[WalkState]):
         """Keeps the walk while it serves; takes it up anew where it does not."""
         fresh, taken_back = self.known.take_in(request.seen)
         self._unrest.note(request.time_s, request.seen)
-        if request.flown is not None and request.flown is self._plan:
-            assert request.flown.path is not None
-            return self._went_on(request, request.flown.path, fresh, taken_back)
-        place = request.position_m
+        place, flown = request.position_m, request.flown
+        if flown is not None and flown is self._plan:
+            assert flown.path is not None
+            return self._went_on(request, flown.path, fresh, taken_back)
         if request.refused is None or not self.legs:
             return self._found(self.walk(place, self.begin(place)), request, place)
         # Not begun anew: the shield only held.
