@@ -37,5 +37,5 @@ class NearestEdge:
 
 
 def distance_to_edges(seen: MapView, points_m: FloatArray) -> FloatArray:
-    """The same, for a map that is asked once."""
+    """The same for a map that is asked once: its method `distance_m`."""
     return NearestEdge(seen).distance_m(points_m)

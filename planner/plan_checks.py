@@ -1,12 +1,9 @@
 """What a planner's answer must be before anything is flown by it.
 
 An answer comes from code of others. It is read once, attribute by attribute; what is flown, judged and recorded is a
-copy of what was read, so that nothing the planner does later can change it.
-
-Frame: local ENU plane, x = east, y = north, metres. A path is refused, with the number of the segment and the figure,
-if it does not begin at the aircraft, does not join, or is larger than any path can be that is meant to be flown. A
-kink between two segments is allowed: the path of a point that turns on the spot has them, and the trackability
-verdict counts each as a corner.
+copy of what was read. A path is refused, with the number of the segment and the figure, if it does not begin at the
+aircraft, does not join, or is larger than any path that is meant to be flown. A kink is allowed: the path of a point
+that turns on the spot has them, and the trackability verdict counts each as a corner.
 """
 
 from __future__ import annotations
@@ -40,11 +37,7 @@ class WrongAnswerError(ValueError):
 
 
 def start_tolerance_m(mission: Mission) -> float:
-    """How far from the aircraft a path may begin.
-
-    A plan begins on the path in effect as long as the aircraft is within `mission.off_path_m` of that, and either where
-    the aircraft is when the planner is asked or where it will be after the compute latency.
-    """
+    """How far from the aircraft a path may begin: on the path in effect, also where that is after the latency."""
     return mission.off_path_m + mission.ground_speed_mps * (mission.compute_latency_s + START_S)
 
 
@@ -70,9 +63,8 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
             raise WrongAnswerError(f"the planner's plan has {_type(value)} as {told}; it must be {must}")
     letters = str.__len__(reason)
     if letters > MOST_REASON_LETTERS:
-        raise WrongAnswerError(
-            f"the planner's plan has a reason of {letters:,} characters; it must have at most {MOST_REASON_LETTERS:,}"
-        )
+        told = f"the planner's plan has a reason of {letters:,} characters"
+        raise WrongAnswerError(f"{told}; it must have at most {MOST_REASON_LETTERS:,}")
     if status is not PlanStatus.FOUND:
         if type(answer) is Plan:
             return answer
@@ -102,22 +94,17 @@ def _refused(what: str) -> WrongAnswerError:
 
 def _waypoints(waypoints_m: Any) -> FloatArray:
     """The waypoints, if they are (n, 2) finite numbers."""
+    told = "the planner gave"
     if not _is_table(waypoints_m, 2):
         shape = "shape " * isinstance(waypoints_m, np.ndarray) + _shape(waypoints_m)
-        raise WrongAnswerError(
-            f"the planner gave waypoints with {shape}; they must be an array of shape (n, 2)"
-        )
-    if len(waypoints_m) > MOST_SEGMENTS:
-        raise WrongAnswerError(
-            f"the planner gave {len(waypoints_m):,} waypoints; a plan must have at most {MOST_SEGMENTS:,}"
-        )
-    far = np.flatnonzero(~(np.abs(waypoints_m) <= FURTHEST_M).all(axis=1))
-    if len(far):
-        east, north = waypoints_m[far[0]].tolist()
-        raise WrongAnswerError(
-            f"the planner gave a waypoint {far[0]} at ({east:g}, {north:g}) m; "
-            f"its coordinates must be finite and within {FURTHEST_M:g} m of the origin"
-        )
+        raise WrongAnswerError(f"{told} waypoints with {shape}; they must be an array of shape (n, 2)")
+    count = len(waypoints_m)
+    if count > MOST_SEGMENTS:
+        raise WrongAnswerError(f"{told} {count:,} waypoints; a plan must have at most {MOST_SEGMENTS:,}")
+    for i in np.flatnonzero(~(np.abs(waypoints_m) <= FURTHEST_M).all(axis=1)).tolist():
+        east, north = waypoints_m[i].tolist()
+        must = f"its coordinates must be finite and within {FURTHEST_M:g} m of the origin"
+        raise WrongAnswerError(f"{told} a waypoint {i} at ({east:g}, {north:g}) m; {must}")
     return np.asarray(waypoints_m, dtype=np.float64)
 
 
@@ -177,23 +164,17 @@ def _check_loiter(rows: FloatArray) -> None:
     turn = abs(float(rows[-1, 4] * rows[-1, 5]))
     gap = math.dist(_ends(rows[-1:])[0].tolist(), rows[-1, :2].tolist())
     if not (abs(turn - math.tau) <= FULL_TURN_RAD and gap <= JOIN_M):
-        raise _refused(
-            f"segment {last}, its loiter, turns by {math.degrees(turn):.6g} deg and ends {gap:.3g} m from where it "
-            "begins; it must be a full circle"
-        )
+        told = f"turns by {math.degrees(turn):.6g} deg and ends {gap:.3g} m from where it begins"
+        raise _refused(f"segment {last}, its loiter, {told}; it must be a full circle")
 
 
 def _ends(rows: FloatArray) -> FloatArray:
     """(n, 2) where segments of constant curvature end: the chord of an arc that turns by `a` is sinc(a / 2) as long."""
     half = 0.5 * rows[:, 4] * rows[:, 5]
     chord = rows[:, 5] * np.sinc(half / np.pi)
-    ahead, left = chord * np.cos(half), chord * np.sin(half)
-    return np.column_stack(
-        (
-            rows[:, 0] + ahead * rows[:, 2] - left * rows[:, 3],
-            rows[:, 1] + ahead * rows[:, 3] + left * rows[:, 2],
-        )
-    )
+    ahead, left = (chord * np.cos(half))[:, None], (chord * np.sin(half))[:, None]
+    ends: FloatArray = rows[:, :2] + ahead * rows[:, 2:4] + left * np.column_stack((-rows[:, 3], rows[:, 2]))
+    return ends
 
 
 def _picture(make: Callable[[], PlanPicture] | None) -> Callable[[], PlanPicture] | None:

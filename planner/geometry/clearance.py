@@ -62,8 +62,5 @@ def behind(places_m: FloatArray, eye_m: Point, edges_m: FloatArray, beside_m: fl
 
 
 def margin_of(mission: Mission) -> float:
-    """Planned distance beyond the clearance where none is given (m).
-
-    A tenth of the clearance, or twice the tracking error that the aircraft showed in tight turns where that is more.
-    """
+    """Planned distance beyond the clearance where none is given (m)."""
     return max(TOLERATED_SHARE * mission.clearance_m, TOLERATED_ERRORS * mission.tracking_error_m)

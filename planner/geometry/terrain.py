@@ -19,10 +19,7 @@ a line, or along which a step may lead."""
 
 
 class WorkCount:
-    """Work done so far, counted by what was looked at and never timed: one is about a microsecond on an ordinary core.
-
-    Counted work makes a search that is cut short end at the same place in every run.
-    """
+    """Work done so far, some microseconds, counted and never timed: a search cut short ends alike in every run."""
 
     def __init__(self) -> None:
         self.done = 0.0

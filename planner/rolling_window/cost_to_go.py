@@ -17,14 +17,11 @@ from planner.geometry.terrain import WorkCount
 from planner.interface import FloatArray
 from planner.kernels.wave import close_cells, spread_wave
 
-CELLS = 5.0
-"""The distance that is kept from edge points is so many cells long."""
+CELLS, LEAST_M = 5.0, 1.0
+"""The distance that is kept from edge points, `LEAST_M` (m) where less is kept, is so many cells long."""
 
 MOST_CELLS = 250_000
 """A grid has at most so many cells; else it is made coarser. It then closes fewer cells, but no open one."""
-
-LEAST_M = 1.0
-"""Least distance (m) that the grid is made for, where less is kept, as where start or goal lie at an edge."""
 
 PAIRS_AT_ONCE = 20_000
 """One step of work is so many pairs of an edge point and a cell, or so many cells that the wave comes to."""

@@ -1,8 +1,7 @@
 """Search over poses where turning is tight: the step model (1)-(3) under the minimum turn radius.
 
-Every step is an arc of one of a few curvatures within the turn radius, so that whatever is found can be flown
-as it is. It is used where no track through the free sectors leaves room for the turns that it needs, and led by the
-distances to go round all that is known (hybrid A*: Dolgov, Thrun, Montemerlo and Diebel, 2008).
+It is used where no track through the free sectors leaves room for the turns that it needs: every step is an arc within
+the turn radius. The distances to go lead it (hybrid A*: Dolgov, Thrun, Montemerlo and Diebel, 2008).
 """
 
 from __future__ import annotations

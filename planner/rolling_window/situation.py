@@ -13,16 +13,13 @@ from planner.shield.committed_plan import CommittedPlan
 class PlanningState(Enum):
     """What the planner is doing about the plan in effect."""
 
-    FOLLOWING = "following"
-    """The committed plan leads on; the window rolls as it is due."""
-    LOITERING = "loitering"
-    """The aircraft is in the turn that the committed plan ends with, and the search for a way on goes on."""
-    ESCAPING = "escaping"
-    """No certified plan is in effect, as before the first, or it is broken: what keeps clear longest is flown."""
-    GIVING_UP = "giving up"
-    """A search found no way: a place is given up, or what was given up is tried again, with more effort."""
-    PROVING = "proving"
-    """The edge points seen leave no way: the goal is unreachable. Or none with room to turn, which ends the flight."""
+    FOLLOWING = "following"  # the committed plan leads on; the window rolls as it is due
+    LOITERING = "loitering"  # in the turn that the committed plan ends with, the search for a way on goes on
+    ESCAPING = (
+        "escaping"  # no certified plan, as before the first, or a broken one: what keeps clear is flown
+    )
+    GIVING_UP = "giving up"  # a search was in vain: a place is given up, or such places are tried again
+    PROVING = "proving"  # the edge points seen leave no way, or none with room to turn, which ends the flight
 
 
 class NoRoomToTurn(RuntimeError):

@@ -1,7 +1,11 @@
-"""The map as a planner under the shield sees it: places that were refused while it was stuck are edge points too."""
+"""The map as a planner under the shield sees it: places that were refused while it was stuck are edge points too.
+
+A planner that does not read `PlanRequest.refused` learns from its map where not to go on.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -11,28 +15,15 @@ from planner.interface import FloatArray, MapView
 from planner.nearest_edge import distance_to_edges
 
 
-class RefusedPlaces:
-    """A planner that does not read `PlanRequest.refused` learns from its map where not to go on."""
-
-    def __init__(self) -> None:
-        self._places: list[tuple[int, Point]] = []  # the map's revision before each, and the place
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    def add(self, place: Point, seen: MapView) -> None:
-        """One more edge point."""
-        self._places.append((seen.revision, place))
-
-    def on(self, seen: MapView) -> MapView:
-        """The map with them."""
-        return cast(MapView, _SeenWith(seen, self._places)) if self._places else seen
+def with_places(seen: MapView, places: Sequence[tuple[int, Point]]) -> MapView:
+    """A map with edge points beside its own: the map's revision before each, and where it is."""
+    return cast(MapView, _SeenWith(seen, places)) if places else seen
 
 
 class _SeenWith:
-    """A map and edge points beside it; each counts as one revision more."""
+    """Each place counts as one revision more."""
 
-    def __init__(self, seen: MapView, places: list[tuple[int, Point]]) -> None:
+    def __init__(self, seen: MapView, places: Sequence[tuple[int, Point]]) -> None:
         self._seen, self._places = seen, tuple(places)
 
     def __getattr__(self, name: str) -> Any:

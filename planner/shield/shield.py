@@ -38,7 +38,7 @@ from planner.shield.certificate import Certified, Certifier, hold_centre
 from planner.shield.certified_planner import CertifiedPlanner, lead_of
 from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import Room, meets, room_m
-from planner.shield.refused_places import RefusedPlaces
+from planner.shield.refused_places import with_places
 from planner.shield.tracking import MOST_RADII, Tracked, can_be_flown, tracked
 
 PROGRESS = 0.25
@@ -77,7 +77,8 @@ class Shield(CertifiedPlanner):
         self._proposed: Adopted | None = None
         self._own = Plan(PlanStatus.KEPT, "")  # the inner planner's last answer, as it gave it
         self._refused: Refused | None = None
-        self._places, self._shown_s = RefusedPlaces(), -math.inf
+        self._places: list[tuple[int, Point]] = []  # refused, the map's revision before each
+        self._shown_s = -math.inf  # when the last of them was put on the inner planner's map
         self._ever_changed = False
 
     def plan(self, request: PlanRequest) -> Plan:
@@ -109,7 +110,7 @@ class Shield(CertifiedPlanner):
             flown = adopted.own
             assert adopted.plan.path is not None
             arc_length_m = _nearest_m(adopted.plan.path, request.position_m, adopted.certified_m)
-        seen = self._places.on(request.seen)
+        seen = with_places(request.seen, self._places)
         told = request._replace(seen=seen, flown=flown, arc_length_m=arc_length_m, refused=self._refused)
         if effective is not None:
             left = Path(effective.left(here_m).segments, effective.path.loiter)
@@ -249,7 +250,7 @@ class Shield(CertifiedPlanner):
             self._log.note(time_s, "")
             return Plan(PlanStatus.KEPT, GOES_ON)
         self._log.note(time_s, why)
-        if answer.status is PlanStatus.UNREACHABLE and self._refused is None and not len(self._places):
+        if answer.status is PlanStatus.UNREACHABLE and self._refused is None and not self._places:
             return answer
         self._show_where(request)
         return Plan(PlanStatus.NO_PATH, f"stuck in the turn since {self._log.since_s:.0f} s: {why}")
@@ -263,7 +264,7 @@ class Shield(CertifiedPlanner):
         place = self._refused.place_m
         beside_m = mission.clearance_m + mission.goal_radius_m
         if math.dist(place, here) > 2.0 * mission.clearance_m and math.dist(place, mission.goal_m) > beside_m:
-            self._places.add(place, request.seen)
+            self._places.append((request.seen.revision, place))
             self._shown_s = request.time_s
 
 

@@ -79,14 +79,10 @@ def tracked(
         out.append(segment)
         pose = along(segment, step_m)
         flown_m += step_m
-        while i < last and _nearer(rows[i + 1], rows[i], pose):
+        while i < last and math.dist(rows[i + 1], pose[:2]) <= math.dist(rows[i], pose[:2]):
             i += 1
         passed.append(at[i])
     return Tracked(Path(np.array(out)), np.array(passed)) if out else None
-
-
-def _nearer(place: list[float], than: list[float], pose: Pose) -> bool:
-    return math.dist(place, pose[:2]) <= math.dist(than, pose[:2])
 
 
 def can_be_flown(path: Path, pose: Pose, limits: Limits) -> bool:

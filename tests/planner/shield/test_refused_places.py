@@ -7,7 +7,7 @@ import pytest
 
 from planner.interface import FloatArray
 from planner.memory import ObstacleMemory
-from planner.shield.refused_places import RefusedPlaces
+from planner.shield.refused_places import with_places
 from tests.planner.rolling_window.test_rolling_window import Seen
 
 
@@ -30,17 +30,16 @@ class Growing(Seen):
 
 
 def test_every_edge_and_every_refused_place_is_remembered_once() -> None:
-    seen, refused, memory = Growing(), RefusedPlaces(), ObstacleMemory(10.0)
-    shown: list[tuple[float, float]] = []
+    seen, memory = Growing(), ObstacleMemory(10.0)
+    refused: list[tuple[int, tuple[float, float]]] = []
     for number in range(12):
         seen.step(remove=number == 7)
         if number in (2, 3, 9):
-            shown.append((50.0 + number, 400.0))
-            refused.add(shown[-1], seen)
-        memory.take_in(refused.on(seen))
-        expected = sorted([(east, 0.0) for _, east in seen.edges] + shown)
+            refused.append((seen.revision, (50.0 + number, 400.0)))
+        memory.take_in(with_places(seen, refused))
+        expected = sorted([(east, 0.0) for _, east in seen.edges] + [place for _, place in refused])
         assert sorted(map(tuple, memory.points_m.tolist())) == expected
         off = np.hypot(*(np.array(expected) - (50.0, 390.0)).T)
-        assert refused.on(seen).distance_m(np.array([[50.0, 390.0]]))[0] == pytest.approx(off.min())
-    assert len(refused) == 3
-    assert refused.on(seen).spacing_m == seen.spacing_m
+        away_m = with_places(seen, refused).distance_m(np.array([[50.0, 390.0]]))
+        assert away_m[0] == pytest.approx(off.min())
+    assert with_places(seen, refused).spacing_m == seen.spacing_m

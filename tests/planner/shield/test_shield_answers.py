@@ -71,7 +71,7 @@ def test_a_refused_planner_is_told_where_and_why(known: Known) -> None:
     assert refused is not None
     assert "too near to something" in refused.reason
     assert math.hypot(*refused.place_m) < 300.0
-    assert shield.report.refused_plans == 2
+    assert shield._log.refused_plans == 2
 
 
 @pytest.mark.parametrize(("straight_m", "refused"), [(0.0, 0), (300.0, 1)])
@@ -102,7 +102,7 @@ def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
         )
     )
     assert told.status is PlanStatus.NO_PATH
-    assert shield.report.refused_plans == refused
+    assert shield._log.refused_plans == refused
     assert ("holding" in told.reason) is (refused == 0)
 
 
