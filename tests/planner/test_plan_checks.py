@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planner.contract import MISSION
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanStatus
 from planner.plan_checks import (
     JOIN_M,
@@ -21,17 +22,6 @@ from planner.plan_checks import (
     start_tolerance_m,
 )
 
-MISSION = Mission(
-    goal_m=(9000.0, 0.0),
-    goal_radius_m=100.0,
-    bounds_m=(0.0, -5000.0, 10_000.0, 5000.0),
-    clearance_m=100.0,
-    turn_radius_m=100.0,
-    speed_mps=25.0,
-    roll_in_s=1.0,
-    tracking_error_m=3.0,
-    sensor_range_m=2000.0,
-)
 RADIUS_M = 200.0
 EAST = (0.0, 0.0, 1.0, 0.0, 0.0, 1000.0)
 LEFT = (1000.0, 0.0, 1.0, 0.0, 1.0 / RADIUS_M, RADIUS_M * math.pi / 2)

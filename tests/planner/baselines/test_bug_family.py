@@ -33,15 +33,11 @@ MakePoints = Callable[..., FloatArray]
 
 WORLDS = Path(__file__).parents[3] / "scenarios" / "worlds"
 
-MISSION = Mission(
+MISSION = replace(
+    contract.MISSION,
     goal_m=(17_000.0, 5000.0),
     goal_radius_m=100.0,
     bounds_m=(0.0, 0.0, 20_000.0, 10_000.0),
-    clearance_m=200.0,
-    turn_radius_m=150.0,
-    speed_mps=25.0,
-    roll_in_s=1.0,
-    tracking_error_m=3.0,
     sensor_range_m=3000.0,
 )
 KEEP = MISSION.clearance_m + margin_of(MISSION)
@@ -83,33 +79,13 @@ class Unsettled(Range):
     last_contradiction_s = 2000.0
 
 
-class TakingBack(Range):
-    """The same; some of what was seen is taken back."""
+class Opening(Range):
+    """The same, until a part of the wall in the west of the goal is taken back."""
 
-    before = 0
+    before = looks = 0
 
     def edges_since(self, revision: int) -> FloatArray:
         return super().edges_since(revision - self.before)
-
-
-class Vanishing(TakingBack):
-    """The same, until all that has been seen has gone."""
-
-    looks = 260
-
-    def look(self, place: Point) -> None:
-        self.looks -= 1
-        if self.looks:
-            super().look(place) if self.looks > 0 else None
-            return
-        self.before = self.revision = self.last_removal_revision = self.revision + 1
-        self._order.clear()
-
-
-class Opening(TakingBack):
-    """The same, until a part of the wall in the west of the goal is taken back."""
-
-    looks = 0
 
     def look(self, place: Point) -> None:
         super().look(place)
@@ -206,16 +182,14 @@ def test_tangent_bug_takes_no_way_round_for_a_way_across_a_dent(range_m: float, 
     assert flight.length_m < 1.1 * math.dist(contract.START, mission.goal_m)
 
 
-@pytest.mark.parametrize("goal_north_m", [2000.3, 4711.7, 5000.2, 8123.9])
+@pytest.mark.parametrize("goal_north_m", [2000.3, 8123.9])
 @pytest.mark.parametrize("kind", OF_CONTACT)
 def test_a_line_that_leads_aslant_is_found_again(kind: str, goal_north_m: float, ring: MakePoints) -> None:
     mission = replace(MISSION, goal_m=(17_000.0, goal_north_m))
     flight = walk(kind, ring(10_000.0, 0.5 * (5000.0 + goal_north_m), 700.0, SPACING), mission=mission)
     assert flight.reason == "reached"
-    places = np.cumsum(np.hypot(*np.diff(flight.track_m, axis=0).T))
-    assert places[-1] < math.dist(START, mission.goal_m) + (4.0 if kind == "bug1" else 1.0) * math.pi * (
-        700.0 + KEEP
-    )
+    most_m = (4.0 if kind == "bug1" else 1.0) * math.pi * (700.0 + KEEP)
+    assert flight.length_m < math.dist(START, mission.goal_m) + most_m
 
 
 @pytest.mark.parametrize("aside", [-800.0, 800.0])
@@ -230,16 +204,6 @@ def test_bug1_returns_to_the_nearest_point_by_the_shorter_way(aside: float, ring
     expected = 7000.0 - back + math.tau * radius + way_back + last
     assert flight.reason == "reached"
     assert flight.length_m == pytest.approx(expected, abs=0.004 * expected + 50.0)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_free_way_is_one_straight_line(kind: str) -> None:
-    flight = walk(kind, np.zeros((0, 2)))
-    assert flight.reason == "reached"
-    assert len(flight.plans) == 1
-    assert flight.plans[0].path is not None
-    np.testing.assert_allclose(flight.plans[0].path.segments, [[*START, 1.0, 0.0, 0.0, 14_000.0]])
-    np.testing.assert_allclose(flight.plans[0].waypoints_m, [START, MISSION.goal_m])
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -327,14 +291,6 @@ def test_an_obstacle_is_known_only_on_contact(kind: str, ring: MakePoints) -> No
     east, north = flight.track_m[flight.track_m[:, 0] < 10_000.0 - 1500.0 - KEEP - 50.0].T
     assert len(east) > 100
     np.testing.assert_allclose(north, 5000.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_an_obstacle_that_has_gone_is_not_followed_on(kind: str, wall: MakePoints) -> None:
-    """What is left of the way is flown straight: neither along the border nor back to where it was."""
-    flight = walk(kind, wall((10_000.0, 500.0), (10_000.0, 9500.0), SPACING), world=Vanishing)
-    assert flight.reason == "reached"
-    assert flight.length_m < 50.0 * 260 + math.dist(flight.track_m[260], MISSION.goal_m) + 500.0
 
 
 @pytest.mark.parametrize("depth_m", [0.5, 2.0, 6.0, 12.0, 20.0, 30.0, 100.0])

@@ -8,25 +8,16 @@ import numpy as np
 import pytest
 import shapely
 
+from planner import contract
 from planner.baselines.vfh_plus import VfhPlus
 from planner.contract import GivenMap
 from planner.geometry.curves import pose_at
-from planner.interface import FloatArray, Mission, Plan, PlanRequest, PlanStatus
+from planner.interface import FloatArray, Plan, PlanRequest, PlanStatus
 from planner.keys import MarginConfig
 
 MakePoints = Callable[..., FloatArray]
 
-MISSION = Mission(
-    goal_m=(15_000.0, 5000.0),
-    goal_radius_m=300.0,
-    bounds_m=(0.0, 0.0, 20_000.0, 10_000.0),
-    clearance_m=200.0,
-    turn_radius_m=150.0,
-    speed_mps=25.0,
-    roll_in_s=1.0,
-    tracking_error_m=3.0,
-    sensor_range_m=6000.0,
-)
+MISSION = replace(contract.MISSION, goal_m=(15_000.0, 5000.0), bounds_m=(0.0, 0.0, 20_000.0, 10_000.0))
 START = (2000.0, 5000.0)
 
 

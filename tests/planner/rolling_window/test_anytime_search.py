@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from planner import contract
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose
-from planner.interface import FloatArray, MapView, Mission
+from planner.interface import FloatArray, MapView
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.local_planning import LocalPlanning
@@ -21,18 +23,13 @@ from tests.planner.rolling_window.test_rolling_window import seen_at_once
 MakePoints = Callable[..., FloatArray]
 Known = Callable[[FloatArray], MapView]
 
-MISSION = Mission(
+MISSION = replace(
+    contract.MISSION,
     goal_m=(12_000.0, 0.0),
     goal_radius_m=100.0,
     bounds_m=(-4000.0, -8000.0, 16_000.0, 8000.0),
-    clearance_m=200.0,
-    turn_radius_m=150.0,
-    speed_mps=25.0,
-    roll_in_s=1.0,
-    tracking_error_m=3.0,
     sensor_range_m=8000.0,
 )
-
 START = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
 
 
@@ -45,16 +42,12 @@ def trap(wall: MakePoints, known: Known) -> MapView:
 
 
 def planning(
-    seen: MapView, closed: Callable[[], bool] = lambda: False
+    seen: MapView, closed: Callable[[], bool] = lambda: False, memory: ObstacleMemory | None = None
 ) -> tuple[LocalPlanning, AnytimeSearch]:
-    memory = ObstacleMemory(MISSION.clearance_m)
+    memory = memory or ObstacleMemory(MISSION.clearance_m)
     memory.take_in(seen)
     local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
     return local, AnytimeSearch(local, len(memory.points_m), 0, closed)
-
-
-def deliberation(seen: MapView, closed: Callable[[], bool] = lambda: False) -> AnytimeSearch:
-    return planning(seen, closed)[1]
 
 
 def all_courses(thinking: AnytimeSearch, work: int, start: Callable[[], Start]) -> tuple[list[Course], int]:
@@ -67,8 +60,8 @@ def all_courses(thinking: AnytimeSearch, work: int, start: Callable[[], Start]) 
 
 
 def test_in_portions_and_at_once_the_same_is_found(trap: MapView) -> None:
-    at_once, one = all_courses(deliberation(trap), 10**9, lambda: START)
-    slowly, many = all_courses(deliberation(trap), 5, lambda: START)
+    at_once, one = all_courses(planning(trap)[1], 10**9, lambda: START)
+    slowly, many = all_courses(planning(trap)[1], 5, lambda: START)
     assert one == 1
     assert many > 10
     assert [course.nodes for course in slowly] == [course.nodes for course in at_once]
@@ -96,7 +89,7 @@ def test_what_is_found_late_begins_where_the_aircraft_has_got_to(trap: MapView) 
         flown += 12.5
         return Start((flown, 0.0), Pose(flown, 0.0, 1.0, 0.0))
 
-    thinking = deliberation(trap)
+    _, thinking = planning(trap)
     while not thinking.done:
         begin = start()
         for course in thinking.courses(begin, None, 5):
@@ -112,8 +105,8 @@ def test_walled_in_the_proof_ends_it(ring: MakePoints, known: Known) -> None:
         asked += 1
         return True
 
-    courses, _ = all_courses(deliberation(known(ring(0.0, 0.0, 3000.0, 50.0)), closed), 40, lambda: START)
-    assert courses == []
+    _, thinking = planning(known(ring(0.0, 0.0, 3000.0, 50.0)), closed)
+    assert all_courses(thinking, 40, lambda: START)[0] == []
     assert asked
 
 
@@ -122,9 +115,7 @@ def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(w
     across = wall((3000.0, -700.0), (3000.0, 6000.0), 50.0)
     behind = wall((3000.0, -700.0), (6000.0, -700.0), 50.0)
     seen, memory = seen_at_once(across), ObstacleMemory(MISSION.clearance_m)
-    memory.take_in(seen)
-    local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
-    thinking = AnytimeSearch(local, len(memory.points_m), 0, lambda: False)
+    _, thinking = planning(seen, memory=memory)
     assert not list(thinking.courses(START, None, 2))
     seen.show(behind)
     memory.take_in(seen)
@@ -140,13 +131,10 @@ def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(w
 def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
     wall: MakePoints, known: Known, flown_before: bool
 ) -> None:
-    memory = ObstacleMemory(MISSION.clearance_m)
-    memory.take_in(known(wall((6000.0, -2000.0), (6000.0, 2100.0), 50.0)))
-    local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
+    local, thinking = planning(known(wall((6000.0, -2000.0), (6000.0, 2100.0), 50.0)))
     if flown_before:
         for share in np.linspace(0.3, 1.0, 60).tolist():
             local.trail.add((6000.0 * share, -2200.0 * share))
-    thinking = AnytimeSearch(local, len(memory.points_m), 0, lambda: False)
     course = next(iter(thinking.courses(START, None, 10**6)))
     assert (course.nodes[0][1] > 0.0) is flown_before
 
@@ -165,12 +153,8 @@ def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_
     courses, _ = all_courses(thinking, 10**9, lambda: START)
     assert local.work_count.done < (400_000.0 if gap_m else 100_000.0)
     assert (len(thinking.candidates) > 0) == (len(courses) > 0) == (gap_m > 0.0)
-    shortest = (
-        3000.0
-        + math.dist((west, 0.0), (west - 200.0, north))
-        + 9400.0
-        + math.dist((6200.0, 4700.0), (12e3, 0))
-    )
+    along_it = math.dist((west, 0.0), (west - 200.0, north)) + math.dist((6200.0, 4700.0), (12e3, 0))
+    shortest = 3000.0 + 9400.0 + along_it
     for course in courses:
         assert course.nodes[-1] == MISSION.goal_m
         assert course.path.length_m < 1.06 * shortest

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from planner import contract
 from planner.geometry.curves import Point
-from planner.interface import FloatArray, MapView, Mission
+from planner.interface import FloatArray, MapView
 from planner.memory import ObstacleMemory
 from planner.rolling_window.barrier import PROVED_AT_ONCE, THIN, Barrier, Proof
 from tests.examples import examples
@@ -131,17 +133,7 @@ def test_a_border_beside_an_end_counts_for_nothing() -> None:
 
 
 def proof_of(seen: MapView, keeps_m: float) -> tuple[Proof, int]:
-    mission = Mission(
-        goal_m=GOAL,
-        goal_radius_m=10.0,
-        bounds_m=BOUNDS,
-        clearance_m=CLEARANCE,
-        turn_radius_m=50.0,
-        speed_mps=25.0,
-        roll_in_s=1.0,
-        tracking_error_m=1.0,
-        sensor_range_m=1000.0,
-    )
+    mission = replace(contract.MISSION, goal_m=GOAL, bounds_m=BOUNDS, clearance_m=CLEARANCE)
     memory = ObstacleMemory(CLEARANCE)
     memory.take_in(seen)
     return Proof(mission, memory, keeps_m), math.ceil(len(memory.points_m) / PROVED_AT_ONCE)

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from planner import contract
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose, along
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
@@ -22,15 +23,13 @@ from planner.shield.committed_plan import CommittedPlan, Start
 Known = Callable[[FloatArray], MapView]
 MakePoints = Callable[..., FloatArray]
 
-MISSION = Mission(
+MISSION = replace(
+    contract.MISSION,
     goal_m=(1000.0, 0.0),
     goal_radius_m=50.0,
     clearance_m=40.0,
     sensor_range_m=3000.0,
-    speed_mps=25.0,
     turn_radius_m=100.0,
-    roll_in_s=1.0,
-    tracking_error_m=3.0,
     bounds_m=(-500.0, -500.0, 1500.0, 500.0),
 )
 LEAST_M = 400.0

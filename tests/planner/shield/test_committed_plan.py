@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from planner import contract
 from planner.geometry.course import Course
 from planner.geometry.curves import pose_at
-from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import FloatArray, Path, Plan, PlanRequest, PlanStatus
 from planner.shield.committed_plan import CUT, CommittedPlan, PlanMonitor, start_of
 from tests.planner.rolling_window.test_rolling_window import Seen
 
@@ -20,17 +22,7 @@ COMMITTED = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 2000.0), TURN]), loiter=Tru
 EDGES = np.array([(1000.0, 900.0), (5000.0, 100.0), (1500.0, -50.0)])
 
 
-MISSION = Mission(
-    goal_m=(9000.0, 0.0),
-    goal_radius_m=50.0,
-    clearance_m=200.0,
-    sensor_range_m=3000.0,
-    speed_mps=25.0,
-    turn_radius_m=100.0,
-    roll_in_s=1.0,
-    tracking_error_m=3.0,
-    bounds_m=(-1e5, -1e5, 1e5, 1e5),
-)
+MISSION = replace(contract.MISSION, goal_m=(9000.0, 0.0), goal_radius_m=50.0, sensor_range_m=3000.0)
 
 
 def monitoring() -> PlanMonitor:
@@ -101,12 +93,7 @@ def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
     flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=STRAIGHT), STRAIGHT, course, 8953.0)
     assert flown.left(400.0).length_m == pytest.approx(8600.0)
     assert flown.turn.length_m == 0.0
-    assert [flown.over(arc_length_m) for arc_length_m in (8953.0, 8999.0, 9000.0, 9100.0)] == [
-        False,
-        False,
-        True,
-        True,
-    ]
+    assert [flown.over(at_m) for at_m in (8953.0, 8999.0, 9000.0, 9100.0)] == [False, False, True, True]
     assert not committed(3).over(1e6)
     monitor = monitoring()
     in_effect(monitor, flown, EDGES[:0])

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from planner import contract
 from planner.geometry.curves import sample
-from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import FloatArray, MapView, Path, Plan, PlanRequest, PlanStatus
 from planner.shield import shield as shield_module
 from planner.shield.shield import Shield
 
 Known = Callable[[FloatArray], MapView]
-MISSION = Mission(
+MISSION = replace(
+    contract.MISSION,
     goal_m=(3000.0, 0.0),
-    goal_radius_m=50.0,
     clearance_m=40.0,
-    sensor_range_m=3000.0,
-    speed_mps=25.0,
     turn_radius_m=100.0,
-    roll_in_s=1.0,
     tracking_error_m=1.0,
     bounds_m=(-500.0, -1000.0, 4000.0, 400.0),
 )
