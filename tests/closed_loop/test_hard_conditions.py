@@ -3,7 +3,9 @@
 Besides the sensor's flaws: obstacles that appear ahead, and obstacles that come to the straight line to the goal
 when the aircraft does. `python -m tests.closed_loop.test_hard_conditions [--most N] [--day typical|rough] [FAMILY...]`
 flies N worlds of each family, has each flight judged by the independent referee, and prints the table of
-planner/MEASURED.md: in the air above, or each world on a day of its own, whose table `--write` puts there.
+planner/MEASURED.md: in the air above, or each world on a day of its own, whose table `--write` puts there. `--table
+laws` flies every guidance law in steady wind (aircraft/MEASURED.md), `--table navigation` every kind of navigation
+(harness/flight/README.md).
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ SPEED_MPS, TURN_M = 25.0, 230.0
 WIND_MPS = 0.3 * SPEED_MPS
 WIND = {"wind": {"speed_mps": WIND_MPS, "from_deg": 270.0}}
 TURBULENCE = {"turbulence": {"model": "tustin", "intensity": "moderate"}}
+OUTAGES = ((0.25, 10), (0.6, 90))
+"""Share of the straight way after which an outage begins, and the least time, s."""
 FLAWS: dict[str, dict[str, Any]] = {
     "noise, 1 % of range": {"sensor": {"range_noise_m": 0.01}},
     "10 % lost returns": {"sensor": {"dropout": 0.1}},
@@ -53,6 +57,18 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "all flaws together": ALL_FLAWS,
     "all of it together": {**ALL_FLAWS, "appear": 3, "move": 3},
 }
+LAWS: dict[str, dict[str, Any]] = {
+    " ".join(guidance.values()): {"guidance": guidance, "environment": WIND}
+    for guidance in (
+        *({"kind": law} for law in ("preview", "npfg", "l1", "vector_field", "pure_pursuit")),
+        *({"kind": law, "follow": "waypoints"} for law in ("npfg", "l1")),
+    )
+}
+NAVIGATION: dict[str, dict[str, Any]] = {
+    **{kind: {"navigation": {"kind": kind}} for kind in ("rtk", "gnss", "dead_reckoning")},
+    "gnss with outages": {"navigation": {"kind": "gnss"}, "outages": True},
+}
+TABLES = {"hard": CONDITIONS, "laws": LAWS, "navigation": NAVIGATION}
 
 
 def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1, day: str | None = None) -> Scenario:
@@ -66,7 +82,7 @@ def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1, day: s
     """
     air = condition.get("environment", WIND | TURBULENCE)
     range_m, clearance = float(world["sensor_range_m"]), float(world["clearance_m"])
-    sensor = {"range_m": range_m} | condition.get("sensor", {})
+    sensor, navigation = {"range_m": range_m} | condition.get("sensor", {}), condition.get("navigation", {})
     if "range_noise_m" in sensor:
         sensor["range_noise_m"] *= range_m
     rng = np.random.default_rng([seed, *world["name"].encode()])
@@ -78,6 +94,11 @@ def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1, day: s
     for _ in range(condition.get("move", 0)):
         obstacles += _moving(rng, start, goal, clearance, range_m)
     way_m = max(world["optimum_m"] or 0.0, abs(goal - start), 10_000.0)
+    if condition.get(
+        "outages"
+    ):  # two of a minute, after a quarter and after three fifths of the straight way
+        begins = (max(least_s, round(share * abs(goal - start) / SPEED_MPS)) for share, least_s in OUTAGES)
+        navigation = navigation | {"outages_s": [[begin, begin + 60] for begin in begins]}
     return scenario_of(
         {
             "schema": "wayproof/scenario/1",
@@ -94,6 +115,7 @@ def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1, day: s
             "sensor": sensor,
             "planner": {"clearance_m": clearance} | condition.get("planner", {}),
             "guidance": condition.get("guidance", {}),
+            **({"navigation": navigation} if navigation else {}),
             **({"environment": air} if day is None else {"conditions": day}),
         }
     )
@@ -176,17 +198,11 @@ def test_a_way_without_room_to_turn_that_is_hard_to_see_is_found_in_the_end() ->
 
 
 class Cell(NamedTuple):
-    """A cell of the table.
+    """A cell of the table."""
 
-    Attributes:
-        ends: how each flight ended.
-        shares: least clearance of each over the wanted one.
-        faults: what the referee found wrong.
-    """
-
-    ends: list[str]
-    shares: list[float]
-    faults: list[str]
+    ends: list[str]  # how each flight ended
+    shares: list[float]  # least clearance of each over the wanted one
+    faults: list[str]  # what the referee found wrong
 
     def __str__(self) -> str:
         """Goals reached, collisions and the bound of their share at 95 %, least clearance over the wanted one."""
@@ -195,12 +211,10 @@ class Cell(NamedTuple):
         return f"{reached}, {hit} (< {upper(hit, len(self.ends)):.0%}), {min(self.shares):.2f}"
 
 
-def _cell(family: str, condition: str, most: int, folder: Path, day: str | None) -> Cell:
+def _cell(family: str, condition: dict[str, Any], most: int, folder: Path, day: str | None) -> Cell:
     cell = Cell([], [], [])
     for number, path in enumerate(worlds(family, most)):
-        scenario = hard(
-            json.loads(path.read_text()), CONDITIONS[condition], 1 + number * (day is not None), day
-        )
+        scenario = hard(json.loads(path.read_text()), condition, 1 + number * (day is not None), day)
         run = folder / path.stem
         metrics = fly_to_folder(scenario, run, recording=False)
         cell.ends.append(metrics["outcome"])
@@ -214,6 +228,7 @@ def main(arguments: Sequence[str]) -> int:
     """Prints the table, a row as soon as it is flown, then what the referee found wrong."""
     parser = argparse.ArgumentParser()
     parser.add_argument("families", nargs="*", default=FAMILIES)
+    parser.add_argument("--table", choices=TABLES, default="hard")
     parser.add_argument("--most", type=int, default=10_000)
     parser.add_argument("--day", choices=("typical", "rough"))
     parser.add_argument("--write", action="store_true")
@@ -222,10 +237,10 @@ def main(arguments: Sequence[str]) -> int:
     lines = head("condition", *asked.families)
     print(*lines, sep="\n", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        for condition in CONDITIONS:
+        for name, condition in TABLES[asked.table].items():
             row = [_cell(each, condition, asked.most, Path(folder), asked.day) for each in asked.families]
             cells += row
-            lines.append(line(condition, *map(str, row)))
+            lines.append(line(name, *map(str, row)))
             print(lines[-1], flush=True)
     ends = [end for cell in cells for end in cell.ends]
     hit, faults = ends.count("collision"), [fault for cell in cells for fault in cell.faults]
