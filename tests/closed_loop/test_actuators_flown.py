@@ -8,7 +8,6 @@ import pytest
 from harness.analysis.metrics import metrics
 from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
-from harness.flight.record import Flight
 from harness.run.scenario_flight import flight_limits, make_loop
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario
@@ -77,8 +76,3 @@ def test_altitude_lost_behind_a_slow_elevator_is_the_servo_s() -> None:
     )
     assert causes(severe.with_({"aircraft.actuators": {"rate_limit_degps": 20.0}})) == {"actuator"}
     assert causes(severe.with_({"aircraft.actuators": {"rate_limit_degps": 600.0}})) == set()
-
-
-@pytest.fixture(scope="module")
-def flight() -> Flight:
-    return fly(make_loop(scenario()))

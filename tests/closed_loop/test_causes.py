@@ -70,12 +70,6 @@ def causes(flown: dict[str, Any]) -> set[str | None]:
     return bad
 
 
-def test_turn_radius_too_tight(check: Check) -> None:
-    """The bank limit of 45 degrees gives 64 m at 25 m/s."""
-    assert causes(check(turn(50.0))) == {"turn radius too tight"}
-    assert causes(check(turn(112.0))) == set()
-
-
 @pytest.mark.flights
 def test_turn_radius_too_tight_for_a_corner_cut_by_more_than_it_may_be(check: Check) -> None:
     """A corner of 170 degrees leads nearly twice the least radius, 64 m, beside the line; one of 90 degrees 26 m."""
@@ -107,16 +101,27 @@ SLOW_ROLL = {
 }
 
 
-def test_bank_limit(check: Check) -> None:
-    """66 m takes 44 of the 45 degrees: none are left to get back onto the path with."""
-    assert causes(check(turn(66.0), trackability__cross_track_m=1, **SLOW_ROLL)) == {"bank limit"}
-    assert causes(check(turn(112.0), trackability__cross_track_m=1, **SLOW_ROLL)) == set()
-
-
-def test_roll_rate(check: Check) -> None:
-    limits = {"trackability__cross_track_m": 0.5, **SLOW_ROLL}
-    assert causes(check(weave(112.0, 0.7, 8), **limits)) == {"roll rate"}
-    assert causes(check(weave(700.0, 0.7, 4), **limits)) == set()
+@pytest.mark.parametrize(
+    ("cause", "bad", "good", "keys"),
+    [
+        # The bank limit of 45 degrees gives 64 m at 25 m/s.
+        ("turn radius too tight", turn(50.0), turn(112.0), {}),
+        # 66 m takes 44 of the 45 degrees: none are left to get back onto the path with.
+        ("bank limit", turn(66.0), turn(112.0), {"trackability__cross_track_m": 1, **SLOW_ROLL}),
+        (
+            "roll rate",
+            weave(112.0, 0.7, 8),
+            weave(700.0, 0.7, 4),
+            {"trackability__cross_track_m": 0.5, **SLOW_ROLL},
+        ),
+        ("load factor", turn(90.0), turn(112.0), {"trackability__load_factor": 1.2}),
+    ],
+)
+def test_a_path_that_asks_too_much_and_one_that_does_not(
+    cause: str, bad: FloatArray, good: FloatArray, keys: dict[str, float], check: Check
+) -> None:
+    assert causes(check(bad, **keys)) == {cause}
+    assert causes(check(good, **keys)) == set()
 
 
 def test_roll_rate_with_the_ailerons_at_their_stops(check: Check) -> None:
@@ -127,11 +132,6 @@ def test_roll_rate_with_the_ailerons_at_their_stops(check: Check) -> None:
     north = wave_m**2 * 9.80665 * math.tan(bank) / speed**2 * (np.cos(east / wave_m) - 1.0)
     line = np.vstack(([[-2000.0, 0.0]], np.column_stack((east, north))))
     assert causes(check(line, "T38", trackability__cross_track_m=0.5)) == {"roll rate"}
-
-
-def test_load_factor(check: Check) -> None:
-    assert causes(check(turn(90.0), trackability__load_factor=1.2)) == {"load factor"}
-    assert causes(check(turn(112.0), trackability__load_factor=1.2)) == set()
 
 
 @pytest.mark.flights

@@ -11,12 +11,15 @@ from typing import Any
 
 import pytest
 
-from harness.run.scenario_flight import fly_to_folder
+from harness.flight.closed_loop import ClosedLoop, fly
+from harness.run.scenario_flight import fly_to_folder, make_loop
 from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
 from planner.interface import PlanRequest
 from planner.rolling_window.planner import RollingWindow
+from tests.closed_loop.small import small_world
 from tests.longer import longer
+from tests.point_mass import PointMass
 
 ROOT = Path(__file__).parents[2]
 
@@ -82,3 +85,11 @@ def test_a_plan_that_serves_on_is_kept_as_if_all_had_been_looked_at(
     assert any(early)
     monkeypatch.setattr(RollingWindow, "_serves_on", lambda _planner, _request: False)
     assert fly_to_folder(loaded, tmp_path / "b", recording=False)["digest"] == first
+
+
+def test_a_loop_is_flown_once() -> None:
+    loop = make_loop(small_world(mission={"time_limit_s": 1.0}), PointMass)
+    fly(loop)
+    for again in (fly, ClosedLoop):
+        with pytest.raises(RuntimeError, match="has been flown for 1 s already; every flight needs a loop"):
+            again(loop)
