@@ -11,12 +11,9 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
-from hypothesis import strategies as st
 
 from aircraft.interface import AircraftState
 from harness.cli.app import main
@@ -31,18 +28,8 @@ from planner.geometry.clearance import distances
 from planner.geometry.curves import on_loiter, pose_at, sample
 from planner.interface import Path
 from tests.closed_loop.small import small_world
-from tests.examples import examples
+from tests.closed_loop.test_convergence import BLUR, CLEARANCE_M, drawn
 from tests.point_mass import PointMass
-
-Obstacles = list[dict[str, Any]]
-
-SIDE_M, CELLS = 4500.0, 6
-CLEARANCE_M, TURN_RADIUS_M = 40.0, 110.4
-BLUR = 0.25
-"""What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
-
-BOUNDED = settings(derandomize=True, phases=(Phase.explicit, Phase.generate))
-"""A flight takes seconds: a failure is shown as drawn, for shrinking it would take minutes."""
 
 
 class Invariant:
@@ -101,76 +88,13 @@ def watched(scenario: Scenario) -> tuple[Flight, Invariant]:
     return fly(loop, [invariant]), invariant
 
 
-def polygon(*corners: tuple[float, float]) -> dict[str, Any]:
-    return {"polygon": {"vertices_m": [list(corner) for corner in corners]}}
-
-
-@st.composite
-def separate(draw: st.DrawFn) -> Obstacles:
-    """Circles and polygons on a grid, not far apart, that may touch each other."""
-    cell, found = SIDE_M / CELLS, []
-    for column in range(CELLS):
-        for row in range(CELLS):
-            if (column, row) in {(0, 0), (CELLS - 1, CELLS - 1)} or not draw(st.booleans()):
-                continue
-            x, y = (cell * (each + 0.5) + draw(st.integers(-150, 150)) for each in (column, row))
-            size, corners = draw(st.integers(30, 330)), draw(st.integers(2, 6))
-            if corners == 2:
-                found.append({"circle": {"center_m": [x, y], "radius_m": float(size)}})
-                continue
-            bearings = [math.tau * corner / corners for corner in range(corners)]
-            reach = [size * (1.0 if corner % 2 else 0.6) for corner in range(corners)]
-            found.append(
-                polygon(
-                    *(
-                        (x + r * math.cos(b), y + r * math.sin(b))
-                        for r, b in zip(reach, bearings, strict=True)
-                    )
-                )
-            )
-    return found
-
-
-@st.composite
-def mazes(draw: st.DrawFn) -> Obstacles:
-    """Walls on the lines of a grid, wherever it comes: corridors, dead ends, rooms that are closed."""
-    cell, half = SIDE_M / CELLS, 10.0
-    found = []
-    for line in range(1, CELLS):
-        for row in range(CELLS):
-            at, low, high = cell * line, cell * row - half, cell * (row + 1) + half
-            if draw(st.booleans()):
-                found.append(
-                    polygon((at - half, low), (at + half, low), (at + half, high), (at - half, high))
-                )
-            if draw(st.booleans()):
-                found.append(
-                    polygon((low, at - half), (high, at - half), (high, at + half), (low, at + half))
-                )
-    return found
-
-
-def scenario_with(obstacles: Obstacles, **mission: Any) -> Scenario:
-    corner = 0.5 * SIDE_M / CELLS
-    return small_world(
-        *obstacles,
-        area={"bounds_m": [0.0, 0.0, SIDE_M, SIDE_M]},
-        mission={
-            "start_m": [corner, corner],
-            "goal_m": [SIDE_M - corner, SIDE_M - corner],
-            "time_limit_s": 500.0,
-            **mission,
-        },
-        sensor={"range_m": 1000.0, "rays": 360},
-        planner={"kind": "rolling_window", "clearance_m": CLEARANCE_M},
-    )
-
-
 @pytest.mark.flights
-@given(obstacles=separate() | mazes(), course_deg=st.integers(0, 359))
-@settings(BOUNDED, max_examples=examples(10))
-def test_every_plan_in_effect_is_safe_for_ever(obstacles: Obstacles, course_deg: int) -> None:
-    flight, invariant = watched(scenario_with(obstacles, course_deg=float(course_deg)))
+@pytest.mark.parametrize("seed", range(100, 110))
+def test_every_plan_in_effect_is_safe_for_ever(seed: int) -> None:
+    """A world of each family, on any first course."""
+    course_deg = float(np.random.default_rng(seed).integers(0, 360))
+    keys = {"mission.time_limit_s": 500, "mission.course_deg": course_deg}
+    flight, invariant = watched(drawn(seed).scenario.with_(keys))
     assert flight.outcome in (Outcome.REACHED, Outcome.UNREACHABLE, Outcome.TIMEOUT), flight.reason
     assert invariant.plans == len(flight.plans)
     assert flight.track.clearance_m.min() >= (1.0 - BLUR) * CLEARANCE_M
@@ -179,8 +103,7 @@ def test_every_plan_in_effect_is_safe_for_ever(obstacles: Obstacles, course_deg:
 def test_the_invariant_sees_a_plan_that_is_not_safe() -> None:
     # The same plans, but a world that has something the planner was never shown.
     hidden = {"circle": {"center_m": [2000.0, 2250.0], "radius_m": 100.0}}
-    blind = make_loop(scenario_with([]), PointMass)
-    truth = make_loop(scenario_with([hidden]), PointMass).world
+    blind, truth = make_loop(small_world(), PointMass), make_loop(small_world(hidden), PointMass).world
     invariant = Invariant(truth, blind.mission.hold_radius_m, blind.mission.tracking_error_m)
     with pytest.raises(AssertionError, match="plan"):
         fly(replace(blind, termination=MissionEnd(blind.world, blind.mission, 120.0)), [invariant])
@@ -190,7 +113,7 @@ def test_the_invariant_sees_a_plan_that_is_not_safe() -> None:
 def test_a_sensor_that_cannot_see_a_turn_is_refused_with_the_numbers(
     tmp_path: FilePath, capsys: pytest.CaptureFixture[str], range_m: float, status: int
 ) -> None:
-    text = dump_scenario(scenario_with([]))
+    text = dump_scenario(small_world(sensor={"range_m": 1000.0, "rays": 360}))
     text = re.sub(r"rolling_step_m: [\d.]+,?\s*", "", text).replace(", }", "}")
     at = tmp_path / "short.yaml"
     at.write_text(text.replace("range_m: 1000.0", f"range_m: {range_m:g}"))

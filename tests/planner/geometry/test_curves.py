@@ -316,16 +316,9 @@ def test_moved_segments_are_the_same_curve_from_another_pose(
     away, there = (np.hypot(*(np.array(rows)[:, :2] - rows[0][:2]).T) for rows in (segments, elsewhere))
     np.testing.assert_allclose(there, away, atol=1e-6)
     np.testing.assert_allclose(moved(elsewhere, start), segments, atol=1e-5)
-
-
-@given(start=POSES, pieces=PIECES)
-def test_what_is_moved_again_and_again_keeps_its_size(start: Pose, pieces: list[tuple[float, float]]) -> None:
-    first = joined(start, pieces)
-    segments = first
-    for _ in range(100):
-        # As an aircraft does that begins each plan on the one before.
-        segments = moved(segments, Pose(*segments[0][:4]))
-    np.testing.assert_allclose(segments, first, atol=1e-6)
+    for _ in range(100):  # as an aircraft does that begins each plan on the one before
+        elsewhere = moved(elsewhere, Pose(*elsewhere[0][:4]))
+    np.testing.assert_allclose(moved(elsewhere, start), segments, atol=1e-5)
 
 
 @given(

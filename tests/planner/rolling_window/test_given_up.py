@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from planner.geometry.curves import Pose, end_of
-from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanStatus
+from planner.interface import FloatArray, Mission, MovingEdges, Plan, PlanStatus
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, RETRY_S
 from planner.rolling_window.planner import RollingWindow
 from planner.rolling_window.situation import NoRoomToTurn, Situation
@@ -18,22 +17,12 @@ from planner.world_stability import SETTLED_S
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
     SPACING,
-    Seen,
     first_request,
     nothing,
     planner,
     request_on,
 )
-
-
-class HalfOpen(Seen):
-    """Nothing is known of what lies further east than some place."""
-
-    to_m = 3000.0
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return points_m[:, 0] < self.to_m
-
+from tests.planner.rolling_window.test_states import HalfOpen, proved, searched_in_vain
 
 FAR = np.array([(0.0, 9000.0), (400.0, 9000.0)])
 
@@ -106,8 +95,8 @@ def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, search
     pilot._memory.cleared += gone
     now = Situation(request_on(plan, flown_m, seen), pilot._monitor.plan, flown_m)
     assert now.plan is not None
-    pilot._proofs.no_room_to_turn.closed = lambda position, most=0: True  # type: ignore[method-assign]
-    pilot._search.last = SimpleNamespace(done=True, stuck=None, candidates=[])  # type: ignore[assignment]
+    proved(pilot, no_room=True)
+    searched_in_vain(pilot)
     effort = pilot._giving_up.effort
     for _ in range(searches + MOST_RETRIES * (MOST_EFFORT + 1) - effort):
         assert pilot._no_way_found(now).status is PlanStatus.NO_PATH
@@ -147,9 +136,8 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
     far_on(pilot, seen, plan, flown_m, changed_s)
     flown = pilot._monitor.plan
     assert flown is not None
-    pilot._proofs.no_way.closed = lambda position, most=0: not for_turns_alone  # type: ignore[method-assign]
-    pilot._proofs.no_room_to_turn.closed = lambda position, most=0: True  # type: ignore[method-assign]
-    pilot._search.last = SimpleNamespace(done=True, stuck=None, candidates=[])  # type: ignore[assignment]
+    proved(pilot, no_way=not for_turns_alone, no_room=True)
+    searched_in_vain(pilot)
 
     def told(time_s: float) -> list[PlanStatus | None]:
         request = request_on(plan, flown_m, seen)._replace(time_s=time_s)

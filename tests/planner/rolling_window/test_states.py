@@ -32,10 +32,12 @@ MakePoints = Callable[..., FloatArray]
 
 
 class HalfOpen(Seen):
-    """Nothing is known of what lies further east than 3 km."""
+    """Nothing is known of what lies further east than some place."""
+
+    to_m = 3000.0
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return points_m[:, 0] < 3000.0
+        return points_m[:, 0] < self.to_m
 
 
 def flown(pilot: RollingWindow, seen: Seen) -> Plan:
@@ -74,14 +76,6 @@ def in_the_loiter() -> tuple[RollingWindow, Situation]:
     pilot.plan(request)
     assert pilot._monitor.plan is not None
     return pilot, Situation(request, pilot._monitor.plan, entry_m + 50.0)
-
-
-def test_a_plan_that_is_found_is_followed() -> None:
-    seen, pilot = Seen(nothing()), planner()
-    plan = flown(pilot, seen)
-    assert pilot.state is PlanningState.FOLLOWING
-    assert pilot.plan(request_on(plan, 10.0, seen)).status is PlanStatus.KEPT
-    assert pilot.state is PlanningState.FOLLOWING
 
 
 def test_a_plan_that_serves_is_prolonged_and_followed_on() -> None:

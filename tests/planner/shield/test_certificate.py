@@ -12,7 +12,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.geometry.curves import Limits, along, between, end_of, pose_at, poses_at, sample
+from planner.geometry.curves import Limits, along, between, pose_at, poses_at, sample
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, Path
 from planner.shield.certificate import Certified, Certifier, disc_radius_m
@@ -223,14 +223,6 @@ def test_a_turn_that_begins_after_room_to_roll_is_free_where_it_is_flown() -> No
     seen = FreeDiscs(np.array([*((east, north, 15.0) for east, north in on_it), disc]))
     found = certifier.certify(path, seen, terrain())
     assert found is None or seen.depth_m(sample(found.path, 2.0)).max() <= fine
-
-
-def test_no_further_than_the_horizon() -> None:
-    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
-    found = CERTIFIER.certify(path, FreeDiscs(np.array([(0.0, 0.0, 1e5)])), terrain())
-    assert found is not None
-    assert found.loiter_entry_m == pytest.approx(HORIZON)
-    assert math.dist(end_of(found.path)[:2], (HORIZON, 0.0)) < 1e-6
 
 
 def test_nothing_is_certified_beyond_where_a_path_is_cut() -> None:
