@@ -7,10 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from aircraft.interface import AircraftState
 from harness.flight.closed_loop import fly
-from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
-from harness.mapping.scan import RangeScan
+from harness.flight.observer import Observer
+from harness.flight.record import Flight, Outcome
 from harness.run.scenario_flight import make_loop
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from tests.closed_loop.small import small_world
@@ -21,15 +20,12 @@ Install = Callable[[Callable[[Mission, PlanRequest], Plan]], None]
 SCAN_S, STEP_S = 0.5, 0.1
 
 
-class Events:
+class Events(Observer):
     """Keeps what is told."""
 
     def __init__(self) -> None:
         self.told: list[tuple[float, str]] = []
 
-    def on_scan(self, scan: RangeScan, state: AircraftState) -> None: ...
-    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None: ...
-    def on_block(self, block: Track) -> None: ...
     def on_event(self, time_s: float, text: str) -> None:
         self.told.append((time_s, text))
 

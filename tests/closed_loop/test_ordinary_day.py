@@ -16,6 +16,7 @@ from aircraft.envelope import performance
 from aircraft.start import Atmosphere
 from harness.bench.tracking import course, fly_course
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+from tests.closed_loop.test_hard_conditions import hard
 
 CAMPAIGNS = FilePath(__file__).parents[2] / "scenarios" / "campaigns"
 CTU = FilePath(__file__).parents[3] / "shared" / "worlds" / "ctu_dubins" / "ctu-dubins-dense-14.json"
@@ -82,26 +83,9 @@ def test_turns_with_room_to_roll_are_kept_within_what_planning_allows_for(
 
 @pytest.mark.flights
 @pytest.mark.skipif(not CTU.exists(), reason="the shared worlds are not here")
-def test_a_dense_public_world_in_wind_is_flown_with_the_turns_that_wind_allows(tmp_path: FilePath) -> None:
+def test_a_dense_public_world_in_wind_is_flown_with_the_turns_that_wind_allows() -> None:
     world = json.loads(CTU.read_text())
-    scenario = {
-        "schema": "wayproof/scenario/1",
-        "name": "dense",
-        "area": {"bounds_m": world["bounds_m"]},
-        "obstacles": [{"polygon": {"vertices_m": each}} for each in world["polygons_m"]]
-        + [{"circle": {"center_m": [x, y], "radius_m": r}} for x, y, r in world["circles_m"]],
-        "mission": {
-            **{key: world[key] for key in ("start_m", "course_deg", "goal_m", "goal_radius_m")},
-            "altitude_m": 300,
-            "time_limit_s": 1200,
-        },
-        "aircraft": {"model": "aerosonde", "airspeed_mps": 25},
-        "sensor": {"range_m": world["sensor_range_m"]},
-        "planner": {"kind": "rolling_window", "clearance_m": world["clearance_m"]},
-        "environment": {"wind": {"speed_mps": 8, "from_deg": 300}},
-    }
-    (tmp_path / "dense.yaml").write_text(json.dumps(scenario))
-    run = wayproof.fly(tmp_path / "dense.yaml")
+    run = wayproof.fly(hard(world, {"environment": {"wind": {"speed_mps": 8, "from_deg": 300}}}))
     assert run.metrics["outcome"] == "reached"
     assert run.metrics["clearance_violation_s"] == 0.0
     assert run.metrics["cross_track_m"]["max"] < 1.0

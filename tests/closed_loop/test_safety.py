@@ -18,9 +18,9 @@ import pytest
 from aircraft.interface import AircraftState
 from harness.cli.app import main
 from harness.flight.closed_loop import fly
-from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
+from harness.flight.observer import Observer
+from harness.flight.record import AcceptedPlan, Flight, Outcome
 from harness.flight.termination import MissionEnd
-from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import make_loop
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.world.world import World
@@ -32,7 +32,7 @@ from tests.closed_loop.test_convergence import BLUR, CLEARANCE_M, drawn
 from tests.point_mass import PointMass
 
 
-class Invariant:
+class Invariant(Observer):
     """Looks at every plan that takes effect, and at every step of the flight."""
 
     def __init__(self, world: World, turn_radius_m: float, tracking_error_m: float) -> None:
@@ -70,15 +70,6 @@ class Invariant:
         # It touches nothing. The clearance is kept from what had been seen; the last of an edge may come into
         # sight later, and then the plan is replaced before it is flown that far.
         assert min(clearance) > 0.0, f"plan {accepted.plan_index}"
-
-    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
-        pass
-
-    def on_block(self, block: Track) -> None:
-        pass
-
-    def on_event(self, time_s: float, text: str) -> None:
-        pass
 
 
 def watched(scenario: Scenario) -> tuple[Flight, Invariant]:

@@ -92,23 +92,6 @@ def test_labels_lie_between_those_of_gaps_that_are_surely_closed_and_not_surely_
     assert is_finer(labels, components(points, 2.0 * CLEARANCE))
 
 
-@given(seed=SEEDS, clusters=st.integers(1, 6))
-def test_clear_clusters_are_the_connected_components(seed: int, clusters: int) -> None:
-    rng = np.random.default_rng(seed)
-    groups = []
-    for i in range(clusters):
-        steps = rng.uniform(0.2, 0.69, 12) * CLEARANCE
-        course = rng.uniform(0.0, math.tau, 12)
-        walk = np.cumsum(np.column_stack((steps * np.cos(course), steps * np.sin(course))), axis=0)
-        groups.append(walk + np.array((2000.0 * i, 0.0)))
-    points = np.concatenate(groups)
-    order = rng.permutation(len(points))
-    labels = memory_of(points[order]).labels
-    truth = np.repeat(np.arange(clusters), 12)[order]
-    assert is_finer(labels, truth)
-    assert is_finer(truth, labels)
-
-
 @given(seed=SEEDS, count=st.integers(2, 80), parts=st.integers(1, 8))
 def test_point_by_point_gives_the_same_obstacles_as_at_once(seed: int, count: int, parts: int) -> None:
     points = scattered(seed, count, 800.0)

@@ -12,10 +12,10 @@ import pytest
 
 from planner import contract
 from planner.geometry.course import Course
-from planner.geometry.curves import Pose, along
+from planner.geometry.curves import Point, Pose, along
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
-from planner.rolling_window.commitment import Commitment
+from planner.rolling_window.commitment import Commitment, explanation
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.shield.certificate import hold_centre
 from planner.shield.committed_plan import CommittedPlan, Start
@@ -146,3 +146,15 @@ def test_nor_nearer_to_the_border_than_an_aircraft_may_be_off_it(side: int, know
         mission = replace(NARROW, bounds_m=(bounds[0], bounds[1], bounds[2], bounds[3]))
         _, found = committed(known(np.zeros((0, 2))), mission, to_goal())
         assert (found is not None) is flown
+
+
+@pytest.mark.parametrize(
+    ("first", "told"),
+    [
+        ([(3000.0, 400.0)], "obstacle ahead at 3.0 km, passing left"),
+        ([(3000.0, -400.0)], "obstacle ahead at 3.0 km, passing right"),
+        ([], "way to the goal in view, 10.0 km to go"),
+    ],
+)
+def test_a_plan_says_what_is_ahead_and_on_which_side_it_is_passed(first: list[Point], told: str) -> None:
+    assert explanation((0.0, 0.0), (10_000.0, 0.0), [*first, (10_000.0, 0.0)]) == told

@@ -101,15 +101,3 @@ def test_what_was_seen_a_while_ago_has_moved_on_since(
     apart = np.hypot(*(one[:, None] - other).transpose(2, 0, 1))
     assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < SPACING
     assert len(other) < 24 * 200
-
-
-def test_as_the_aircraft_comes_nearer_the_places_draw_together() -> None:
-    angles = np.linspace(0.0, math.pi, 24)
-    points = np.column_stack((50.0 * np.cos(angles), 1000.0 + 50.0 * np.sin(angles)))
-    each = MovingEdges(0.0, points, (6.0, 0.0))
-    widths = [
-        float(np.ptp(met_at(each, (0.0, 900.0 - away), 0.0, SPEED, SPACING)[:, 0]))
-        for away in (50.0, 300.0, 800.0)
-    ]
-    assert 100.0 <= widths[0] < widths[1] < widths[2]
-    assert widths[0] < 100.0 + 6.0 * (LATER_S + 5.0)
