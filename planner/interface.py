@@ -108,40 +108,23 @@ class MapView(Protocol):
 
 @dataclass(frozen=True)
 class Mission:
-    """What stays the same for a whole flight.
+    """What stays the same for a whole flight."""
 
-    Attributes:
-        goal_m: (east, north) of the goal.
-        goal_radius_m: reached when inside this circle.
-        bounds_m: xmin, ymin, xmax, ymax of the area; must not be crossed.
-        clearance_m: wanted distance from every obstacle edge.
-        turn_radius_m: smallest radius a path may have.
-        speed_mps: airspeed.
-        roll_in_s: time from wings level to 90 % of 30 degrees, or of the bank limit if that is less.
-        tracking_error_m: largest expected distance of the aircraft from its path.
-        sensor_range_m: radius of the sensing range (the paper's r).
-        compute_latency_s: a plan takes effect this long after the request.
-        sensor_latency_s: a scan is known this long after it was taken.
-        wind_mps: the strongest steady wind to expect.
-        least_hold_radius_m: smallest radius of a full turn that ends a plan; None: that of any turn.
-        least_spaced_radius_m: smallest radius of turns with a straight between them on which the aircraft rolls;
-            None: that of any turn.
-    """
-
-    goal_m: tuple[float, float]
-    goal_radius_m: float
-    bounds_m: tuple[float, float, float, float]
-    clearance_m: float
-    turn_radius_m: float
-    speed_mps: float
-    roll_in_s: float
-    tracking_error_m: float
-    sensor_range_m: float
-    compute_latency_s: float = 0.0
-    sensor_latency_s: float = 0.0
-    wind_mps: float = 0.0
-    least_hold_radius_m: float | None = None
+    goal_m: tuple[float, float]  # (east, north) of the goal
+    goal_radius_m: float  # reached when inside this circle
+    bounds_m: tuple[float, float, float, float]  # xmin, ymin, xmax, ymax of the area; must not be crossed
+    clearance_m: float  # wanted distance from every obstacle edge
+    turn_radius_m: float  # smallest radius a path may have
+    speed_mps: float  # airspeed
+    roll_in_s: float  # from wings level to 90 % of 30 degrees, or of the bank limit if that is less
+    tracking_error_m: float  # largest expected distance of the aircraft from its path
+    sensor_range_m: float  # radius of the sensing range (the paper's r)
+    compute_latency_s: float = 0.0  # a plan takes effect this long after the request
+    sensor_latency_s: float = 0.0  # a scan is known this long after it was taken
+    wind_mps: float = 0.0  # the strongest steady wind to expect
+    least_hold_radius_m: float | None = None  # of a full turn that ends a plan; None: that of any turn
     least_spaced_radius_m: float | None = None
+    """Smallest radius of turns with a straight between them on which the aircraft rolls; None: that of any turn."""
 
     @property
     def hold_radius_m(self) -> float:
@@ -222,29 +205,17 @@ class Refused(NamedTuple):
 
 
 class PlanRequest(NamedTuple):
-    """One question to a planner.
+    """One question to a planner."""
 
-    Attributes:
-        time_s: simulated time.
-        position_m: (east, north) of the aircraft.
-        direction: unit vector of its ground velocity.
-        seen: the map so far.
-        flown: the plan in effect, None before the first.
-        arc_length_m: distance of the aircraft along `flown.path`, from its start.
-        scanned: a scan has come in since the last request.
-        refused: why the shield refused the planner's last path; None without a shield, and while it is flown.
-        committed: what is left of the certified path that is flown under a shield, and the turn it ends in; else None.
-    """
-
-    time_s: float
-    position_m: tuple[float, float]
-    direction: tuple[float, float]
-    seen: MapView
-    flown: Plan | None = None
-    arc_length_m: float = 0.0
-    scanned: bool = True
-    refused: Refused | None = None
-    committed: Path | None = None
+    time_s: float  # simulated time
+    position_m: tuple[float, float]  # (east, north) of the aircraft
+    direction: tuple[float, float]  # unit vector of its ground velocity
+    seen: MapView  # the map so far
+    flown: Plan | None = None  # the plan in effect, None before the first
+    arc_length_m: float = 0.0  # distance of the aircraft along `flown.path`, from its start
+    scanned: bool = True  # a scan has come in since the last request
+    refused: Refused | None = None  # why the shield refused the planner's last path; None while it is flown
+    committed: Path | None = None  # under a shield: what is left of the certified path, and its turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,24 +248,17 @@ class PlanPicture:
 class Plan:
     """One answer of a planner.
 
-    Attributes:
-        status: how the call ended.
-        reason: one sentence for the event log.
-        waypoints_m: (k, 2) fixed-altitude waypoints, anything that numpy makes such an array of; empty unless FOUND.
-        path: the curve through them; None unless FOUND.
-        picture: makes a drawing of how the plan was found, or None; called once for each path that is accepted.
-        wants_more_time: the search goes on: the planner wants to be asked again before the next scan.
-
     Raises:
         ValueError: the path has a tangent that is no unit vector: nothing could be flown or judged by it.
     """
 
-    status: PlanStatus
-    reason: str
+    status: PlanStatus  # how the call ended
+    reason: str  # one sentence for the event log
     waypoints_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    path: Path | None = None
-    picture: Callable[[], PlanPicture] | None = None
-    wants_more_time: bool = False
+    """(k, 2) fixed-altitude waypoints, anything that numpy makes such an array of; empty unless FOUND."""
+    path: Path | None = None  # the curve through them; None unless FOUND
+    picture: Callable[[], PlanPicture] | None = None  # draws how the plan was found; called once if accepted
+    wants_more_time: bool = False  # the search goes on: the planner wants to be asked before the next scan
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "waypoints_m", _frozen(self.waypoints_m))

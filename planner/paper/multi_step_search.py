@@ -24,23 +24,14 @@ from planner.paper.sectors import (
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """Section 3.3: the planning window U_1 = {x : |x - w_k| <= r_1}, and what was sensed in it.
+    """Section 3.3: the planning window U_1 = {x : |x - w_k| <= r_1}, and what was sensed in it."""
 
-    Attributes:
-        center_m: w_k, where the aircraft is.
-        radius_m: r_1. No track point lies beyond it.
-        points_m: (m, 2) sensed edge points whose grown discs meet the window.
-        keep_m: distance to be kept from each.
-        mission: goal, area and turn radius.
-        config: the symbols of the paper.
-    """
-
-    center_m: Point
-    radius_m: float
-    points_m: FloatArray
-    keep_m: float
-    mission: Mission
-    config: ImprovedBugConfig
+    center_m: Point  # w_k, where the aircraft is
+    radius_m: float  # r_1; no track point lies beyond it
+    points_m: FloatArray  # (m, 2) sensed edge points whose grown discs meet the window
+    keep_m: float  # distance to be kept from each
+    mission: Mission  # goal, area and turn radius
+    config: ImprovedBugConfig  # the symbols of the paper
 
     def holds(self, place_m: Point) -> bool:
         """Whether a track point may lie at a place: in U_1."""
@@ -55,21 +46,13 @@ class Window:
 
 @dataclass(frozen=True)
 class Track:
-    """Sub-segments w_s1 ... w_sn of a candidate.
+    """Sub-segments w_s1 ... w_sn of a candidate."""
 
-    Attributes:
-        nodes: the track points.
-        course_rad: theta on arrival at the last.
-        flown_m: length of the sub-segments.
-        left_m: x, distance from the last track point to the goal.
-        ended: it leads to the goal, or to the rim of the window.
-    """
-
-    nodes: tuple[Point, ...]
-    course_rad: float
-    flown_m: float
-    left_m: float
-    ended: bool = False
+    nodes: tuple[Point, ...]  # the track points
+    course_rad: float  # theta on arrival at the last
+    flown_m: float  # length of the sub-segments
+    left_m: float  # x, distance from the last track point to the goal
+    ended: bool = False  # it leads to the goal, or to the rim of the window
 
     @property
     def cost_m(self) -> float:
