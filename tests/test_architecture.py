@@ -146,10 +146,10 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("rolling_window",),
         ("paper",),
         ("shield",),
-        ("memory", "world_stability"),
+        ("keys", "memory", "world_stability"),
         ("geometry",),
         ("kernels",),
-        ("compiled", "keys", "nearest_edge", "plan_checks"),
+        ("compiled", "nearest_edge", "plan_checks"),
         ("interface", "kernel_cache"),
     ),
 }
