@@ -31,7 +31,7 @@ READMES = {
 FRONT_DOOR = ROOT / "harness" / "front_door"
 README = READMES["README.md"]
 CAMPAIGNS, FALSIFY = READMES["harness/campaign/README.md"], READMES["harness/falsify/README.md"]
-SET_UP = "python3 -m venv .venv && .venv/bin/pip install -q -c constraints.txt "
+SET_UP = "python3 -m venv .venv && .venv/bin/pip install -q --no-compile -c constraints.txt "
 MOST_LINES = 250
 FLY, TESTS = (line for line in README.splitlines() if line.startswith(SET_UP))
 
