@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from aircraft.airframes import AircraftError
     from aircraft.guidance.interface import GuidanceLimits, GuidanceOutput
     from aircraft.interface import AircraftState, Route
-    from harness.api.campaigns import certify, compare, load_campaign, sweep
+    from harness.api.campaigns import compare, load_campaign, sweep
     from harness.api.flights import fly, load_run
     from harness.api.metrics import Metrics
     from harness.api.paths import check, replay
@@ -31,7 +31,7 @@ __all__ = [
     "AircraftError", "AircraftState", "CampaignResult", "ComparisonResult", "FlightResult", "GuidanceLimits",
     "GuidanceOutput", "InputError", "MapView", "Metrics", "Mission", "Path", "Plan", "PlanPicture",
     "PlanRequest", "PlanStatus", "Planner", "PlannerError", "PlannerKind", "Route", "Scenario", "Status",
-    "SteppedFlight", "WriteError", "certify", "check", "compare", "dump_scenario", "fly", "load_campaign",
+    "SteppedFlight", "WriteError", "check", "compare", "dump_scenario", "fly", "load_campaign",
     "load_run", "load_scenario", "make", "replay", "sweep",
 ]  # fmt: skip
 

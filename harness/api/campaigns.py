@@ -1,12 +1,11 @@
-"""Many flights from Python: `compare`, `sweep`, `certify`, and reading a campaign's folder."""
+"""Many flights from Python: `compare`, `sweep`, and reading a campaign's folder."""
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from harness.api.flights import as_input_errors, in_python
 from harness.api.results import CampaignResult, ComparisonResult
@@ -14,9 +13,7 @@ from harness.files.input_file import InputError
 from harness.scenario.scenario import Scenario, load_scenario
 
 if TYPE_CHECKING:
-    from harness.analysis.metric import Claim
     from harness.campaign.flight import Answer
-    from harness.certification.certification import Certificate, Tally
     from harness.scenario.kinds import LoopPart
 
 
@@ -33,10 +30,7 @@ def compare(
 
     Scenarios are objects, files, or names of those that come with wayproof; planners and laws are kinds, or
     `FILE.py:NAME`, `MODULE:NAME`. `recording` records each flight and an overlay of all. `workers` flights are flown at
-    a time, by default one a processor.
-
-    Raises:
-        InputError: a scenario, planner, law or the folder cannot be used; nothing was flown.
+    a time, by default one a processor. An InputError says that one of them cannot be used; nothing was flown.
     """
     import pyarrow as pa
 
@@ -94,23 +88,19 @@ def sweep(
 ) -> CampaignResult:
     """Flies a campaign on all processors, or on a Dask cluster, one row each in `results.parquet`.
 
-    Args:
-        campaign: its file, or the name of one that comes with wayproof.
-        out: its folder; default: `runs/NAME`.
-        workers: flights at a time; default: one a processor.
-        scheduler: address of a Dask cluster, such as `tls://HOST:8786`. It can run code on this machine.
-        resume: fly only the runs missing in the folder.
-        progress: called with the answer of every run that has ended.
+    `campaign` is its file, or the name of one that comes with wayproof; `out` its folder, by default `runs/NAME`.
+    `workers` flights are flown at a time, by default one a processor; `scheduler` is the address of a Dask cluster that
+    flies instead, such as `tls://HOST:8786`, and can run code on this machine. `resume`: only the runs missing in the
+    folder are flown. `progress` is called with the answer of every run that has ended.
 
     Raises:
         InputError: the campaign or the folder cannot be used; nothing was flown.
         OSError: the folder cannot be written any more, or processes died; `resume=True` goes on.
     """
     from harness.campaign.campaign_file import load_campaign as read_campaign
-    from harness.campaign.folder import CampaignFolder
+    from harness.campaign.folder import CampaignFolder, fly_missing, told_left
     from harness.campaign.runs import CampaignRuns
     from harness.campaign.summary import write_summary
-    from harness.campaign.sweep import fly_missing, told_left
     from harness.campaign.workers import dask_workers, local_workers
     from harness.scenario.shipped import campaign_path
 
@@ -142,70 +132,3 @@ def load_campaign(folder: str | Path) -> CampaignResult:
     result = CampaignResult(path)
     len(result.table)
     return result
-
-
-def certify(
-    subject: Scenario | str | Path | Sequence[Sequence[float]],
-    claim: Claim | None = None,
-    *,
-    probability: float | None = None,
-    confidence: float = 0.95,
-    runs: int = 1000,
-    vary: Mapping[str, Any] | Sequence[str] = (),
-    conditions: str | None = None,
-    aircraft: str | None = None,
-    scenario: str | Path | None = None,
-    settings: Mapping[str, str] | None = None,
-    out: str | Path | None = None,
-    workers: int | None = None,
-    resume: bool = False,
-    progress: Callable[[Tally], None] | None = None,
-) -> Certificate:
-    """Flies a scenario or a given path on many days, and says how often a claim holds.
-
-        found = wayproof.certify("aerosonde_forest", probability=0.9, vary={"environment.wind.speed_mps": (0, 8)})
-        found.verdict, found.held, found.runs, found.probability_lower
-
-    Args:
-        subject: a scenario, its file or name; or a path: a file that `check` takes, or points (n, 2) in metres.
-        claim: `reached`, `no-contact`, `trackable`, or of a path `as-given`. Default: `reached`, of a path `as-given`.
-        probability: share of the days on which the claim is to hold; the flights end once that is shown or refuted.
-            None: all `runs` days are flown, and nothing is to be shown.
-        confidence: of each bound.
-        runs: number of days, at most.
-        vary: what is drawn anew every day: texts as `KEY=LO:HI`, `KEY=MEAN~SIGMA`, `KEY=A,B`; or by key path
-            `(low, high)`, such a text without its key, or a distribution as a campaign file has it.
-        conditions: replaces the scenario's.
-        aircraft: likewise; of a path by default `aerosonde`.
-        scenario: of a path: the world with obstacles, bounds and air.
-        settings: further keys to replace, by key path; values as YAML.
-        out: the folder; default: `runs/NAME/certify-CLAIM`.
-        workers: flights at a time; default: one a processor. They do not change the answer.
-        resume: fly only the days missing in the folder.
-        progress: told of the days that count, after every day that is over.
-
-    Raises:
-        InputError: subject, claim or folder cannot be used; nothing was flown.
-        OSError: the folder cannot be written any more; `resume=True` goes on.
-    """
-    from harness.campaign.workers import local_workers
-    from harness.certification.certification import Terms
-    from harness.certification.certification import certify as fly_days
-    from harness.certification.days import days_of, distributions
-    from harness.scenario.shipped import scenario_path
-
-    given = {"aircraft.model": aircraft, "conditions": conditions}
-    keys = [(key, json.dumps(value)) for key, value in given.items() if value is not None]
-    try:
-        drawn = distributions(vary)
-    except ValueError as error:
-        raise InputError(f"wayproof: vary: {error}") from error
-    with as_input_errors():
-        terms = Terms(probability, confidence)
-        world = None if scenario is None else scenario_path(str(scenario))
-        days = days_of(subject, [*keys, *(settings or {}).items()], drawn, claim, world, most=runs)
-        days.check()
-        folder = Path(out) if out is not None else Path("runs") / days.campaign.name / f"certify-{days.claim}"
-        with local_workers(workers or os.cpu_count() or 1) as flyers:
-            command = in_python(f"wayproof.certify({days.campaign.name!r}, {days.claim!r})")
-            return fly_days(days, folder, flyers, terms, resume=resume, progress=progress, command=command)

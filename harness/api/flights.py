@@ -14,22 +14,16 @@ from harness.api.metrics import Metrics
 from harness.api.results import FlightResult
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
-from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, registered
+from harness.scenario.kinds import GUIDANCE, PLANNER, registered
 from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
     from harness.flight.observer import Progress
 
-NEEDED: Final = [
-    "outcome",
-    "reason",
-    "flown_length_m",
-    "cross_track_m",
-    "trackable",
-    "trackability",
-    "digest",
-]
+NEEDED: Final = (
+    *("outcome", "reason", "flown_length_m", "cross_track_m", "trackable", "trackability", "digest"),
+)
 """Figures of every run."""
 
 
@@ -59,15 +53,14 @@ def fly(
 
         run = wayproof.fly("aerosonde_forest", planner=MyPlanner)
 
-    Args:
-        scenario: a scenario, its file, or the name of one that comes with wayproof.
-        planner: replaces the scenario's: a kind, `FILE.py:NAME` or `MODULE:NAME`, a class or function that takes the
-            mission or nothing and makes the planner, or an object with the method `plan(request)`.
-        guidance: replaces the scenario's law: likewise; a class or function takes the `GuidanceLimits` or nothing, an
-            object has the methods `follow(route, arc_length_m)` and `update(state)`.
-        out: the run folder to write, in place of an earlier run there; None: no folder.
-        recording: whether to record the flight for rerun (`run.show()`).
-        progress: called every few simulated seconds with simulated time (s), distance to go (m) and the state.
+    `scenario`: a scenario, its file, or the name of one that comes with wayproof.
+    `planner` replaces the scenario's: a kind, `FILE.py:NAME` or `MODULE:NAME`, a class or function that takes the
+    mission or nothing and makes the planner, or an object with the method `plan(request)`.
+    `guidance` replaces its law: likewise; a class or function takes the `GuidanceLimits` or nothing, an object has the
+    methods `follow(route, arc_length_m)` and `update(state)`.
+    `out`: the run folder to write, in place of an earlier run there; None: no folder.
+    `recording`: whether to record the flight for rerun (`run.show()`).
+    `progress`: called every few simulated seconds with simulated time (s), distance to go (m) and the state.
 
     Raises:
         InputError: the scenario, planner or folder cannot be used; nothing was flown.
@@ -90,17 +83,15 @@ def fly(
 
 def given_parts(scenario: Scenario | str | Path, planner: object, guidance: object) -> Scenario:
     """A scenario with a planner and a law as `fly` takes them; an InputError says which cannot be used."""
-    given = {"planner.kind": (planner, PLANNER), "guidance.kind": (guidance, GUIDANCE)}
-    kinds = {key: _name_of(*each) for key, each in given.items() if each[0] is not None}
+    kinds = {}
+    for key, given, part in (("planner.kind", planner, PLANNER), ("guidance.kind", guidance, GUIDANCE)):
+        if given is not None:
+            try:
+                kinds[key] = registered(given, part)
+            except ValueError as error:
+                raise InputError(f"wayproof: {part.noun}: {error}") from error
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     return loaded.with_(kinds) if kinds else loaded
-
-
-def _name_of(given: object, part: LoopPart) -> str:
-    try:
-        return registered(given, part)
-    except ValueError as error:
-        raise InputError(f"wayproof: {part.noun}: {error}") from error
 
 
 def flown_into(out: str | Path | None, scenario: Scenario, fly_to: Callable[[Path], object]) -> FlightResult:

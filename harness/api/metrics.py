@@ -18,10 +18,7 @@ OPTIONAL: Final = frozenset(metric.path.partition(".")[0] for metric in METRICS 
 
 
 class Figures(dict[str, Any]):
-    """A mapping of `metrics.json`, read only: a key is an attribute too, and a nested mapping is one of these.
-
-    run.metrics.cross_track_m.p95, run.metrics.check.corners[0].kept
-    """
+    """A mapping of `metrics.json`, read only: `run.metrics.cross_track_m.p95`, `run.metrics.check.corners[0].kept`."""
 
     def __init__(self, content: Mapping[str, Any]) -> None:
         super().__init__({name: _viewed(value) for name, value in content.items()})

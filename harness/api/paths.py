@@ -41,21 +41,14 @@ def check(
         run = wayproof.check("survey.plan", aircraft="aerosonde", wind=(8, 270))
         run.metrics.check.ok, run.metrics.check.verdict
 
-    Args:
-        path: a file that `wayproof check` takes, or points (n, 2 or 3): east, north, perhaps altitude, in metres.
-        aircraft: a name that `wayproof list aircraft` prints, or a folder.
-        scenario: gives obstacles, bounds, environment, seed, altitude and written limits; None: an empty calm world.
-        airspeed_mps: true airspeed; None: the aircraft's cruising speed.
-        altitude_m: above mean sea level; None: the path's, else the scenario's, else 300 m.
-        wind: speed (m/s) and the direction it blows from (degrees); None: the scenario's, else calm.
-        tolerance_m: largest distance from the path; None: a tenth of a written clearance, else 10 m.
-        corner_m: largest distance from corners; None: as tolerance_m, of a mission its acceptance radius or 90 m.
-        settings: further keys of a scenario, by key path; values as YAML.
-        out: the run folder to write; None: no folder.
-        recording: whether to record the flight for rerun.
-
-    Raises:
-        InputError: path, scenario, aircraft or folder cannot be used; nothing was flown.
+    `path` is a file that `wayproof check` takes, or points (n, 2 or 3): east, north, perhaps altitude, in metres.
+    `scenario` gives obstacles, bounds, environment, seed, altitude and written limits; None: an empty calm world.
+    `airspeed_mps` is true airspeed, by default the aircraft's cruising speed; `altitude_m` is above mean sea level, by
+    default the path's, else the scenario's, else 300 m; `wind` is a speed (m/s) and the direction it blows from (deg).
+    `tolerance_m` is allowed off the path, by default a tenth of a written clearance, else 10 m; `corner_m` at corners,
+    by default the same, of a mission its acceptance radius or 90 m. `settings` are further keys of a scenario, by key
+    path, values as YAML. `out` is the run folder to write, if any; `recording`: for rerun. An InputError says that
+    path, scenario, aircraft or folder cannot be used; nothing was flown.
     """
     from harness.run.path_check import asked, fly_check, origin_of
     from harness.run_files.path_files import given_points, read_path
@@ -101,17 +94,11 @@ def replay(
         found = wayproof.replay("flight.parquet", "ultrastick25e", "mission.json")
         found.told["simulated"]["lap_mean_s"] - found.told["flown"]["lap_mean_s"]
 
-    Args:
-        log: a table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...).
-        aircraft: a name that `wayproof list aircraft` prints, or a folder.
-        mission: a file that `wayproof check` takes, or a JSON with `mission.corners_east_north_m`; None: the mission
-            that an ArduPilot log (.bin) has.
-        out: the folder to write; None: `runs/replay/NAME` of the log.
-        settings: keys of the simulated flight's scenario, by key path; values as YAML.
-        recording: whether to record both flights for rerun.
-
-    Raises:
-        InputError: log, mission, aircraft or folder cannot be used; nothing was flown.
+    `log` is a table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...); `mission` a file that
+    `wayproof check` takes, or a JSON with `mission.corners_east_north_m`, by default the one that an ArduPilot log has.
+    `settings` are keys of the simulated flight's scenario, by key path, values as YAML. `out` is the folder, by default
+    `runs/replay/NAME` of the log; `recording`: both flights for rerun. An InputError says that one of them cannot be
+    used; nothing was flown.
     """
     from harness.replays.replay import replay as flown_anew
 

@@ -144,13 +144,6 @@ class CampaignResult:
         return summarise(self.folder)
 
     @property
-    def recordings(self) -> dict[int, Path]:
-        """The recordings that the campaign kept, by the number of the run."""
-        from harness.campaign.results import recordings_of
-
-        return {int(path.parent.name): path for path in recordings_of(self.folder)}
-
-    @property
     def outcomes(self) -> dict[str, int]:
         """Number of runs with each outcome, the most frequent first."""
         return dict(self.summary.outcomes)

@@ -53,12 +53,10 @@ def make(
             status = flight.step()
         run = flight.result()  # as wayproof.fly gives it, with the same digest
 
-    To decide itself, a caller gives its own planner or law as an object and changes the object between two steps: a
-    planner is asked after every scan, a guidance law at every step. `step(roll_command_rad=...)` steers for one step
-    in place of the law.
-
-    Scenario, planner and law are as `fly` takes them; an object serves every flight, a class makes one for each.
-    `observers` are told of each scan, plan and event, and of the track in blocks (`harness.flight.observer.Observer`).
-    `reset()` begins the flight. An InputError says that the scenario or planner cannot be used.
+    Scenario, planner and law are as `fly` takes them; an object serves every flight, a class makes one for each. To
+    decide itself, a caller changes its object between two steps: a planner is asked after every scan, a guidance law
+    at every step. `step(roll_command_rad=...)` steers for one step in place of the law. `observers` are told of each
+    scan, plan and event, and of the track in blocks (`harness.flight.observer.Observer`). An InputError says that the
+    scenario or planner cannot be used.
     """
     return SteppedFlight(given_parts(scenario, planner, guidance), observers)

@@ -44,12 +44,7 @@ def _bare(section: type[Section], name: str) -> BeforeValidator:
 
 
 class Campaign(Section):
-    """Many flights, completely described.
-
-    A case is one draw of one combination of scenario, world and grid values; every planner with every aircraft
-    flies each case. Attributes equal the keys of the file, except `schema_` and `set_`, which are `schema` and
-    `set` there.
-    """
+    """Many flights: every planner with every aircraft flies each draw of each combination of world and grid values."""
 
     schema_: Literal["wayproof/campaign/1"] = Field(alias="schema")
     """Format and version."""
@@ -205,7 +200,10 @@ def load_campaign(
     for index, name in enumerate(campaign.scenarios):
         loc: Loc = ("scenarios", index)
         for file in _files(name, path.parent, partial(fault, loc)):
-            base = _base(file)
+            keys = strict_yaml.read(file)
+            if not isinstance(keys.value, dict):
+                raise InputError(f"{file}:{keys.line}: must be a mapping that begins with `schema:`")
+            base = Base(file.name, str(file), absolute_paths(keys, file.parent))
             if base.name in bases:
                 raise fault(loc, f"is a second scenario called {base.name}; rename one")
             bases[base.name] = base
@@ -215,29 +213,13 @@ def load_campaign(
     return CampaignFile(campaign, source, root, tuple(bases.values()))
 
 
-def _base(file: Path) -> Base:
-    root = strict_yaml.read(file)
-    if not isinstance(root.value, dict):
-        raise InputError(f"{file}:{root.line}: must be a mapping that begins with `schema:`")
-    return Base(file.name, str(file), absolute_paths(root, file.parent))
-
-
-def is_campaign(path: Path) -> bool:
-    """Whether a file says that it is a campaign."""
-    return _says(path, "wayproof/campaign/")
-
-
-def is_scenario(path: Path) -> bool:
-    """Whether a file says that it is a scenario."""
-    return _says(path, "wayproof/scenario/")
-
-
-def _says(path: Path, schema: str) -> bool:
+def is_a(what: Literal["campaign", "scenario"], path: Path) -> bool:
+    """Whether a file says that it is a campaign, or a scenario."""
     try:
         said = strict_yaml.read(path).at(("schema",))
     except InputError:
         return False
-    return said is not None and str(said.value).startswith(schema)
+    return said is not None and str(said.value).startswith(f"wayproof/{what}/")
 
 
 def campaign_schema() -> dict[str, Any]:
@@ -260,10 +242,8 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
         if path.is_file():
             return [path]
         if path.is_dir():
-            found = sorted(path.glob("[!.]*.y*ml"))
-            if files := [
-                each for each in found if each.suffix in (".yaml", ".yml") and not is_campaign(each)
-            ]:
+            found = (each for each in sorted(path.glob("[!.]*.y*ml")) if each.suffix in (".yaml", ".yml"))
+            if files := [each for each in found if not is_a("campaign", each)]:
                 return files
             raise fault(f"is {entry!r}, a folder without scenario files (*.yaml, *.yml)")
     except OSError as error:
@@ -276,13 +256,11 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
 
 
 def absolute_paths(node: Node, folder: Path, keys: str = "") -> Node:
-    """The keys of a scenario or a campaign with aircraft, and files of obstacles, from the root of the file system on.
-
-    Circles and polygons are passed over: there may be thousands, without a file. `keys` is the key path of a part.
-    """
+    """The keys of a scenario or a campaign with absolute paths of aircraft and of files among the obstacles."""
     value = node.value
     if isinstance(value, tuple):
         return Node(tuple(absolute_paths(each, folder, keys) for each in value), node.line)
+    # Circles and polygons are passed over: there may be thousands, without a file.
     if isinstance(value, dict) and not {"circle", "polygon"} & value.keys():
         inner = {key: absolute_paths(each, folder, f"{keys}.{key}") for key, each in value.items()}
         return Node(inner, node.line)

@@ -1,12 +1,8 @@
-"""Runs in groups by a varied key, what a group comes to, and what people are shown of it: an entry of `QUESTIONS` each.
-
-A key's groups are its values, quantiles of drawn numbers, or quarters of the compass for directions.
-"""
+"""Runs in groups by a varied key, what a group comes to, and what people are shown of it (`QUESTIONS`)."""
 
 from __future__ import annotations
 
 import itertools
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -47,9 +43,8 @@ class Share:
 class Cell:
     """The figures of a group of runs; one that no run has is None.
 
-    `success` counts a goal proved unreachable, and a failure of the software, as not reached. Lengths are over the
-    clairvoyant optimum, of the runs that reached the goal; the other shares are of the runs that were flown to an end.
-    `planner_p99_ms` is the largest 99th percentile of a run; of all searches together it is no larger.
+    `success` is of all runs, the other shares of those flown to an end; lengths are over the clairvoyant optimum, of
+    the runs that reached the goal. `planner_p99_ms` is the largest 99th percentile of a run.
     """
 
     runs: int
@@ -102,16 +97,15 @@ def wilson(successes: int, trials: int) -> Share:
 
 @dataclass(frozen=True)
 class Question:
-    """What people are shown of a cell: one figure of it or two, by name.
-
-    `short` heads its column on a terminal; `bad` says how bad it is, from 0 to 1, where the first figure is known.
-    """
+    """What people are shown of a cell: one figure of it or two, by name."""
 
     title: str
     note: str
     short: str
+    """Heads its column on a terminal."""
     figures: tuple[str, ...]
     bad: Callable[[Any], float]
+    """How bad it is, from 0 to 1, where the first figure is known."""
     form: Callable[[Any], str] = str
 
     def text(self, cell: Cell) -> str:
@@ -139,8 +133,7 @@ LENGTH: Final = "Median/95th percentile where the goal was reached; full shade a
 NEAREST: Final = "Least distance to an obstacle edge in any run, in m"
 TRACKED: Final = f"The aircraft tracked every leg; {INTERVAL}"
 TIME: Final = "Milliseconds: largest p99 of a run/longest search; full shade at 20 ms of p99"
-LENGTHS: Final = ("length_median", "length_p95")
-TIMES: Final = ("planner_p99_ms", "planner_max_ms")
+LENGTHS, TIMES = ("length_median", "length_p95"), ("planner_p99_ms", "planner_max_ms")
 BELOW: Final = "Below the wanted clearance"
 
 QUESTIONS: Final = (
@@ -165,9 +158,7 @@ def legend() -> list[str]:
 MAX_NUMBERS: Final = 8
 """A key with more different numbers than this is taken as drawn at random."""
 BINS: Final = 4
-"""Numbers drawn at random are grouped into this many quantiles, directions into as many sectors."""
-MAX_NAMES: Final = 12
-"""At most this many names have a group of their own; the rarest of more share one."""
+"""More numbers drawn at random than this are grouped into so many quantiles, directions into as many sectors."""
 NONE: Final = "not set"
 DIRECTIONS: Final = ("from_deg", "course_deg", "heading_deg")
 """Ends of the paths of keys that are directions: 359 degrees is beside 0."""
@@ -185,11 +176,6 @@ class Axis:
     edges: tuple[float, ...] = ()
 
 
-def is_direction(key: str) -> bool:
-    """Whether a key is a direction."""
-    return key.endswith(DIRECTIONS)
-
-
 def are_numbers(values: Sequence[Scalar]) -> bool:
     """Whether values are numbers, but for those that are missing."""
     given = [value for value in values if value is not None]
@@ -197,39 +183,24 @@ def are_numbers(values: Sequence[Scalar]) -> bool:
 
 
 def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis, IntArray]:
-    """The groups of a key's values, and each value's group: numbers rising, names as they first appear, then `NONE`.
-
-    `drawn`: they were drawn at random: numbers are grouped where there are more than `BINS`.
-    """
-    counts = Counter(value for value in values if value is not None)
+    """The groups of a key's values, and each value's group: numbers rising, names as they first appear, then `NONE`."""
+    given = [*dict.fromkeys(value for value in values if value is not None)]
     if not are_numbers(values):
-        names = _names(counts)
-    elif len(counts) > (BINS if drawn else MAX_NUMBERS):
+        names = {value: str(value).lower() if isinstance(value, bool) else str(value) for value in given}
+    elif len(given) > (BINS if drawn else MAX_NUMBERS):
         return _binned(key, values)
     else:
-        names = dict(zip(sorted(counts), _told_apart(sorted(counts)), strict=True))
+        names = dict(zip(sorted(given), _told_apart(sorted(given)), strict=True))
     labels = [*dict.fromkeys(names.values()), *([NONE] if None in values else [])]
     index = [labels.index(NONE if value is None else names[value]) for value in values]
     return Axis(key, tuple(labels)), np.array(index, dtype=np.int64)
-
-
-def _names(counts: Counter[Any]) -> dict[Any, str]:
-    """A label for each value that is not a number."""
-    common = dict(counts.most_common(MAX_NAMES - 1 if len(counts) > MAX_NAMES else MAX_NAMES))
-    others = f"{len(counts) - len(common)} others"
-    first = {
-        value: str(value).lower() if value is True or value is False else str(value)
-        for value in counts
-        if value in common
-    }
-    return first | {value: others for value in counts if value not in common}
 
 
 def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
     """Quantiles of numbers, or quarters of the compass, each about one of its points."""
     numbers = np.array([np.nan if value is None else value for value in values], dtype=np.float64)
     missing = np.isnan(numbers)
-    if is_direction(key):
+    if key.endswith(DIRECTIONS):
         labels, edges = SECTORS, ()
         index = np.floor(np.nan_to_num((numbers + 45.0) % 360.0) / 90.0)
     else:

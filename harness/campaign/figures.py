@@ -8,19 +8,15 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from harness.campaign.cell import are_numbers, is_direction
+from harness.campaign.cell import DIRECTIONS, are_numbers
 from harness.campaign.results import Runs
 from harness.flight.record import FloatArray
 from harness.report.figure_style import colour, styled
 
-ROW_IN: Final = 0.17
-"""Height of a line of small letters."""
-PANEL_IN: Final = 1.5
-"""Height of a panel of small multiples."""
+ROW_IN, PANEL_IN = 0.17, 1.5
+"""Heights of a line of small letters and of a panel."""
 MAX_OUTLINES: Final = 1500
 """A figure with more points than this is drawn as a picture of dots: a browser takes seconds for so many outlines."""
-LABEL_LETTERS: Final = 32
-"""A longer key loses its middle, for it takes room from what is drawn."""
 MAX_KEYS: Final = 4
 """Only the first this many varied numbers have a column of panels."""
 ENOUGH: Final = 20
@@ -28,7 +24,7 @@ ENOUGH: Final = 20
 
 
 def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
-    """Figures against every varied number, a point a run; None where no number was varied.
+    """Figures (a row of panels each) against every varied number, a point a run; None where no number was varied.
 
     Runs that did not reach the goal are crosses. A figure's axis ends at its 1st and 99th percentile where others lie
     far beyond them; those are triangles at its edge.
@@ -45,7 +41,7 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
 
 def _drawn(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray]) -> Figure:
     """A row of panels a figure, a column a key."""
-    rows, columns, names = len(figures), len(varied), [_below(key) for key in varied]
+    rows, columns, names = len(figures), len(varied), [key.replace(".", ".\n") for key in varied]
     dots = rows * columns * len(runs) > MAX_OUTLINES
     with styled(0.5 + PANEL_IN * rows + ROW_IN * max(name.count("\n") for name in names)) as figure:
         grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -53,7 +49,7 @@ def _drawn(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray])
             panels[0].set_ylabel(label)
             for key, axes in zip(varied, panels, strict=True):
                 _panel(axes, runs.numbers(key), values, runs.reached, dots)
-                if is_direction(key):
+                if key.endswith(DIRECTIONS):
                     axes.set(xlim=(-10, 370), xticks=range(0, 361, 90))
         for name, axes in zip(names, grid[-1], strict=True):
             axes.set_xlabel(name)
@@ -86,9 +82,3 @@ def _panel(axes: Any, numbers: FloatArray, values: FloatArray, reached: Any, dot
         shown = np.clip(values[among], low, high) if is_outlying else values[among]
         axes.plot(numbers[among], shown, marker, ms=3.5, color=shade, alpha=0.7, rasterized=dots)
     axes.grid(color="0.9", lw=0.6)
-
-
-def _below(key: str) -> str:
-    """A key path below its panel, broken behind its dots."""
-    end = (LABEL_LETTERS - len("...")) // 2
-    return (key if len(key) <= LABEL_LETTERS else f"{key[:end]}...{key[-end:]}").replace(".", ".\n")

@@ -26,31 +26,27 @@ FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 
 @dataclass(frozen=True)
 class Job:
-    """One run to be flown.
-
-    Attributes:
-        packed: the scenario to fly (`harness.scenario.scenario.packed`).
-        recordings: when the run folder is kept; `folders`: always, without recordings.
-        again: the command that flies it again.
-        varied: the keys that the campaign varies and their values in this run, for the recording's properties.
-        claim: a run is a failure where this does not hold of it.
-        path: a check, if a given path is flown in place of what a planner finds; `packed` is empty then.
-        planners: planners that the process has to import, as FILE.py:NAME or MODULE:NAME; `laws`: likewise.
-        identity: of the recording among others; empty: as `fly_to_folder` has it.
-    """
+    """One run to be flown."""
 
     run: int
     packed: bytes
+    """The scenario to fly (`harness.scenario.scenario.packed`); empty where a given `path` is flown."""
     folder: Path
     recordings: Literal["all", "thin", "failures", "none", "folders"]
+    """When the run folder is kept; `folders`: always, without recordings."""
     optimum: bool
     again: str = ""
+    """The command that flies it again."""
     varied: Mapping[str, str | float | int | bool] = field(default_factory=dict)
+    """The keys that the campaign varies and their values in this run, for the recording's properties."""
     claim: Claim = "reached"
+    """A run is a failure where this does not hold of it."""
     path: PathCheck | None = None
     planners: tuple[str, ...] = ()
+    """Planners that the process has to import, as FILE.py:NAME or MODULE:NAME; `laws`: likewise."""
     laws: tuple[str, ...] = ()
     identity: str = ""
+    """Of the recording among others; empty: as `fly_to_folder` has it."""
 
 
 @dataclass(frozen=True)
@@ -63,17 +59,11 @@ class Answer:
     held: bool = False
 
 
-class NoMemoryError(Exception):
-    """There was no memory for a run: that is no fault of the run."""
-
-
-def fly_job(job: Job) -> Answer:
-    """Flies a job. What goes wrong in the flight is an answer too.
+def fly_job(job: Job) -> Answer | None:
+    """Flies a job. What goes wrong in the flight is an answer too; None where there was no memory for it.
 
     Raises:
-        NoMemoryError: there was none.
-        OSError: the run folder cannot be written (`WriteError`), or the disk is full.
-        RunFolderError: it cannot be made.
+        OSError: the run folder cannot be made or written, or the disk is full.
     """
     try:
         for part, sources in ((PLANNER, job.planners), (GUIDANCE, job.laws)):
@@ -83,23 +73,25 @@ def fly_job(job: Job) -> Answer:
         metrics = _flown(job, scenario)
         optimum_m = optimum_of(scenario).length_m if job.optimum else None
         cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
-    except (WriteError, RunFolderError):
+    except WriteError:
         raise
+    except RunFolderError as error:
+        raise OSError(str(error)) from error
     except Exception as error:
-        _blame_machine(error)
+        if _is_out_of_memory(error):
+            return None
         row = {"outcome": ERROR, "reason": sentence(error), "error": trace(error)}
         return Answer(job.run, row, {})
     return Answer(job.run, cells, time_cells(metrics), holds(job.claim, metrics))
 
 
-def _blame_machine(error: Exception) -> None:
-    """Raises what the machine did, if that made an error: no memory, or a full disk."""
+def _is_out_of_memory(error: Exception) -> bool:
+    """Whether there was no memory; raises what a full disk said: neither is a fault of the run."""
     for cause in (error, error.__cause__):
-        if isinstance(cause, MemoryError):
-            raise NoMemoryError from None
         # Whatever the constructor of a planner raised is its own, a full disk too.
         if isinstance(cause, OSError) and cause.errno in FULL and not isinstance(error, PlannerError):
             raise cause from None
+    return any(isinstance(cause, MemoryError) for cause in (error, error.__cause__))
 
 
 _imported = cache(registered_source)
@@ -109,24 +101,18 @@ _imported = cache(registered_source)
 def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
     """The metrics of a flight, its run folder kept as the job says."""
     if job.recordings in ("failures", "none"):
-        found = _measured(job, scenario)
+        if job.path is not None:
+            from harness.run.path_check import fly_check
+
+            found = fly_check(job.path)
+        else:
+            from harness.run.scenario_flight import fly_and_measure
+
+            found = fly_and_measure(scenario)
         if job.recordings == "none" or holds(job.claim, found):
             return found
         # Failures are few: to fly them again costs less than to record every flight.
     return _kept(job, scenario)
-
-
-def _measured(job: Job, scenario: Scenario) -> dict[str, Any]:
-    """The metrics of a flight that leaves no run folder."""
-    if job.path is not None:
-        from harness.run.path_check import fly_check
-
-        return fly_check(job.path)
-    from harness.analysis.metrics import metrics
-    from harness.flight.closed_loop import fly
-    from harness.run.scenario_flight import flight_limits, make_loop
-
-    return metrics(fly(make_loop(scenario)), flight_limits(scenario))
 
 
 def _kept(job: Job, scenario: Scenario) -> dict[str, Any]:

@@ -1,9 +1,8 @@
 """The folder of a campaign: `campaign.json` says what is flown, the journal what has been, two tables the results.
 
-The journal has a line for every run that is over, flushed to the disk before the next. A process killed in the middle
-of a line leaves a torn last one, which is left out; any other line that is not as it was written is damage, and nothing
-more is made of the folder then. The tables are made from the journal, and replaced whole. Whoever writes holds a lock
-on the file `lock` (flock), which ends with the process.
+The journal has a line for every run that is over, flushed to the disk before the next. A torn last line, of a process
+that was killed, is left out; any other line that is not as it was written is damage, and refused. The tables are made
+from the journal, and replaced whole. Whoever writes holds a lock on the file `lock` (flock).
 """
 
 from __future__ import annotations
@@ -11,17 +10,22 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import textwrap
+import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, Final
 
 from aircraft.airframes import airframe
+from harness.analysis.metric import ERROR
 from harness.campaign.flight import Answer
-from harness.campaign.results import INDEX, METRICS, RESULTS, RUN, TIMES, TIMINGS, table
+from harness.campaign.results import INDEX, METRICS, RESULTS, RUN, RUNS, TIMES, TIMINGS, table
 from harness.campaign.runs import CampaignRuns
+from harness.campaign.workers import Workers, fly_jobs
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.files.input_file import read_index
@@ -36,15 +40,15 @@ SEAL: Final = "sha256"
 """Key of the SHA-256 of what a line of the journal tells."""
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/2"
 MAX_INDEX_BYTES: Final = 10**9
-
+TABLES_EVERY_S: Final = 30.0
+TABLES_SHARE: Final = 0.01
+"""Tables are made anew at least this far apart, and so seldom that it takes at most this share of the time."""
 MAX_TOLD: Final = 3
+"""Differences that are named where a folder is of another campaign."""
 
 
 def claim_folder(path: Path, what: str, index: str, schema: str, lock: str | None = None) -> FolderLock:
-    """Holds the folder that a command writes (`what`), made where missing; a RunFolderError where that cannot be.
-
-    `lock`: name of a file to lock in place of the folder.
-    """
+    """Holds the folder that a command writes (`what`), by its file `lock` if named; or a RunFolderError."""
     if path.exists() and not path.is_dir():
         raise RunFolderError(f"{path} is a file, not a folder for a {what}")
     try:
@@ -62,17 +66,14 @@ def claim_folder(path: Path, what: str, index: str, schema: str, lock: str | Non
 class CampaignFolder:
     """The folder of a campaign that is being flown. Use as a context manager; the lock ends with it.
 
-    Attributes:
-        over: the runs that are over, by number.
-        grown: whether the campaign was begun with fewer draws.
+    `over`: the runs that are over, by number; `grown`: whether the campaign was begun with fewer draws.
     """
 
     def __init__(self, path: Path, runs: CampaignRuns, *, resume: bool) -> None:
         """Claims the folder: makes it, or with `resume` goes on with what it has of this campaign, or of fewer draws.
 
-        Raises:
-            RunFolderError: the folder holds something else, results without `resume` or of another campaign, or damage;
-                another process is flying into it, or it cannot be written.
+        A RunFolderError: it holds something else, results without `resume` or of another campaign, or damage; another
+        process is flying into it, or it cannot be written.
         """
         self.path, self._runs = path, runs
         with ExitStack() as stack:
@@ -170,6 +171,58 @@ class CampaignFolder:
                 "another folder"
             )
         return grows or bool(before["grown"])
+
+
+def fly_missing(
+    runs: CampaignRuns,
+    folder: CampaignFolder,
+    workers: Workers,
+    progress: Callable[[Answer], None] | None = None,
+    enough: Callable[[], bool] = lambda: False,
+) -> list[int]:
+    """Flies what is missing; whatever ends it, what is done is in the folder's tables.
+
+    `enough`: asked before every look whether what is over answers the question; what still flies is given up then.
+    The numbers that are returned are of runs whose process was killed, or had no memory: they are no results.
+    """
+    left: list[int] = []
+    tables_due = time.monotonic()
+
+    def over(run: int, answer: Answer | None) -> None:
+        if answer is None or answer.row["outcome"] == ERROR:
+            # What a crash has left is no whole run folder.
+            shutil.rmtree(folder.path / RUNS / str(run), ignore_errors=True)
+        if answer is None:
+            left.append(run)
+            return
+        folder.append(replace(answer, row={**runs.cells(run), **answer.row}))
+        if progress is not None:
+            progress(answer)
+
+    def write_at_times() -> None:
+        nonlocal tables_due
+        begun = time.monotonic()
+        if folder.over and begun >= tables_due:
+            folder.write_tables()
+            tables_due = time.monotonic() + max(TABLES_EVERY_S, (time.monotonic() - begun) / TABLES_SHARE)
+
+    try:
+        missing = (runs.job(run, folder.path) for run in range(len(runs)) if run not in folder.over)
+        fly_jobs(missing, workers, over, write_at_times, enough)
+    finally:
+        if folder.over or left:
+            folder.write_tables()
+    return sorted(left)
+
+
+def told_left(runs: Sequence[int]) -> str:
+    """A sentence on the runs that the machine kept from their ends."""
+    first = ", ".join(map(str, runs[:5])) + (", ..." if len(runs) > 5 else "")
+    were, them = ("was", "it") if len(runs) == 1 else ("were", "them")
+    return (
+        f"{counted(len(runs), 'run')} {were} not flown to the end ({first}): the process died, or had no memory, each "
+        f"time that it was tried; --resume flies {them}"
+    )
 
 
 def _read_journal(path: Path) -> tuple[dict[int, Answer], int]:

@@ -1,7 +1,6 @@
 """Planners against each other on the same cases: differences of each figure with intervals and a paired test.
 
-A pair is one case flown with the same aircraft by both planners. What the world, the weather and the seed do to a
-flight is then in both halves of a pair and drops out of their difference.
+A pair is one case flown with the same aircraft by both planners: world, weather and seed drop out of the difference.
 """
 
 from __future__ import annotations
@@ -49,20 +48,17 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Tested:
-    """One figure of two planners on the pairs of which both have it: their means, in the unit of the label.
-
-    Attributes:
-        difference: mean of the first less the second, with its bootstrap interval over the cases.
-        p: of Wilcoxon's signed-rank test over the cases (two-sided), corrected by Holm's method for all figures of the
-            two planners; None where all pairs agree or there are fewer than `MIN_CASES`.
-    """
+    """One figure of two planners on the pairs of which both have it: their means, in the unit of the label."""
 
     figure: str
     pairs: int
     first: float
     second: float
     difference: Estimate
+    """Mean of the first less the second, with its bootstrap interval over the cases."""
     p: float | None
+    """Of Wilcoxon's signed-rank test over the cases (two-sided), corrected by Holm's method for all figures of the two
+    planners; None where all pairs agree or there are fewer than `MIN_CASES`."""
 
 
 @dataclass(frozen=True)
@@ -86,15 +82,17 @@ def duels(
 ) -> tuple[Duel, ...]:
     """Every planner against every other, in the order in which they first appear.
 
-    `cases`: of each flight, what a pair has in common: the case first, then what else there is, its aircraft perhaps.
-    `figures`: by name of `TESTED`, one a flight; NaN where there is none.
+    `cases`: what a pair has in common: case, perhaps aircraft. `figures`: by name of `TESTED`, NaN where there is none.
     """
     flown: dict[str, dict[Any, int]] = {}
     for row, (planner, case) in enumerate(zip(planners, cases, strict=True)):
         flown.setdefault(planner, {})[case] = row
-    every = {"goals reached, %": 100.0 * np.array(reached, dtype=np.float64)}
-    every |= {_label(each): figures[each.name] * _factor(each) for each in TESTED if each.name in figures}
     held, found = np.array(reached, dtype=bool), []
+    every = {"goals reached, %": 100.0 * held}
+    for each in TESTED:
+        if each.name in figures:
+            unit, percent = (", %", 100.0) if each.kind == "bool" else ("", 1.0)
+            every[each.label + unit] = figures[each.name] * each.factor * percent
     for first, second in itertools.combinations(flown, 2):
         common = [case for case in flown[first] if case in flown[second]]
         rows = np.array([[flown[name][case] for case in common] for name in (first, second)], dtype=int)
@@ -104,14 +102,6 @@ def duels(
         counts = (len(common), int((won & ~lost).sum()), int((lost & ~won).sum()), int((won & lost).sum()))
         found.append(Duel(first, second, *counts, _corrected([*filter(None, tested)])))
     return tuple(found)
-
-
-def _label(metric: Metric) -> str:
-    return f"{metric.label}, %" if metric.kind == "bool" else metric.label
-
-
-def _factor(metric: Metric) -> float:
-    return metric.factor * (100.0 if metric.kind == "bool" else 1.0)
 
 
 def _tested(label: str, halves: FloatArray, cases: IntArray) -> Tested | None:
@@ -141,8 +131,7 @@ def _corrected(tested: Sequence[Tested]) -> tuple[Tested, ...]:
 def mean_estimate(differences: FloatArray, cases: IntArray) -> Estimate:
     """The mean of paired differences (n,), all finite, with the percentile bootstrap interval over the cases.
 
-    All pairs of a case, one an aircraft, are drawn together: they share its world, weather and seed. Efron and
-    Tibshirani, An Introduction to the Bootstrap (1993), chapters 8 and 13.
+    All pairs of a case are drawn together. Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 8 and 13.
     """
     mean = float(differences.mean())
     different, index = np.unique(cases, return_inverse=True)

@@ -50,11 +50,9 @@ METRICS: Final = {each.path: each.kind for each in WITHOUT_TIMES} | dict.fromkey
 )
 """Columns after them: what `metrics.json` has, dots between its levels, times left out, and more.
 
-Of what is there only with terrain, with navigation errors or of a given path the other runs have nothing.
 Of the legs of `trackability` there are their number, that of those not trackable, and their causes, each once;
-`wanted_clearance_m` is the planner's `clearance_m`; `optimum_m` is the shortest path of a point that knows the
-world and keeps the clearance, `length_ratio` the flown length over it where the goal was reached; `error` is a
-traceback.
+`wanted_clearance_m` is the planner's `clearance_m`; `optimum_m` is the shortest path of a point that knows the world
+and keeps the clearance, `length_ratio` the flown length over it where the goal was reached; `error` is a traceback.
 """
 TIMES: Final = {"run": "int"} | {
     each.path.removeprefix("timing."): each.kind for each in FIGURES if each.timed
@@ -91,12 +89,9 @@ def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:
 def table(
     rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], about: Mapping[str, Any]
 ) -> pa.Table:
-    """Rows as a table.
+    """Rows as a table that says what it is `about`, as JSON has it.
 
-    Args:
-        rows: cells by column; those that are missing are null.
-        columns: what each column holds: int, number, bool, text; or empty, for what stands there, JSON where mixed.
-        about: what goes with it of its campaign, as JSON has it.
+    `columns`: what each holds: int, number, bool, text; or empty, for what stands there, JSON where mixed.
     """
     import pyarrow as pa
 
@@ -164,14 +159,9 @@ def recordings_of(folder: Path) -> list[Path]:
 
 
 class Runs:
-    """The runs of a campaign as its tables have them, a column a figure.
+    """The runs of a campaign as its tables have them; `planned` is how many it has, flown or not, where that is known.
 
     A planner or an aircraft that is named more than once is told apart by the keys that each entry gives.
-
-    Attributes:
-        planned: how many runs the campaign has, flown or not; None where the results do not say so.
-        varied: columns that say what was varied: names with more than one value, and the varied key paths.
-        reached: whether each run reached its goal.
     """
 
     def __init__(self, results: pa.Table, timings: pa.Table | None = None) -> None:
@@ -179,7 +169,10 @@ class Runs:
         self.campaign: Mapping[str, Any] = about.get("campaign", {})
         self.planned: int | None = about.get("runs")
         self._count = results.num_rows
-        self._columns = {name: _without_nan(results[name]) for name in results.column_names}
+        self._columns: dict[str, list[Any]] = {
+            name: [None if value != value else value for value in results[name].to_pylist()]
+            for name in results.column_names
+        }
         self._tell_apart("planner", self.campaign.get("planners", ()), "kind")
         self._tell_apart("aircraft", self.campaign.get("aircraft", ()), "model")
         before = itertools.takewhile(lambda name: name != "outcome", self._columns)
@@ -248,7 +241,3 @@ class Runs:
             if named[value] > 1:
                 told = [f"{key} {cells[row]}" for key, cells in columns.items() if cells[row] is not None]
                 self._columns[name][row] = ", ".join((value, *told))
-
-
-def _without_nan(column: pa.ChunkedArray) -> list[Any]:
-    return [None if value != value else value for value in column.to_pylist()]

@@ -1,4 +1,4 @@
-"""The runs of a campaign, by number: what each flies follows from the campaign and its number, never from order.
+"""The runs of a campaign: what each flies follows from the campaign and its number, never from order.
 
 Case `c` is draw `c // combinations` of combination `c % combinations`; run `r` flies case `r // pairs` with
 planner and aircraft `r % pairs`. A case's streams are children of the campaign's root seed
@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeAlias
@@ -34,35 +33,10 @@ SEED, WORLD, DRAW = range(3)
 
 MOST_KEPT: Final = 100_000_000
 """Bytes of scenarios that are kept from the check on: to make one takes some six times as long as to unpack it."""
-
 KIND, MODEL = ("planner", "kind"), ("aircraft", "model")
 """The section of a scenario that an entry of a list replaces, and its key that a bare entry gives."""
 LISTED: Final = {"planner": "planners", "aircraft": "aircraft"}
 """The list of a campaign, by section."""
-
-
-@dataclass(frozen=True)
-class PlannedRun:
-    """One run of a campaign, before it is flown; its fields are the first columns of `results.parquet`.
-
-    Attributes:
-        case: runs of one case fly the same world with the same seed and draws.
-        world: name of its file, or label of the forest.
-        varied: grid and drawn values, and those of its entries, by key path; lists and mappings as JSON text.
-    """
-
-    run: int
-    case: int
-    scenario: str
-    world: str
-    planner: str
-    aircraft: str
-    seed: int
-    varied: dict[str, Scalar]
-
-    def cells(self) -> dict[str, Any]:
-        """Its first columns in `results.parquet`."""
-        return {**{name: getattr(self, name) for name in RUN}, **self.varied}
 
 
 class _Change(NamedTuple):
@@ -88,16 +62,12 @@ class _Place(NamedTuple):
 
 
 class CampaignRuns:
-    """All runs of a campaign.
-
-    Attributes:
-        planners: the kinds of planners that fly; `aircraft`: the models.
-        can_grow: whether a campaign with more draws may go on with the runs of one with fewer.
-        claim: a run is a failure where this does not hold of it.
-    """
+    """All runs of a campaign; `planners` are the kinds that fly, `aircraft` the models."""
 
     can_grow: bool = True
+    """Whether a campaign with more draws may go on with the runs of one with fewer."""
     claim: Claim = "reached"
+    """A run is a failure where this does not hold of it."""
 
     def __init__(
         self, file: CampaignFile, planners: tuple[str, ...] = (), laws: tuple[str, ...] = ()
@@ -127,54 +97,45 @@ class CampaignRuns:
     @cached_property
     def varied(self) -> list[str]:
         """Key paths that differ between runs: of the grid, of what is drawn, and of the entries."""
+        drawn = map(strict_yaml.as_spelt, (*self.campaign.grid, *self.campaign.random))
         entries = [change.loc for axis in self._entries for entry in axis for change in entry]
-        own = [key_path(loc) for loc in entries if loc not in (KIND, MODEL)]
-        return [
-            *dict.fromkeys([*map(strict_yaml.as_spelt, (*self.campaign.grid, *self.campaign.random)), *own])
-        ]
+        return [*dict.fromkeys([*drawn, *(key_path(loc) for loc in entries if loc not in (KIND, MODEL))])]
 
     @cached_property
     def _whole(self) -> list[str]:
         """Keys drawn at random that take whole numbers alone, from ranges that end at such."""
         drawn = {name: each for name, each in self.campaign.random.items() if not each.choice}
-        middle = {
-            name: each.whole_number(0.5) if each.is_whole else each.number(0.5)
+        middle = [
+            _Change(loc_of(name), Node(each.whole_number(0.5) if each.is_whole else each.number(0.5), 0), ())
             for name, each in drawn.items()
-        }
+        ]
         with suppress(InputError, KeyFaults):  # the check of the runs tells of their faults
-            root, _ = self._root(
-                0, [_Change(loc_of(name), Node(each, 0), ()) for name, each in middle.items()]
-            )
-            scenario = scenario_from(root.plain()) if drawn else None
-            return [
-                name
-                for name, each in drawn.items()
-                if scenario and each.is_whole and takes_whole_numbers(scenario, loc_of(name))
-            ]
+            scenario = scenario_from(self._root(0, middle)[0].plain())
+            whole = (name for name in drawn if takes_whole_numbers(scenario, loc_of(name)))
+            return [name for name in whole if drawn[name].is_whole]
         return []
 
-    def run(self, number: int) -> PlannedRun:
-        """Run `number`, from 0."""
+    def cells(self, number: int) -> dict[str, Any]:
+        """The first columns of `results.parquet` for run `number`, from 0: `RUN`, then what varies by key path.
+
+        Runs of one `case` fly the same world with the same seed and draws; `world` is the name of its file, or of the
+        generator. Lists and mappings are JSON text.
+        """
         place = self._place(number)
         base, campaign = self.file.bases[place.base], self.campaign
         changes = [*_chosen(self._entries, place.entries), *_chosen(self._grid, place.grid)]
         given = {key_path(each.loc): _cell(each.node) for each in [*changes, *self._drawn(place.case)]}
-        return PlannedRun(
-            number,
-            place.case,
-            base.name,
-            campaign.worlds[place.world].label if campaign.worlds else base.file,
-            self.planners[place.entries[0] if campaign.planners else place.base],
-            self.aircraft[place.entries[1] if campaign.aircraft else place.base],
-            self._seed(place.case),
-            {name: given.get(name) for name in self.varied},
-        )
+        planner = self.planners[place.entries[0] if campaign.planners else place.base]
+        model = self.aircraft[place.entries[1] if campaign.aircraft else place.base]
+        world = campaign.worlds[place.world].label if campaign.worlds else base.file
+        named = (number, place.case, base.name, world, planner, model, self._seed(place.case))
+        return {**dict(zip(RUN, named, strict=True)), **self._varied(given)}
+
+    def _varied(self, row: Mapping[str, Any]) -> dict[str, Scalar]:
+        return {name: row.get(name) for name in self.varied}
 
     def scenario(self, number: int, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-        """What run `number` flies, complete; an InputError that names what in the campaign makes it no scenario.
-
-        `overrides`: keys to replace besides, as `load_scenario` takes them.
-        """
+        """What run `number` flies, keys replaced as by `load_scenario`; an InputError names what makes it none."""
         if number in self._made and not overrides:
             return unpacked(self._made[number])
         root, changes = self._root(number, self._drawn(self._place(number).case))
@@ -220,7 +181,7 @@ class CampaignRuns:
             self.campaign.recordings,
             self.campaign.optimum,
             self.again(number, folder),
-            {name: value for name, value in self.run(number).varied.items() if value is not None},
+            {name: cell for name, cell in self._varied(self.cells(number)).items() if cell is not None},
             claim=self.claim,
             planners=self._sources[0],
             laws=self._sources[1],
@@ -230,7 +191,7 @@ class CampaignRuns:
     def again(self, number: int, folder: Path) -> str:
         """The command that flies run `number` again."""
         law = self.campaign.set_.get(LAW, "")
-        return fly_again(folder / RESULTS, number, self.run(number).planner, law)
+        return fly_again(folder / RESULTS, number, self.cells(number)["planner"], law)
 
     def plain(self) -> dict[str, Any]:
         """All that says what is flown, as JSON."""
@@ -308,7 +269,7 @@ class CampaignRuns:
                 named = loc == change.loc and change.origin[0] != "worlds"
                 inner = "" if named else f"{key_path(loc)}: "
                 return self._line(change.origin, f"{inner}{sentence} (run {number})")
-        told = "".join(f", {name} {value}" for name, value in self.run(number).varied.items())
+        told = "".join(f", {name} {value}" for name, value in self._varied(self.cells(number)).items())
         where = f"(run {number} of {self.file.source}{told})"
         source = self.file.bases[self._place(number).base].source
         return fault_line(source, root.line_of(loc), loc, f"{sentence} {where}")
@@ -331,7 +292,7 @@ def flown_run(
 ) -> tuple[Scenario, str | None]:
     """What a run of a campaign flew, and the digest of its row, by `results.parquet` alone; or an InputError.
 
-    `overrides`: keys to replace besides; where they change what is flown, or the row is missing, there is no digest.
+    There is no digest where the row is missing, or `overrides` change what is flown.
     """
     table, about = read_table(results)
     runs = CampaignRuns(CampaignFile.from_plain(about, str(results)))

@@ -51,13 +51,7 @@ class Table:
 
 @dataclass(frozen=True)
 class WorstRun:
-    """A run to look at.
-
-    Attributes:
-        name: scenario or world, planner and aircraft.
-        clearance_ratio: its least clearance over the wanted one, where that is known.
-        folder: its run folder relative to the campaign's, and `view` the command that shows its recording; or empty.
-    """
+    """A run to look at; `name`: its scenario or world, planner and aircraft."""
 
     run: int
     name: str
@@ -66,32 +60,31 @@ class WorstRun:
     reason: str
     min_clearance_m: float | None
     clearance_ratio: float | None
+    """Its least clearance over the wanted one, where that is known."""
     varied: Mapping[str, Any]
     folder: str
+    """Its run folder relative to the campaign's, and `view` the command that shows its recording; or empty."""
     view: str
     command: str
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The answers.
-
-    Attributes:
-        outcomes: number of runs by outcome, the most frequent first.
-        worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
-        untracked: number of runs that were not tracked, by the causes of all their legs, the most frequent first.
-        planned: how many runs the campaign has, flown or not; None where the results do not say so.
-    """
+    """The answers."""
 
     name: str
     varied: tuple[str, ...]
     outcomes: Mapping[str, int]
+    """Number of runs by outcome, the most frequent first."""
     total: Cell
     tables: tuple[Table, ...]
     worst: tuple[WorstRun, ...]
+    """Failures, collisions first; where nothing failed, the runs that came closest to an obstacle."""
     untracked: Mapping[str, int]
+    """Number of runs that were not tracked, by the causes of all their legs, the most frequent first."""
     duels: tuple[Duel, ...]
     planned: int | None = None
+    """How many runs the campaign has, flown or not; None where the results do not say so."""
 
     @property
     def never(self) -> str:
@@ -113,10 +106,7 @@ class Summary:
 
 
 def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summary:
-    """The answers of the campaign in a folder; an InputError where there is none, or no column of a key.
-
-    `by`: one or two keys for each table; default: every two of the first varied keys.
-    """
+    """The answers of the campaign in a folder, with a table for each one or two keys in `by`; or an InputError."""
     runs = Runs.of(folder)
     for each in by or ():
         if len(each) not in (1, 2) or len(set(each)) < len(each):
@@ -168,17 +158,9 @@ def _table(runs: Runs, *keys: str) -> Table:
 
 
 def _worst(runs: Runs, folder: Path) -> tuple[WorstRun, ...]:
-    """Failures by severity, then by clearance over the wanted one, or by clearance where that is unknown.
-
-    Where nothing failed, the few that came closest.
-    """
-    ratio, clearance_m, outcomes = (
-        runs.clearance_ratio,
-        runs.numbers("min_clearance_m"),
-        runs.texts("outcome"),
-    )
-    near = np.nan_to_num(ratio if np.isfinite(ratio).any() else clearance_m, nan=np.inf)
-    numbers = runs.values("run")
+    """Failures by severity, then by clearance over the wanted one or alone; if none failed, the closest few."""
+    ratio, outcomes, numbers = runs.clearance_ratio, runs.texts("outcome"), runs.values("run")
+    near = np.nan_to_num(ratio if np.isfinite(ratio).any() else runs.numbers("min_clearance_m"), nan=np.inf)
     order = sorted(range(len(runs)), key=lambda row: (-severity(outcomes[row]), near[row], numbers[row]))
     failed = int((~runs.reached).sum())
     return tuple(_worst_run(runs, row, folder) for row in order[: min(failed, WORST) if failed else CLOSEST])

@@ -20,11 +20,11 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from typing import Any, Final, TypeAlias
 
-from harness.campaign.flight import Answer, Job, NoMemoryError, fly_job
-from harness.files.errors import RunFolderError
+from harness.campaign.flight import Answer, Job, fly_job
 from harness.files.spawning import open_standard_files, without_main
 from harness.files.strict_yaml import InputError
 from harness.files.versions import versions
+from harness.flight.signals import held_back
 from planner.compiled import own_this_process
 
 ONE_THREAD: Final = dict.fromkeys(
@@ -35,9 +35,10 @@ ONE_THREAD: Final = dict.fromkeys(
 CONNECT_S: Final = 10.0
 SCHEDULER_PORT: Final = 8786
 GONE: Final = "the Dask scheduler has gone"
+INTERRUPT_S: Final = 0.1
+"""How often it is looked whether the process was asked to end, at the least."""
 JOBS_EACH: Final = 2
 """Jobs handed out for each that can be flown at a time: nobody waits for the next while an answer is written down."""
-
 
 Flown: TypeAlias = tuple[int, Answer | None]
 """Number of a run that is over, and what came of it; None where the machine kept it from its end."""
@@ -48,7 +49,7 @@ class Workers(ABC):
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
-        self._flying: dict[Future[Answer], Job] = {}
+        self._flying: dict[Future[Answer | None], Job] = {}
 
     @abstractmethod
     def free(self) -> int:
@@ -63,16 +64,38 @@ class Workers(ABC):
         done = [(self._flying.pop(each).run, each) for each in finished(self._flying, timeout_s)]
         return [(run, self._answer(each)) for run, each in done]
 
-    def _answer(self, future: Future[Answer]) -> Answer | None:
-        try:
-            return future.result()
-        except NoMemoryError:
-            return None
-        except RunFolderError as error:
-            raise OSError(str(error)) from error
+    def _answer(self, future: Future[Answer | None]) -> Answer | None:
+        return future.result()
 
 
-def finished(futures: Collection[Future[Answer]], timeout_s: float) -> set[Future[Answer]]:
+def fly_jobs(
+    jobs: Iterator[Job],
+    workers: Workers,
+    over: Callable[[int, Answer | None], None],
+    between: Callable[[], None] = lambda: None,
+    enough: Callable[[], bool] = lambda: False,
+) -> None:
+    """Hands out jobs until none is left; an OSError where a run folder cannot be written, or who flies has gone.
+
+    `over`: told of every job that is over, by its number; None where the machine kept it from its end.
+    """
+    ahead, flying = next(jobs, None), 0
+    # An interrupt that is raised inside `concurrent.futures` leaves a future locked, and who ends the workers waits for
+    # it without end.
+    with held_back() as let_interrupt_through:
+        while (ahead is not None or flying) and not enough():
+            let_interrupt_through()
+            while ahead is not None and workers.free() > 0:
+                workers.start(ahead)
+                flying += 1
+                ahead = next(jobs, None)
+            for run, answer in workers.over(INTERRUPT_S):
+                flying -= 1
+                over(run, answer)
+            between()
+
+
+def finished(futures: Collection[Future[Any]], timeout_s: float) -> set[Future[Any]]:
     """Those that are done, waited for until the first is."""
     if not futures:
         time.sleep(timeout_s)
@@ -135,7 +158,7 @@ def _pool(number: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(number, multiprocessing.get_context("spawn"), _begin)
 
 
-def _died(future: Future[Answer]) -> bool:
+def _died(future: Future[Answer | None]) -> bool:
     return isinstance(future.exception(), BrokenProcessPool)
 
 
@@ -165,11 +188,9 @@ def dask_workers(
 ) -> Iterator[Workers]:
     """The workers of a Dask cluster, as many as there are at any time; an InputError where there are none like us.
 
-    A job whose worker dies is flown again by another one; after the scheduler's `allowed-failures` it is given
-    up. Scheduler and workers are trusted: Dask sends pickles, which run code, in both directions.
-
-    `unencrypted`: whether an address beyond this machine may lead there without TLS, where whoever can change
-    what is sent can run code on both ends.
+    A job whose worker dies is flown again by another one; after the scheduler's `allowed-failures` it is given up.
+    Scheduler and workers are trusted: Dask sends pickles, which run code, in both directions. `unencrypted`: whether an
+    address beyond this machine may lead there without TLS, where whoever can change what is sent can run code.
     """
     with _client(address, unencrypted) as client:
         ours = versions()
@@ -234,7 +255,7 @@ class DaskWorkers(Workers):
         threads: int = sum(threads_of.values())
         return JOBS_EACH * threads - len(self._flying)
 
-    def _answer(self, future: Future[Answer]) -> Answer | None:
+    def _answer(self, future: Future[Answer | None]) -> Answer | None:
         from distributed import KilledWorker
 
         if future.cancelled():

@@ -1,11 +1,10 @@
 """One-sided confidence bounds of a probability, from how often something held.
 
 For a number of trials that is fixed before the first, the bounds are those of Clopper and Pearson (Biometrika 26,
-1934). Where the number depends on what came out, they would cover too seldom. There the bounds come from a mixture
-test (Robbins, Annals of Mathematical Statistics 41, 1970): the likelihood of what was seen, averaged over all failure
-rates on one side of a rate f, over its likelihood at f, is a nonnegative supermartingale if the true rate lies on the
-other side of f. By Ville's inequality it ever exceeds 1 / (1 - confidence) with a probability of at most
-1 - confidence. So each bound is valid at every look at once, and a test may stop at any time.
+1934). Where the number depends on what came out, they come from a mixture test (Robbins, Annals of Mathematical
+Statistics 41, 1970): the likelihood of what was seen, averaged over all failure rates on one side of a rate f, over its
+likelihood at f, is a nonnegative supermartingale if the true rate lies on the other side of f. By Ville's inequality it
+ever exceeds 1 / (1 - confidence) with a probability of at most 1 - confidence: a test may stop at any time.
 """
 
 from __future__ import annotations
@@ -49,10 +48,7 @@ def sequential_bounds(held: int, runs: int, confidence: float) -> tuple[float, f
 
 
 def verdict(held: int, runs: int, probability: float, confidence: float) -> Verdict:
-    """What the runs so far say of the claim that something holds with at least `probability`.
-
-    `confidence`: with which a claim is shown or refuted, over all looks together.
-    """
+    """What the runs so far say of the claim that something holds with at least `probability`, over all looks."""
     rate, failed, wanted = 1.0 - probability, runs - held, math.log(1.0 / (1.0 - confidence))
     if _evidence(rate, failed, runs, above=False) >= wanted:
         return "shown"

@@ -1,8 +1,7 @@
-"""Flies days until a claim is shown, refuted, or the days are used up, and writes the certificate.
+"""Flies days until a claim is shown, refuted, or the days are used up, and writes `certificate.json`.
 
-The folder is that of a campaign: `results.parquet` has a row a day, `runs/` the run folder of every day on which the
-claim does not hold, `certificate.json` the answer. Days count in the order of their numbers, whoever flew them when:
-the answer is the same for any number of workers.
+The folder is that of a campaign. Days count in the order of their numbers, whoever flew them when: the answer is the
+same for any number of workers.
 """
 
 from __future__ import annotations
@@ -23,9 +22,8 @@ from harness.analysis.band import BAND, write_band
 from harness.analysis.metric import Claim
 from harness.campaign.cell import grouped
 from harness.campaign.flight import Answer
-from harness.campaign.folder import CampaignFolder
+from harness.campaign.folder import CampaignFolder, fly_missing, told_left
 from harness.campaign.results import RUNS
-from harness.campaign.sweep import fly_missing, told_left
 from harness.campaign.workers import Workers
 from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
 from harness.certification.days import Days, PathDays
@@ -36,8 +34,6 @@ from harness.run_files.run_folder import TRACK
 
 CERTIFICATE: Final = "certificate.json"
 SCHEMA: Final = "wayproof/certificate/1"
-FIRST_FAILURES: Final = 5
-"""Runs that are named of those that failed in the same way."""
 SECTIONS: Final = ("environment", "navigation", "uncertainty", "sensor", "aircraft")
 """Sections of a scenario whose numbers may differ between days without being varied by name: conditions draw them."""
 MOST_RUNS: Final = 1000
@@ -46,61 +42,54 @@ CONFIDENCE: Final = 0.95
 
 @dataclass(frozen=True)
 class Failure:
-    """Days that failed and ended alike: how many, and the first of them.
-
-    `cause`: why legs were not tracked, or what the check of a given path found; may be empty.
-    """
+    """Days that failed and ended alike: how many, and the first of them."""
 
     outcome: str
     cause: str
+    """Why legs were not tracked, or what the check of a given path found; may be empty."""
     count: int
     runs: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Explained:
-    """The share, from 0 to 1, of the variance of failing that is due to the group that a varied quantity falls in.
-
-    `worst`: the group with the largest share of failures; `failed` of its `runs` did.
-    """
+    """The share, from 0 to 1, of the variance of failing that is due to the group that a varied quantity falls in."""
 
     key: str
     share: float
     worst: str
+    """The group with the largest share of failures; `failed` of its `runs` did."""
     failed: int
     runs: int
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """On how many of the days that count the claim held, and what follows from it.
-
-    Attributes:
-        probability_lower: bound, each by itself at `confidence`, of the probability that the claim holds on a day.
-        probability: the verdict is that the claim holds with at least this; None where nothing was claimed.
-        method: how the bounds were derived.
-        most_runs: number of days that were allowed.
-        planner: its kind; `given` for a path.
-        failures: days on which it did not hold, by how they ended, the most frequent first; `failing_runs` has all.
-    """
+    """On how many of the days that count the claim held, and what follows from it: content of `certificate.json`."""
 
     claim: Claim
     runs: int
     held: int
     probability_lower: float
     probability_upper: float
+    """Bounds of the probability that the claim holds on a day, each by itself at `confidence`."""
     confidence: float
     verdict: Verdict
     probability: float | None
+    """What the verdict is about: the claim holds with at least this; None where nothing was claimed."""
     method: str
+    """How the bounds were derived."""
     most_runs: int
+    """Number of days that were allowed."""
     subject: str
     planner: str
+    """Its kind; `given` for a path."""
     aircraft: str
     conditions: str | None
     seed: int
     varied: Mapping[str, Any]
     failures: tuple[Failure, ...]
+    """The most frequent first; `failing_runs` has all days on which the claim did not hold."""
     explained: tuple[Explained, ...]
     failing_runs: tuple[int, ...]
     command: str
@@ -109,10 +98,6 @@ class Certificate:
     def plain(self) -> dict[str, Any]:
         """The content of `certificate.json`."""
         return {"schema": SCHEMA, **asdict(self)}
-
-    def write(self, folder: Path) -> None:
-        """Writes `certificate.json` into a folder."""
-        replace_text(folder / CERTIFICATE, json.dumps(self.plain(), indent=2, allow_nan=False) + "\n")
 
 
 @dataclass(frozen=True)
@@ -159,12 +144,8 @@ def certify(
     *,
     resume: bool = False,
     progress: Callable[[Tally], None] | None = None,
-    command: str | None = None,
 ) -> Certificate:
-    """Flies days and writes the folder; `progress` is told after every day that is over.
-
-    `resume`: whether to go on with what the folder has of these days, or of fewer.
-    `command`: what the certificate says was called; default: the command line.
+    """Flies days and writes the folder; with `resume` goes on with what it has of these days, or of fewer.
 
     Raises:
         RunFolderError: the folder holds something else, or days already without `resume`.
@@ -184,25 +165,19 @@ def certify(
         if left and not tally.decided:
             raise OSError(told_left(left))
         folder.write_tables(tally.runs)
-        certificate = _certificate(days, folder, tally, terms, command)
+        certificate = _certificate(days, folder, tally, terms)
         if days.band and not (out / BAND).exists():
             kept = (out / RUNS / str(run) for run in range(tally.runs))
             write_band(out, [each for each in kept if (each / TRACK).is_file()])
-        _leave_only(out / RUNS, set(certificate.failing_runs))
-        certificate.write(out)
+        for each in (out / RUNS).glob("*"):  # of days that were flown ahead of the day that decided
+            if each.name.isdecimal() and int(each.name) not in certificate.failing_runs:
+                shutil.rmtree(each, ignore_errors=True)
+        content = json.dumps(certificate.plain(), indent=2, allow_nan=False) + "\n"
+        replace_text(out / CERTIFICATE, content)
     return certificate
 
 
-def _leave_only(runs: Path, kept: set[int]) -> None:
-    """Removes the run folders of days that were flown ahead of the day that decided."""
-    for folder in runs.glob("*"):
-        if folder.name.isdecimal() and int(folder.name) not in kept:
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-def _certificate(
-    days: Days, folder: CampaignFolder, tally: Tally, terms: Terms, command: str | None
-) -> Certificate:
+def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms) -> Certificate:
     over = [(run, folder.over[run]) for run in range(tally.runs)]
     failing = [{**each.row, "run": run} for run, each in over if not each.held]
     first = days.scenario(0)
@@ -227,18 +202,15 @@ def _certificate(
         failures=failures(failing),
         explained=explained(np.array([not each.held for _, each in over]), quantities),
         failing_runs=tuple(row["run"] for row in failing),
-        command=command or shlex.join(["wayproof", *sys.argv[1:]]),
+        command=shlex.join(["wayproof", *sys.argv[1:]]),
         versions=versions(),
     )
 
 
 def _sure(tally: Tally, terms: Terms, grown: bool) -> dict[str, Any]:
-    """Verdict, bounds and method of a certificate.
-
-    A number of days that was raised once some had been flown is not fixed beforehand: whoever raises it knows what came
-    out. Its bounds are those that hold at every look.
-    """
+    """Verdict, bounds and method of a certificate."""
     counted, said = (tally.held, tally.runs), "undecided"
+    # Who raises the number of days knows what came out: it was not fixed beforehand.
     if terms.probability is None and not grown:
         method, bounds = "Clopper-Pearson, number of runs fixed beforehand", clopper_pearson
     else:
@@ -258,7 +230,7 @@ def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
         cause = row.get("trackability.causes") or row.get("check.verdict") or ""
         alike.setdefault((str(row["outcome"]), str(cause)), []).append(int(row["run"]))
     ordered = sorted(alike.items(), key=lambda each: -len(each[1]))
-    return tuple(Failure(*key, len(runs), tuple(runs[:FIRST_FAILURES])) for key, runs in ordered)
+    return tuple(Failure(*key, len(runs), tuple(runs[:5])) for key, runs in ordered)
 
 
 def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]) -> tuple[Explained, ...]:
@@ -267,26 +239,20 @@ def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]
     The share is epsilon squared (Kelley, Proceedings of the National Academy of Sciences 21, 1935): the correlation
     ratio of failing (n,) over the groups of a quantity (n,), less what one without influence would show.
     """
-    if failed.all() or not failed.any():
-        return ()
-    found = [_of(key, values, failed) for key, values in quantities.items()]
-    return tuple(sorted((each for each in found if each), key=lambda each: -each.share))
-
-
-def _of(key: str, values: Sequence[Any], failed: NDArray[np.bool_]) -> Explained | None:
-    axis, group = grouped(key, values, drawn=True)
-    used, index = np.unique(group, return_inverse=True)
-    sizes, sums = np.bincount(index), np.bincount(index, failed)
-    count, groups = len(failed), len(used)
-    if groups < 2 or count <= groups:
-        return None
-    rates, overall = sums / sizes, failed.mean()
-    between = float((sizes * (rates - overall) ** 2).sum())
+    found, count, overall = [], len(failed), failed.mean()
     total = float(count * overall * (1.0 - overall))
-    within = (total - between) / (count - groups)
-    worst = int(rates.argmax())
-    share = max(0.0, (between - (groups - 1) * within) / total)
-    return Explained(key, share, axis.labels[used[worst]], int(sums[worst]), int(sizes[worst]))
+    for key, values in quantities.items() if total else ():
+        axis, group = grouped(key, values, drawn=True)
+        used, index = np.unique(group, return_inverse=True)
+        if (groups := len(used)) < 2 or count <= groups:
+            continue
+        sizes, sums = np.bincount(index), np.bincount(index, failed)
+        rates = sums / sizes
+        between = float((sizes * (rates - overall) ** 2).sum())
+        within = (total - between) / (count - groups)
+        share, worst = max(0.0, (between - (groups - 1) * within) / total), int(rates.argmax())
+        found.append(Explained(key, share, axis.labels[used[worst]], int(sums[worst]), int(sizes[worst])))
+    return tuple(sorted(found, key=lambda each: -each.share))
 
 
 def differing(days: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:

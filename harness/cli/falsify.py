@@ -82,7 +82,6 @@ def falsify(
             loaded,
             varied,
             folder,
-            flown=_flown,
             claim=claim,
             conditions=most,
             tolerance=tolerance,
@@ -97,14 +96,6 @@ def falsify(
             say(f"again: {shlex.join(words)}")
         say(last_line(found))
     return 0
-
-
-def _flown(scenario: Scenario) -> dict[str, Any]:
-    from harness.analysis.metrics import metrics
-    from harness.flight.closed_loop import fly
-    from harness.run.scenario_flight import flight_limits, make_loop
-
-    return metrics(fly(make_loop(scenario)), flight_limits(scenario))
 
 
 def range_of(text: str) -> tuple[str, float, float]:

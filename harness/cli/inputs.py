@@ -165,11 +165,11 @@ def validate(
 
 def _found(file: str) -> tuple[str, tuple[str, ...]]:
     """What a valid file holds, in a few words, and what of a scenario lies outside the planner's assumptions."""
-    from harness.campaign.campaign_file import is_campaign
+    from harness.campaign.campaign_file import is_a
     from harness.files.wording import counted
     from harness.scenario.shipped import campaign_path, shipped_campaigns
 
-    if file in shipped_campaigns() or (os.path.isfile(file) and is_campaign(Path(file))):
+    if file in shipped_campaigns() or (os.path.isfile(file) and is_a("campaign", Path(file))):
         from harness.cli.sweep import checked
 
         runs = checked(campaign_path(file))

@@ -100,14 +100,14 @@ def checked(
     laws: tuple[str, ...] = (),
 ) -> CampaignRuns:
     """The runs of a campaign file, every scenario of them made once."""
-    from harness.campaign.campaign_file import is_scenario, load_campaign
+    from harness.campaign.campaign_file import is_a, load_campaign
     from harness.campaign.runs import CampaignRuns
 
     try:
         kinds = [kind_of(each) for each in planners]
         runs = CampaignRuns(load_campaign(path, kinds, settings), sources(*planners), laws)
     except InputError as error:
-        if is_scenario(path):
+        if is_a("scenario", path):
             use = shlex.join(["wayproof", "fly", str(path)])
             raise InputError(f"{path}: this is a scenario: use `{use}`") from error
         raise
@@ -121,9 +121,8 @@ def _fly(
 ) -> tuple[dict[str, int], bool]:
     """Flies what is missing; returns how many runs ended how, and whether all are over."""
     from harness.campaign.flight import Answer
-    from harness.campaign.folder import CampaignFolder
+    from harness.campaign.folder import CampaignFolder, fly_missing, told_left
     from harness.campaign.results import INDEX
-    from harness.campaign.sweep import fly_missing, told_left
 
     with (
         resumable(path, INDEX),

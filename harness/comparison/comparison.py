@@ -1,8 +1,7 @@
 """Planners side by side: flies every one on every scenario, writes tables, figures, overlays and a report.
 
-The folder of a comparison holds `comparison.csv`, `comparison.json` and `report.html`, and for each scenario a folder
-with its figures, `overlay.rrd` and a run folder for each planner. The index `comparison.json` is written first and last
-and says whether the comparison is complete.
+The folder holds for each scenario a folder with its figures, `overlay.rrd` and a run folder for each planner. The index
+`comparison.json` is written first and last and says whether the comparison is complete.
 """
 
 from __future__ import annotations
@@ -23,8 +22,7 @@ from harness.analysis.rows import COMPARED, Row, to_csv
 from harness.campaign.flight import Answer, Job
 from harness.campaign.folder import claim_folder
 from harness.campaign.paired import TESTED, Duel, duels
-from harness.campaign.sweep import fly_jobs
-from harness.campaign.workers import local_workers
+from harness.campaign.workers import fly_jobs, local_workers
 from harness.files.errors import RunFolderError
 from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
@@ -58,6 +56,10 @@ class Comparison:
         rows = [row.plain() for row in self.rows]
         return {"schema": SCHEMA, "complete": complete, **vars(self), "rows": rows}
 
+    def write(self, out: Path, *, complete: bool) -> None:
+        """Writes `comparison.json` into a folder."""
+        replace_text(out / INDEX, json.dumps(self.plain(complete), indent=2, allow_nan=False) + "\n")
+
 
 class _Flight(NamedTuple):
     """One planner, under one law, on one scenario; `law` is empty where all fly under the same one."""
@@ -80,9 +82,8 @@ def fly_and_compare(
 ) -> Comparison:
     """Flies scenarios that differ in name or planner and writes the folder of the comparison.
 
-    `scenarios`: one a flight, those of one name together; each names its planner.
-    `command`: what the report says was called; default: the command line.
-    `sources`: planners, and guidance laws, that are given as FILE.py:NAME or MODULE:NAME.
+    `scenarios`: one a flight, those of one name together; each names its planner. `command`: what the report says was
+    called, by default the command line. `sources`: planners, and laws, given as FILE.py:NAME or MODULE:NAME.
 
     Raises:
         InputError: two flights, or a flight and a file of the comparison, would have one name.
@@ -95,7 +96,7 @@ def fly_and_compare(
     lock = claim_folder(out, "comparison", INDEX, SCHEMA)
     try:
         try:
-            _write_index(out, begun, complete=False)
+            begun.write(out, complete=False)
             for name in (CSV, REPORT):
                 (out / name).unlink(missing_ok=True)
         except OSError as error:
@@ -168,12 +169,8 @@ def _written(
     replace_text(out / CSV, to_csv(done.rows))
     page = report_html(chapters, done.command, done.versions, done.started_utc, _duels(done.rows))
     replace_text(out / REPORT, page)
-    _write_index(out, done, complete=True)
+    done.write(out, complete=True)
     return done
-
-
-def _write_index(out: Path, comparison: Comparison, *, complete: bool) -> None:
-    replace_text(out / INDEX, json.dumps(comparison.plain(complete), indent=2, allow_nan=False) + "\n")
 
 
 def read_rows(folder: Path) -> list[Row]:
@@ -193,11 +190,8 @@ def _entry(flight: _Flight, crash: str | None, optimum: Optimum) -> ReportedFlig
 
 
 def _overlay(folder: Path, entries: Sequence[ReportedFlight]) -> None:
-    recorded = {
-        each.row.label: each.run.folder / RECORDING
-        for each in entries
-        if each.run and (each.run.folder / RECORDING).exists()
-    }
+    files = {each.row.label: each.run.folder / RECORDING for each in entries if each.run}
+    recorded = {label: file for label, file in files.items() if file.exists()}
     (folder / OVERLAY).unlink(missing_ok=True)
     if recorded:
         from harness.recording.overlay import write_overlay

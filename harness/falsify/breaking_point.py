@@ -1,11 +1,9 @@
 """The breaking point: flies a scenario under ever harder conditions until the mildest is known that makes it fail.
 
-All keys get harder together, in equal steps from their mild ends, until the first condition fails; bisection narrows
-that step down. With several keys each key is then taken back towards its mild end while the condition still fails. A
-failing range below the answer that is narrower than a step may have been missed.
-
-The folder holds `falsify.json`, the result and every flight; and, where something failed, `falsified.yaml`, the whole
-scenario that does. They are written when the search ends.
+All keys get harder together, in equal steps, until a condition fails; bisection narrows that step down. With several
+keys each is then taken back towards its mild end while the condition still fails. A failing range below the answer that
+is narrower than a step may have been missed. When the search ends `falsify.json` is written, with every flight, and
+where something failed `falsified.yaml`, the whole scenario that does.
 """
 
 from __future__ import annotations
@@ -21,12 +19,14 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
+from aircraft.airframes import AircraftError
 from harness.analysis.metric import Claim, holds
 from harness.campaign.folder import claim_folder
 from harness.campaign.sampling import takes_whole_numbers
 from harness.files.errors import WriteError, sentence
 from harness.files.strict_yaml import InputError, as_spelt, loc_of
 from harness.files.whole_file import replace_text
+from harness.run.scenario_flight import fly_and_measure
 from harness.scenario.scenario import Scenario, dump_scenario
 
 SCHEMA: Final = "wayproof/falsify/3"
@@ -41,18 +41,13 @@ FIGURES: Final = (
 
 Load: TypeAlias = Callable[[Sequence[tuple[str, str]]], Scenario]
 """Makes the scenario with keys replaced, as `harness.scenario.scenario.load_scenario` takes them."""
-Flown: TypeAlias = Callable[[Scenario], Mapping[str, Any]]
-"""Flies a scenario and gives the content of its `metrics.json`."""
 Values: TypeAlias = tuple[float, ...]
 """A condition: the value of each key."""
 
 
 @dataclass(frozen=True)
 class Vary:
-    """A key to be varied from its mild end to its hard one, which lies below where smaller is harder.
-
-    A value between the ends is rounded to so many places after the point before it is flown.
-    """
+    """A key varied from its mild end to its hard one; values between are rounded to so many places before a flight."""
 
     key: str
     mild: float
@@ -75,29 +70,23 @@ class Vary:
 
 @dataclass
 class Search:
-    """Conditions tried, each once.
-
-    Attributes:
-        judge: whether a condition fails; an InputError, where there is none, passes while a key is taken back.
-        left: how many more may be tried, at least 2 at the beginning.
-        tolerance: a displacement is narrowed down to this.
-        steps: number of equal steps of the scan.
-        settled: whether the conditions sufficed to narrow the answer down.
-    """
+    """Conditions tried, each once."""
 
     vary: Sequence[Vary]
     judge: Callable[[Values], bool]
+    """Whether a condition fails; an InputError, where there is none, passes while a key is taken back."""
     left: int
+    """How many more may be tried, at least 2 at the beginning."""
     tolerance: float
+    """A displacement is narrowed down to this, above 0 and below 1."""
     steps: int = 1
+    """Number of equal steps of the scan."""
     settled: bool = True
+    """Whether the conditions sufficed to narrow the answer down."""
     verdicts: dict[Values, bool] = field(default_factory=dict)
 
     def run(self) -> Search:
-        """Looks for the mildest condition that fails; a ValueError where too few are allowed, or no such tolerance."""
-        if self.left < 2 or not 0.0 < self.tolerance < 1.0:
-            told = f"{self.left}, {self.tolerance}"
-            raise ValueError(f"needs 2 conditions or more and a tolerance between 0 and 1: {told}")
+        """Looks for the mildest condition that fails."""
         steps = self.steps = self._affordable(self.left if len(self.vary) == 1 else self.left // 2)
         failing = next((step for step in range(steps + 1) if self._fails(self.at(step / steps))), None)
         if failing:
@@ -120,10 +109,9 @@ class Search:
     @property
     def mildest(self) -> Values | None:
         """The failing condition whose largest displacement is least; of equal ones, that with the smallest sum."""
-        failed = [values for values, failed in self.verdicts.items() if failed]
-        return min(
-            failed, key=lambda each: (max(self.hardness(each)), sum(self.hardness(each))), default=None
-        )
+        by_hardness = {self.hardness(each): each for each, failed in self.verdicts.items() if failed}
+        least = min(by_hardness, key=lambda each: (max(each), sum(each)), default=None)
+        return None if least is None else by_hardness[least]
 
     @property
     def passed_below(self) -> Values | None:
@@ -131,11 +119,9 @@ class Search:
         if (found := self.mildest) is None:
             return None
         limits = self.hardness(found)
-        passed = [values for values, failed in self.verdicts.items() if not failed]
-        below = [
-            each for each in passed if all(a <= b for a, b in zip(self.hardness(each), limits, strict=True))
-        ]
-        return max(below, key=lambda each: sum(self.hardness(each)), default=None)
+        by_hardness = {self.hardness(each): each for each, failed in self.verdicts.items() if not failed}
+        below = [key for key in by_hardness if all(a <= b for a, b in zip(key, limits, strict=True))]
+        return by_hardness[max(below, key=sum)] if below else None
 
     def _affordable(self, conditions: int) -> int:
         """The most equal steps of the scan for which the conditions suffice, the bisection of one step included."""
@@ -193,13 +179,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Breaking:
-    """What was found.
-
-    Attributes:
-        claim: a flight fails where this does not hold of it.
-        steps, settled: as `Search` has them; a failing range narrower than a step may have been missed.
-        passes: values of the hardest condition that passed and is no harder in any key.
-    """
+    """What was found. A flight fails where the claim does not hold of it; `steps`, `settled`: those of `Search`."""
 
     scenario: str
     planner: str
@@ -214,6 +194,7 @@ class Breaking:
     verdict: Literal["found", "not_found", "fails_at_the_mild_end"]
     found: Trial | None
     passes: Values | None
+    """The hardest condition that passed and is no harder in any key."""
     trials: tuple[Trial, ...]
 
     def plain(self) -> dict[str, Any]:
@@ -227,20 +208,24 @@ def vary_of(
 ) -> tuple[Vary, ...]:
     """The keys to vary, once every combination of their ends has been found to be a scenario; or an InputError.
 
-    `given`: key path, mild end and hard end of each.
-    `fixed`: keys that are given a value.
-    `tolerance`: a displacement is narrowed down to this share of its range; values are flown rounded to a
-    hundredth of that, so that what is printed is what was flown.
+    `given`: key path, mild end and hard end of each; `fixed`: keys that are given a value.
+    `tolerance`: values are flown rounded to a hundredth of this share of a range, so that what is printed was flown.
     """
     if len(given) > MAX_KEYS:
         raise InputError(
             f"command line: --vary is given {len(given)} times; at most {MAX_KEYS} keys are varied"
         )
+    valued = [_spelt("--set", each) for each in fixed]
     ranges: dict[str, tuple[float, float]] = {}
     for name, mild, hard in given:
         key = _spelt("--vary", name)
-        valued = key in [_spelt("--set", each) for each in fixed]
-        if fault := _fault(key, mild, hard, twice=key in ranges, valued=valued):
+        faults = {
+            "a seed is no condition; --seed gives another": key == "seed",
+            "is given twice; give one range": key in ranges,
+            "is given a value too, with --set; give one of them": key in valued,
+            f"both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}": mild == hard,
+        }
+        if fault := next(filter(faults.get, faults), None):
             raise InputError(f"command line: --vary {key}: {fault}")
         ranges[key] = mild, hard
     base = load([(key, number_text(mild)) for key, (mild, _) in ranges.items()])
@@ -253,17 +238,6 @@ def vary_of(
     for values in dict.fromkeys([*ends, *diagonal]):
         scenario_at(load, vary, values)
     return vary
-
-
-def _fault(key: str, mild: float, hard: float, *, twice: bool, valued: bool) -> str:
-    """What is wrong with a range; empty if nothing is."""
-    if key == "seed":
-        return "a seed is no condition; --seed gives another"
-    if twice:
-        return "is given twice; give one range"
-    if valued:
-        return "is given a value too, with --set; give one of them"
-    return f"both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}" if mild == hard else ""
 
 
 def scenario_at(load: Load, vary: Sequence[Vary], values: Values) -> Scenario:
@@ -293,7 +267,7 @@ def falsify(
     vary: Sequence[Vary],
     out: Path,
     *,
-    flown: Flown,
+    flown: Callable[[Scenario], Mapping[str, Any]] = fly_and_measure,
     claim: Claim = "reached",
     conditions: int = 40,
     tolerance: float = 0.01,
@@ -309,7 +283,13 @@ def falsify(
     trials: dict[Values, Trial] = {}
 
     def judge(values: Values) -> bool:
-        figures = _flown(flown, scenario_at(load, vary, values))
+        scenario = scenario_at(load, vary, values)
+        try:
+            figures = flown(scenario)
+        except AircraftError as error:  # a crash is a failure, an aircraft that cannot begin a flight is not
+            raise InputError(f"wayproof: cannot fly this condition: {error}") from error
+        except Exception as error:
+            figures = {"outcome": "error", "reason": sentence(error), "trackable": None}
         kept = {name: figures.get(name) for name in FIGURES}
         trials[values] = trial = Trial(search.hardness(values), values, not holds(claim, figures), kept)
         if progress is not None:
@@ -353,18 +333,6 @@ def falsify(
             for each in made:
                 each.rmdir()
     return result
-
-
-def _flown(flown: Flown, scenario: Scenario) -> Mapping[str, Any]:
-    """The figures of a flight; a crash of it is a failure, an aircraft that cannot begin it is not."""
-    from aircraft.airframes import AircraftError
-
-    try:
-        return flown(scenario)
-    except AircraftError as error:
-        raise InputError(f"wayproof: cannot fly this condition: {error}") from error
-    except Exception as error:
-        return {"outcome": "error", "reason": sentence(error), "trackable": None}
 
 
 def _write(out: Path, result: Mapping[str, Any], failing: Scenario | None) -> None:

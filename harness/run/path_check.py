@@ -33,14 +33,7 @@ if TYPE_CHECKING:
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: this length, and this share of its span."""
 OF_THE_WORLD: Final = (
-    "seed",
-    "area",
-    "obstacles",
-    "ground",
-    "sources",
-    "environment",
-    "conditions",
-    "uncertainty",
+    *("seed", "area", "obstacles", "ground", "sources", "environment", "conditions", "uncertainty"),
 )
 """Sections that a check takes from a scenario that it flies a path in; mission, aircraft and sensor are its own."""
 KEYS_OF_THE_WORLD: Final = (
@@ -111,7 +104,7 @@ def asked(
     def validly(root: Node) -> Scenario:
         return validated(root, "command line" if world is None else str(world), folder, ends_checked=False)
 
-    root = overridden(_with(base, {**_mission_about(about(given.points_m), base), **keys}), settings)
+    root = overridden(_with(base, {**_mission_about(given.points_m, base), **keys}), settings)
     scenario = validly(root)
     field = None if scenario.ground is None else scenario.ground.field()
     plan = planned(given, scenario, altitude_m, None if field is None else field.at, corner_m)
@@ -169,6 +162,8 @@ def _mission_about(points_m: FloatArray, base: Node) -> dict[Loc, Any]:
 
     Start and goal may lie anywhere, in an obstacle too: that is then what the flight finds.
     """
+    if np.ptp(points_m, axis=0).max() <= SAME_PLACE_M:  # all in one place, as a mission's may be
+        points_m = np.concatenate((points_m, points_m[:1] + 1000.0))
     start, far = points_m[0], np.hypot(*(points_m - points_m[0]).T)
     goal_radius = min(100.0, float(0.25 * far.max()))
     goal = points_m[-1] if far[-1] > 2.0 * goal_radius else points_m[int(far.argmax())]
@@ -189,10 +184,7 @@ def _mission_about(points_m: FloatArray, base: Node) -> dict[Loc, Any]:
 def _without_files(
     root: Node, folder: FilePath | None, ground: GroundSpec | None
 ) -> tuple[Node, tuple[FileSpec, ...]]:
-    """Keys without the files among the obstacles, for a path that is not flown at one altitude; and those files.
-
-    The ground stands in place of what they say of it.
-    """
+    """Keys without the files among the obstacles, for a path that is not flown at one altitude; and those files."""
     if ground is not None:
         root = _with(root, {("ground",): ground.model_dump()})
     listed = root.at(("obstacles",))
@@ -203,13 +195,6 @@ def _without_files(
     return with_key(root, ("obstacles",), Node(kept, root.line)), specs
 
 
-def about(points_m: FloatArray) -> FloatArray:
-    """Points, and one more where they are all in one place, as a mission's may be."""
-    if np.ptp(points_m, axis=0).max() > SAME_PLACE_M:
-        return points_m
-    return np.concatenate((points_m, points_m[:1] + 1000.0))
-
-
 def fly_check(
     check: PathCheck,
     out: FilePath | None = None,
@@ -217,26 +202,22 @@ def fly_check(
     progress: Progress | None = None,
     command: str | None = None,
 ) -> dict[str, Any]:
-    """Flies a path, into a run folder if one is named, and returns the content of its `metrics.json`.
-
-    Raises:
-        AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
-        RunFolderError: the folder holds something else or cannot be written.
-    """
-    level, scenario = check.plan.profile.level, check.scenario
+    """Flies a path, into a run folder if one is named, and returns its `metrics.json`; errors as `fly_to_folder`."""
+    scenario, profile = check.scenario, check.plan.profile
     model = partial(jsbsim_aircraft, scenario, climb_limit_mps=check.plan.climb_limit_mps)
+    make = partial(make_loop, make_model=model)
     if out is None:
-        flight = fly_along(check.plan, make_loop(scenario, None if level else model), (), progress)
+        flight = fly_along(check.plan, make(scenario), (), progress)
         return measured(check, flight, flight_limits(scenario, planned=False))
     return fly_to_folder(
         scenario,
         out,
         recording,
         progress,
-        make=make_loop if level else partial(make_loop, make_model=model),
+        make=make,
         pilot=GIVEN,
         flown_by=partial(fly_along, check.plan),
         measured_by=partial(measured, check),
         command=command,
-        profile=None if level else check.plan.profile.altitudes,
+        profile=None if profile.level else profile.altitudes,
     )

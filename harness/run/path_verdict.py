@@ -43,11 +43,7 @@ MOST_TRIES: Final = 50
 
 
 def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str, Any]:
-    """The content of `metrics.json` of a path that was flown.
-
-    On top of what a flight has: `deviation_from_given_m`, `contact`, `breaches`, and under `check` the verdict, the
-    worst place, the corners, what was given, and what became of the items of a mission.
-    """
+    """The content of `metrics.json` of a path that was flown: that of any flight, and what is asked of a path."""
     track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
     corners = [replace(each, allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
     window_m = WINDOW_RADII * limits.turn_radius_m
@@ -137,10 +133,17 @@ def verdict(
 
 
 def _touched(seen: Kept) -> list[str]:
-    """What was touched, entered and left, the deepest of each kind."""
+    """What was touched, entered and left, the deepest of each kind, and how many more there are."""
     kinds = (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves"))
     crossed = [([each for each in seen.crossings if each.kind == kind], verb) for kind, verb in kinds]
-    return [_deepest(some, verb) for some, verb in ((seen.contacts, "touches"), *crossed) if some]
+    found = []
+    for some, verb in ((seen.contacts, "touches"), *crossed):
+        if some:
+            deepest = max(some, key=lambda each: each.depth_m)
+            more = f", {len(some) - 1} more" if len(some) > 1 else ""
+            where = f"{deepest.name} at {deepest.start_s:.0f} s"
+            found.append(f"{verb} {where}, by {deepest.depth_m:.3g} m{more}")
+    return found
 
 
 def _yes(told: Mapping[str, Any], limits: FlightLimits) -> str:
@@ -179,10 +182,7 @@ def _at_speed(legs: Sequence[Mapping[str, Any]], limits: FlightLimits) -> bool:
 
 
 def _how_far(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
-    """How far off the path and a corner an aircraft was, where that was too far.
-
-    Another limit at the corners makes a yes only where nothing else is wrong (`corners_alone`).
-    """
+    """How far off the path and a corner an aircraft was, where too far; `corners_alone`: nothing else is wrong."""
     worst, enough_m = told["worst"], told["corner_m_that_would_do"]
     missed = next((corner for corner in told["corners"] if not corner["kept"]), None)
     noun, faults = "waypoint" if told["drawn"] else "item", []
@@ -197,13 +197,6 @@ def _how_far(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
         would = "be yes" if corners_alone else "do for the corners alone"
         faults.append(f"--corner-m {enough_m:g} would {would}")
     return faults
-
-
-def _deepest(found: Sequence[Breach], verb: str) -> str:
-    """The deepest of some breaches, and how many more there are."""
-    deepest = max(found, key=lambda each: each.depth_m)
-    more = f", {len(found) - 1} more" if len(found) > 1 else ""
-    return f"{verb} {deepest.name} at {deepest.start_s:.0f} s, by {deepest.depth_m:.3g} m{more}"
 
 
 def _sufficient_m(
@@ -259,15 +252,13 @@ def _as_given(
 def _ends(plan: PathPlan, corners: list[CutCorner]) -> list[CutCorner]:
     """Where legs end: at every item of a mission; at the corners of a drawn line, and where its slope changes."""
     known = {(corner.waypoint, round(corner.arc_length_m, 3)): corner for corner in corners}
-    plain = {(number, round(along, 3)): _plain(number, along) for number, along in plan.marks or plan.bends}
+    plain = {
+        (number, round(along, 3)): CutCorner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along, 0.0)  # no corner
+        for number, along in plan.marks or plan.bends
+    }
     every = plain | known
     ends = [every[key] for key in plain] if plan.marks else list(every.values())
     return sorted(ends, key=lambda each: each.arc_length_m)
-
-
-def _plain(number: int, along_m: float) -> CutCorner:
-    """An end of a leg that is no corner."""
-    return CutCorner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along_m, 0.0)
 
 
 def _passed(corner: CutCorner, track: Track, off_m: FloatArray, tolerance_m: float) -> dict[str, Any]:

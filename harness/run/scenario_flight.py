@@ -43,9 +43,6 @@ SENSOR_STREAM, TURBULENCE_STREAM, NAVIGATION_STREAM = 1, 2, 3
 """Numbers of the random streams that derive from the scenario's seed."""
 
 
-Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
-
-
 def make_loop(
     scenario: Scenario, make_model: Callable[[StartConditions, Atmosphere], FlightModel] | None = None
 ) -> Loop:
@@ -133,6 +130,11 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
     )
 
 
+def fly_and_measure(scenario: Scenario) -> dict[str, Any]:
+    """Flies a scenario without a run folder, and gives the content of its `metrics.json`."""
+    return metrics(fly(make_loop(scenario)), flight_limits(scenario))
+
+
 def fly_to_folder(
     scenario: Scenario,
     out: Path,
@@ -145,19 +147,18 @@ def fly_to_folder(
     identity: str | None = None,
     varied: Mapping[str, str | float | int | bool] | None = None,
     thin: bool = False,
-    flown_by: Fly = fly,
+    flown_by: Callable[[Loop, Sequence[Observer], Progress | None], Flight] = fly,
     measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics,
     command: str | None = None,
     profile: Callable[[FloatArray], FloatArray] | None = None,
 ) -> dict[str, Any]:
     """Flies a complete scenario into a run folder and returns the content of its `metrics.json`.
 
-    `make` makes the parts of the flight, `flown_by` flies them to an end, and `measured_by` gives the figures.
-    `watching` are observers besides those that write the folder. The manifest says that `command` was called, by
-    default the command line. A recording is called `identity` among others, by default its name with a hash of all
-    settings and versions; it names the `pilot` in place of the planner's kind, and the keys that a campaign `varied`. A
-    `thin` one has no more than track, plans and obstacles. `profile` gives the altitudes to be held at arc lengths
-    along a path, in place of the mission's.
+    `make` makes the parts of the flight, `flown_by` flies them to an end, `measured_by` gives the figures, `watching`
+    are further observers. The manifest says that `command` was called, by default the command line. A recording is
+    called `identity`, by default its name with a hash of all settings and versions; it names the `pilot` in place of
+    the planner's kind, and the keys that a campaign `varied`; a `thin` one has no more than track, plans and obstacles.
+    `profile` gives the altitudes to be held at arc lengths along a path, in place of the mission's.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
@@ -199,8 +200,7 @@ class _SoFar(Observer):
     def __init__(self) -> None:
         self._blocks: list[Track] = []
         self._plans: list[AcceptedPlan] = []
-        self.events: list[tuple[float, str, str]] = []
-        """Simulated time (s), level and sentence of each event."""
+        self.events: list[tuple[float, str, str]] = []  # simulated time (s), level and sentence
 
     def on_event(self, time_s: float, text: str) -> None:
         """Keeps an event."""

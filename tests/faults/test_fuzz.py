@@ -105,7 +105,7 @@ def read_campaign(path: Path) -> None:
     again = CampaignRuns(CampaignFile.from_plain(json.loads(json.dumps(taken.file.plain())), str(path)))
     assert (len(taken), taken.varied) == (len(again), again.varied)
     for number in sorted({0, len(taken) - 1}):
-        assert taken.run(number) == again.run(number)
+        assert taken.cells(number) == again.cells(number)
         assert parse_scenario(dump_scenario(taken.scenario(number))) == again.scenario(number)
 
 

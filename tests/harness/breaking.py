@@ -6,10 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.analysis.metrics import metrics
 from harness.falsify.breaking_point import Breaking, falsify, vary_of
-from harness.flight.closed_loop import fly
-from harness.run.scenario_flight import flight_limits, make_loop
 from harness.scenario.scenario import Scenario, load_scenario
 
 SCENARIO = """
@@ -27,19 +24,12 @@ WAY_M = 1400.0
 """From the start to the goal circle."""
 
 
-def flown(scenario: Scenario) -> dict[str, Any]:
-    """Flies straight to the goal at the airspeed."""
-    return metrics(fly(make_loop(scenario)), flight_limits(scenario))
-
-
 def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Breaking:
     def load(replaced: Sequence[tuple[str, str]]) -> Scenario:
         return load_scenario(file, replaced)
 
     out = other.pop("out", file.parent / "out")
-    return falsify(
-        load, vary_of(load, ranges, (), other.get("tolerance", 0.01)), out, **({"flown": flown} | other)
-    )
+    return falsify(load, vary_of(load, ranges, (), other.get("tolerance", 0.01)), out, **other)
 
 
 def stand_in(outcome: str = "reached", /, **other: Any) -> dict[str, Any]:

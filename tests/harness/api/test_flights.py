@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import pickle
 import re
 import shutil
@@ -59,6 +60,9 @@ def test_in_memory_and_into_a_folder_the_same_is_flown(
     again = wayproof.load_run(str(kept.folder))
     assert (again.digest, again.scenario, again.metrics) == (kept.digest, kept.scenario, kept.metrics)
     assert again.plans.equals(kept.plans)
+    for thing in (run, kept, run.metrics, run.scenario, run.metrics.cross_track_m):
+        assert len(repr(thing)) < 250
+    assert repr(run) == "FlightResult(short: reached; rolling_window, aerosonde, seed 1)"
 
 
 def test_figures_are_attributes_and_keys_and_cannot_be_changed(run: wayproof.FlightResult) -> None:
@@ -71,12 +75,6 @@ def test_figures_are_attributes_and_keys_and_cannot_be_changed(run: wayproof.Fli
         _ = metrics.cros_track_m
     with pytest.raises(AttributeError, match="cannot be changed"):
         metrics.outcome = "collision"
-
-
-def test_reprs_are_short(run: wayproof.FlightResult, kept: wayproof.FlightResult) -> None:
-    for thing in (run, kept, run.metrics, run.scenario, run.metrics.cross_track_m):
-        assert len(repr(thing)) < 250
-    assert repr(run) == "FlightResult(short: reached; rolling_window, aerosonde, seed 1)"
 
 
 def test_a_figure_that_a_run_lacks_is_told(kept: wayproof.FlightResult, tmp_path: Path) -> None:
@@ -149,10 +147,8 @@ def test_a_guidance_law_is_given_as_a_class(
     assert (back.digest, back.scenario.guidance) == (gentle.digest, gentle.scenario.guidance)
     assert main(["report", str(tmp_path / "run")]) == 0
     assert back.manifest["turn_radius_m"] == radius_m > mission_of(small()).turn_radius_m
-    assert (
-        f"turn radius R {back.manifest['turn_radius_m']:.1f} m"
-        in (tmp_path / "run" / "report.html").read_text()
-    )
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert f"turn radius R {radius_m:.1f} m" in page
     assert main(["export", str(tmp_path / "run"), "--format", "plan", "--out", str(tmp_path / "a.plan")]) == 0
     with pytest.raises(wayproof.InputError, match=r"guidance\.kind: .*Gentle is not here; give it anew"):
         wayproof.fly(back.scenario)
@@ -283,13 +279,6 @@ def test_importing_it_loads_nothing_heavy() -> None:
         "import sys, wayproof; heavy = {'numpy', 'pydantic', 'numba', 'pyarrow', 'rerun', 'harness'} & {*sys.modules};"
         "sys.exit(', '.join(heavy) or 0)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=_environment(), capture_output=True, text=True, check=False
-    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-
-
-def _environment() -> dict[str, str]:
-    import os
-
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

@@ -10,7 +10,8 @@ import pytest
 
 import wayproof
 from aircraft.interface import AircraftState
-from harness.flight.record import AcceptedPlan, Track
+from harness.flight.observer import Observer
+from harness.flight.record import AcceptedPlan
 from harness.mapping.scan import RangeScan
 from tests.harness.api.worlds import Beeline, small
 from wayproof import Path, Plan, PlanRequest, PlanStatus
@@ -79,7 +80,7 @@ class Steered:
         return Plan(PlanStatus.FOUND, "to the waypoint", line, Path.through(line))
 
 
-class Scans:
+class Scans(Observer):
     """An observer that counts."""
 
     def __init__(self) -> None:
@@ -90,10 +91,6 @@ class Scans:
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
         self.plans += 1
-
-    def on_block(self, block: Track) -> None: ...
-
-    def on_event(self, time_s: float, text: str) -> None: ...
 
 
 def test_a_caller_is_the_planner_waypoint_by_waypoint() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from harness.campaign.flight import Answer
-from harness.campaign.sweep import fly_missing
+from harness.campaign.folder import fly_missing
 from harness.campaign.workers import finished
 
 FLYING = 3000
@@ -29,8 +29,8 @@ class Runs:
     def job(self, number: int, folder: Path) -> SimpleNamespace:
         return SimpleNamespace(run=number)
 
-    def run(self, number: int) -> SimpleNamespace:
-        return SimpleNamespace(varied={}, cells=dict)
+    def cells(self, number: int) -> dict[str, Any]:
+        return {}
 
 
 class Crowd:

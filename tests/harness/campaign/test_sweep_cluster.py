@@ -8,7 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -190,26 +189,22 @@ def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
 
 @pytest.mark.flights
 def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    begun = time.monotonic()
     address = f"tcp://{LOCAL}:{free_port()}"
     out = place / "nowhere"
     assert main(["sweep", str(place / "campaign.yaml"), "--scheduler", address, "--out", str(out)]) == 2
     assert f"no Dask scheduler answers at {address}" in capsys.readouterr().err
-    assert time.monotonic() - begun < 60
     assert not out.exists()
+    words = [
+        "sweep",
+        "campaign.yaml",
+        "--scheduler",
+        "tcp://no-such-host:8786",
+        "--unencrypted",
+        "--out",
+        "nowhere",
+    ]
     nobody = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "harness",
-            "sweep",
-            "campaign.yaml",
-            "--scheduler",
-            "tcp://no-such-host:8786",
-            "--unencrypted",
-            "--out",
-            "nowhere",
-        ],
+        [sys.executable, "-m", "harness", *words],
         cwd=place,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,

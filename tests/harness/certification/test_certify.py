@@ -38,7 +38,9 @@ def flown(place: Path) -> dict[str, Any]:
     return certificate
 
 
-def test_days_are_counted_as_a_separate_flight_without_limit_says(flown: dict[str, Any], place: Path) -> None:
+def test_days_are_counted_as_flights_alone_say_and_failing_ones_are_kept(
+    flown: dict[str, Any], place: Path
+) -> None:
     arrival_s = wayproof.fly(place / "short.yaml").metrics.flight_time_s
     limits_s = pq.read_table(place / "out" / "results.parquet")["mission.time_limit_s"].to_pylist()
     failing = [run for run, limit_s in enumerate(limits_s) if limit_s < arrival_s]
@@ -51,11 +53,8 @@ def test_days_are_counted_as_a_separate_flight_without_limit_says(flown: dict[st
     assert [(each["outcome"], each["count"]) for each in flown["failures"]] == [("timeout", len(failing))]
     assert [each["key"] for each in flown["explained"]] == ["mission.time_limit_s"]
     assert flown["explained"][0]["share"] > 0.5
-
-
-def test_failing_days_are_kept_and_fly_again(flown: dict[str, Any], place: Path) -> None:
     kept = sorted(int(each.name) for each in (place / "out" / "runs").iterdir())
-    assert kept == flown["failing_runs"]
+    assert kept == failing
     run = wayproof.load_run(place / "out" / "runs" / str(kept[0]))
     row = pq.read_table(place / "out" / "results.parquet").to_pylist()[kept[0]]
     assert (run.outcome, run.digest) == ("timeout", row["digest"])
@@ -111,21 +110,25 @@ def test_more_days_go_on_with_those_that_were_flown_and_have_bounds_that_allow_i
     assert "campaign.draws was 10, is 4" in capsys.readouterr().err
 
 
-def test_a_given_path_is_certified_as_given(tmp_path: Path) -> None:
-    found = wayproof.certify(
-        [(0, 0), (2000, 0), (2000, 1500)],
-        runs=4,
-        vary={"trackability.cross_track_m": "0.001,50"},
-        settings={"seed": "5"},
-        out=tmp_path / "out",
-        workers=1,
-    )
-    limits_m = pq.read_table(tmp_path / "out" / "results.parquet")["trackability.cross_track_m"].to_pylist()
-    strict = [run for run, limit_m in enumerate(limits_m) if limit_m == 0.001]
-    assert found.claim == "as-given"
-    assert list(found.failing_runs) == strict
+def certify_path(place: Path, points: str, *words: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """The certificate of some days of a path, and their rows."""
+    (place / "path.csv").write_text(f"east_m,north_m\n{points}\n")
+    words = (str(place / "path.csv"), *words, "--workers", "1", "--out", str(place / "out"))
+    assert main(["certify", *words]) == 1
+    certificate = json.loads((place / "out" / "certificate.json").read_text())
+    return certificate, pq.read_table(place / "out" / "results.parquet").to_pylist()
+
+
+def test_a_given_path_is_certified_as_given(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--vary", "trackability.cross_track_m=0.001,50", "--seed", "5", "--runs", "4"]
+    found, days = certify_path(tmp_path, "0,0\n2000,0\n2000,1500", *words)
+    assert "no --aircraft: the path is flown by the aerosonde" in capsys.readouterr().err
+    strict = [day["run"] for day in days if day["trackability.cross_track_m"] == 0.001]
+    assert found["claim"] == "as-given"
+    assert found["failing_runs"] == strict
     assert 0 < len(strict) < 4
-    assert [(each.key, each.share) for each in found.explained] == [("trackability.cross_track_m", 1.0)]
+    key, share = found["explained"][0]["key"], found["explained"][0]["share"]
+    assert (len(found["explained"]), key, share) == (1, "trackability.cross_track_m", 1.0)
     kept = wayproof.load_run(tmp_path / "out" / "runs" / str(strict[0]))
     assert kept.metrics.check is not None
     assert not kept.metrics.check.ok
@@ -133,30 +136,10 @@ def test_a_given_path_is_certified_as_given(tmp_path: Path) -> None:
 
 def test_the_days_of_a_path_have_the_limits_of_its_check(tmp_path: Path) -> None:
     """A given path has no planner that keeps a margin in hand: 10 m are 10 m, satellite navigation or not."""
-    gnss = {"navigation.kind": "gnss"}
-    wayproof.certify([(0, 0), (2000, 0)], runs=4, settings=gnss, out=tmp_path / "days", workers=1)
-    days = pq.read_table(tmp_path / "days" / "results.parquet").to_pylist()
+    _, days = certify_path(tmp_path, "0,0\n2000,0", "--set", "navigation.kind=gnss", "--runs", "4")
     off_m = [(day["deviation_from_given_m.max"], day["altitude_error_m.max"]) for day in days]
     assert any(10.0 < off < 20.0 for off, _ in off_m)  # the margin of a planner would be 20 m
     assert [day["check.ok"] for day in days] == [max(each) <= 10.0 for each in off_m]
-
-
-def test_who_flies_a_path_is_told_where_nobody_was_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "path.csv").write_text("east_m,north_m\n0,0\n1500,0\n")
-    words = [
-        "certify",
-        str(tmp_path / "path.csv"),
-        "--runs",
-        "1",
-        "--workers",
-        "1",
-        "--out",
-        str(tmp_path / "out"),
-    ]
-    assert main(words) == 1
-    assert "no --aircraft: the path is flown by the aerosonde" in capsys.readouterr().err
 
 
 def test_keys_of_a_path_are_read_as_those_of_a_scenario(

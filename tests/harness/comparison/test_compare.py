@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import math
 import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,11 +23,12 @@ from harness.analysis.rows import Row
 from harness.cli.app import main
 from harness.cli.compare import print_comparison
 from harness.flight.record import AcceptedPlan, Track
-from harness.report import figure_style, figures
+from harness.report import figures
 from harness.report.page import Chapter, report_html
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.world.obstacle import Circle, Obstacle
+from tests.harness.campaign.test_sweep import wait_for
 from tests.page import shown
 
 ROOT = Path(__file__).parents[3]
@@ -96,7 +97,8 @@ OPTIMUM_M = 2 * math.sqrt(SIDE_M**2 - GROWN_M**2) + 2 * GROWN_M * math.asin(GROW
 def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder with two scenarios, and with another distribution's planners that children find as well."""
     folder = tmp_path_factory.mktemp("compare")
-    (folder / "ring.yaml").write_text(SCENARIO.format(name="ring", motion=""))
+    for file, name in (("ring", "ring"), ("ours", "report.html")):
+        (folder / f"{file}.yaml").write_text(SCENARIO.format(name=name, motion=""))
     (folder / "drift.yaml").write_text(
         SCENARIO.format(name="drift", motion="\n    velocity_mps: [-1.0, 0.5]")
     )
@@ -116,17 +118,8 @@ def flown(place: Path) -> Path:
     """The aircraft on one scenario, with four planners of which two crash."""
     out = place / "flown"
     kinds = "rolling_window,corner,dies,raises"
-    arguments = [
-        "compare",
-        str(place / "ring.yaml"),
-        "--planners",
-        kinds,
-        "--out",
-        str(out),
-        "--workers",
-        "2",
-    ]
-    assert main(arguments) == 1
+    options = ["--planners", kinds, "--out", str(out), "--workers", "2"]
+    assert main(["compare", str(place / "ring.yaml"), *options]) == 1
     return out
 
 
@@ -165,6 +158,10 @@ def test_an_error_is_a_row_and_the_others_fly_on(flown: Path) -> None:
 
 @pytest.mark.flights
 def test_figures_are_those_of_the_runs(flown: Path) -> None:
+    with (flown / "comparison.csv").open(newline="") as file:
+        table = list(csv.DictReader(file))
+    for cells, row in zip(table, rows_of(flown), strict=True):
+        assert cells == {name: "" if value is None else str(value) for name, value in row.items()}
     for row in rows_of(flown)[:2]:
         said = load_run(flown / "ring" / row["planner"]).metrics
         assert row["digest"] == said["digest"]
@@ -184,14 +181,6 @@ def test_a_corner_is_tighter_than_the_aircraft_and_is_not_tracked(flown: Path) -
     assert corner["tightest_turn"] == pytest.approx(math.pi / 2 / 25.0 * corner["turn_radius_m"], rel=1e-2)
     assert corner["trackable"] is False
     assert corner["total_system_error_max_m"] > 10.0
-
-
-@pytest.mark.flights
-def test_csv_holds_the_same_rows(flown: Path) -> None:
-    with (flown / "comparison.csv").open(newline="") as file:
-        table = list(csv.DictReader(file))
-    for cells, row in zip(table, rows_of(flown), strict=True):
-        assert cells == {name: "" if value is None else str(value) for name, value in row.items()}
 
 
 @pytest.mark.flights
@@ -264,6 +253,7 @@ def test_the_overlay_of_an_earlier_comparison_is_not_offered(
         (["{place}/ring.yaml", "{place}/ring.yaml", "--planners", "corner"], "corner is to fly ring twice"),
         (["{place}/nowhere.yaml", "--planners", "corner"], "nowhere.yaml: no such file"),
         (["{place}/ring.yaml", "--planners", "corner", "--workers", "0"], "--workers"),
+        (["{place}/ours.yaml", "--planners", "corner"], "a scenario is called report.html, as a file of the"),
     ],
 )
 def test_bad_input_ends_with_2_before_anything_is_flown(
@@ -275,17 +265,6 @@ def test_bad_input_ends_with_2_before_anything_is_flown(
     assert sentence in said.err
     assert said.err.count("\n") <= 2
     assert said.out == ""
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("name", ["comparison.json", "comparison.csv", "report.html"])
-def test_a_scenario_with_the_name_of_a_file_of_ours_is_refused(
-    place: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "other.yaml"
-    file.write_text((place / "ring.yaml").read_text().replace("name: ring", f"name: {name}"))
-    assert main(["compare", str(file), "--planners", "corner", "--out", str(tmp_path / "out")]) == 2
-    assert f"a scenario is called {name}, as a file of the comparison" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
@@ -302,19 +281,6 @@ def test_a_planner_in_a_file_may_lie_in_another_folder(
     assert [row["planner"] for row in rows_of(tmp_path / "out")] == ["rolling_window", "own.py:Corner"]
 
 
-def test_a_folder_with_other_things_is_refused_and_left_alone(
-    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "thesis.tex").write_text("years of work")
-    (tmp_path / "comparison.json").write_text("[]")
-    arguments = ["compare", str(place / "ring.yaml"), "--planners", "corner", "--out"]
-    assert main([*arguments, str(tmp_path)]) == 2
-    assert "is not empty and not a comparison" in capsys.readouterr().err
-    assert files(tmp_path) == {"thesis.tex", "comparison.json"}
-    assert main([*arguments, str(tmp_path / "thesis.tex")]) == 2
-    assert "is a file" in capsys.readouterr().err
-
-
 def alive(group: int) -> bool:
     """Whether any process of a group is there."""
     try:
@@ -327,41 +293,24 @@ def alive(group: int) -> bool:
 @pytest.mark.flights
 def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place: Path) -> None:
     out = place / "interrupted"
-    arguments = [
-        "compare",
-        "paper_circles",
-        "--planners",
-        "rolling_window",
-        "--no-recording",
-        "--out",
-        str(out),
-    ]
+    arguments = ["compare", "paper_circles", "--planners", "rolling_window", "--no-recording", "--out"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "harness", *arguments],
+        [sys.executable, "-m", "harness", *arguments, str(out)],
         cwd=place,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
     )
-    until = time.monotonic() + 60.0
-    while not (out / "paper_circles" / "rolling_window" / "scenario.yaml").exists():
-        assert process.poll() is None
-        assert time.monotonic() < until
-        time.sleep(0.01)
+    wait_for((out / "paper_circles" / "rolling_window" / "scenario.yaml").exists)
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
     assert said.splitlines()[-1] == f"wayproof: interrupted; the comparison in {out} is marked incomplete"
     assert json.loads((out / "comparison.json").read_text())["complete"] is False
-    assert (
-        json.loads((out / "paper_circles" / "rolling_window" / "manifest.json").read_text())["complete"]
-        is False
-    )
-    until = time.monotonic() + 10.0
-    while alive(process.pid):
-        assert time.monotonic() < until, "a flight goes on"
-        time.sleep(0.05)
+    manifest = out / "paper_circles" / "rolling_window" / "manifest.json"
+    assert json.loads(manifest.read_text())["complete"] is False
+    wait_for(lambda: not alive(process.pid))
 
 
 def test_the_terminal_table_fits_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
@@ -386,12 +335,9 @@ def test_the_terminal_table_has_planner_and_law_whole(
 ) -> None:
     laws = ("preview", "npfg", "l1", "vector_field", "pure_pursuit")
     figures = {"flown_length_m": 123456.7, "ratio": 12.3456, "planner_p99_ms": 123.4}
+    pairs = itertools.product(planners, laws)
     print_comparison(
-        [
-            Row("world", planner, "planner_failed", "x", guidance=law, **figures)
-            for planner in planners
-            for law in laws
-        ]
+        [Row("world", one, "planner_failed", "x", guidance=law, **figures) for one, law in pairs]
     )
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
@@ -403,17 +349,9 @@ def test_the_terminal_table_has_planner_and_law_whole(
     assert lines[0].rstrip() == ("world, rolling_window" if len(planners) == 1 else "world")
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(None, ""), (0.0, "0"), (1.0, "1"), (0.12345, "0.123"), (0.00004, "4.0e-05"), (-0.5, "-0.5"),
-     (94321.5, "94322"), (306.04, "306.0"), (99.96, "100")],
-)  # fmt: skip
-def test_numbers_read_well(value: float | None, text: str) -> None:
-    assert number(value) == text
-
-
-MakeTrack = Callable[..., Track]
-MakePlan = Callable[..., AcceptedPlan]
+def test_numbers_read_well() -> None:
+    values = (None, 0.0, 1.0, 0.12345, 0.00004, -0.5, 94321.5, 306.04, 99.96)
+    assert [*map(number, values)] == ["", "0", "1", "0.123", "4.0e-05", "-0.5", "94322", "306.0", "100"]
 
 
 @pytest.fixture
@@ -427,31 +365,6 @@ def drawn(
         goal_m=(4000.0, 4500.0), goal_radius_m=60.0, clearance_m=50.0, turn_radius_m=100.0, optimum_m=np.zeros((0, 2)),
     )  # fmt: skip
     return scene, figures.DrawnRun("round", "timeout", track, [circle_plan])
-
-
-def test_the_map_shows_the_track(drawn: tuple[figures.FigureScene, figures.DrawnRun]) -> None:
-    scene, run = drawn
-    (axes,) = figures.overview(scene, [(2, run)]).axes
-    lines = {str(line.get_label()): line for line in axes.get_lines()}
-    flown = np.asarray(lines["round"].get_xydata())
-    assert flown[0] == pytest.approx((0.5, 0.0))
-    assert flown[-1] == pytest.approx((run.track.east_m[-1] / 1e3, run.track.north_m[-1] / 1e3))
-    assert np.hypot(*flown.T) == pytest.approx(0.5, abs=2e-3)
-    assert lines["round"].get_color() == figure_style.COLOURS[2]
-    assert "clairvoyant optimum" not in lines
-
-
-def test_the_profile_shows_the_curvature_of_plan_and_track(
-    drawn: tuple[figures.FigureScene, figures.DrawnRun],
-) -> None:
-    """A circle of 500 m and a turn radius of 100 m: 0.2 all along."""
-    scene, run = drawn
-    planned, flown = (
-        np.asarray(line.get_xydata()) for line in figures.profiles(scene, [(0, run)]).axes[0].get_lines()[:2]
-    )
-    assert planned[:, 1] == pytest.approx(0.2, abs=1e-6)
-    assert flown[:, 1] == pytest.approx(0.2, abs=2e-3)
-    assert (planned[0, 0], flown[-1, 0]) == pytest.approx((0.0, 1.5), abs=0.01)
 
 
 @pytest.mark.parametrize("changes", [False, True])
@@ -508,28 +421,12 @@ def test_a_near_miss_is_enlarged(
     assert len(planner_figure(replace(scene, clearance_m=least_m), run, 0).axes) == 1
 
 
-def test_a_curve_of_many_rows_keeps_its_peaks(
-    make_track: MakeTrack, straight_plan: AcceptedPlan, drawn: tuple[figures.FigureScene, figures.DrawnRun]
-) -> None:
-    error = np.zeros(50_000)
-    error[31_234], error[44_321] = 7.0, -3.0
-    track = make_track(50_000, cross_track_m=error)
-    run = figures.DrawnRun("straight", "reached", track, [straight_plan])
-    cross = figures.profiles(drawn[0], [(0, run)]).axes[1]
-    curve = max((np.asarray(line.get_xydata()) for line in cross.get_lines()), key=len)
-    assert len(curve) < 2000
-    assert (curve[:, 1].max(), curve[:, 1].min()) == (7.0, -3.0)
-
-
 @pytest.mark.flights
 def test_the_table_of_a_comparison_for_a_paper(flown: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", str(flown), "--format", "csv"]) == 0
     heads, *rows = csv.reader(capsys.readouterr().out.splitlines())
     assert heads[:4] == ["scenario", "planner", "outcome", "km"]
-    km = [
-        f"{row['flown_length_m'] / 1e3:.3g}" if row["flown_length_m"] else "\N{EN DASH}"
-        for row in rows_of(flown)
-    ]
-    assert [row[3] for row in rows] == km
+    lengths_m = [row["flown_length_m"] for row in rows_of(flown)]
+    assert [row[3] for row in rows] == [f"{m / 1e3:.3g}" if m else "\N{EN DASH}" for m in lengths_m]
     assert main(["report", str(flown / "ring"), "--format", "csv"]) == 2
     assert "is not the folder of a campaign or of a complete comparison" in capsys.readouterr().err

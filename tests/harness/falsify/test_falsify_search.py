@@ -77,12 +77,6 @@ def test_the_conditions_are_counted(conditions: int) -> None:
     assert result.settled == (conditions >= 12), "two ends and ten halvings to a thousandth"
 
 
-@pytest.mark.parametrize(("conditions", "tolerance"), [(1, 0.1), (9, 1.0), (9, 0.0)])
-def test_a_search_that_cannot_be_made_is_refused(conditions: int, tolerance: float) -> None:
-    with pytest.raises(ValueError, match="2 conditions or more and a tolerance between 0 and 1"):
-        found(lambda point: True, conditions=conditions, tolerance=tolerance)
-
-
 @given(st.lists(st.floats(0.05, 0.95), min_size=2, max_size=3))
 @settings(max_examples=examples(12))
 def test_where_every_key_makes_it_harder_the_mildest_is_found(edges: list[float]) -> None:
@@ -117,15 +111,3 @@ def test_places_without_a_scenario_are_passed_over_away_from_the_diagonal() -> N
     assert result.mildest == pytest.approx((0.4, 0.7), abs=0.02)
     with pytest.raises(InputError, match="inside an obstacle"):
         Search([EVENLY] * 2, lambda point: judge((0.1, point[1])), 60, 0.01).run()
-
-
-def test_points_that_stand_for_the_same_value_are_tried_once() -> None:
-    asked: list[Values] = []
-
-    def judge(point: Values) -> bool:
-        asked.append(point)
-        return point[0] >= 2
-
-    result = Search([Vary("quarters", 0.0, 4.0, whole=True)], judge, 40, 0.001).run()
-    assert asked == [(0,), (1,), (2,)]
-    assert (result.mildest, result.passed_below, result.settled) == ((2,), (1,), True)
