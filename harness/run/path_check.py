@@ -109,7 +109,7 @@ def asked(
     field = None if scenario.ground is None else scenario.ground.field()
     plan = planned(given, scenario, altitude_m, None if field is None else field.at, corner_m)
     files: tuple[FileSpec, ...] = ()
-    if not given.drawn or given.above_ground or not plan.profile.level:
+    if given.mission is not None or given.above_ground or not plan.profile.level:
         # Now it is known where and how high it begins, and how high the obstacles matter.
         east, north = plan.way.segments[0, 2:4].tolist()
         keys["mission", "course_deg"] = math.degrees(math.atan2(east, north)) % 360.0

@@ -91,7 +91,7 @@ def _told(
     return {
         "ok": False,
         "verdict": "",
-        "drawn": given.drawn,
+        "drawn": given.mission is None,
         "points": len(given.points_m),
         "given_length_m": float(np.hypot(*np.diff(line, axis=0).T).sum()),
         "worst": {

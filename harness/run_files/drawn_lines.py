@@ -50,14 +50,10 @@ FloatArray = NDArray[np.float64]
 
 
 class PathAsRead(NamedTuple):
-    """A line as its file has it.
+    """A line as its file has it: `where` it stands, for faults, and notes on what else is there.
 
-    Attributes:
-        where: file and name of the line, for faults.
-        points: latitude, longitude (deg; where `local` east, north in metres), and altitude (m) or None.
-        notes: what else is in the file and does not change the path, a line each.
-        above_ground: the altitudes are above the ground, not the sea.
-        local: the points lie in the local plane.
+    Points are latitude, longitude (deg; where `local` east, north in metres), and altitude (m) or None, above the sea
+    or `above_ground`.
     """
 
     where: str
@@ -192,10 +188,7 @@ def read_gpx(text: str, source: str) -> PathAsRead:
 
 
 def read_igc(text: str, source: str) -> PathAsRead:
-    """The fixes of a flight, from the takeoff to the landing, at their GNSS altitude; InputError without a flight.
-
-    Where the logger has no GNSS altitude (0 or no 3-D fix), all of it is at the pressure altitude.
-    """
+    """The fixes of a flight from takeoff to landing at GNSS altitudes; where one is missing, at pressure altitudes."""
     fixes, broken = _fixes(text, source)
     placed = fixes[np.abs(fixes[:, :2]).max(axis=1) > 1e-9]
     leaps, over = _leaps(placed[:-1], placed[1:]), _leaps(placed[:-2], placed[2:])

@@ -39,10 +39,7 @@ PX4, FIXED_WING = 12, 1
 
 
 class ExportedPath(NamedTuple):
-    """A path on the WGS84 ellipsoid, "flown" or "planned": (n, 2) geodetic latitude and longitude, rounded for a file.
-
-    Altitudes (n,) are above mean sea level.
-    """
+    """A path, "flown" or "planned": (n, 2) latitude and longitude (WGS84), (n,) altitudes above mean sea level."""
 
     what: str
     scenario: Scenario
@@ -51,10 +48,7 @@ class ExportedPath(NamedTuple):
 
 
 def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
-    """A run as a file of another tool, and what its user should know, a sentence each.
-
-    In one of `FORMATS`: what was flown, or of every plan what was in effect.
-    """
+    """A run in one of `FORMATS`, what was flown or of every plan what was in effect; and what its user should know."""
     path = _path_of(run, what)
     if len(path.degrees) < 2:
         raise RunFolderError(f"the run in {run.folder} has no {what} path: it is too short")
@@ -155,10 +149,7 @@ def waypoints_text(path: ExportedPath) -> str:
 
 
 def geojson_text(path: ExportedPath) -> str:
-    """A LineString after RFC 7946, its altitudes above mean sea level.
-
-    Across the antimeridian it goes on beyond 180 degrees, so that no line leads round the earth.
-    """
+    """A LineString after RFC 7946; across the antimeridian it goes on beyond 180 degrees, not round the earth."""
     latitude, longitude = path.degrees.T
     places = np.column_stack((np.unwrap(longitude, period=360.0).round(DIGITS), latitude, path.altitude_m))
     airspeed_mps = path.scenario.aircraft.airspeed_mps

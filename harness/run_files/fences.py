@@ -16,12 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fences:
-    """All fences of a path.
-
-    Attributes:
-        every: in the order of the file.
-        inside_all: of several to stay inside of, all count, as ArduPilot has it; else one is enough, as PX4 has it.
-    """
+    """All fences of a path; the aircraft stays `inside_all` inclusion fences (ArduPilot), or in one of them (PX4)."""
 
     every: tuple[Fence, ...] = ()
     inside_all: bool = False

@@ -82,14 +82,10 @@ class CutCorner:
 class FlyBy:
     """A polyline with an arc at every corner.
 
-    Attributes:
-        waypoints_m: (k, 2) those of the points given that are needed.
-        segments: (n, 6) as in `planner.interface.Path`.
-        corners: those that are cut by more than was left free, in order.
-        kept: (k,) which of the points given the waypoints are.
-        stations_m: (k,) arc length of `segments` that belongs to each.
-        given_m: (m, 3) the polyline with the points where arcs touch it: east, north, and the arc length of `segments`
-            that belongs there; an arc is shared out over what it cuts off.
+    Waypoints are (k, 2) those of the points given that are needed, `kept` says which, stations the arc length that
+    belongs to each of `segments`, (n, 6) as in `planner.interface.Path`. Corners are those that are cut by more than
+    was left free. `given_m` is (m, 3) the polyline with the points where arcs touch it: east, north, and the arc length
+    that belongs there; an arc is shared out over what it cuts off.
     """
 
     waypoints_m: FloatArray

@@ -48,15 +48,11 @@ MISSIONS: Final[dict[str, Callable[[str, str], Program]]] = {
 
 @dataclass(frozen=True, eq=False)
 class PathAsGiven:
-    """A path as it was given, with areas that come with it and notes on what does not change the path.
+    """A path as it was given, its file or `path` for faults, and notes on what does not change the path.
 
-    Attributes:
-        source: the file, for faults.
-        points_m: (n, 2) east, north; every point of the file that has a place.
-        origin_deg: latitude and longitude of east = north = 0; None where the file does not say.
-        altitudes_m: (n,) above mean sea level; (0,) where the file does not say, and for a mission.
-        above_ground: the altitudes are above the ground instead.
-        mission: what is flown, in the plane, where it is a mission; None for a line that is wanted as drawn.
+    Points are (n, 2) east, north; latitude and longitude of the origin are None where the file does not say. Altitudes
+    are (n,) above mean sea level or `above_ground`; (0,) where the file does not say, and for a mission. A mission lies
+    in the plane; it is None for a line that is wanted as drawn.
     """
 
     source: str
@@ -72,22 +68,13 @@ class PathAsGiven:
         """Those of the mission, in the plane."""
         return Fences() if self.mission is None else self.mission.fences
 
-    @property
-    def drawn(self) -> bool:
-        """Whether the line itself is wanted; else it is a mission, whose corners may be cut."""
-        return self.mission is None
-
 
 def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None = None) -> PathAsGiven:
     """Reads a path; the name's ending says how it is written.
 
-    Args:
-        path: the file.
-        any_altitude: the altitudes of a drawn line are left out, for a flight whose altitude is given otherwise.
-        origin_deg: latitude and longitude of east = north = 0; None: those of the first point of a path in degrees.
-
-    Raises:
-        InputError: the file cannot be read, is not of its format, or holds no path that can be flown.
+    With `any_altitude` the altitudes of a drawn line are left out. The origin is latitude and longitude of east = north
+    = 0; None: those of the first point of a path in degrees. An InputError says that the file cannot be read, is not of
+    its format, or holds no path that can be flown.
     """
     source, suffix = str(path), path.suffix.lower()
     every = (*LINES, *KML, *MISSIONS)

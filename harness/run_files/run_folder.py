@@ -71,10 +71,7 @@ class Run:
 
 
 class RunFolder(AbstractContextManager["RunFolder"]):
-    """A run folder being written. Use as a context manager; `finish` makes it complete.
-
-    Left without `finish` (an error, Ctrl-C), the folder stays marked incomplete.
-    """
+    """A run folder being written, a context manager; left without `finish`, it stays marked incomplete."""
 
     def __init__(self, path: Path, manifest: dict[str, Any], lock: FolderLock) -> None:
         self.path = path

@@ -17,7 +17,7 @@ from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.height_field import HeightField, cell_sides, height_field
-from harness.world_files.parts import Box, Contents, FloatArray, Raster, Reading
+from harness.world_files.parts import BoolArray, Box, Contents, FloatArray, Raster, Reading
 from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.solids import Layer, Solid, clipped, placed_cells, simplified, sliced_parts
 
@@ -27,8 +27,6 @@ DECIMALS: Final = 3
 """Decimals of a corner in metres: corners are rounded to a millimetre."""
 MAX_CORNERS: Final = 900_000
 """Most corners of all files together: a scenario with more could not be read again."""
-MAX_POLYGONS: Final = 150_000
-"""Most polygons of a file."""
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
 """Bottom and top of what has none."""
 
@@ -52,10 +50,7 @@ class FileSpec:
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What became of one file: shapely polygons in the plane, cut to the area and valid, and what was assumed.
-
-    `heights_m` has bottom and top of each, above mean sea level.
-    """
+    """What became of one file: valid polygons in the plane and area, their bottoms and tops, and what was assumed."""
 
     spec: FileSpec
     kind: str
@@ -89,10 +84,7 @@ def expanded(
     altitude_m: float,
     ground: HeightField | None = None,
 ) -> Expanded:
-    """Obstacles and ground of some files, in the plane of a place; a fault is a FileFault.
-
-    What lies outside of the bounds is left out. `ground` is taken where no file has terrain.
-    """
+    """Obstacles and ground of files in bounds of the plane of a place; `ground` is taken where no file has terrain."""
     margin = MARGIN * max(bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1])
     box = bounds_m[0] - margin, bounds_m[1] - margin, bounds_m[2] + margin, bounds_m[3] + margin
     loaded: list[tuple[Contents, Mapping]] = []
@@ -127,7 +119,7 @@ def blaming(index: int) -> Iterator[None]:
 def _check_size(sources: Sequence[Source]) -> None:
     every = [each for source in sources for each in source.polygons]
     corners = int(shapely.get_num_coordinates(np.array(every, dtype=object)).sum())
-    if corners > MAX_CORNERS or len(every) > MAX_POLYGONS:
+    if corners > MAX_CORNERS:
         raise InputError(
             f"has {counted(len(sources[-1].polygons), 'polygon')}, {corners:,} corners in the area with those of the "
             f"files before; at most {MAX_CORNERS:,} corners can be kept: make area.bounds_m smaller"
@@ -164,11 +156,10 @@ def _loaded(path: Path, stamp: tuple[int, int], kind: str | None, reading: Readi
 def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
     """X and y, in the file, of the corners of all that it holds, of each part those of its box; empty without any."""
     found = [np.zeros((0, 2))]
-    for raster in (contents.terrain, contents.occupied):
-        if raster is not None:
-            rows, columns = raster.values.shape
-            x, y = raster.places(np.array([0.0, columns, columns, 0.0]), np.array([0.0, 0.0, rows, rows]))
-            found.append(np.column_stack((x, y)))
+    if (raster := contents.raster) is not None:
+        rows, columns = raster.values.shape
+        x, y = raster.places(np.array([0.0, columns, columns, 0.0]), np.array([0.0, 0.0, rows, rows]))
+        found.append(np.column_stack((x, y)))
     if contents.parts:
         bounds = shapely.bounds(np.array([part.footprint for part in contents.parts], dtype=object))
         found += [bounds[:, [i, j]] for i in (0, 2) for j in (1, 3)]
@@ -200,12 +191,11 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
         layer = layer._replace(flat_m=0.0)
         notes.append("no terrain: the ground is taken as flat at 0 m (ground_m)")
     solids = sliced_parts(contents.parts, mapping, layer, box)
-    tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
-    for raster, solid, heights_m in _solid_cells(contents, spec, layer, notes):
+    tolerance_m = _tolerance_m(spec, contents, mapping)
+    if (raster := contents.raster) is not None:
+        heights_m = HEIGHTS_M if raster.occupancy else (layer.low_m, layer.low_m)
+        solid = _solid_cells(raster, spec, layer.low_m, notes)
         solids += [Solid(shape, *heights_m) for shape in placed_cells(raster, solid, mapping, box)]
-        if spec.tolerance_m is None:
-            rows, columns = raster.values.shape
-            tolerance_m = max(cell_sides(raster, mapping, columns / 2, rows / 2) or (tolerance_m,))
     solids = clipped(solids, box)
     polygons = _outlines([each.shape for each in solids], tolerance_m)
     if polygons:
@@ -216,22 +206,22 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
     return Source(spec, contents.kind, contents.sha256, tuple(polygons), heights, tuple(notes))
 
 
-def _solid_cells(
-    contents: Contents, spec: FileSpec, layer: Layer, notes: list[str]
-) -> Iterator[tuple[Raster, Any, tuple[float, float]]]:
-    """Rasters of a file with those of their cells that are solid, and between which heights."""
-    if (terrain := contents.terrain) is not None:
-        missing = np.isnan(terrain.values)
-        if missing.any():
-            told = f"without a height taken as {spec.nodata} (nodata)"
-            notes.append(f"{counted(int(missing.sum()), 'cell')} {told}")
-        solid = (terrain.values >= layer.low_m) | (missing & (spec.nodata == "solid"))
-        yield terrain, solid, (layer.low_m, layer.low_m)
-    if (occupied := contents.occupied) is not None:
-        missing = np.isnan(occupied.values)
-        if missing.any():
-            notes.append(f"{counted(int(missing.sum()), 'unknown cell')} taken as {spec.unknown} (unknown)")
-        yield occupied, (occupied.values >= 0.5) | (missing & (spec.unknown == "occupied")), HEIGHTS_M
+def _tolerance_m(spec: FileSpec, contents: Contents, mapping: Mapping) -> float:
+    """By how much outlines may be simplified: by default a cell of a raster."""
+    if spec.tolerance_m is not None or contents.raster is None:
+        return 0.1 if spec.tolerance_m is None else spec.tolerance_m
+    rows, columns = contents.raster.values.shape
+    return max(cell_sides(contents.raster, mapping, columns / 2, rows / 2) or (0.1,))
+
+
+def _solid_cells(raster: Raster, spec: FileSpec, low_m: float, notes: list[str]) -> BoolArray:
+    """Which cells of a raster are solid: occupied, or at least as high as the lowest height of the aircraft."""
+    missing = np.isnan(raster.values)
+    taken, key = (spec.unknown, "unknown") if raster.occupancy else (spec.nodata, "nodata")
+    if missing.any():
+        notes.append(f"{counted(int(missing.sum()), 'cell')} without a value taken as {taken} ({key})")
+    solid: BoolArray = raster.values >= (0.5 if raster.occupancy else low_m)
+    return solid | (missing & (taken != "free"))
 
 
 def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:

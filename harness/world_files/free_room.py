@@ -1,7 +1,4 @@
-"""Where an aircraft has room in a world: distances from what is solid on a grid, and two places far apart in it.
-
-Frame: local ENU plane, metres.
-"""
+"""Where an aircraft has room in the local plane (m): distances from what is solid, and two places far apart."""
 
 from __future__ import annotations
 
@@ -27,10 +24,7 @@ DIRECTIONS: Final = 24
 
 @dataclass(frozen=True, eq=False)
 class FreeRoom:
-    """Distance from the middle of each cell of a grid to what is solid and to the border, at least.
-
-    The corner is the south-western one; the room is (rows, columns) from south to north.
-    """
+    """Least distance from the middle of each cell to what is solid and to the border, from the south-western corner."""
 
     corner_m: tuple[float, float]
     cell_m: float
@@ -60,8 +54,7 @@ def free_room(polygons: Sequence[Any], bounds_m: Box) -> FreeRoom:
 def ends(room: FreeRoom, turn_radius_m: float, clearance_m: float, turning: bool) -> FloatArray | None:
     """Start and goal, (2, 2): two places far apart with room to turn, joined by a corridor; None where there are none.
 
-    The corridor has the clearance to both sides of its middle; where `turning`, a turn radius more, so that an aircraft
-    can turn round anywhere on it.
+    The corridor has the clearance to both sides of its middle; where `turning`, room to turn round too.
     """
     from scipy import ndimage
 

@@ -1,7 +1,4 @@
-"""The ground as heights (m) above mean sea level on a grid of the local ENU plane (m).
-
-It comes from terrain of files, and is a text in a scenario file.
-"""
+"""The ground as heights (m) above mean sea level on a grid of the local ENU plane (m): of files, and as text."""
 
 from __future__ import annotations
 

@@ -24,34 +24,30 @@ from harness.world_files.readers import (
     zones,
 )
 
-KINDS: Final[dict[str, Callable[[Path, Reading], Contents]]] = {
-    "geotiff": raster.read,
-    "ascii_grid": raster.read,
-    "srtm": raster.read,
-    "numpy_dem": raster.read_numpy,
-    "osm": osm.read_xml,
-    "osm_pbf": osm.read_pbf,
-    "cityjson": city_json.read,
-    "geojson": maps.read_geojson,
-    "kml": maps.read_kml_polygons,
-    "openair": open_air.read,
-    "ed269": zones.read_ed269,
-    "ed318": zones.read_ed318,
-    "plan_fence": fences.read_plan,
-    "ardupilot_fence": fences.read_ardupilot,
-    "ros_map": occupancy.read_ros,
-    "moving_ai": occupancy.read_moving_ai,
+Reader = Callable[[Path, Reading], Contents]
+GROUPS: Final[dict[str, dict[str, Reader]]] = {
+    "terrain": {
+        **dict.fromkeys(("geotiff", "ascii_grid", "srtm"), raster.read),
+        "numpy_dem": raster.read_numpy,
+    },
+    "buildings": {
+        "osm": osm.read_xml,
+        "osm_pbf": osm.read_pbf,
+        "cityjson": city_json.read,
+        "geojson": maps.read_geojson,
+    },
+    "airspace": {
+        "geojson": maps.read_geojson,
+        "kml": maps.read_kml_polygons,
+        "openair": open_air.read,
+        "ed269": zones.read_ed269,
+        "ed318": zones.read_ed318,
+    },
+    "fences": {"plan_fence": fences.read_plan, "ardupilot_fence": fences.read_ardupilot},
+    "occupancy": {"ros_map": occupancy.read_ros, "moving_ai": occupancy.read_moving_ai},
 }
-"""Readers by the name of their kind."""
-
-GROUPS: Final = {
-    "terrain": ("geotiff", "ascii_grid", "srtm", "numpy_dem"),
-    "buildings": ("osm", "osm_pbf", "cityjson", "geojson"),
-    "airspace": ("geojson", "kml", "openair", "ed269", "ed318"),
-    "fences": ("plan_fence", "ardupilot_fence"),
-    "occupancy": ("ros_map", "moving_ai"),
-}
-"""Kinds by what they hold. The name of a group may stand for any of its kinds, which is then told from the file."""
+"""Readers by the name of their kind, by what they hold. The name of a group may stand for any of its kinds."""
+KINDS: Final[dict[str, Reader]] = {kind: read for group in GROUPS.values() for kind, read in group.items()}
 
 IMAGE: Final = "an image; give the YAML file of its ROS map"
 GAZEBO: Final = "a Gazebo world; give its footprints as GeoJSON, or its cells as a MovingAI .map"
@@ -65,10 +61,7 @@ GIVEN_UP: Final = {
     "overpass": "JSON of Overpass; ask it for XML ([out:xml]) and give that",
 }
 """Files that are not read, by their ending or kind, with what would do."""
-FAMILIES: Final = (
-    "terrain (GeoTIFF, ESRI ASCII, SRTM .hgt), buildings (OSM XML or PBF, CityJSON, GeoJSON), airspace (GeoJSON, KML, "
-    "OpenAir, ED-269, ED-318), fences (.plan, ArduPilot), occupancy (ROS map_server, MovingAI)"
-)
+FAMILIES: Final = "; ".join(f"{group} ({', '.join(kinds)})" for group, kinds in GROUPS.items())
 HEAD: Final = 65_536
 """Bytes at the begin of a file by which its kind is told, but for JSON."""
 _BINARY: Final = (
@@ -116,10 +109,11 @@ def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
     for note in notes:
         name, its, sentence = note.rpartition(": its ")
         names.setdefault(its + sentence, []).append(name)
-    return tuple(
-        (of[0] if len(of) == 1 else f"{len(of)} parts, {of[0]} the first" if of[0] else "") + sentence
-        for sentence, of in names.items()
-    )
+    told = []
+    for sentence, of in names.items():
+        first = of[0] or ("a part" if sentence.startswith(": its ") else "")
+        told.append((f"{len(of)} parts, {first} the first" if first and len(of) > 1 else first) + sentence)
+    return tuple(told)
 
 
 def kind_of(path: Path) -> str:

@@ -66,13 +66,14 @@ class Part:
 class Raster:
     """Numbers in rows and columns, the first row on top: heights above mean sea level (m), NaN where there is none.
 
-    Of an occupancy map they are 1 where a cell is occupied, 0 where it is free, NaN where it is not known. The affine
+    Of an `occupancy` map they are 1 where a cell is occupied, 0 where it is free, NaN where it is not known. The affine
     a, b, c, d, e, f puts the corner of column i and row j at x = a i + b j + c, y = d i + e j + f; the value belongs to
     the middle of a cell.
     """
 
     values: FloatArray
     affine: Affine
+    occupancy: bool = False
 
     @property
     def middle_x(self) -> float:
@@ -94,18 +95,19 @@ class Raster:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """All that was read from a file with a SHA-256, and sentences on what was passed over or assumed.
-
-    Its coordinate reference system is one that pyproj takes; None: metres in a plane of its own.
-    """
+    """What was read from a file, its crs as pyproj takes it, None for metres of its own, and what was assumed."""
 
     kind: str
     crs: str | None
     parts: tuple[Part, ...] = ()
-    terrain: Raster | None = None
-    occupied: Raster | None = None
+    raster: Raster | None = None
     notes: tuple[str, ...] = ()
     sha256: str = ""
+
+    @property
+    def terrain(self) -> Raster | None:
+        """Heights of the ground."""
+        return None if self.raster is None or self.raster.occupancy else self.raster
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,7 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Mapping:
-    """Coordinates of one file in the plane of a scenario that lies at a place.
-
-    `crs` is that of the file; None: metres in a plane of its own, to which `shift_m` east and north are added.
-    """
+    """Coordinates of one file, by its crs, in a plane; without one metres of its own, to which `shift_m` is added."""
 
     crs: str | None
     place: Place

@@ -1,7 +1,6 @@
 """From files alone to an area with start and goal: what `wayproof world` writes.
 
-The local ENU plane lies about the origin that is chosen; files without a place on earth keep their own metres, moved so
-that the south-western corner of the area is (0, 0).
+Files without a place on earth keep their own metres, moved so that the area's south-western corner is (0, 0).
 """
 
 from __future__ import annotations
@@ -30,8 +29,6 @@ from harness.world_files.solids import placed_cells
 
 ANY_PLACE: Final = Place(47.0, 8.0)
 """Where the plane lies of a file that has no place on earth."""
-SCALABLE: Final = ("ros_map", "moving_ai", "ascii_grid")
-"""Kinds of files whose scale may be chosen, by metres_per_cell."""
 LARGEST_TURNS, LARGEST_M = 400.0, 400_000.0
 """Longest side of an area, in turn radii and in metres: a part of a larger file is taken."""
 PAD_TURNS: Final = 12.0
@@ -49,10 +46,7 @@ class Craft:
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """An area with a mission: the files, placed, obstacles and ground there, and notes on what was chosen.
-
-    The place is the origin of the plane, None where no file has a place on earth; start and goal are (2, 2).
-    """
+    """An area with a mission, start and goal (2, 2); the place is the plane's origin, None without one on earth."""
 
     specs: tuple[FileSpec, ...]
     place: Place | None
@@ -162,16 +156,13 @@ def _place(latitude_deg: float, longitude_deg: float) -> Place:
 
 
 def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tuple[_Files, Box, list[str]]]:
-    """Bounds about a start and a goal that are given, else of what the files hold, and what is said of them.
-
-    Of large files there are several parts: where the most obstacles are, the middle, the corners.
-    """
+    """Bounds about start and goal, else of what the files hold; of large ones the most crowded part and others."""
     inside, around = _covered(files)
     pad = PAD_TURNS * craft.turn_radius_m
     if given is not None:
         reach = max(pad, 0.25 * math.dist(*given))
-        box = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
-        yield files, _common(*inside, box) or box, []
+        about = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
+        yield files, _common(*inside, about) or about, []
         return
     low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
     whole = _common(*inside, (*low.tolist(), *high.tolist()))
@@ -199,7 +190,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
 
 def _crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
     """The middle of the most corners of obstacles, each its box, that fit in one part; none of rasters alone."""
-    drawn = ((replace(each, terrain=None, occupied=None), mapping) for each, mapping in files.placed())
+    drawn = ((replace(each, raster=None), mapping) for each, mapping in files.placed())
     places = np.hstack([np.stack(mapping.to_plane(*corners_of(each))) for each, mapping in drawn]).T
     places = places[np.isfinite(places).all(axis=1)]
     if not len(places):
@@ -214,7 +205,7 @@ def _covered(files: _Files) -> tuple[list[Box], list[Box]]:
     inside: list[Box] = []
     around: list[Box] = []
     for each, mapping in files.placed():
-        raster = each.terrain or each.occupied
+        raster = each.raster
         east, north = mapping.to_plane(*corners_of(each if raster is None else replace(each, parts=())))
         known = np.isfinite(east) & np.isfinite(north)
         if known.any():
@@ -236,8 +227,8 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
     """Start and goal in free room, and what is to be said of the way; or the numbers that say why there are none."""
     solid = [each for source in found.sources for each in source.polygons]
     for each, mapping in files.placed():
-        if each.occupied is not None:  # what is not known is no place for a start
-            solid += placed_cells(each.occupied, np.isnan(each.occupied.values), mapping, bounds)
+        if each.raster is not None and each.raster.occupancy:  # what is not known is no place for a start
+            solid += placed_cells(each.raster, np.isnan(each.raster.values), mapping, bounds)
     room = free_room(solid, bounds)
     turn_m, clearance_m = craft.turn_radius_m, craft.clearance_m
     if (chosen := ends(room, turn_m, clearance_m, turning=True)) is not None:
@@ -260,8 +251,7 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
 
 def _cell_that_fits(files: _Files, craft: Craft, room: FreeRoom) -> float | None:
     """Side of a cell, in metres, with which the aircraft has room; None of files whose scale is given."""
-    scalable = [each for each in files.contents if each.crs is None and each.kind in SCALABLE]
-    rasters = [raster for each in scalable if (raster := each.occupied or each.terrain)]
+    rasters = [each.raster for each in files.contents if each.crs is None and each.raster is not None]
     for scale in 1.1 ** np.arange(1.0, 120.0) if rasters else ():
         if ends(room, craft.turn_radius_m / scale, craft.clearance_m / scale, turning=True) is not None:
             cell_m = math.hypot(rasters[0].affine[0], rasters[0].affine[3]) * float(scale)

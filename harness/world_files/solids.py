@@ -95,16 +95,14 @@ def clipped(solids: Sequence[Solid], box: Box) -> list[Solid]:
 def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
     """A part as far as it reaches into the layer, where its limits make it largest; None: the ground is not known."""
     bottom, top, on_ground = part.bottom, part.top, Datum.GROUND in (part.bottom.datum, part.top.datum)
-    if (bottom.datum is Datum.SEA and bottom.height_m > layer.high_m) or (
-        top.datum is Datum.SEA and top.height_m < layer.low_m
-    ):
-        return []  # whatever the ground
+    if _is_out(part, layer):
+        return []
     if on_ground and layer.field is not None and not part.rigid:
         shape = shapely.intersection(shape, shapely.box(*layer.known_in))
         if shape.is_empty:
             return []
     heights, corner = _ground_below(part, shape, layer) if on_ground else (np.zeros((1, 1)), (0.0, 0.0))
-    if not (heights.size and np.isfinite(heights).all()):
+    if not heights.size or np.isnan(heights).any():
         return None
     lows, tops = (each.height_m + heights * (each.datum is Datum.GROUND) for each in (bottom, top))
     solid = Solid(shape, float(lows.min()), float(tops.max()))
@@ -116,6 +114,12 @@ def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
     spacing = layer.field.spacing_m
     placed = shapely.transform(outlines(mask), lambda p: p * spacing + corner)
     return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]
+
+
+def _is_out(part: Part, layer: Layer) -> bool:
+    """Whether a part lies above or below a layer, whatever the ground."""
+    above = part.bottom.datum is Datum.SEA and part.bottom.height_m > layer.high_m
+    return above or (part.top.datum is Datum.SEA and part.top.height_m < layer.low_m)
 
 
 def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, tuple[float, float]]:
@@ -177,9 +181,8 @@ def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -
 def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     """Polygons with fewer corners that cover the given ones, which are valid.
 
-    A corner that points into the solid is left out where the notch that it makes is not deeper than the tolerance,
-    small notches first, until `MOST_GROWTH` of the polygon's area has been added; corners on a straight line are
-    left out as well. Each of at most `PASSES` passes moves an edge by no more than the tolerance.
+    In each of `PASSES` passes corners that make a notch no deeper than the tolerance are left out, small notches first,
+    until `MOST_GROWTH` of the polygon's area has been added; corners on a straight line as well.
     """
     given = shapely.orient_polygons(np.array(polygons, dtype=object))
     convex = shapely.area(shapely.convex_hull(given)) <= shapely.area(given) * (1.0 + 1e-12)
@@ -219,10 +222,7 @@ def _filled(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatArra
 
 
 def _bends(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Of each corner of a closed ring: twice the area that it adds, the base from neighbour to neighbour, the edge on.
-
-    The area is negative in a notch; the last is whether the ring goes on forwards.
-    """
+    """Of each corner of a ring: twice its area, below 0 in a notch, base, edge on, and whether it goes on forwards."""
     before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
     into, on, base = points - before, after - points, after - before
     turn = into[:, 0] * on[:, 1] - into[:, 1] * on[:, 0]

@@ -1,7 +1,6 @@
-"""Ways onto a circle and off it, as lines and arcs: for loiters.
+"""Ways onto the circle of a loiter and off it, as lines and arcs: rows of `planner.interface.Path`.
 
-Frame: the plane as complex numbers, east + i north, metres; a direction is a number of size 1. Segments are rows of
-`planner.interface.Path`.
+The plane is one of complex numbers, east + i north, metres; a direction is a number of size 1.
 """
 
 from __future__ import annotations
@@ -58,10 +57,7 @@ class Circle(NamedTuple):
         return abs(self.direction(pose[0]) - pose[1]) < 1e-3
 
     def further_m(self, place: complex, target: complex | None, length_m: float) -> float:
-        """How much further round it is than a length from a place, to where the way to a target leaves it.
-
-        A target inside, or none, is left for where it is.
-        """
+        """How much further round it is than a length from a place, to where the way to a target outside leaves it."""
         leave = None if target is None else self.left_to(target)
         if leave is None:
             return 0.0

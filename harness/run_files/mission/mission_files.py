@@ -1,7 +1,4 @@
-"""Missions with their fences: .plan files of QGroundControl, and plain text ("QGC WPL").
-
-The plan's format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html
-"""
+"""Missions with their fences: .plan files of QGroundControl (developer guide, Plan file format), and "QGC WPL"."""
 
 from __future__ import annotations
 
@@ -86,11 +83,7 @@ def _home_item(items: list[Item], notes: list[str]) -> Home:
 
 
 def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
-    """Items with numbers that can be jumped to.
-
-    Autopilots count the items of a file by their lines. The numbers that stand there are kept unless that matters:
-    where one comes twice, or some are left out and there is a jump.
-    """
+    """Items by their numbers; where one comes twice, or some are left out and there is a jump, counted by lines."""
     numbers = [item.number for item in items]
     twice = len(set(numbers)) < len(numbers)
     gaps = bool(numbers) and numbers != list(range(numbers[0], numbers[0] + len(numbers)))
@@ -114,12 +107,7 @@ def read_plan(text: str, source: str) -> Program:
         raise InputError(f"{source}: mission.items: is missing; it is required")
     notes: list[str] = []
     home = _home(mission.get("plannedHomePosition"), f"{source}: mission.plannedHomePosition", notes)
-    items: list[Item] = []
-    for number, each in enumerate(mission["items"]):
-        items += _items(each, f"{source}: mission.items[{number}]", len(items) + 1, notes)
-    if len({item.number for item in items}) < len(items):
-        items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
-        notes.append("a doJumpId is there twice: items are counted from 1 instead")
+    items = _every_item(mission["items"], f"{source}: mission.items", notes)
     geofence, rally = plan.get("geoFence") or {}, plan.get("rallyPoints") or {}
     fences = Fences(plan_fences(geofence, f"{source}: "), commands.inside_all(mission.get("firmwareType")))
     if geofence.get("breachReturn") is not None:
@@ -135,6 +123,17 @@ def _home(home: Any, where: str, notes: list[str]) -> Home:
         notes.append("its home has no altitude: altitudes above home are counted from the sea")
         home = [*home[:2], 0.0]
     return numbers(home, where, PLACE, (3,))
+
+
+def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item]:
+    """The items of a plan, numbered as there unless a number comes twice."""
+    items: list[Item] = []
+    for number, each in enumerate(given):
+        items += _items(each, f"{where}[{number}]", len(items) + 1, notes)
+    if len({item.number for item in items}) < len(items):
+        items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
+        notes.append("a doJumpId is there twice: items are counted from 1 instead")
+    return items
 
 
 def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:

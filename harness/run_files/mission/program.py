@@ -227,10 +227,7 @@ class _Run:
         self._over = self._closing or ends
 
     def _step(self, item: Item, **more: Any) -> MissionStep:
-        """A step to where an item says, at its altitude.
-
-        ArduPilot takes a position of zeros as the present one, and an altitude of 0 with it as the present one, too.
-        """
+        """A step to where an item says; as with ArduPilot zeros are the present place, a 0 with it that altitude."""
         height: float | None = _bounded(item, "is at", item.params[6], MOST_HEIGHT_M, "m")
         if item.position is None and height == 0.0:
             height = None

@@ -1,7 +1,6 @@
 """The route of a mission as fixed-wing autopilots fly it: lines and arcs, with altitude and airspeed along them.
 
-Waypoints are flown by, the altitude goes from one to the next along the leg (ArduPilot's glide slope, PX4's first-order
-hold), circles are joined and left along tangents.
+Altitudes go from one waypoint to the next along the leg, as with ArduPilot's glide slope and PX4's first-order hold.
 """
 
 from __future__ import annotations
@@ -150,15 +149,8 @@ class _Build:
         entry = before if climbs else altitude
         self._altitude_m = before
         pose = self._join(item, circle, turn_m, entry)
-        if loiter.turns is not None:
-            length = loiter.turns * math.tau * circle.radius_m
-        else:
-            length = self._climbing_m(altitude) if loiter.time_s is None else loiter.time_s * self._mps
-        target, after = None, next(iter(self._steps[number + 1 : number + 2]), None)
-        if after is not None and after.place is not None:
-            # It goes on round the same centre.
-            again = after.loiter is not None and abs(after.place - center) < SAME_PLACE_M
-            target = None if again else after.place
+        length = self._around_m(loiter, circle, altitude)
+        target = self._target(number, center)
         length += circle.further_m(pose[0], target, length)
         self._speeds.append((self._length_m, self._asked_mps, self._mps))
         self._altitudes.append((self._length_m, entry))
@@ -177,6 +169,20 @@ class _Build:
             turn = onto(pose, Circle(target, 0.0, 1), turn_m)
             pose = self._turn(turn[: len(turn) - (turn[-1][4] == 0.0)]) or pose
         self._add(Vertex(pose[0], altitude, None))
+
+    def _around_m(self, loiter: Loiter, circle: Circle, altitude: float) -> float:
+        """How far a loiter goes round its circle."""
+        if loiter.turns is not None:
+            return loiter.turns * math.tau * circle.radius_m
+        return self._climbing_m(altitude) if loiter.time_s is None else loiter.time_s * self._mps
+
+    def _target(self, number: int, center: complex) -> complex | None:
+        """What the aircraft turns to as it leaves a circle; None where it goes on round the same centre or straight."""
+        after = next(iter(self._steps[number + 1 : number + 2]), None)
+        if after is None or after.place is None:
+            return None
+        again = after.loiter is not None and abs(after.place - center) < SAME_PLACE_M
+        return None if again else after.place
 
     def _join(self, item: int, circle: Circle, turn_m: float, altitude: float) -> Pose:
         """Gets onto a circle."""

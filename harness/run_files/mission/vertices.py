@@ -101,10 +101,7 @@ def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:
 
 
 def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:
-    """The legs between waypoints, with the arc length of the route at each.
-
-    Places that only mark where a circle is joined or left are passed.
-    """
+    """The legs between waypoints, by arc lengths; places that only mark where a circle is joined are passed."""
     pairs = zip(pairwise(run), pairwise(stations_m.tolist()), strict=True)
     return [
         straight((a.place, b.place), along, 0.0 if b.item is None else b.acceptance_m or None, b.centre)

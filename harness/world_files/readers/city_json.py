@@ -1,7 +1,4 @@
-"""Buildings from CityJSON 1.0 to 2.0: each object between its lowest and its highest vertex.
-
-Heights are those of the file's vertical datum, taken as mean sea level.
-"""
+"""Buildings from CityJSON 1.0 to 2.0, each between its lowest and its highest vertex, above mean sea level."""
 
 from __future__ import annotations
 
@@ -31,22 +28,17 @@ WALL: Final = 1e-9
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads the buildings and bridges of a CityJSON file, or of a sequence of them (CityJSONSeq), a feature a line.
-
-    A building that is flat, as those of level of detail 0 are, is as high as its attributes say. Heights are metres.
-    """
+    """Reads the buildings and bridges of a CityJSON file, or of a sequence of them (CityJSONSeq), a feature a line."""
     contents = json_of(path, lines=True)
     if not all(isinstance(each, dict) and isinstance(each.get("CityObjects"), dict) for each in contents):
         raise InputError("has no CityObjects; must be CityJSON")
     crs = reading.crs or _crs(contents[0].get("metadata"))
-    if crs is not None:
-        check_metres(crs)
     parts: list[Part] = []
     passed, buildings = Counter[str](), limits.Buildings(reading)
     for content in contents:
         vertices = _vertices(content, contents[0].get("transform"))
         for name, thing in content["CityObjects"].items():
-            kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
+            kind = _kind(thing)
             if kind.startswith(SOLID):
                 parts += _parts(name, thing, vertices, buildings, passed)
             else:
@@ -58,16 +50,19 @@ def read(path: Path, reading: Reading) -> Contents:
         notes.append(f"passed over: {', '.join(told)}")
     if crs is None:
         notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
+    else:
+        check_metres(crs)
     return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
+
+
+def _kind(thing: Any) -> str:
+    return str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
 
 
 def _parts(
     name: str, thing: dict[str, Any], vertices: FloatArray, buildings: limits.Buildings, passed: Counter[str]
 ) -> list[Part]:
-    """The part that an object is: its surfaces from above, between its lowest and its highest vertex.
-
-    What of it is passed over is counted.
-    """
+    """The part that an object is: its surfaces from above; one that is flat is as high as its attributes say."""
     instances = sum(each["type"] == INSTANCE for each in _geometries(thing))
     passed[INSTANCE] += instances
     surfaces = list(_best_surfaces(name, thing, vertices))

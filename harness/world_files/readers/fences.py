@@ -1,7 +1,4 @@
-"""Fences of autopilots: the geoFence of a QGroundControl plan, ArduPilot's fence files old and new.
-
-What is not inside an inclusion fence is solid. PX4 asks to be inside one of several, ArduPilot inside all of them.
-"""
+"""Fences of autopilots: the geoFence of a QGroundControl plan, ArduPilot's fence files old and new."""
 
 from __future__ import annotations
 
@@ -69,7 +66,7 @@ def _shape(fence: Fence) -> Any:
 def _contents(
     kind: str, fences: Sequence[Fence], any_of: bool, rally: int, told: tuple[str, ...] = ()
 ) -> Contents:
-    """The fences as parts; where the aircraft has to be inside any of several, those are one."""
+    """The fences as parts; where the aircraft has to be inside any of several, as with PX4, those are one."""
     points = counted(rally, "rally point")
     if not fences:
         held = f", but {points}, which are no obstacles" if rally else ""

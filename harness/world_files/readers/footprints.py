@@ -28,7 +28,7 @@ Place = tuple[float, float]
 
 def finished(contents: Contents) -> Contents:
     """Contents whose footprints are valid, on earth, have an area (others are counted), and go the short way round."""
-    if contents.terrain is not None or contents.occupied is not None:
+    if contents.raster is not None:
         return contents
     if not contents.parts:
         raise InputError("has no polygon; must have some")

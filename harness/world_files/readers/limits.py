@@ -1,7 +1,4 @@
-"""Heights as files write them: limits of airspace (`2500 ft AMSL`, `FL 65`, `SFC`) and heights of buildings.
-
-A flight level is taken as an altitude above mean sea level, as it is in the standard atmosphere.
-"""
+"""Heights as files write them: limits of airspace (`2500 ft AMSL`; `FL 65`, taken as above the sea), buildings."""
 
 from __future__ import annotations
 
@@ -76,10 +73,7 @@ def _told(words: Sequence[str]) -> tuple[str | None, Datum | None]:
 
 
 def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | None:
-    """A height as airspace files write it, `2500 ft AMSL`, `FL 65`, `100m GND`; NO_BOTTOM for the surface.
-
-    A number without a unit or a datum has those that are given. None where it cannot be told.
-    """
+    """A height as airspace files write it, NO_BOTTOM for the surface, by default in this unit above this datum."""
     word = " ".join(text.upper().split())
     plain = next((limit for pattern, limit in _PLAIN if pattern.fullmatch(word)), None)
     match = _LIMIT.fullmatch(word)
@@ -91,10 +85,7 @@ def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | N
 
 
 def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | None:
-    """A limit whose unit and reference may stand apart; what is missing is metres above mean sea level, and noted.
-
-    The value is a number or a text; where it has none, `said` has its unit and reference, as `FT AGL`, `m AMSL`, `FL`.
-    """
+    """A limit whose unit and reference may stand apart in `said`; what is missing is metres above the sea, noted."""
     text = str(value) if isinstance(value, str | int | float) else ""
     own_unit, own_datum = _told(_WORD.findall(text.upper()))
     unit, datum = _told(re.findall("[A-Z]+", said.upper()))
@@ -105,17 +96,14 @@ def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | No
         ((unit, own_unit) == (None, None), "unit", "metres"),
         ((datum, own_datum) == (None, None), "known reference", "above mean sea level"),
     ):
-        told = f"{name or 'a part'}: its limits name no {what}; taken as {taken}"
+        told = f"{name}: its limits name no {what}; taken as {taken}"
         notes += [told] * (none and told not in notes[-4:])
     return limit
 
 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:
-    """Bottom and top: what is not known is no limit, and limits that are the wrong way round are turned.
-
-    Files write an upper limit of 0 where there is none; a zone of no height would forbid nothing.
-    """
-    told = f"{name or 'a part'}: its"
+    """Bottom and top: what is not known, or an upper limit of 0, is no limit; those the wrong way round are turned."""
+    told = f"{name}: its"
     for side, limit in (("lower", lower), ("upper", upper)):
         if limit is None:
             notes.append(f"{told} {side} limit is not known; taken as without")
@@ -141,15 +129,15 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
         raise InputError("is a facility map: one may fly up to its ceilings; give the airspace")
     found: list[Limit | None] = []
     for begins, none in zip(_SIDES, (NO_BOTTOM, NO_TOP), strict=True):
-        side = [key for key in given if key.startswith(begins)]
-        match = next((match for key in side if (match := _NAME.fullmatch(key))), None)
+        side = {key: value for key, value in given.items() if key.startswith(begins)}
+        match = next(filter(None, map(_NAME.fullmatch, side)), None)
         if match is None:
             found.append(none)
             continue
         words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
-        words += [str(given[key]) for key in side if _OWN.search(key)]
+        words += [str(value) for key, value in side.items() if _OWN.search(key)]
         words += [str(value) for key, value in given.items() if _BOTH.fullmatch(key)]
-        found.append(limit_told(given[match[0]], " ".join(words), notes, name))
+        found.append(limit_told(side[match[0]], " ".join(words), notes, name))
     return band_of(found[0], found[1], notes, name)
 
 

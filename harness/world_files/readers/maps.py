@@ -74,11 +74,7 @@ def polygon_of(geometry: dict[str, Any]) -> Any:
 
 
 def read_kml_polygons(path: Path, reading: Reading) -> Contents:
-    """Reads the polygons of a KML file, or of a KMZ archive with one.
-
-    Each is solid from the ground up to its highest corner; on the ground it is solid at every altitude. Limits in its
-    ExtendedData go before altitudes.
-    """
+    """Reads the polygons of a KML file, or of a KMZ archive with one, by limits in their ExtendedData or altitudes."""
     found = read_kml(read_bytes(path, MAX_TREE_BYTES), "", MAX_TREE_BYTES)
     notes: list[str] = []
     parts = tuple(_part(each, notes) for each in found.polygons if each.rings)

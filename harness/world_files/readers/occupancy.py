@@ -27,11 +27,12 @@ IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}
 def read_moving_ai(path: Path, reading: Reading) -> Contents:
     """Reads a MovingAI map; a cell is as large as `metres_per_cell` says, else one metre."""
     text = text_of(read_bytes(path))
-    head = re.match(r"type.*\n((?:\s*(?:height|width)\s+\d{1,9}\s*\n){2})\s*map\s*\n", text)
-    sizes = dict(line.split() for line in head[1].split("\n") if line.strip()) if head else {}
-    if head is None or len(sizes) != 2:
+    side = r"\s*(height|width)\s+(\d{1,9})\s*\n"
+    head = re.match(rf"type.*\n{side}{side}\s*map\s*\n", text)
+    if head is None or head[1] == head[3]:
         raise InputError("has no height, width and `map`; must be a MovingAI map")
-    rows, columns = int(sizes["height"]), int(sizes["width"])
+    sizes = {head[1]: int(head[2]), head[3]: int(head[4])}
+    rows, columns = sizes["height"], sizes["width"]
     body = [line.encode("latin-1", "replace") for line in text[head.end() :].splitlines()[:rows]]
     if len(body) != rows or set(map(len, body)) != {columns} or columns == 0:
         raise InputError(f"has {len(body)} rows, not {rows} of {columns} cells: it may be torn")
@@ -42,7 +43,7 @@ def read_moving_ai(path: Path, reading: Reading) -> Contents:
     size = reading.metres_per_cell or 1.0
     notes = () if reading.metres_per_cell else ("says not how large a cell is: 1 m (metres_per_cell)",)
     place = (size, 0, 0, 0, -size, rows * size)
-    return Contents("moving_ai", None, occupied=Raster(occupied, place), notes=notes)
+    return Contents("moving_ai", None, raster=Raster(occupied, place, True), notes=notes)
 
 
 def read_ros(path: Path, reading: Reading) -> Contents:
@@ -76,7 +77,7 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     west, south, rows = x * cell / size, y * cell / size, len(solid)
     cos, sin = cell * math.cos(yaw), cell * math.sin(yaw)
     place = (cos, sin, west - rows * sin, sin, -cos, south + rows * cos)
-    return Contents("ros_map", None, occupied=Raster(solid, place))
+    return Contents("ros_map", None, raster=Raster(solid, place, True))
 
 
 def _greys(path: Path) -> FloatArray:

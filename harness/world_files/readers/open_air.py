@@ -85,14 +85,13 @@ class _Airspace:
 
 def read(path: Path, reading: Reading) -> Contents:
     """Reads every airspace, whatever its class; a fault names its line."""
-    spaces, ignored = list[_Airspace](), Counter[str]()
+    spaces, ignored, notes = list[_Airspace](), Counter[str](), list[str]()
     for number, line in enumerate(text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines(), 1):
         command, _, rest = (part.strip() for part in line.partition("*")[0].strip().partition(" "))
         try:
             _take(spaces, command.upper(), rest, ignored)
         except InputError as error:
             raise InputError(f"line {number}: {error}") from error
-    notes: list[str] = []
     parts = [each.parts(notes) for each in spaces]
     if not any(parts):
         raise InputError("has no airspace with an area; must be OpenAir with some")
@@ -111,11 +110,11 @@ def read(path: Path, reading: Reading) -> Contents:
 def _take(spaces: list[_Airspace], command: str, rest: str, ignored: Counter[str]) -> None:
     """One line of a file; an airspace begins with its class, or without one with its name."""
     last = spaces[-1] if spaces else _Airspace("none", shapes=[None])  # as behind one that is whole
-    is_drawn = bool(last.ring or last.line or last.shapes)
+    is_drawn = any((last.ring, last.line, last.shapes))
     if command == "AC" and not last.kind and not is_drawn:
         last.kind = rest  # its name stood before its class
     elif command == "AC" or (command == "AN" and is_drawn):
-        spaces.append(_Airspace(rest if command == "AC" else "", rest[:40] if command == "AN" else ""))
+        spaces.append(_Airspace(*((rest, "") if command == "AC" else ("", rest[:40]))))
     elif spaces and command in COMMANDS:
         last.take(command, rest)
     elif command:

@@ -1,8 +1,4 @@
-"""Buildings of OpenStreetMap, XML or PBF, by osmium (`wayproof[maps]`), which puts ways and relations together.
-
-Buildings and their parts (`building:part`), chimneys, towers and tanks (`man_made`) are all taken, each with its own
-height: where they overlap the union is solid.
-"""
+"""Buildings of OpenStreetMap and their parts, chimneys, towers and tanks, XML or PBF, by osmium (`wayproof[maps]`)."""
 
 from __future__ import annotations
 

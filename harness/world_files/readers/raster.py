@@ -67,7 +67,7 @@ def read(path: Path, reading: Reading) -> Contents:
         values = band.data.astype(np.float64) * source.scales[0] + source.offsets[0]
         values[np.ma.getmaskarray(band) | np.isin(band.data, VOIDS)] = np.nan
         affine: Any = tuple(source.transform)[:6]
-        if source.transform.is_identity or affine[0] * affine[4] == affine[1] * affine[3]:
+        if source.transform.is_identity or not source.transform.determinant:
             raise InputError("says not where it lies (no transformation); warp it with gdalwarp")
         if (crs := reading.crs or _crs(source, affine)) is not None:
             check_metres(crs, source.units[0] or "")
@@ -80,7 +80,7 @@ def read(path: Path, reading: Reading) -> Contents:
     values[(values <= HEIGHTS_M[0]) | (values >= HEIGHTS_M[1])] = np.nan
     if np.isnan(values).all():
         raise InputError("has no cell with a height between -12000 and 9000 m; must be terrain")
-    return Contents("raster", crs, terrain=Raster(values, affine), notes=notes)
+    return Contents("raster", crs, raster=Raster(values, affine), notes=notes)
 
 
 def _inside(path: Path) -> tuple[Path | str, str]:
@@ -121,10 +121,7 @@ def _crs(source: Any, affine: tuple[float, ...]) -> str | None:
 
 
 def read_numpy(path: Path, reading: Reading) -> Contents:
-    """Reads an archive of NumPy: what matplotlib's wheel brings along as `jacksboro_fault_dem.npz`.
-
-    It has `elevation` in rows from the north, and its edges in degrees: of `ymin` and `ymax` the larger is north.
-    """
+    """Reads `elevation` in rows from the north and its edges in degrees, as in matplotlib's `jacksboro_fault_dem`."""
     try:
         with zipfile.ZipFile(path) as archive:
             too_large = sum(each.file_size for each in archive.infolist()) > MAX_NUMPY_BYTES
@@ -140,4 +137,4 @@ def read_numpy(path: Path, reading: Reading) -> Contents:
         )
     rows, columns = values.shape
     affine: Any = ((east - west) / columns, 0.0, west, 0.0, -(north - south) / rows, north)
-    return Contents("numpy_dem", reading.crs or WGS84, terrain=Raster(values, affine))
+    return Contents("numpy_dem", reading.crs or WGS84, raster=Raster(values, affine))

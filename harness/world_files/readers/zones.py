@@ -72,26 +72,32 @@ def read_ed269(path: Path, reading: Reading) -> Contents:
     for zone in content:
         if not isinstance(zone, dict) or not isinstance(zone.get("geometry"), list):
             raise InputError("has a zone without a list `geometry`; must be ED-269")
-        times = zone.get("applicability") or ()
-        times = [each for each in ([times] if isinstance(times, dict) else times) if isinstance(each, dict)]
-        at_times = any(each.get("permanent") == "NO" or "schedule" in each for each in times)
+        at_times = _is_at_times(zone.get("applicability") or ())
         name = str(zone.get("identifier") or zone.get("name") or "")[:40]
-        for volume in (
-            () if found.passes(zone.get("restriction"), zone["geometry"], at_times) else zone["geometry"]
-        ):
-            projection = volume.get("horizontalProjection") if isinstance(volume, dict) else None
-            if not isinstance(projection, dict):
-                raise InputError(f"has zone {name!r} without a horizontalProjection")
-            unit, round_ = _unit(volume.get("uomDimensions")), projection.get("type") == "Circle"
-            if round_ and unit != "m":
-                found.notes.append(f"{name or 'a zone'}: its radius is taken as metres, its limits as feet")
-            shape = _disc(projection, "center") if round_ else polygon_of(projection)
-            if shape is None:
-                raise InputError(
-                    f"has zone {name!r} whose projection is neither a circle nor a polygon with an area"
-                )
-            found.add(shape, volume, unit, name)
+        passed = found.passes(zone.get("restriction"), zone["geometry"], at_times)
+        for volume in () if passed else zone["geometry"]:
+            _add_volume(found, volume, name)
     return found.contents("ed269")
+
+
+def _is_at_times(applicability: Any) -> bool:
+    """Whether a zone of ED-269 applies at times only."""
+    times = [applicability] if isinstance(applicability, dict) else applicability
+    return any(isinstance(t, dict) and (t.get("permanent") == "NO" or "schedule" in t) for t in times)
+
+
+def _add_volume(found: _Zones, volume: Any, name: str) -> None:
+    """Adds a volume of a zone of ED-269."""
+    projection = volume.get("horizontalProjection") if isinstance(volume, dict) else None
+    if not isinstance(projection, dict):
+        raise InputError(f"has zone {name!r} without a horizontalProjection")
+    unit, is_round = _unit(volume.get("uomDimensions")), projection.get("type") == "Circle"
+    if is_round and unit != "m":
+        found.notes.append(f"{name}: its radius is taken as metres, its limits as feet")
+    shape = _disc(projection, "center") if is_round else polygon_of(projection)
+    if shape is None:
+        raise InputError(f"has zone {name!r} whose projection is neither a circle nor a polygon with an area")
+    found.add(shape, volume, unit, name)
 
 
 def read_ed318(path: Path, reading: Reading) -> Contents:

@@ -25,11 +25,10 @@ def kml(line: str = LINE, mode: str = "absolute", more: str = "") -> str:
     )
 
 
-def ring(coordinates: str, name: str = "innerBoundaryIs") -> str:
-    return f"<{name}><LinearRing><coordinates>{coordinates}</coordinates></LinearRing></{name}>"
-
-
-ZONE = f"<Placemark><name>zone</name><Polygon>{ring(SQUARE, 'outerBoundaryIs')}</Polygon></Placemark>"
+ZONE = (
+    "<Placemark><name>zone</name><Polygon><outerBoundaryIs><LinearRing><coordinates>"
+    f"{SQUARE}</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>"
+)
 
 
 def gpx(body: str) -> str:

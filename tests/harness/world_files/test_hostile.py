@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import zipfile
 from collections.abc import Callable
@@ -63,7 +62,6 @@ def _no_building(folder: Path) -> Path:
     return osm(folder / "a.osm", [({"highway": "x"}, [(8, 47), (8, 48), (9, 47)])])
 
 
-FLAT = {"type": "Building", "geometry": [{"type": "MultiSurface", "boundaries": [[[0, 1, 9]]]}]}
 GRID = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
 HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "empty": (text("a.tif", ""), "is empty"),
@@ -77,10 +75,6 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "words for numbers": (
         lambda folder: geojson(folder / "a.json", feature({}, [["a", "b"], ["c", "d"], ["e", "f"]])),  # type: ignore[list-item]
         "rings are not lists of positions"),
-    "words in KML": (
-        text("a.kml", "<kml><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>8,47 8.1,far 8.1,47.1 8,47"
-            "</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></kml>"),
-        "corner 1: is 'far'; must be a finite number"),
     "entities": (text("a.osm", BOMB), "cannot be read by osmium .XML entities are not supported"),
     "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "cannot be read by osmium .Can not read file"),
     "a place that is no number": (text("a.osm", "<osm version='0.6'><node id='1' lat='47x' lon='8'/></osm>"),
@@ -111,9 +105,6 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "an airspace of nothing": (text("a.txt", "AC R\nAN x\n"), "has no airspace with an area"),
     "an empty fence": (text("a.plan", '{"fileType": "Plan", "geoFence": {}}'), "has an empty fence"),
     "a fence of a line": (text("fence.txt", "47.0 8.0\n47.0 8.0\n47.1 8.1\n47.0 8.0\n"), "fewer than three corners"),
-    "a vertex that is not there": (
-        text("a.json", json.dumps({"CityObjects": {"b": FLAT}, "vertices": [[0, 0, 0]]})),
-        "with a vertex that is not there"),
     "a zone without a shape": (text("a.json", '{"UASZoneList": [{"geometry": [{}]}]}'),
         "without a horizontalProjection"),
 }  # fmt: skip

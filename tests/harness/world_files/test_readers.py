@@ -112,14 +112,10 @@ def test_a_multipolygon_of_pieces_has_its_courtyard(tmp_path: Path) -> None:
         f'<node id="{k}" lon="{8 + x / 1e3}" lat="{47 + y / 1e3}"/>' for k, (x, y) in enumerate(corners)
     )
     ways = {1: (0, 1, 2), 2: (2, 3, 0), 3: (4, 5, 6, 7, 4)}
-    lines = "".join(
-        f'<way id="{number}">{"".join(f"<nd ref={chr(34)}{ref}{chr(34)}/>" for ref in refs)}</way>'
-        for number, refs in ways.items()
-    )
-    members = "".join(
-        f'<member type="way" ref="{ref}" role="{role}"/>'
-        for ref, role in ((1, "outer"), (2, "outer"), (3, "inner"))
-    )
+    refs = {number: "".join(f"<nd ref='{ref}'/>" for ref in way) for number, way in ways.items()}
+    lines = "".join(f"<way id='{number}'>{inner}</way>" for number, inner in refs.items())
+    roles = {1: "outer", 2: "outer", 3: "inner"}
+    members = "".join(f"<member type='way' ref='{ref}' role='{role}'/>" for ref, role in roles.items())
     tags = '<tag k="type" v="multipolygon"/><tag k="building" v="yes"/>'
     path = tmp_path / "a.osm"
     path.write_text(f"<osm version='0.6'>{nodes}{lines}<relation id='9'>{members}{tags}</relation></osm>")
@@ -198,24 +194,16 @@ def test_an_arc_goes_round_its_centre_the_way_it_is_told(tmp_path: Path) -> None
     assert areas["-"] == pytest.approx(areas["+"], rel=1e-6)
 
 
-def zone(kind: str, **limits: Any) -> dict[str, Any]:
-    circle = {"type": "Circle", "center": [8.0, 47.0], "radius": 500}
-    return {
-        "identifier": "Z1",
-        "restriction": kind,
-        "geometry": [{"uomDimensions": "FT", "horizontalProjection": circle, **limits}],
-    }
-
-
 def test_ed269_zones_have_their_own_unit_and_reference(tmp_path: Path) -> None:
-    above = {
-        "lowerLimit": 100,
-        "lowerVerticalReference": "AMSL",
-        "upperLimit": 400,
-        "upperVerticalReference": "AGL",
+    volume = {
+        "uomDimensions": "FT",
+        "horizontalProjection": {"type": "Circle", "center": [8.0, 47.0], "radius": 500},
+        **{"lowerLimit": 100, "lowerVerticalReference": "AMSL"},
+        **{"upperLimit": 400, "upperVerticalReference": "AGL"},
     }
+    zones = [{"restriction": kind, "geometry": [volume]} for kind in ("PROHIBITED", "NO_RESTRICTION")]
     path = tmp_path / "a.json"
-    path.write_text(json.dumps({"features": [zone("PROHIBITED", **above), zone("NO_RESTRICTION", **above)]}))
+    path.write_text(json.dumps({"features": zones}))
     found = read_any(path)
     assert found.kind == "ed269"
     (part,) = found.parts
@@ -227,20 +215,12 @@ def test_ed269_zones_have_their_own_unit_and_reference(tmp_path: Path) -> None:
 
 def test_ed318_layers_and_extents(tmp_path: Path) -> None:
     layer = {"upper": 150, "upperReference": "AMSL", "lower": 50, "lowerReference": "AMSL", "uom": "m"}
-    round_ = {
-        "type": "Point",
-        "coordinates": [8, 47],
-        "extent": {"subType": "Circle", "radius": 900},
-        "layer": layer,
-    }
+    extent = {"subType": "Circle", "radius": 900}
+    round_ = {"type": "Point", "coordinates": [8, 47], "extent": extent, "layer": layer}
     square = {"type": "Polygon", "coordinates": [SQUARE], "layer": {**layer, "upper": 500, "uom": "ft"}}
     both = {"type": "GeometryCollection", "geometries": [round_, square]}
-    content = {
-        "type": "FeatureCollection",
-        "features": [{"type": "Feature", "properties": {}, "geometry": both}],
-    }
     path = tmp_path / "a.json"
-    path.write_text(json.dumps(content))
+    path.write_text(json.dumps({"type": "Feature", "properties": {}, "geometry": both}))
     found = read_any(path)
     assert found.kind == "ed318"
     assert [part.top.height_m for part in found.parts] == pytest.approx([150.0, 500 * FOOT_M])
@@ -282,7 +262,7 @@ def test_fences_keep_in_and_out(tmp_path: Path) -> None:
 def test_a_moving_ai_map_is_as_large_as_its_cells(tmp_path: Path) -> None:
     path = tmp_path / "a.map"
     path.write_text("type octile\nwidth 3\nheight 2\nmap\n.@.\nTTG\n")
-    found = read_any(path, metres_per_cell=20.0).occupied
+    found = read_any(path, metres_per_cell=20.0).raster
     assert found is not None
     assert found.values.tolist() == [[0, 1, 0], [1, 1, 0]]
     assert found.affine == (20.0, 0.0, 0.0, 0.0, -20.0, 40.0)

@@ -71,11 +71,9 @@ def test_a_world_in_which_it_can_turn_round_nowhere_on_the_way_says_with_which_c
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "a.map"
-    rows = [["."] * 60 for _ in range(14)]
-    for column in range(14, 46):  # two ends, and a narrow corridor between them
-        for row in range(14):
-            rows[row][column] = "." if 4 <= row < 10 else "@"
-    path.write_text("type octile\nheight 14\nwidth 60\nmap\n" + "\n".join(map("".join, rows)) + "\n")
+    # Two ends, and a narrow corridor between them.
+    rows = ["." * 14 + ("." if 4 <= row < 10 else "@") * 32 + "." * 14 for row in range(14)]
+    path.write_text("type octile\nheight 14\nwidth 60\nmap\n" + "\n".join(rows) + "\n")
     found = occupancy(path, 56.0)
     (note,) = [note for note in found.notes if "proved unreachable" in note]
     assert "narrower than 460 m, where aerosonde cannot turn round" in note

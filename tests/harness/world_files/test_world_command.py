@@ -99,13 +99,9 @@ def test_start_and_goal_may_be_given_in_degrees(tmp_path: Path) -> None:
 
 def moving_ai(folder: Path) -> Path:
     """A map of 32 by 32 cells with a wall in the middle that leaves a gap."""
-    rows = [["."] * 32 for _ in range(32)]
-    for row in range(6, 32):
-        rows[row][16] = "@"
+    rows = ["." * 32] * 6 + ["." * 16 + "@" + "." * 15] * 26
     path = folder / "wall.map"
-    path.write_text(
-        "type octile\nheight 32\nwidth 32\nmap\n" + "\n".join("".join(row) for row in rows) + "\n"
-    )
+    path.write_text("type octile\nheight 32\nwidth 32\nmap\n" + "\n".join(rows) + "\n")
     return path
 
 
@@ -134,7 +130,10 @@ def test_a_map_too_small_names_the_cell_that_would_do(
         (["--start", "47;8", "--goal", "1,2"], "is not A,B"),
         (["--aircraft", "zeppelin"], "unknown aircraft"),
         (["--crs", "EPSG:99999"], "which is not known"),
-        (["--start", "48,9", "--goal", "48.1,9"], "lies outside the area"),
+        (
+            ["--start", "48,9", "--goal", "48.1,9"],
+            "area.origin {latitude_deg: 47.0050, longitude_deg: 8.0050} is in",
+        ),
         (["--start", "47.005,8.005", "--goal", "47.005,8.05"], "the scenario would not fly"),
         (["--altitude-m", "1"], "at least 5"),
         (["--metres-per-cell", "nan"], "--metres-per-cell is nan; must be a finite number greater than 0"),

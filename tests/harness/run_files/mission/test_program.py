@@ -55,20 +55,14 @@ def test_a_jump_to_a_tag_is_refused_by_name() -> None:
         run(at(1), item(2, 600, 77), at(3), item(4, 601, 77, 1), at(5))
 
 
-def test_speeds_hold_from_where_they_are_changed() -> None:
-    done = run(at(1), item(2, 178, 0, 22), at(3), at(4), item(5, 178, 1, 30), item(6, 178, 0, -1), at(7))
-    assert [step.airspeed_mps for step in done.steps] == [None, 22.0, None, None]
+def test_speeds_hold_from_where_they_are_changed_and_minus_2_goes_back() -> None:
+    """To that of the flight, as ArduPlane and MAVLink have it."""
+    changes = {2: (0, 22), 5: (1, 30), 6: (0, -1), 8: (0, -2), 10: (1, -2)}
+    done = run(*(item(k, 178, *changes[k]) if k in changes else at(k) for k in range(1, 12)))
+    assert [step.airspeed_mps for step in done.steps] == [None, 22.0, None, None, 0.0, None]
     assert told(done)[5] == ("not flown", "a least ground speed of 30 m/s is not held")
-    assert told(done)[6] == ("passed over", "changes no speed")
-
-
-def test_a_speed_of_minus_2_goes_back_to_that_of_the_flight() -> None:
-    """As ArduPlane and MAVLink have it; the mission flew on at the changed speed."""
-    back = item(4, 178, 0, -2)
-    done = run(at(1), item(2, 178, 0, 22), at(3), back, at(5), item(6, 178, 1, -2), at(7))
-    assert [step.airspeed_mps for step in done.steps] == [None, 22.0, 0.0, None]
-    assert told(done)[4] == ("flown", "back to the airspeed before any change")
-    assert told(done)[6] == ("passed over", "changes no speed")
+    assert told(done)[6] == told(done)[10] == ("passed over", "changes no speed")
+    assert told(done)[8] == ("flown", "back to the airspeed before any change")
 
 
 def test_loiters_have_turns_or_time_or_an_altitude_and_a_side() -> None:
