@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -162,7 +162,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     if given is not None:
         reach = max(pad, 0.25 * math.dist(*given))
         about = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
-        yield files, _common(*inside, about) or about, []
+        yield files, _common(*inside, about, default=about), []
         return
     low, high = np.min(around or inside, axis=0)[:2] - pad, np.max(around or inside, axis=0)[2:] + pad
     whole = _common(*inside, (*low.tolist(), *high.tolist()))
@@ -184,7 +184,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
             longitude, latitude = Mapping(WGS84, files.place).from_plane(np.array([x]), np.array([y]), 0.0)
             at = replace(files, place=_place(float(latitude[0]), float(longitude[0])))
             box = (*(-half).tolist(), *half.tolist())
-            box = _common(box, *_covered(at)[0]) or box
+            box = _common(box, *_covered(at)[0], default=box)
         yield at, box, [told]
 
 
@@ -217,10 +217,10 @@ def _covered(files: _Files) -> tuple[list[Box], list[Box]]:
     return inside, around
 
 
-def _common(*boxes: Box) -> Box | None:
-    """What lies in all of some boxes; None where nothing does."""
+def _common(*boxes: Box, default: Any = None) -> Any:
+    """What lies in all of some boxes; where nothing does, the default."""
     (xmin, ymin), (xmax, ymax) = np.max(boxes, axis=0)[:2].tolist(), np.min(boxes, axis=0)[2:].tolist()
-    return (xmin, ymin, xmax, ymax) if xmin < xmax and ymin < ymax else None
+    return (xmin, ymin, xmax, ymax) if xmin < xmax and ymin < ymax else default
 
 
 def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[FloatArray, list[str]]:

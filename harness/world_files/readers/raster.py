@@ -62,12 +62,12 @@ def read(path: Path, reading: Reading) -> Contents:
         if source.count > 1 or source.colorinterp[0].name == "palette":
             raise InputError(f"has {source.count} bands or a palette; must have one band, of heights")
         if source.driver == "AAIGrid":
-            _check_grid(path, source.height * source.width)
+            _check_grid(path, source)
         band = source.read(1, masked=True)
         values = band.data.astype(np.float64) * source.scales[0] + source.offsets[0]
         values[np.ma.getmaskarray(band) | np.isin(band.data, VOIDS)] = np.nan
         affine: Any = tuple(source.transform)[:6]
-        if source.transform.is_identity or not source.transform.determinant:
+        if source.transform.is_identity:
             raise InputError("says not where it lies (no transformation); warp it with gdalwarp")
         if (crs := reading.crs or _crs(source, affine)) is not None:
             check_metres(crs, source.units[0] or "")
@@ -99,7 +99,7 @@ def _inside(path: Path) -> tuple[Path | str, str]:
     return path, "SRTMHGT"
 
 
-def _check_grid(path: Path, cells: int) -> None:
+def _check_grid(path: Path, source: Any) -> None:
     """Raises InputError if an ESRI ASCII grid has more or fewer numbers than cells: GDAL fills up with zeros."""
     found = 0
     with path.open("rb") as file:
@@ -108,7 +108,9 @@ def _check_grid(path: Path, cells: int) -> None:
                 found += len(line.split())
                 if line.translate(None, b"0123456789+-.eE \t\r\n\x1a"):
                     raise InputError("has something that is no number among its heights")
-    if found != cells:
+    if not source.transform.determinant:
+        raise InputError("has cells of no size; must be terrain")
+    if found != (cells := source.height * source.width):
         raise InputError(f"has {found:,} heights; nrows times ncols are {cells:,}: it may be torn")
 
 
