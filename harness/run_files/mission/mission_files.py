@@ -176,7 +176,10 @@ def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[I
         numbers(item.get(each), f"{where}.{each}", PLACE, (3,))
         for each in ("landingApproachCoordinate", "landCoordinate")
     )
-    frame = ABSOLUTE if item.get("altitudesAreRelative") is False else RELATIVE
+    relative = item.get("altitudesAreRelative", True)
+    if not isinstance(relative, bool):
+        raise InputError(f"{where}.altitudesAreRelative: must be true or false")
+    frame = RELATIVE if relative else ABSOLUTE
     radius = abs(finite(item.get("loiterRadius", 0.0), f"{where}.loiterRadius"))
     turning = item.get("useLoiterToAlt", True) is not False
     side = radius if item.get("loiterClockwise", True) else -radius

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import shapely
 
@@ -13,11 +13,9 @@ from harness.files.mavlink import commands
 from harness.files.mavlink.fences import Fence, item_fences, plan_fences
 from harness.files.mavlink.items import WPL, wpl_items
 from harness.files.wording import counted
-from harness.world_files.bounded import json_of, read_bytes, text_of
+from harness.world_files.bounded import MAX_TREE_BYTES, json_of, read_bytes, text_of
 from harness.world_files.parts import WGS84, Contents, Part, Reading
 from harness.world_files.readers.footprints import circle, on_earth
-
-MAX_BYTES: Final = 10_000_000
 
 
 def read_plan(path: Path, reading: Reading) -> Contents:
@@ -34,7 +32,7 @@ def read_plan(path: Path, reading: Reading) -> Contents:
 
 def read_ardupilot(path: Path, reading: Reading) -> Contents:
     """Reads an ArduPilot fence: lines of latitude and longitude, the return point first; or a waypoint file."""
-    text = text_of(read_bytes(path, MAX_BYTES))
+    text = text_of(read_bytes(path, MAX_TREE_BYTES))
     if text.startswith(WPL):
         items = wpl_items(text, "")
         home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
