@@ -16,10 +16,8 @@ from harness.flight.record import FloatArray
 BAND: Final = "band.json"
 SCHEMA: Final = "wayproof/band/1"
 SHARE: Final = 0.95
-STATIONS: Final = 400
-"""The band has at most this many places along the path."""
-STEP_M: Final = 5.0
-"""They are at least this far apart."""
+STATIONS, STEP_M = 400, 5.0
+"""The band has at most this many places along the path, at least this far apart."""
 
 
 def band_of(tracks: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:

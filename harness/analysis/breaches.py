@@ -74,8 +74,7 @@ def kept(
     """Compares a track with obstacles, fences and the bounds of the area."""
     import shapely
 
-    heights = track.altitude_above_ground_m
-    found = [*_contacts(track, world), *others[0]]
+    heights, found = track.altitude_above_ground_m, [*_contacts(track, world), *others[0]]
     margins = [float(np.min(track.clearance_m, initial=np.inf)), others[1]]
     for fence in fences.exclusions:
         margin = -inside_m(track, fence.area)
@@ -102,8 +101,7 @@ def _heights(track: Track, heights_m: FloatArray | None) -> dict[str, float] | N
     if heights_m is None or not np.isfinite(heights_m).any():
         return None
     row = int(np.nanargmin(heights_m))
-    told = {"min": float(heights_m[row]), "mean": float(np.nanmean(heights_m))}
-    return told | _where(track, row)
+    return {"min": float(heights_m[row]), "mean": float(np.nanmean(heights_m)), **_where(track, row)}
 
 
 def _where(track: Track, row: int) -> dict[str, float]:

@@ -45,8 +45,7 @@ class FlightLimits:
     airspeed_sigma_mps: float = 0.0
     """1 sigma of the error with which the aircraft knows its airspeed."""
     navigation_margin_m: float = 0.0
-    """Distance that plans keep from obstacles beyond the clearance, for the navigation error. The limit of the
-    cross-track error is larger by it."""
+    """Distance that plans keep beyond the clearance for the navigation error; the cross-track limit is larger by it."""
 
     @property
     def cross_track_threshold_m(self) -> float:

@@ -1,9 +1,8 @@
 """What was in force while a plan was flown, row by row, and what the plan asked for, in shares of it.
 
-A turn is judged at the airspeed commanded there, in the wind there. In calm air a turn of curvature k at airspeed V
-takes the bank atan(k V^2 / g). In wind the path over the ground has that curvature, and the lift acts across the
-heading: the bank is atan(k Vg^2 / (g cos(drift))), Vg being the groundspeed along the path and drift the angle from
-heading to course.
+In calm air a turn of curvature k at the commanded airspeed V takes the bank atan(k V^2 / g). In wind the path over the
+ground has that curvature, and the lift acts across the heading: the bank is atan(k Vg^2 / (g cos(drift))), Vg being the
+groundspeed along the path and drift the angle from heading to course.
 """
 
 from __future__ import annotations
@@ -76,8 +75,7 @@ class Demand:
 def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand:
     """What was planned for some rows of a track, and for the window after them, asks for.
 
-    The curvature is the change of the plan's direction over a window of about one second, as long as it takes to roll:
-    a joint shorter than that is no turn of its own, and a corner is a turn within the window.
+    The curvature is the change of the plan's direction over a window of about one second, as long as it takes to roll.
     """
     window = window_m(lead)
     reach = lead.arc_length_m.copy()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +22,7 @@ from harness.analysis.smoothness import (
     window_m,
 )
 from harness.analysis.trackability import legs
-from harness.flight.record import Flight, FloatArray, IntArray, Outcome, Track, digest
-
-COUNTED_BEAMS: Final = 20
-"""The worst scan is one in which at least so many beams met something: of a few, chance may lose all."""
+from harness.flight.record import Flight, FloatArray, Outcome, Track, digest
 
 
 def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) -> dict[str, Any]:
@@ -51,14 +48,14 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     believed_m = track.believed_cross_track_m if track.has_beliefs else track.cross_track_m
     assert believed_m is not None
     under_plan = track.plan_index >= 0
-    off_path = error_figures(track.cross_track_m[under_plan])
+    off_path, load = error_figures(track.cross_track_m[under_plan]), float(track.load_factor.max())
     return {
         "outcome": flight.outcome.value,
         "reason": flight.reason,
         "flown_length_m": float(flown_lengths(track).sum()),
         "planned_length_m": _planned_length_m(flight),
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
-        "min_clearance_m": _finite(nearest_m.min()),
+        "min_clearance_m": _least(nearest_m),
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
         "clearance_violation_s": float(np.diff(track.time_s)[nearest_m[1:] < limits.clearance_m].sum()),
         "cross_track_m": off_path,
@@ -71,7 +68,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
             "flown": dataclasses.asdict(smoothness(flown_profile(track), window)),
         },
         "bank_saturation_fraction": float(saturated(track, limits.bank_limit_rad).mean()),
-        "max_load_factor": _finite(track.load_factor.max()),
+        "max_load_factor": load if math.isfinite(load) else None,
         "trackable": bool(verdicts) and all(leg.trackable for leg in verdicts),
         "trackability": [dict(vars(leg)) for leg in verdicts],
         "findings": [dataclasses.asdict(each) for each in findings(flight, limits)],
@@ -79,7 +76,6 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "replans": max(len(flight.plans) - 1, 0),
         "shield": flight.shield and dataclasses.asdict(flight.shield),
         "plan_delay_s": percentiles(list(filter(math.isfinite, (plan.delay_s for plan in flight.plans)))),
-        "lost_returns": lost_returns(flight.lost_returns),
         "compute_ms": percentiles(flight.compute_ms),
         "timing": {
             "sim_s": flight.sim_s,
@@ -126,17 +122,6 @@ def percentiles(values: Sequence[float]) -> dict[str, float | None]:
     return {"p50": float(p50), "p99": float(p99), "max": max(values)}
 
 
-def lost_returns(counts: IntArray | None) -> dict[str, float | None]:
-    """`share` of the beams that met something and returned nothing, `max` in the worst scan; None without a sensor."""
-    if counts is None:
-        return {"share": None, "max": None}
-    met, lost = counts.sum(axis=0).tolist()
-    share = lost / met if met else 0.0
-    many = counts[counts[:, 0] >= COUNTED_BEAMS]
-    worst = float((many[:, 1] / many[:, 0]).max()) if len(many) else share
-    return {"share": share, "max": worst}
-
-
 def _planned_length_m(flight: Flight) -> float:
     """Length of the planned curve that was in effect: progress along each plan while it was flown, up to its end."""
     flown_m = 0.0
@@ -151,7 +136,3 @@ def _least(values: FloatArray | None) -> float | None:
     """The least of those that are known."""
     known = np.zeros(0) if values is None else values[np.isfinite(values)]
     return float(known.min()) if len(known) else None
-
-
-def _finite(value: np.float64) -> float | None:
-    return float(value) if np.isfinite(value) else None

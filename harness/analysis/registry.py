@@ -45,7 +45,6 @@ def _smooth(figure: str, title: str, unit: str, short: tuple[str, str], factor: 
 
 
 _SMOOTH_FOR_PEOPLE: Final = ("heading_change_deg", "bending_energy_1pm")
-
 HINTS: Final[Mapping[str, str]] = {
     "total_system_error_p95_m": "distance of the true position from the path, as planned or as given",
     "flight_technical_error_p95_m": "distance of the believed position from the path",
@@ -60,7 +59,6 @@ HINTS: Final[Mapping[str, str]] = {
     "trackable": "every leg was flown within the limits for cross-track error, altitude, airspeed and load",
     "navigation_jump_m": "the most that the navigation error changes in a tenth of a second, as when a fix comes back",
     "plan_delay_max_s": "simulated time from the latest scan that a plan could know of until it was flown",
-    "lost_returns": "share of the beams that met something and returned nothing",
     "plan_contradictions": "they lead to the other side of the course within 5 s of flight",
 }
 """What figures mean whose title does not say it."""
@@ -113,10 +111,6 @@ _METRICS: Final = (
     *(Metric(f"plan_delay_{of}_s", path=f"plan_delay_s.{of}") for of in ("p50", "p99")),
     Metric("plan_delay_max_s", "plan delay max", "s", "delay s", "plan_delay_s.max", worse="more", rare=True,
            recorded=True, heading="plan delay max, s"),
-    Metric("lost_returns", "returns lost by the sensor", "%", "lost %", "lost_returns.share", factor=100.0,
-           worse="more", rare=True),
-    Metric("lost_returns_max", "returns lost in the worst scan", "%", path="lost_returns.max", factor=100.0,
-           worse="more", rare=True, recorded=True, heading="lost in worst scan, %"),
     Metric("bank_reversals_per_min", "bank reversals", "1/min", "rev/min", worse="more", recorded=True,
            of=lambda flight, limits: bank_reversals_per_min(flight.track)),
     Metric("plan_contradictions", "plans that contradict the one before", short="contra", kind="int", worse="more",

@@ -16,10 +16,8 @@ DASH: Final = "\N{EN DASH}"
 
 COMPARED: Final = {metric.name: metric for metric in METRICS if metric.short or metric.derived}
 """The figures of a row, by name: those that people are shown, and those that take more than `metrics.json`."""
-_SHORT: Final = {metric.short: metric for metric in METRICS}
-ON_TERMINAL: Final = tuple(
-    _SHORT[each] for each in ("outcome", "km", "ratio", "clear m", "κ·R", "tracks", "tse max", "p99 ms")
-)
+_FIT: Final = ("outcome", "km", "ratio", "clear m", "κ·R", "tracks", "tse max", "p99 ms")
+ON_TERMINAL: Final = tuple(next(metric for metric in METRICS if metric.short == each) for each in _FIT)
 """Those that fit 80 columns."""
 LATEX: Final = str.maketrans(
     {
@@ -90,11 +88,8 @@ def row_of(
 
 def shown_figures(rows: Sequence[Row]) -> list[Metric]:
     """The figures that a table of rows shows: the rare ones only where a row has one that is not 0."""
-    return [
-        metric
-        for metric in METRICS
-        if metric.short and (not metric.rare or any(row.figures[metric.name] for row in rows))
-    ]
+    shown = [metric for metric in METRICS if metric.short]
+    return [each for each in shown if not each.rare or any(row.figures[each.name] for row in rows)]
 
 
 def rows_for_paper(rows: Sequence[Row]) -> tuple[list[str], list[list[str]], list[str]]:

@@ -76,8 +76,8 @@ def window_m(track: Track) -> float:
 def flown_profile(track: Track) -> Profile:
     """Curvature profile of a flown track: course rate over ground speed.
 
-    Piece i reaches from row i to row i + 1. Its curvature is minus the change of course (course is clockwise,
-    curvature counter-clockwise) over a window centred on it, divided by the distance flown in that window.
+    The curvature between rows i and i + 1 is minus the change of course, which is clockwise, over a window about them,
+    divided by the distance flown in that window.
     """
     if len(track) < 2:
         return Profile(np.zeros(0), np.zeros(0))

@@ -1,8 +1,8 @@
 """Which parts of what was planned could be tracked, and why the others could not.
 
-A plan is trackable where the true position stayed within `FlightLimits.cross_track_threshold_m` of it. A path that was
-given is judged as it was given, corner by corner, not by the arcs that were made of it. Altitude, airspeed and load
-factor have limits of their own. No limit depends on who flies.
+A plan is trackable where the true position stayed within `FlightLimits.cross_track_threshold_m` of it. A given path is
+judged as given, corner by corner, not by the arcs that were made of it. Altitude, airspeed and load factor have limits
+of their own. No limit depends on who flies.
 """
 
 from __future__ import annotations
@@ -233,8 +233,7 @@ class _Flown:
 def _is_misled(believed: FloatArray | None, true: FloatArray, most: float, row: int) -> bool:
     """Whether the larger part of the largest true error, or all of it beyond the limit, is navigation's.
 
-    It is not where the belief is unknown. At other rows the aircraft may have believed to be off: it flies to where its
-    first fix says that it should be.
+    It is not where the belief is unknown. At other rows the aircraft may have believed to be off.
     """
     if believed is None or not np.isfinite(believed[row]):
         return False

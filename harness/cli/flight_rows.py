@@ -15,11 +15,7 @@ MOST_ITEMS: Final = 12
 OF_NOTE: Final = ("not flown", "flown", "not reached")
 """Treatments of mission items that are listed if there is a reason to tell; items not flown are always listed."""
 OF_HEIGHT_OR_SPEED: Final = (
-    "climb too steep",
-    "descent too steep",
-    "speed or throttle saturation",
-    "control saturation",
-    "stall",
+    *("climb too steep", "descent too steep", "speed or throttle saturation", "control saturation", "stall"),
 )
 """Causes at which a leg's errors of altitude and airspeed are told beside its cross-track error."""
 
@@ -87,15 +83,13 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     legs, check = metrics["trackability"], metrics["check"]
     point = "item" if check["items"] else "waypoint"
     style, (word, _, why) = "bold green" if check["ok"] else "bold red", check["verdict"].partition(":")
-    lengths = [f"{metrics['planned_length_m']:,.0f} m"]
-    if "given_length_m" in check:  # in runs made since it is kept
-        lengths = [f"{check['given_length_m']:,.0f} m", f"rounded {lengths[0]}"]
+    lengths = f"{check['given_length_m']:,.0f} m, rounded {metrics['planned_length_m']:,.0f} m"
     corners = sorted(check["corners"], key=lambda each: each["kept"])
     bad = [{"number": number, **leg} for number, leg in enumerate(legs, start=1) if not leg["trackable"]]
     return {
         "flown as given": f"[{style}]{word}[/]:{plain(why)}",
         "outcome": plain(f"{metrics['outcome']}: {metrics['reason']}"),
-        "path": f"{check['points']} points, {', '.join(lengths)}, {counted(len(legs), 'leg')}",
+        "path": f"{check['points']} points, {lengths}, {counted(len(legs), 'leg')}",
         **_contacts(metrics),
         **_deviations(metrics),
         **_counted("legs not trackable", bad),

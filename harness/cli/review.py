@@ -106,6 +106,7 @@ def report(
     """
     from harness.campaign.results import RESULTS
     from harness.campaign.summary import summarise, write_summary
+    from harness.files.strict_yaml import as_spelt
     from harness.report.run_report import write_report
 
     if out is not None and table is None:
@@ -114,7 +115,10 @@ def report(
         raise typer.BadParameter(
             f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
         )
-    keys = [[_column(key.strip()) for key in each.split(",")] for each in by] if by else None
+    try:  # a key may be spelled as `--set` takes it: `obstacles.0.velocity_mps`
+        keys = [[as_spelt(key.strip()) for key in each.split(",")] for each in by] if by else None
+    except ValueError as error:
+        raise InputError(f"command line: --by: {error}") from error
     if table is not None:
         _print_table(run, keys, table, out)
     elif (run / RESULTS).is_file():
@@ -163,16 +167,6 @@ def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str,
     with written(out):
         replace_text(out, text)
     say(f"table: {out}")
-
-
-def _column(key: str) -> str:
-    """The column of a key, which may be spelled as `--set` takes it: `obstacles.0.velocity_mps`."""
-    from harness.files.strict_yaml import as_spelt
-
-    try:
-        return as_spelt(key)
-    except ValueError as error:
-        raise InputError(f"command line: --by: {error}") from error
 
 
 @replacing("guidance", "settings")

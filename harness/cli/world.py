@@ -168,12 +168,9 @@ def _print(found: Site, out: Path) -> None:
     xmin, ymin, xmax, ymax = found.bounds_m
     solid = [each for source in found.expanded.sources for each in source.polygons]
     inside = min(sum(each.area for each in solid) / ((xmax - xmin) * (ymax - ymin)), 1.0)
-    place = found.place
-    where = (
-        f"{place.latitude_deg:.5f}, {place.longitude_deg:.5f}"
-        if place
-        else "none: the files name no place on earth"
-    )
+    where, place = "none: the files name no place on earth", found.place
+    if place is not None:
+        where = f"{place.latitude_deg:.5f}, {place.longitude_deg:.5f}"
     rows = {
         "area": f"{(xmax - xmin) / 1e3:.4g} x {(ymax - ymin) / 1e3:.4g} km",
         "origin": where,

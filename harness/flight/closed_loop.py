@@ -294,5 +294,4 @@ class ClosedLoop:
             contact_m=self._loop.termination.contact_m,
             compute_wall_ms=tuple(self.plans.compute_wall_ms),
             shield=self.plans.shield,
-            lost_returns=self._loop.sensor.lost_returns() if self._loop.sensor else None,
         )

@@ -248,8 +248,6 @@ class Flight:
         compute_wall_ms: wall-clock time of the same calls as `compute_ms`.
         error: the traceback of what the planner or the guidance law raised; None where neither did.
         contact_m: clearance at a contact between the last two rows; +inf without.
-        lost_returns: (k, 2) of each scan of a sensor that has imperfections, how many beams met something, and how many
-            of those returned nothing; k = 0 for a perfect sensor, None without one.
         shield: what the planner's shield did; None without one.
     """
 
@@ -263,5 +261,4 @@ class Flight:
     error: str | None = None
     contact_m: float = math.inf
     compute_wall_ms: tuple[float, ...] = ()
-    lost_returns: IntArray | None = None
     shield: ShieldReport | None = None

@@ -18,8 +18,6 @@ from harness.world.world import Surroundings, World
 from planner.interface import FloatArray
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from harness.scenario.sections import Sensor
 
 
@@ -82,7 +80,6 @@ class RangeSensor:
             child_stream(seed_sequence, number) for number in range(3)
         )
         self._flawed = config.range_noise_m > 0 or config.dropout > 0 or config.false_return > 0
-        self._lost: list[tuple[int, int]] = []
         self._surroundings: Surroundings | None = None
         self._listed_at = (math.nan, math.nan, math.nan)
 
@@ -109,13 +106,6 @@ class RangeSensor:
             seen["_follow"] = partial(self._fan.ranges_m, faces, east_m, north_m, heading_rad)
         return _Unread.of(seen)
 
-    def lost_returns(self) -> NDArray[np.int64]:
-        """(k, 2) of each scan so far, how many beams met something, and how many of those returned nothing.
-
-        A perfect sensor counts nothing: k = 0. A false return does not make up for a lost one.
-        """
-        return np.array(self._lost, dtype=np.int64).reshape(-1, 2)
-
     def _near(self, east: float, north: float, time: float) -> Surroundings:
         """All that is in range, from the neighbour list; this renews the list when it runs out."""
         skin = _SKIN * self._config.range_m
@@ -133,13 +123,11 @@ class RangeSensor:
     def _degraded(self, ranges: FloatArray) -> FloatArray:
         """Ranges with the imperfections of the sensor."""
         config, n = self._config, len(ranges)
-        met = int(np.count_nonzero(ranges < math.inf))
         if config.range_noise_m > 0:
             ranges = np.maximum(ranges + config.range_noise_m * self._noise.standard_normal(n), 0.0)
             ranges[ranges > config.range_m] = math.inf
         if config.dropout > 0:
             ranges[self._dropout.random(n) < config.dropout] = math.inf
-        self._lost.append((met, met - int(np.count_nonzero(ranges < math.inf))))
         if config.false_return > 0:
             chance, share = self._false_return.random((2, n))
             ranges = np.where(chance < config.false_return, config.range_m * (1.0 - share), ranges)

@@ -11,7 +11,6 @@ import pytest
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import (
     error_figures,
-    lost_returns,
     metrics,
     percentiles,
 )
@@ -27,7 +26,7 @@ KEYS = {
     "min_altitude_above_ground_m", "clearance_violation_s", "cross_track_m", "total_system_error_m",
     "flight_technical_error_m", "altitude_error_m", "smoothness", "bank_saturation_fraction",
     "max_load_factor", "trackable", "trackability", "findings", "bank_reversals_per_min",
-    "plan_contradictions", "replans", "plan_delay_s", "lost_returns", "compute_ms", "timing", "digest",
+    "plan_contradictions", "replans", "plan_delay_s", "compute_ms", "timing", "digest",
     "error",
 }  # fmt: skip
 
@@ -130,15 +129,6 @@ def test_planned_length_counts_every_round_of_a_loiter_and_nothing_beyond_an_end
 def test_error_figures_leave_out_nan() -> None:
     assert error_figures(np.array([np.nan, -3.0, 3.0])) == {"rms": 3.0, "p95": 3.0, "max": 3.0}
     assert percentiles((5.0,)) == {"p50": 5.0, "p99": 5.0, "max": 5.0}
-
-
-def test_lost_returns_are_shares_of_what_beams_met() -> None:
-    """A scan in which one beam met something and lost it is not the worst: chance does that."""
-    scans = np.array([(100, 10), (50, 25), (1, 1), (0, 0)])
-    assert lost_returns(scans) == {"share": pytest.approx(36 / 151), "max": 0.5}
-    assert lost_returns(scans[2:]) == {"share": 1.0, "max": 1.0}
-    assert lost_returns(np.zeros((0, 2), dtype=np.int64)) == {"share": 0.0, "max": 0.0}
-    assert lost_returns(None) == {"share": None, "max": None}
 
 
 def test_a_plan_is_as_late_as_the_scan_it_knew_is_old() -> None:

@@ -42,7 +42,7 @@ SCHEMA = pa.schema(
     + [("max_load_factor", pa.float64()), ("trackability.causes", pa.string())]
     + [("bank_saturation_fraction", pa.float64()), ("plan_delay_s.max", pa.float64())]
     + [("navigation_error_m.max", pa.float64()), ("navigation_margin_m", pa.float64())]
-    + [("navigation_jump_m", pa.float64()), ("lost_returns.max", pa.float64())]
+    + [("navigation_jump_m", pa.float64())]
 )
 WIND = "environment.wind.speed_mps"
 

@@ -258,8 +258,6 @@ def test_the_fences_of_a_mission_are_kept(
         (0.0, (), 0, 90.0),
         (50.0, (), 0, 50.0),
         (50.0, ("--corner-m", "5"), 1, 5.0),
-        (30.0, (), 0, 30.0),
-        (0.0, ("--corner-m", "5"), 1, 5.0),
     ],
 )
 def test_a_mission_may_cut_corners_by_its_acceptance_radius(

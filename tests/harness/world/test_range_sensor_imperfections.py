@@ -50,21 +50,6 @@ def test_noise_neither_makes_a_range_negative_nor_longer_than_the_range() -> Non
     assert np.isinf(ranges(EMPTY, range_noise_m=5.0)).all()
 
 
-def test_what_was_lost_is_counted_scan_by_scan() -> None:
-    """Half of what is met from here; a false return does not make up for what was lost."""
-    half = World([Obstacle(Circle((700.0, 0.0), 500.0))], BOUNDS)
-    source = sensor(half, dropout=0.3, false_return=0.5)
-    for number in range(5):
-        source.scan(0.0, 0.0, 0.0, 0.5 * number)
-    met = np.isfinite(ranges(half)).sum()
-    lost = np.isfinite(ranges(half)) & np.isinf(ranges(half, scans=5, dropout=0.3))
-    np.testing.assert_array_equal(source.lost_returns(), [(met, each.sum()) for each in lost])
-    assert 0 < lost.sum() < 5 * met
-    perfect = sensor(half)
-    perfect.scan(0.0, 0.0, 0.0, 0.0)
-    assert perfect.lost_returns().shape == (0, 2)
-
-
 def test_false_returns_are_spread_evenly_over_the_range() -> None:
     scans = ranges(EMPTY, scans=200, false_return=0.2)
     returned = scans[np.isfinite(scans)]
