@@ -71,22 +71,6 @@ def test_aircraft_are_listed_with_their_figures(
     assert glider.startswith("SGS           cannot be flown: SGS cannot be trimmed for level flight")
 
 
-@pytest.mark.flights
-def test_new_aircraft_are_flown_once_and_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(airframes, "aircraft_names", lambda: ("aerosonde", "SGS"))
-    airframes.airframe.cache_clear()
-    assert main(["list", "aircraft"]) == 0
-    assert capfd.readouterr().err.startswith("2 aircraft are flown for the figures")
-    assert airframes.is_surveyed("aerosonde")
-    assert main(["list", "aircraft"]) == 0
-    said = capfd.readouterr()
-    assert said.err.startswith("SGS is flown for the figures")
-    assert said.out.splitlines()[1].startswith("aerosonde ")
-
-
 def test_what_of_another_distribution_cannot_be_loaded_is_told_in_a_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
