@@ -157,7 +157,7 @@ def _of(parameters: Mapping[str, float], names: Mapping[str, float]) -> float | 
 
 def _of_json(text: str, source: str) -> FlownMission:
     try:
-        return FlownMission.model_validate_json(text)
+        return FlownMission.model_validate_json(text, by_name=False)
     except ValidationError as error:
         first: Any = error.errors()[0]
         if first["type"] == "json_invalid":

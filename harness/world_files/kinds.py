@@ -117,7 +117,7 @@ def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def kind_of(path: Path) -> str:
-    """The kind of a file, told from what stands in it; of none of them, a InputError says what would do."""
+    """The kind of a file, told from what stands in it; of none of them, an InputError says what would do."""
     first, ending = bounded.read_bytes(path, first=HEAD), path.suffix.lower()
     if not first:
         raise InputError("is empty; get it again")

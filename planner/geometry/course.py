@@ -20,9 +20,7 @@ class Course:
     path: Path  # from where the aircraft was when it was found
     nodes: tuple[Point, ...]  # track points, the goal last
     known: int  # how many of the remembered edge points, of what stands still, it was found with
-    shortest: (
-        bool  # none shorter was known; more obstacles shorten no way, so it stays so while nothing cuts it
-    )
+    shortest: bool  # none shorter was known, nor will be while nothing cuts it: obstacles shorten no way
     to_goal: bool = True  # it leads to the goal, not only into a turn
 
     def ahead(self, arc_length_m: float) -> Course:

@@ -166,9 +166,7 @@ class Limits(NamedTuple):
     """How a curve may bend."""
 
     radius_m: float  # smallest radius
-    roll_m: (
-        float  # flown while rolling into a turn, the wind behind; straight between a left and a right turn
-    )
+    roll_m: float  # flown, downwind, while rolling into a turn; straight between a left and a right turn
 
     @classmethod
     def of(cls, mission: Mission) -> Limits:

@@ -15,9 +15,7 @@ class PlanningState(Enum):
 
     FOLLOWING = "following"  # the committed plan leads on; the window rolls as it is due
     LOITERING = "loitering"  # in the turn that the committed plan ends with, the search for a way on goes on
-    ESCAPING = (
-        "escaping"  # no certified plan, as before the first, or a broken one: what keeps clear is flown
-    )
+    ESCAPING = "escaping"  # without a certified plan, or with a broken one, what keeps clear is flown
     GIVING_UP = "giving up"  # a search was in vain: a place is given up, or such places are tried again
     PROVING = "proving"  # the edge points seen leave no way, or none with room to turn, which ends the flight
 

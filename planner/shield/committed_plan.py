@@ -34,9 +34,7 @@ class CommittedPlan:
     plan: Plan  # as it was given to the loop
     path: Path  # of the plan: along the course, then into the turn; or the course, where that is flown to the goal
     course: Course  # the whole way
-    loiter_entry_m: (
-        float  # arc length at which the path leaves the course for the turn, or the flight is over
-    )
+    loiter_entry_m: float  # arc length at which the path leaves the course, or the flight is over
 
     @cached_property
     def turn(self) -> Path:

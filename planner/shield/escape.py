@@ -72,9 +72,7 @@ class _Option(NamedTuple):
     """One option of an escape."""
 
     path: Path  # what would be flown
-    standing: Path | None = (
-        None  # what of it must keep clear of what stands; None where that is known already
-    )
+    standing: Path | None = None  # what of it must keep clear of what stands; None where that is known
     reason: str = ""  # why it is flown, a sentence
     committed: CommittedPlan | None = None  # the certified plan that it comes from
 
@@ -84,9 +82,7 @@ class Escape:
     """The answer where nothing is certified."""
 
     plan: Plan
-    committed: CommittedPlan | None = (
-        None  # the new plan that it commits to; None: the plan in effect goes on
-    )
+    committed: CommittedPlan | None = None  # the new plan; None: the plan in effect goes on
     broken: bool = True  # the plan in effect comes too near to something
 
 

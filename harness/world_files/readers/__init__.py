@@ -1,1 +1,1 @@
-"""Readers of world files, one module a format; a file that cannot be used is a InputError."""
+"""Readers of world files, one module a format; a file that cannot be used is an InputError."""

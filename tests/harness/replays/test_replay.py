@@ -46,7 +46,7 @@ def circles(tmp_path: Path, wind: tuple[float, float], laps: int = 4) -> tuple[P
     log, mission = tmp_path / "log.parquet", tmp_path / "mission.json"
     pq.write_table(pa.table(columns), log)
     keys = {"corners_east_north_m": SQUARE, "acceptance_radius_m": 45.0, "bank_limit_deg": 45.0}
-    mission.write_text(json.dumps({"mission": keys}))
+    mission.write_text(json.dumps({"mission": keys, "origin": "not read"}))
     return log, mission
 
 
@@ -201,7 +201,7 @@ def test_a_log_of_positions_alone_shows_the_same_wind_and_laps(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"mission": {"acceptance_radius_m": 10}}, "mission.corners_east_north_m: is missing"),
+        ({"mission": {}, "corners_m": SQUARE}, "mission.corners_east_north_m: is missing"),
         ({"mission": {"corners_east_north_m": [[0, 0], [1]]}}, "must be two or more pairs"),
         ({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": "45"}}, "bank_limit_deg: is '45'"),
     ],

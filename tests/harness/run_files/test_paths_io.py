@@ -173,6 +173,10 @@ BROKEN = {
     "a landing pattern": ("a.plan",
         plan(item(47.0, 8.0), {"type": "ComplexItem", "complexItemType": "fwLandingPattern"}),
         ": mission.items[1].landingApproachCoordinate: must be [latitude, longitude, altitude]"),
+    "a landing above what": ("a.plan",
+        plan(item(47.0, 8.0), {"type": "ComplexItem", "complexItemType": "fwLandingPattern", "altitudesAreRelative": 0,
+            "landingApproachCoordinate": [47, 8, 500], "landCoordinate": [47, 8.1, 400]}),
+        ": mission.items[1].altitudesAreRelative: must be true or false"),
     "a fence of two corners": ("a.plan",
         json.dumps({
             **json.loads(plan(item(47.0, 8.0), item(47.1, 8.0, doJumpId=2))),
