@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from harness.analysis.metric import ERROR, Claim, holds
 from harness.campaign.results import metric_cells, time_cells
 from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence, trace
+from harness.flight.record import Outcome
 from harness.report.chapters import optimum_of
 from harness.scenario.kinds import GUIDANCE, PLANNER, registered_source
 from harness.scenario.scenario import Scenario, unpacked
@@ -42,6 +43,8 @@ class Job:
     claim: Claim = "reached"
     """A run is a failure where this does not hold of it."""
     path: PathCheck | None = None
+    cannot_fly: str = ""
+    """Why the drawn aircraft cannot begin the flight: control is lost at once then."""
     planners: tuple[str, ...] = ()
     """Planners that the process has to import, as FILE.py:NAME or MODULE:NAME; `laws`: likewise."""
     laws: tuple[str, ...] = ()
@@ -65,6 +68,8 @@ def fly_job(job: Job) -> Answer | None:
     Raises:
         OSError: the run folder cannot be made or written, or the disk is full.
     """
+    if job.cannot_fly:
+        return Answer(job.run, {"outcome": Outcome.LOST_CONTROL.value, "reason": job.cannot_fly}, {})
     try:
         for part, sources in ((PLANNER, job.planners), (GUIDANCE, job.laws)):
             for source in sources:

@@ -46,7 +46,7 @@ class Failure:
 
     outcome: str
     cause: str
-    """Why legs were not tracked, or what the check of a given path found; may be empty."""
+    """Why legs were not tracked, what the check of a given path found, or why nothing was flown; may be empty."""
     count: int
     runs: tuple[int, ...]
 
@@ -147,9 +147,7 @@ def certify(
 ) -> Certificate:
     """Flies days and writes the folder; with `resume` goes on with what it has of these days, or of fewer.
 
-    Raises:
-        RunFolderError: the folder holds something else, or days already without `resume`.
-        OSError: it cannot be written, or who flies has gone.
+    A RunFolderError: it holds something else, or days without `resume`; an OSError: disk or workers give out.
     """
     tally = Tally(terms)
     with CampaignFolder(out, days, resume=resume) as folder:
@@ -181,10 +179,11 @@ def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms)
     over = [(run, folder.over[run]) for run in range(tally.runs)]
     failing = [{**each.row, "run": run} for run, each in over if not each.held]
     first = days.scenario(0)
+    flew = [each for each in over if each[0] not in days.grounded]
     quantities: dict[str, list[Any]] = {}
     if failing:
-        quantities = differing([days.scenario(run).model_dump(by_alias=True) for run, _ in over])
-        quantities |= {key: [each.row[key] for _, each in over] for key in days.varied}
+        quantities = differing([days.scenario(run).model_dump(by_alias=True) for run, _ in flew])
+        quantities |= {key: [each.row[key] for _, each in flew] for key in days.varied}
     return Certificate(
         claim=days.claim,
         runs=tally.runs,
@@ -200,7 +199,7 @@ def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms)
         seed=days.campaign.seed,
         varied=dict(days.vary),
         failures=failures(failing),
-        explained=explained(np.array([not each.held for _, each in over]), quantities),
+        explained=explained(np.array([not each.held for _, each in flew]), quantities),
         failing_runs=tuple(row["run"] for row in failing),
         command=shlex.join(["wayproof", *sys.argv[1:]]),
         versions=versions(),
@@ -227,7 +226,8 @@ def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
     """Rows of days that failed, by outcome and cause, the most frequent first."""
     alike: dict[tuple[str, str], list[int]] = {}
     for row in rows:
-        cause = row.get("trackability.causes") or row.get("check.verdict") or ""
+        flown = row.get("trackability.causes") or row.get("check.verdict") or ""
+        cause = flown if row.get("digest") else row["reason"]
         alike.setdefault((str(row["outcome"]), str(cause)), []).append(int(row["run"]))
     ordered = sorted(alike.items(), key=lambda each: -len(each[1]))
     return tuple(Failure(*key, len(runs), tuple(runs[:5])) for key, runs in ordered)

@@ -23,10 +23,13 @@ from harness.run.path_check import PathCheck, origin_of
 from harness.run.path_check import asked as path_check
 from harness.run_files.path_files import read_path
 from harness.scenario.scenario import Scenario, overridden
+from harness.scenario.sections import UncertaintySpec
 from harness.scenario.shipped import scenario_path, shipped_scenarios
 
 DEFAULT_AIRCRAFT: Final = "aerosonde"
 DEFAULT_SEED: Final = 1
+AS_MEANT: Final = ("uncertainty", json.dumps(dict.fromkeys(UncertaintySpec.model_fields, 0.0)))
+"""The setting by which the aircraft flies as its model says."""
 FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
 
 Settings = Sequence[tuple[str, str]]
@@ -64,7 +67,24 @@ class Days(CampaignRuns):
         root, source = node_of(plain, COMMAND_LINE), "command line"
         super().__init__(CampaignFile(validated(root, source), source, root, (base,)), *sources)
         self.claim, self.vary, self.band = claim, vary, band
+        self.grounded: dict[int, str] = {}  # why the aircraft that a day draws cannot fly, by its number
         self.can_grow = not band  # the tracks of earlier days are gone
+
+    def scenario(self, number: int, overrides: Settings = ()) -> Scenario:
+        """The scenario of day `number`; with its aircraft as it is meant to be where the one drawn cannot fly level."""
+        try:
+            return self._drawn_scenario(number, overrides)
+        except InputError as error:
+            found = self._drawn_scenario(number, [*overrides, AS_MEANT])  # else it is another mistake
+            self.grounded[number] = str(error).partition("must be smaller: ")[2].rpartition(" (")[0]
+            return found
+
+    def _drawn_scenario(self, number: int, overrides: Settings) -> Scenario:
+        return super().scenario(number, overrides)
+
+    def job(self, number: int, folder: Path) -> Job:
+        """Day `number` as it is handed to who flies it."""
+        return replace(super().job(number, folder), cannot_fly=self.grounded.get(number, ""))
 
     def plain(self) -> dict[str, Any]:
         """All that says what is flown, and what is claimed."""
@@ -109,8 +129,7 @@ class PathDays(Days):
         day = self.cells(number)
         return [(key, json.dumps(day[key])) for key in ("seed", *self.varied)]
 
-    def scenario(self, number: int, overrides: Settings = ()) -> Scenario:
-        """The scenario of day `number`, complete."""
+    def _drawn_scenario(self, number: int, overrides: Settings) -> Scenario:
         try:
             return self._ask([*self._settings(number), *overrides]).scenario
         except InputError as error:
@@ -118,7 +137,8 @@ class PathDays(Days):
 
     def job(self, number: int, folder: Path) -> Job:
         """Day `number` as it is handed to who flies it."""
-        return replace(super().job(number, folder), path=self._ask(self._settings(number)))
+        job = super().job(number, folder)
+        return job if job.cannot_fly else replace(job, path=self._ask(self._settings(number)))
 
     def again(self, number: int, folder: Path) -> str:
         """The command that flies day `number` again."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import shlex
 from collections.abc import Mapping, Sequence
@@ -79,7 +80,8 @@ def certify(
         print_json(found.plain())
     elif not quiet:
         _print(found, f"{found.subject}: {found.planner}, {found.aircraft}", folder)
-        for run in found.failing_runs[:1]:
+        kept = (run for run in found.failing_runs if (folder / "runs" / str(run)).is_dir())
+        for run in itertools.islice(kept, 1):
             say(f"view: {shlex.join(['wayproof', 'view', str(folder / 'runs' / str(run))])}")
     return 0 if found.verdict == "shown" else FAILED
 

@@ -83,11 +83,9 @@ def fly_and_compare(
     """Flies scenarios that differ in name or planner and writes the folder of the comparison.
 
     `scenarios`: one a flight, those of one name together; each names its planner. `command`: what the report says was
-    called, by default the command line. `sources`: planners, and laws, given as FILE.py:NAME or MODULE:NAME.
-
-    Raises:
-        InputError: two flights, or a flight and a file of the comparison, would have one name.
-        RunFolderError: the folder holds something else or cannot be written.
+    called, by default the command line. `sources`: planners, and laws, given as FILE.py:NAME or MODULE:NAME. An
+    InputError: two flights, or a flight and a file of the comparison, would have one name; a RunFolderError: the folder
+    holds something else or cannot be written.
     """
     how = Job(0, b"", out, "all" if recording else "folders", optimum=False, again=command or "")
     flights = _flights(scenarios, replace(how, planners=sources[0], laws=sources[1]))

@@ -275,10 +275,8 @@ def falsify(
 ) -> Breaking:
     """Searches, and writes the folder; `progress` is told after each flight how many of how many, and its end.
 
-    Raises:
-        InputError: a condition is no scenario, or cannot be flown; the folder is as it was.
-        RunFolderError: the folder holds something else, or another process writes to it.
-        WriteError: it cannot be written.
+    An InputError: a condition is no scenario, or cannot be flown; the folder is as it was. A RunFolderError: the folder
+    holds something else, or another process writes to it. A WriteError: it cannot be written.
     """
     trials: dict[Values, Trial] = {}
 

@@ -110,6 +110,28 @@ def test_more_days_go_on_with_those_that_were_flown_and_have_bounds_that_allow_i
     assert "campaign.draws was 10, is 4" in capsys.readouterr().err
 
 
+def test_a_day_whose_drawn_aircraft_cannot_fly_fails_with_its_cause(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The days that count as failures are those whose flight alone is refused."""
+    keys = {"aircraft.airspeed_mps": 18, "uncertainty.mass": 0.3, "mission.time_limit_s": 5}
+    words = [word for key, value in keys.items() for word in ("--set", f"{key}={value}")]
+    words += ["--claim", "no-contact", "--runs", "6", "--workers", "1"]
+    _, found = certify(place, *words, out="heavy")
+    refused = []
+    for day in pq.read_table(place / "heavy" / "results.parquet").to_pylist():
+        try:
+            wayproof.load_scenario(place / "short.yaml").with_({**keys, "seed": day["seed"]})
+        except wayproof.InputError:
+            refused.append(day["run"])
+    assert 0 < len(refused) < 6
+    assert found["failing_runs"] == refused
+    assert {each["outcome"] for each in found["failures"]} == {"lost_control"}
+    assert found["failures"][0]["cause"].startswith("aerosonde cannot be trimmed for level flight at 18 m/s")
+    assert certify(place, *words, "--set", "aircraft.deviation.mass=0.5", out="written")[0] == 2
+    assert "aircraft.deviation" in capsys.readouterr().err
+
+
 def certify_path(place: Path, points: str, *words: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """The certificate of some days of a path, and their rows."""
     (place / "path.csv").write_text(f"east_m,north_m\n{points}\n")
