@@ -25,23 +25,10 @@ class PointMass:
         roll_lag_s: float = 0.25,
         step_rate_hz: int = 120,
     ) -> None:
-        """Starts level, along the course.
-
-        Args:
-            start: position, altitude, course and airspeed.
-            atmosphere: steady wind; default: calm.
-            roll_lag_s: time constant of roll.
-            step_rate_hz: steps per second that `advance` counts in.
-
-        Raises:
-            ValueError: if the course cannot be held in the wind, or turbulence or a gust is asked for, which
-                this does not model.
-        """
+        """Starts level, along the course; a ValueError says that it cannot be held, or of turbulence."""
         atmosphere = atmosphere or Atmosphere()
         if atmosphere.turbulence is not None:
             raise ValueError("the point mass does not model turbulence or gusts")
-        if not roll_lag_s > 0.0:
-            raise ValueError(f"roll_lag_s must be positive; got {roll_lag_s:g}")
         self._step_rate_hz = step_rate_hz
         self._roll_lag_s = roll_lag_s
         self._wind_east, self._wind_north = atmosphere.wind_east_mps, atmosphere.wind_north_mps

@@ -66,33 +66,28 @@ def quick(command: str) -> bool:
     )
 
 
-def wayproof(
-    arguments: str, folder: Path, *, path: Path = ROOT, timeout_s: float = 600
-) -> subprocess.CompletedProcess[str]:
-    """Runs the command in a folder, the packages taken from `path`."""
+def ran(words: list[str], folder: Path, path: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Runs Python with some words in a folder as a person would, the packages taken from `path`."""
+    places = os.pathsep.join(map(str, dict.fromkeys((path, ROOT, FRONT_DOOR))))
     return subprocess.run(
-        [sys.executable, "-m", "harness", *shlex.split(arguments)],
+        [sys.executable, *words],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, dict.fromkeys((path, ROOT, FRONT_DOOR))))},
-        capture_output=True,
-        text=True,
-        timeout=timeout_s,
-        check=False,
-    )
-
-
-def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Runs code in a folder as a person would."""
-    path = (str(ROOT), str(FRONT_DOOR))
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(path)},
+        env={**os.environ, "PYTHONPATH": places},
         capture_output=True,
         text=True,
         timeout=600,
         check=False,
     )
+
+
+def wayproof(arguments: str, folder: Path, *, path: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Runs the command."""
+    return ran(["-m", "harness", *shlex.split(arguments)], folder, path)
+
+
+def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Runs code."""
+    return ran(["-c", code], folder)
 
 
 @pytest.mark.flights
@@ -207,7 +202,7 @@ def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tm
 def test_the_breaking_point_is_found_as_shown(tmp_path: Path) -> None:
     (command,) = re.findall(r"`wayproof (falsify aerosonde_forest [^`]+)`", FALSIFY)
     (shown,) = (block for block in blocks("text", FALSIFY) if "mildest found" in block)
-    searched = wayproof(command.replace("--runs 24", "--runs 8"), tmp_path, timeout_s=600)
+    searched = wayproof(command.replace("--runs 24", "--runs 8"), tmp_path)
     assert (searched.returncode, said(searched)) == (0, [])
     names = [line[:29].strip() for line in shown.splitlines()[2:5]]
     assert [line[:29].strip() for line in searched.stdout.splitlines()[2:5]] == names
@@ -233,9 +228,9 @@ def test_ones_own_planner_in_a_file_is_flown_on_the_command_line_and_in_python(t
     assert (flown.returncode, said(flown)) == (0, [])
     first = json.loads(flown.stdout)
     assert first["outcome"] == "reached"
-    ran = python(script, tmp_path)
-    assert (ran.returncode, said(ran)) == (0, [])
-    assert ran.stdout.splitlines()[0] == f"reached {first['reason']}"
+    done = python(script, tmp_path)
+    assert (done.returncode, said(done)) == (0, [])
+    assert done.stdout.splitlines()[0] == f"reached {first['reason']}"
     (again,) = load_run(tmp_path / "runs" / "windy").manifest["command"]
     assert again.startswith("wayproof.fly('my_world', planner='rolling_window', ")
 
@@ -255,9 +250,9 @@ def test_ones_own_law_in_a_file_is_compared_on_the_command_line_and_in_python(tm
     assert [row["outcome"] for row in rows] == ["reached", "reached"]
     assert rows[0]["total_system_error_max_m"] < rows[1]["total_system_error_max_m"]
     call = f"compare('my_world.yaml', ['rolling_window'], 'in_python', guidance={laws.split(',')})"
-    ran = python(f"import wayproof\nprint(wayproof.{call}.table.to_pylist())", tmp_path)
-    assert (ran.returncode, said(ran)) == (0, [])
-    assert repr(rows[1]["total_system_error_max_m"]) in ran.stdout
+    done = python(f"import wayproof\nprint(wayproof.{call}.table.to_pylist())", tmp_path)
+    assert (done.returncode, said(done)) == (0, [])
+    assert repr(rows[1]["total_system_error_max_m"]) in done.stdout
     measured = wayproof("bench tracking --guidance my_law.py:LAW --seeds 1 --json", tmp_path)
     assert said(measured) == []
     assert measured.returncode in (0, 1)
@@ -273,8 +268,8 @@ def test_python_shown_runs(name: str, tmp_path: Path) -> None:
     # Each with names of its own, in one process: to import and load all of it takes longer than to run them.
     code = "\n".join(f"exec({block!r}, {{'__name__': '__main__'}})" for block in shown)
     if shown:
-        ran = python(code, tmp_path)
-        assert (ran.returncode, said(ran)) == (0, [])
+        done = python(code, tmp_path)
+        assert (done.returncode, said(done)) == (0, [])
 
 
 @pytest.mark.flights

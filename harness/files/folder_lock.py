@@ -10,11 +10,10 @@ from harness.files.errors import RunFolderError
 
 
 class FolderLock:
-    """Holds a folder, which must exist, for this process (flock(2) on the folder itself) until it is released.
+    """Holds a folder for this process (flock(2) on the folder itself) until it is released; a RunFolderError if held.
 
     With a name, a file of that name in it is held in its place, made where missing: on a network file system (NFS) only
-    what is open for writing can be held. A RunFolderError says that another process, or another lock of this one, holds
-    it; an OSError that the folder cannot be opened.
+    what is open for writing can be held.
     """
 
     def __init__(self, path: Path, name: str | None = None) -> None:

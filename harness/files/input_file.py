@@ -23,11 +23,7 @@ _KINDS: Final = {
 
 
 def read_text(path: Path, max_bytes: int, what: str) -> str:
-    """The text of a regular file, UTF-8 without a byte order mark.
-
-    An InputError says why it cannot be read, that it is larger than `max_bytes`, or no text. `what` says there what the
-    file should be: "a scenario, in YAML".
-    """
+    """The text of a regular file, UTF-8; an InputError says why it cannot be read, and `what` the file should be."""
     return decoded(read_data(path, max_bytes, what), str(path), what)
 
 
@@ -62,10 +58,7 @@ def decoded(data: bytes, source: str, what: str) -> str:
 
 
 def open_regular(path: Path) -> BinaryIO:
-    """Opens a regular file for reading, without ever waiting for who writes a pipe.
-
-    An InputError says that it is not a regular file; an OSError that it cannot be opened.
-    """
+    """Opens a regular file for reading, without waiting for who writes a pipe; an InputError says that it is none."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
     if kind != stat.S_IFREG:
@@ -85,10 +78,7 @@ def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict
 
 
 def parsed_json(text: str, source: str, once: bool = True) -> Any:
-    """What a JSON text holds; an InputError begins with `source`, the file or nothing.
-
-    It says that it is not JSON, has a number that is not finite, or where `once` a key twice in one place.
-    """
+    """What a JSON text holds, where `once` no key twice in one place; `source`, or nothing, begins an InputError."""
 
     def fault(sentence: str, line: int | None = None) -> InputError:
         where = source if line is None else f"{source}:{line}" if source else f"line {line}"

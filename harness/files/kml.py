@@ -51,8 +51,7 @@ class Kml(NamedTuple):
 def read_kml(data: bytes, source: str, most: int) -> Kml:
     """Reads the bytes of a KML file, or of an archive with one that unpacks to at most `most` bytes.
 
-    An InputError, which begins with `source`, the file or nothing, says that it is none, cannot be unpacked, has a
-    coordinate that is no number, or what is refused by name.
+    `source`, the file or nothing, begins an InputError.
     """
     if data.startswith(b"PK"):
         try:
@@ -83,10 +82,7 @@ def read_kml(data: bytes, source: str, most: int) -> Kml:
 
 
 def parsed_xml(data: bytes, source: str, root: str) -> Element:
-    """The root of an XML text; `source` begins an InputError.
-
-    It says that it is no whole XML, declares entities, is of another root, or has an element of `GIVEN_UP`.
-    """
+    """The root of an XML text, which must be of that name and have no entities; `source` begins an InputError."""
     where = f"{source}: " if source else ""
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # a few lines of entities unpack to gigabytes
         raise InputError(f"{where}declares a document type or XML entities; remove the declaration")

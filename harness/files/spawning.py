@@ -18,9 +18,8 @@ _starting = threading.Lock()
 def without_main() -> Iterator[None]:
     """Processes that are begun in the block, by `spawn`, do not import the `__main__` of this one.
 
-    Else a script that calls us at its top, without `if __name__ == "__main__":`, would begin processes without end. An
-    interrupt, which reaches the whole process group, is blocked in them from their first moment on: the parent decides
-    what it means.
+    Else a script that calls us at its top would begin processes without end. An interrupt, which reaches the whole
+    process group, is blocked in them from their first moment on: the parent decides what it means.
     """
     with _starting:
         resource_tracker.ensure_running()  # unblocks the interrupt when it begins its own process
@@ -35,10 +34,7 @@ def without_main() -> Iterator[None]:
 
 
 def open_standard_files() -> None:
-    """Opens what is closed of the file descriptors 0 to 2, to nowhere.
-
-    Else the next file that is opened gets such a number, and a process that is begun takes it for its standard output.
-    """
+    """Opens what is closed of the file descriptors 0 to 2, to nowhere: else another file would get such a number."""
     for number in range(3):
         try:
             os.fstat(number)

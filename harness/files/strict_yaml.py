@@ -2,8 +2,7 @@
 
 Plain scalars are resolved by the core schema of YAML 1.2 (https://yaml.org/spec/1.2.2/#103-core-schema):
 `1e3` is a number; `on`, `yes` and `1_000` are text. Duplicate keys, anchors, aliases, merge keys, tags and a
-second document are errors. Size, depth and number of values are bounded, so that no file takes memory or time
-without end.
+second document are errors. Size, depth and number of values are bounded.
 """
 
 from __future__ import annotations
@@ -243,10 +242,7 @@ def _is_key(text: str) -> bool:
 
 
 def replaced(node: Node, loc: Loc, new: Node, depth: int = 0) -> Node:
-    """A copy of `node` with `new` at `loc` behind `depth` steps; mappings on the way are made where they are missing.
-
-    An InputError says that a step of `loc` leads into a scalar or past the end of a list.
-    """
+    """A copy of `node` with `new` at `loc` behind `depth` steps; an InputError says that `loc` leads nowhere."""
     if depth == len(loc):
         return new
     step, value, where = loc[depth], node.value, min(new.line, COMMAND_LINE)

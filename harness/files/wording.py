@@ -9,8 +9,7 @@ from typing import Final
 _CONTROLS: Final = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )
-"""Control characters of ASCII and Latin-1 but for tab and end of line, what changes the direction of writing, and
-halves of characters, which no encoding has."""
+"""Control characters but for tab and end of line, what changes the direction of writing, and halves of characters."""
 
 
 def counted(number: int, noun: str) -> str:

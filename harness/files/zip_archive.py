@@ -14,15 +14,8 @@ from harness.files.input_file import InputError
 from harness.files.wording import counted, printable
 
 DAMAGES: Final = (
-    zipfile.BadZipFile,
-    zlib.error,
-    lzma.LZMAError,
-    struct.error,
-    EOFError,
-    OSError,
-    ValueError,
-    IndexError,
-)
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, ValueError, IndexError
+)  # fmt: skip
 """What Python's unpacking raises of damaged archives."""
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from harness.files.input_file import InputError
-from harness.files.mavlink.fences import Fence, Place
+from harness.files.mavlink.items import Fence, Place
 
 if TYPE_CHECKING:
     from shapely import Geometry

@@ -15,8 +15,7 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError, decoded, read_data
-from harness.files.mavlink.fences import Place
-from harness.files.mavlink.items import HOME, WPL
+from harness.files.mavlink.items import HOME, WPL, Place
 from harness.files.wording import counted
 from harness.run_files.drawn_lines import PathAsRead, read_csv, read_geojson, read_gpx, read_igc, read_kml
 from harness.run_files.fences import Fences, in_plane

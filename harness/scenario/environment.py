@@ -91,11 +91,9 @@ class Wind(Section):
     from_deg: Direction = 270.0
     """Direction it blows from."""
     measured_at_m: Annotated[float | None, Field(ge=1, le=300)] = None
-    """Height over ground of these speeds; above and below, the wind has the logarithmic profile of MIL-F-8785C.
-    Default: the wind is the same at all heights."""
+    """Height over ground of these speeds, for the profile of MIL-F-8785C. Default: the same at all heights."""
     changes: Annotated[tuple[Change, ...], Strict(False), Field(max_length=10_000)] = ()
-    """Later winds: time in s, speed in m/s, direction in degrees, each; the wind goes over linearly from one to the
-    next, and stays after the last."""
+    """Later winds: time in s, speed in m/s, direction in degrees, each; linear in between, and the last one stays."""
 
     @model_validator(mode="after")
     def _times_rise(self) -> Wind:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,11 +19,7 @@ if TYPE_CHECKING:
 
 
 def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[ScenarioKeys, Sequence[str]]:
-    """A scenario whose files are made into obstacles and ground, and what messages call each obstacle.
-
-    Its mission is in metres; paths are looked for in the folder of the scenario file first. A KeyFault says why a file
-    cannot be used.
-    """
+    """A scenario whose files are made into obstacles and ground, and what messages call each obstacle."""
     at = [index for index, each in enumerate(keys.obstacles) if each.file is not None]
     if not at:
         return keys, [f"obstacles[{index}]" for index in range(len(keys.obstacles))]
@@ -68,11 +65,10 @@ def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:
 
 def file_beside(text: str, folder: Path | None) -> Path | None:
     """The file that lies so from a folder; None where there is none."""
-    try:
-        beside = None if folder is None else folder / Path(text).expanduser()
-        return beside if beside and beside.exists() else None
-    except (OSError, RuntimeError):  # too long, or the home of nobody
-        return None
+    with suppress(OSError, RuntimeError):  # too long, or the home of nobody
+        if folder and (beside := folder / Path(text).expanduser()).exists():
+            return beside
+    return None
 
 
 def _parts(source: Source, active_s: Interval | None) -> list[Obstacle]:

@@ -39,8 +39,7 @@ class Forest(Section):
     size_m: Annotated[tuple[Length, Length], Strict(False)] = (5000.0, 5000.0)
     """Width and height of the area."""
     room_m: Length = 400.0
-    """About start and goal there is no obstacle nearer than this. They lie as far from the edges, in the south-western
-    and the north-eastern corner."""
+    """Least distance of start and goal, south-western and north-eastern, from obstacles; that from the edges."""
     density_1pkm2: Annotated[float, Field(ge=0, le=1e6)] = 2.0
     """How many copses a square kilometre."""
     gap_m: Annotated[float, Field(ge=0, le=MAX_COORDINATE_M)] = 400.0
@@ -108,10 +107,7 @@ class WorldSpec(Section):
 
 
 def generated(spec: WorldSpec, seed: int) -> dict[Loc, Any]:
-    """Area, obstacles, start and goal of the world that a seed makes, by their keys of a scenario.
-
-    It is the same one every time; `spec.seed` goes before the seed.
-    """
+    """Area, obstacles, start and goal of the world of a seed, by their keys; `spec.seed` goes before."""
     rng, forest = np.random.default_rng(seed if spec.seed is None else spec.seed), spec.forest
     copses = [forest.copse(rng) for _ in range(forest.number)]
     reach_m = [max(math.hypot(*at) + radius for at, radius in copse) for copse in copses]
@@ -123,9 +119,7 @@ def generated(spec: WorldSpec, seed: int) -> dict[Loc, Any]:
         if place
         for (east, north), radius in copse
     ]
-    circles = [
-        {"center_m": [round(x, 1), round(y, 1)], "radius_m": round(radius, 1)} for x, y, radius in trunks
-    ]
+    circles = ({"center_m": [round(x, 1), round(y, 1)], "radius_m": round(r, 1)} for x, y, r in trunks)
     return {
         ("area", "bounds_m"): (0.0, 0.0, width, height),
         ("obstacles",): tuple({"circle": circle} for circle in circles),

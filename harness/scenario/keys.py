@@ -30,8 +30,7 @@ class TrackabilitySpec(Section):
     """What a leg of the flight may be off before it counts as not trackable."""
 
     cross_track_m: Length = DERIVED
-    """Distance of the true position from the plan; what the planner keeps for navigation errors comes on top. Default:
-    a tenth of planner.clearance_m where the file gives that, else 10 m."""
+    """Distance of the true position from the plan. Default: a tenth of a written planner.clearance_m, else 10 m."""
     altitude_m: Length = DERIVED
     """Distance from mission.altitude_m. Default: 10 m."""
     airspeed_mps: Annotated[float, Field(gt=0, le=1000)] = DERIVED
@@ -44,8 +43,7 @@ class TrackabilitySpec(Section):
 RATES_HZ: Final = (STEP_RATE_HZ, 120)
 """The step rates that are taken where none is given, the first that the sensor's rate divides."""
 SLOWEST_HZ: Final = 30
-"""A step is then as long as the time constant of the Aerosonde's roll rate, 1/32 s; its track on 14 turns is 0.07 m
-from that with 480 steps a second."""
+"""The Aerosonde's track on 14 turns is then 0.07 m from that with 480 steps a second."""
 
 
 class Simulation(Section):
@@ -59,18 +57,14 @@ class Simulation(Section):
     @classmethod
     def _is_a_multiple_of_the_guidance_rate(cls, rate_hz: int) -> int:
         if rate_hz % UPDATE_RATE_HZ:
+            right = f"a multiple of the guidance rate of {UPDATE_RATE_HZ} Hz"
             near = round(rate_hz / UPDATE_RATE_HZ) * UPDATE_RATE_HZ
-            raise ValueError(
-                f"is {rate_hz}; must be a multiple of the guidance rate of {UPDATE_RATE_HZ} Hz, such as {near}"
-            )
+            raise ValueError(f"is {rate_hz}; must be {right}, such as {near}")
         return rate_hz
 
 
 class ScenarioKeys(Section):
-    """One flight as a file describes it; flying it twice gives the same track bit for bit.
-
-    Attributes equal the keys of the file, except `schema_`, which is `schema` there.
-    """
+    """One flight as a file describes it. Attributes equal its keys, except `schema_`, which is `schema` there."""
 
     model_config = ConfigDict(title="Scenario")
 
@@ -111,11 +105,6 @@ class ScenarioKeys(Section):
     """The air."""
     trackability: TrackabilitySpec = TrackabilitySpec()
     """What a leg may be off before it counts as not trackable."""
-
-    @property
-    def given(self) -> dict[str, Any]:
-        """What the file has, by attribute."""
-        return {name: value for name, value in self if name in self.model_fields_set}
 
     def updated(self, **sections: Any) -> ScenarioKeys:
         """The same with some sections replaced."""

@@ -38,7 +38,6 @@ class LoopPart:
 
     noun: str
     kind: type[Any]
-    """Class of the entries under which its implementations are registered."""
     built_in: tuple[Any, ...]
     group: str
     """Group of the entry points by which other distributions add kinds."""
@@ -77,10 +76,7 @@ class LoopPart:
         return {**self.installed(), **self.registered}
 
     def register(self, kind: Any) -> None:
-        """Lets this process know a kind by its name; one registered under the same name before is replaced.
-
-        A ValueError says that a built-in kind, or one of another distribution, has the name.
-        """
+        """Lets this process know a kind by its name; a ValueError says that an installed kind has the name."""
         if kind.kind in self.installed():
             raise ValueError(f"there is a {self.noun} called {kind.kind} already; give this one another name")
         self.registered[kind.kind] = kind
@@ -136,9 +132,9 @@ def own_words(planner: str | None, law: str | None) -> list[str]:
 
 
 def registered(given: object, part: LoopPart = PLANNER) -> str:
-    """Registers what was given, unless it has been; returns the name by which scenarios of this process know it.
+    """Registers what was given, or FILE.py:NAME or MODULE:NAME names; returns its name for scenarios of this process.
 
-    A text is a kind, or FILE.py:NAME or MODULE:NAME. A ValueError, one sentence, says why it cannot be used.
+    A ValueError, one sentence, says why it cannot be used.
     """
     if isinstance(given, str):
         return registered_source(given, part) if is_source(given) else given
@@ -156,8 +152,7 @@ def registered_source(source: str, part: LoopPart = PLANNER) -> str:
     place, _, name = source.rpartition(":")
     module = _imported(place, source)
     if not name.isidentifier() or not hasattr(module, name):
-        own = (each for each, value in vars(module).items() if _is_own(value, module.__name__))
-        there = ", ".join(own)
+        there = ", ".join(each for each, value in vars(module).items() if _is_own(value, module.__name__))
         raise ValueError(f"{place} has no {name or 'name'}; it has {there or 'no class or function'}")
     kind = replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}")
     part.register(kind)
@@ -172,10 +167,8 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
     if isinstance(given, type) or (callable(given) and not _is_part(given, part)):
         made = _maker(given, part)
     elif not _is_part(given, part):
-        raise ValueError(
-            f"a {part.noun} must be a kind, a class, a function or an object with the method "
-            f"{' and '.join(part.methods)}; this is a {type(given).__name__}"
-        )
+        wanted = f"a kind, a class, a function or an object with the method {' and '.join(part.methods)}"
+        raise ValueError(f"a {part.noun} must be {wanted}; this is a {type(given).__name__}")
     summary = (inspect.getdoc(given) or f"a {part.noun} given in Python").splitlines()[0]
     kind: Kind = part.kind(_name(given), summary, NoKeys, made)
     return kind

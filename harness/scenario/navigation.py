@@ -88,11 +88,9 @@ class Navigation(Section):
     drift_share: Share = DERIVED
     """Without a fix the position drifts by this share of the distance flown. Default: that of the kind."""
     outages_s: Annotated[tuple[Interval, ...], Strict(False), Field(max_length=1000)] = DERIVED
-    """Times without a fix, from and to, one after the other; at the end the position comes back with a jump. Default:
-    that of the kind."""
+    """Times without a fix, from and to; at the end the position comes back with a jump. Default: that of the kind."""
     latency_s: Annotated[float, Field(ge=0, le=5)] = DERIVED
-    """Age of the state that guidance and autopilot work with: position, velocity, attitude and airspeed. Default: that
-    of the conditions, 0 for ideal."""
+    """Age of the state that guidance and autopilot work with. Default: that of the conditions, 0 for ideal."""
     margin_m: Error = DERIVED
     """What the planner keeps from obstacles beyond planner.clearance_m. Default: 3 sigma, the bias, what is flown in
     latency_s, the drift of the longest outage, or of half a turn where that is less, and what 3 sigma of the heading
@@ -108,8 +106,8 @@ class Navigation(Section):
                 object.__setattr__(self, name, value)
             elif self.kind == "perfect" and name != "position_correlation_s" and given != value:
                 told = f"is {given:g}" if isinstance(given, float) else "is given"
-                told += ", but kind perfect has no error; must be left out, or kind be gnss"
-                raise KeyFault((name,), told)
+                right = "must be left out, or kind be gnss"
+                raise KeyFault((name,), f"{told}, but kind perfect has no error; {right}")
         last_s = -math.inf
         for index, (begin_s, end_s) in enumerate(self.outages_s):
             if not last_s < begin_s < end_s:

@@ -30,8 +30,7 @@ class Polygon(Section):
     """A simple polygon, convex or not, its vertices in either direction; kept without repeated vertices."""
 
     vertices_m: Annotated[tuple[Point, ...], Strict(False), FailFast(), Field(min_length=3)]
-    """Vertices in order round the shape: east, north. One that repeats the vertex before it, or the first at the end,
-    is dropped."""
+    """Vertices in order round the shape: east, north. One that repeats the vertex before it is dropped."""
     holes_m: Rings | None = None
     """Rings inside the shape, in either direction, within which it is free. Default: none."""
 
@@ -51,10 +50,9 @@ class Polygon(Section):
 
         if self.holes_m and not (shape := shapely.Polygon(self.vertices_m, self.holes_m)).is_valid:
             what, _, where = shapely.is_valid_reason(shape).partition("[")
-            raise ValueError(
-                f"has holes_m that lie outside of it, cross or touch ({what.lower()} at "
-                f"({where.rstrip(']').replace(' ', ', ')})); each hole must lie inside, apart from the others"
-            )
+            told = f"{what.lower()} at ({where.rstrip(']').replace(' ', ', ')})"
+            wrong = f"has holes_m that lie outside of it, cross or touch ({told})"
+            raise ValueError(f"{wrong}; each hole must lie inside, apart from the others")
         return self
 
 
@@ -93,8 +91,7 @@ class WorldFile(Section):
     vertical_clearance_m: Annotated[float, Field(ge=0, le=10_000)] = 10.0
     """A part is an obstacle where it reaches into the band of so much below and above mission.altitude_m."""
     metres_per_cell: Annotated[float | None, Field(gt=0, le=MAX_COORDINATE_M)] = None
-    """Side of a cell of an occupancy map, or of a grid that names no place on earth. Default: as the file says, else 1
-    m."""
+    """Side of a cell of an occupancy map, or of a grid with no place on earth. Default: the file's, else 1 m."""
     shift_m: Annotated[tuple[Shift, Shift], Strict(False)] = (0.0, 0.0)
     """East and north, added to the metres of a file that names no place on earth."""
     crs: Annotated[str | None, Field(min_length=1, max_length=200)] = None
@@ -131,8 +128,7 @@ class Obstacle(Section):
     """Pops up at the first time and is gone after the second. Default: there for the whole flight."""
 
     heights_m: Annotated[tuple[Height, Height], Strict(False)] | None = None
-    """Bottom and top above mean sea level, for drawings; the aircraft flies at one altitude, at which it is there.
-    Twice the same: terrain, cut at that height. Default: a column without end."""
+    """Bottom and top above mean sea level, for drawings; twice the same: terrain, cut there. Default: without end."""
 
     @model_validator(mode="after")
     def _has_one_shape(self) -> Obstacle:

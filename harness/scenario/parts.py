@@ -103,10 +103,7 @@ def _code_of_others(fault: Callable[[str], Exception]) -> Iterator[None]:
 
 
 def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False) -> PlannerSpec:
-    """The planner's section with its own keys checked and every default filled in from what it is told.
-
-    That of a run folder (`as_flown`) is complete: a planner given by a source file, or in Python, need not be here.
-    """
+    """The planner's section, complete; that of a run folder (`as_flown`) need not be here."""
     if as_flown and spec.kind not in planner_kinds():
         return spec
     kind = _named("planner", spec, planner_kinds())

@@ -26,10 +26,7 @@ MAX_WIND_FRACTION: Final = 0.9
 
 
 def performance_of(scenario: ScenarioKeys) -> Performance:
-    """What the scenario's aircraft can do at its airspeed under its guidance, in its wind and turbulence.
-
-    A KeyFault says that it cannot hold the airspeed, its wind is too strong, or the law does not track with it.
-    """
+    """What the aircraft can do at its airspeed under its guidance, in its wind and gusts; a KeyFault says why not."""
     from aircraft.airframes import AircraftError
     from aircraft.envelope import performance
 
@@ -112,8 +109,7 @@ MIDDLE: Final = 1.05
 """Between the altitudes `NEAR_M` an aircraft flies level at an airspeed that is by this factor within the range
 measured at `SURVEYED_M`: the density of the air differs by 7 % at most. It need not be trimmed."""
 NEAR_SHARE, NEAR_SHIFT = 0.25, 0.01
-"""Nor if its deviations are at most this share, and the shift of its centre of gravity this over the cube root of the
-mass (m/kg^1/3)."""
+"""Nor if its deviations are at most these: shares, and the shift over the cube root of the mass (m/kg^1/3)."""
 STEP_M: Final = 50.0
 """The highest altitude of level flight is told to this."""
 

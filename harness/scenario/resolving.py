@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -43,11 +44,7 @@ TOLERANCE_M: Final = 10.0
 def resolve(
     keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
 ) -> ScenarioKeys:
-    """The same flight with every default filled in and every file of obstacles expanded.
-
-    The arguments are those of `scenario.validated`. A KeyFault says that keys contradict each other, or that the
-    aircraft cannot do what they ask for.
-    """
+    """The same flight, every default filled in, every file of obstacles expanded; arguments as `validated` has them."""
     sensor = keys.sensor
     simulation = keys.simulation.filled(rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
     mission = _ends_in_plane(keys.mission, keys.area)
@@ -120,12 +117,10 @@ def model_or_folder(model: str, folder: Path | None) -> str:
 
     if "/" not in model and model in aircraft_names():
         return model
-    for place in (Path() if folder is None else folder, Path()):
-        try:
+    for place in (folder or Path(), Path()):
+        with suppress(OSError, RuntimeError):  # too long, not allowed, or the home of nobody: no folder
             if (place / model).expanduser().is_dir():
                 return str((place / model).expanduser().resolve())
-        except (OSError, RuntimeError):  # too long, not allowed, or the home of nobody: no folder
-            continue
     return model
 
 
@@ -215,10 +210,7 @@ def _distance_to(obstacle: Obstacle, point: Point, wanted_m: float) -> float:
 
 
 def check_start_leads_in(area: Area, mission: MissionSpec, turn_radius_m: float) -> None:
-    """Raises a KeyFault, with a course that would do, if the flight begins by leaving the area.
-
-    It does not if straight on, or a tightest turn to one side, keeps within it.
-    """
+    """Raises a KeyFault, with a course that would do, if straight on and tightest turns to both sides lead out."""
     if _stays_inside(area, mission.start_m, mission.course_deg, turn_radius_m):
         return
     courses = range(0, 360, COURSE_STEP_DEG)

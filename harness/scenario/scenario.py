@@ -90,10 +90,7 @@ def _plain(value: Any) -> Any:
 
 
 class Scenario(ScenarioKeys):
-    """One flight, completely described, nothing left to a default; flying it twice gives the same track bit for bit.
-
-    Attributes equal the keys of the file, except `schema_`, which is `schema` there.
-    """
+    """One flight, completely described; flying it twice gives the same track bit for bit."""
 
     def with_(self, keys: Mapping[str, Any]) -> Scenario:
         """A copy with some keys changed, checked anew; defaults that follow from others are derived anew.
@@ -122,8 +119,7 @@ def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -
 
     Args:
         path: the file, or the name of a scenario that comes with wayproof, such as `paper_circles`.
-        overrides: keys to replace before anything is checked, as (`"sensor.range_m"`, `"5000"`): key path and
-            value as YAML; `obstacles[0].circle.radius_m` reaches into a list.
+        overrides: key paths and values as YAML, replaced before anything is checked: (`"sensor.range_m"`, `"5000"`).
     """
     path = scenario_path(str(path))
     return validated(overridden(strict_yaml.read(path), overrides), str(path), path.absolute().parent)
@@ -188,5 +184,9 @@ def scenario_from(
         raise KeyFaults.of(error, ScenarioKeys) from error
     complete = resolve(keys, folder, ends_checked, as_flown)
     scenario = Scenario.model_construct(keys.model_fields_set, **dict(complete))
-    object.__setattr__(scenario, "_given", Given(keys.given, folder))
+    object.__setattr__(
+        scenario,
+        "_given",
+        Given({name: value for name, value in keys if name in keys.model_fields_set}, folder),
+    )
     return scenario

@@ -1,7 +1,7 @@
 """The sections of a scenario file as frozen types: attribute = key.
 
-Units are SI and stand in every name. Positions are metres in the local ENU plane, x = east, y = north;
-courses and wind directions are degrees clockwise from north.
+Positions are metres in the local ENU plane, x = east, y = north; courses and wind directions are degrees clockwise
+from north.
 """
 
 from __future__ import annotations
@@ -50,15 +50,12 @@ class Section(BaseModel):
 def _docstrings(section: type) -> dict[str, str]:
     """The docstrings below the attributes of a section, by attribute; none of one that has no source text."""
     try:
-        body = ast.walk(ast.parse(inspect.getsource(section)))
+        (body,) = ast.parse(inspect.getsource(section)).body
     except (OSError, TypeError):
         return {}
-    pairs = (
-        pair for each in body if isinstance(each, ast.ClassDef) for pair in itertools.pairwise(each.body)
-    )
     return {
         ast.unparse(above.target): " ".join(str(ast.literal_eval(below.value)).split())
-        for above, below in pairs
+        for above, below in itertools.pairwise(getattr(body, "body", ()))
         if isinstance(above, ast.AnnAssign) and isinstance(below, ast.Expr)
     }
 
@@ -135,8 +132,7 @@ class MissionSpec(Section):
     altitude_m: Annotated[float, Field(ge=ALTITUDES_M[0], le=ALTITUDES_M[1])] = 300.0
     """Above mean sea level, held throughout."""
     time_limit_s: Annotated[float, Field(gt=0, le=1e7)] = DERIVED
-    """Simulated time after which the flight ends. Default: ten times the straight line at airspeed less wind and one
-    minute, rounded up to a minute."""
+    """Simulated. Default: ten times the straight line at airspeed less wind and a minute, rounded up to a minute."""
 
     @model_validator(mode="after")
     def _has_each_end_once(self) -> MissionSpec:
@@ -174,8 +170,7 @@ class AutopilotSpec(Section):
     least_airspeed_mps: Annotated[float | None, Field(gt=0, le=1000)] = None
     """Below this true airspeed height goes before speed. Default: 0.97 of the lowest of level flight."""
     state_latency_s: Annotated[float, Field(ge=0, le=2)] = DERIVED
-    """Age of attitude, airspeed and height that the autopilot works with; it and guidance are tuned for it. Default:
-    navigation.latency_s."""
+    """Age of the attitude, airspeed and height that the autopilot is tuned for. Default: navigation.latency_s."""
 
     @model_validator(mode="after")
     def _pitch_in_order(self) -> AutopilotSpec:
@@ -244,8 +239,7 @@ class Sensor(Section):
     """A planar range sensor: each of its beams returns the distance to the nearest obstacle edge within it."""
 
     beam_deg: Annotated[float, Field(ge=0, le=120)] = DERIVED
-    """Width of each beam. Beams that touch leave no room for anything between two; 0: pencil rays. Default:
-    field_of_view_deg / rays, so that beams touch."""
+    """Width of each beam; 0: pencil rays. Default: field_of_view_deg / rays: beams touch, nothing fits between."""
     least_width_m: Length = DERIVED
     """Width of the narrowest obstacle that there is. It counts where beams do not touch: space is taken to be seen free
     only as far as nothing so wide can hide between two of them. Default: planner.clearance_m."""
@@ -318,7 +312,6 @@ class GuidanceSpec(PartSpec):
     kind: str = "preview"
     """A name that `wayproof list guidance` prints."""
     follow: Literal["path", "waypoints"] = "path"
-    """path: the law follows the plan's lines and arcs; waypoints: straight legs between the corners of the plan, as a
-    mission on an autopilot."""
+    """path: the law follows the plan's lines and arcs; waypoints: straight legs between the corners of the plan."""
     acceptance_radius_m: Annotated[float | None, Field(gt=0, le=100_000)] = None
     """A waypoint counts as reached from here, with follow: waypoints. Default: by the rule of the law's autopilot."""

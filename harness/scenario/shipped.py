@@ -24,19 +24,12 @@ def shipped_campaigns() -> dict[str, Path]:
 
 
 def campaign_path(text: str) -> Path:
-    """The file that a command's CAMPAIGN means: a path, or the name or path of a shipped campaign.
-
-    An InputError says that there is neither.
-    """
+    """The file that a command's CAMPAIGN means: a path, or the name or path of a shipped campaign."""
     return _named(text, shipped_campaigns(), Path("scenarios/campaigns"), "a campaign file")
 
 
 def scenario_path(text: str) -> Path:
-    """The file that a command's SCENARIO means: a path, or the name or path of a shipped scenario.
-
-    `paper_circles` and, where there is no such file, `scenarios/paper_circles.yaml` name a shipped one, and
-    `barn/barn-world-006` names a benchmark world. An InputError says that there is neither.
-    """
+    """The file that a command's SCENARIO means: a path, or the name of a shipped scenario or world."""
     return _named(text, shipped_scenarios(), Path("scenarios"), "a scenario file")
 
 
@@ -45,11 +38,10 @@ def _named(text: str, shipped: dict[str, Path], folder: Path, what: str) -> Path
     try:
         if path.is_file():
             return path
-        there = path.exists()
+        if path.exists():
+            raise InputError(f"{text}: is not a file; {wanted}")
     except OSError as error:
         raise InputError(f"{text}: cannot be read ({error.strerror}); {wanted}") from error
-    if there:
-        raise InputError(f"{text}: is not a file; {wanted}")
     if path.parent in (Path(), folder) and path.suffix in ("", ".yaml") and path.stem in shipped:
         return shipped[path.stem]
     worlds = shipped_worlds() if folder == Path("scenarios") else {}

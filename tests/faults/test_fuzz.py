@@ -118,15 +118,7 @@ def read_given_path(path: Path) -> None:
 
 @dataclass(frozen=True)
 class Reader:
-    """A kind of file.
-
-    Attributes:
-        name: of the file.
-        read: reads it; raises InputError or nothing.
-        valid: a file of this kind, as a tree or as rows.
-        write: turns a spoilt tree into text.
-        snippets: what values are replaced by.
-    """
+    """A kind of file: what reads it, a valid one as a tree or rows, what writes a spoilt tree, and what spoils it."""
 
     name: str
     read: Callable[[Path], None]
@@ -243,16 +235,8 @@ def test_keys_set_on_the_command_line(cases: int, tmp_path: Path) -> None:
     path = tmp_path / "s.yaml"
     path.write_text(as_yaml(EVERYTHING))
     known = st.sampled_from(list(filter(None, map(_dotted, places(EVERYTHING)))))
-    odd = st.sampled_from(
-        (
-            *KEYS,
-            "a" * 5000,
-            "a." * 3000 + "a",
-            "obstacles[" + "9" * 5000 + "]",
-            "obstacles[99]",
-            "obstacles[-1]",
-        )
-    )
+    long = ("a" * 5000, "a." * 3000 + "a", "obstacles[" + "9" * 5000 + "]")
+    odd = st.sampled_from((*KEYS, *long, "obstacles[99]", "obstacles[-1]"))
     joined = st.builds("{}.{}".format, known, odd)
     name = st.one_of(known, known, odd, joined, st.text(max_size=8))
     value = st.one_of(st.sampled_from(YAML_SNIPPETS), st.text(max_size=8))

@@ -17,7 +17,6 @@ from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.run_files.run_folder import load_run
 from tests.faults.command import FOREST, PROGRESS, ROOT, run, run_here, start, wait_until
-from tests.longer import longer
 
 FLY = ("fly", str(FOREST), "--out", "run")
 SHORT = ("--set", "mission.time_limit_s=15")
@@ -27,11 +26,7 @@ LONG = ("fly", "paper_circles", "--out", "run", "--quiet")
 @pytest.mark.flights
 @pytest.mark.parametrize(
     ("signum", "recording"),
-    [
-        (signal.SIGINT, ()),
-        *longer((signum, ()) for signum in (signal.SIGTERM, signal.SIGHUP)),
-        *longer((signum, ("--no-recording",)) for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)),
-    ],
+    [(signal.SIGINT, ()), *((signum, ("--no-recording",)) for signum in (signal.SIGTERM, signal.SIGHUP))],
 )
 def test_a_signal_in_flight_is_said_in_a_line(
     signum: signal.Signals, recording: tuple[str, ...], tmp_path: Path
@@ -83,12 +78,10 @@ def test_a_flight_whose_planner_hangs_can_be_broken_off_and_leaves_what_was_flow
     )
     assert process.returncode == 143
     track = pq.read_table(tmp_path / "run" / "track.parquet")
-    times, flown_m = (
-        track["time_s"].to_numpy(),
-        np.hypot(*(np.ptp(track[name]) for name in ("east_m", "north_m"))),
-    )
-    assert times[-1] > 1.0
-    assert flown_m == pytest.approx(25.0 * times[-1], rel=0.2)
+    last_s = track["time_s"].to_numpy()[-1]
+    assert last_s > 1.0
+    flown_m = np.hypot(*(np.ptp(track[name]) for name in ("east_m", "north_m")))
+    assert flown_m == pytest.approx(25.0 * last_s, rel=0.2)
     assert pq.read_table(tmp_path / "run" / "plans.parquet").num_rows >= 1
     with pytest.raises(RunFolderError, match=r"track\.parquet and plans\.parquet have what was flown"):
         load_run(tmp_path / "run")
@@ -99,7 +92,7 @@ def test_a_flight_whose_planner_hangs_can_be_broken_off_and_leaves_what_was_flow
     ("shell", "told"),
     [
         (
-            "ulimit -n 14; exec {} sweep {campaign} --workers 2 --out out",
+            "ulimit -n 14; exec {} sweep forest_planners --workers 2 --out out",
             "raise the limit with `ulimit -n 1024`",
         ),
         (
@@ -111,9 +104,8 @@ def test_a_flight_whose_planner_hangs_can_be_broken_off_and_leaves_what_was_flow
 )
 def test_what_the_process_may_not_have_is_told_with_its_remedy(shell: str, told: str, tmp_path: Path) -> None:
     (tmp_path / "gone").mkdir()
-    names = {"campaign": "forest_planners", "forest": str(FOREST)}
     done = subprocess.run(
-        ["bash", "-c", shell.format(f"{sys.executable} -m harness", **names)],
+        ["bash", "-c", shell.format(f"{sys.executable} -m harness", forest=FOREST)],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -127,17 +119,8 @@ def test_what_the_process_may_not_have_is_told_with_its_remedy(shell: str, told:
 
 @pytest.mark.flights
 def test_a_comparison_is_ended_with_its_flights(tmp_path: Path) -> None:
-    process = start(
-        tmp_path,
-        "compare",
-        "paper_circles",
-        "--planners",
-        "bug2,rolling_window",
-        "--out",
-        "c",
-        "--workers",
-        "2",
-    )
+    words = "compare paper_circles --planners bug2,rolling_window --out c --workers 2"
+    process = start(tmp_path, *words.split())
     runs = [tmp_path / "c" / "paper_circles" / kind / "manifest.json" for kind in ("bug2", "rolling_window")]
     wait_until(lambda: all(each.exists() for each in runs), process)
     process.send_signal(signal.SIGTERM)

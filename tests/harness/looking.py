@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from harness.mapping.scan import RangeScan
-from harness.scenario.sections import Sensor
 from harness.world.range_sensor import RangeSensor
-from harness.world.world import Circle, Obstacle, Polygon, World
-
-FloatArray = NDArray[np.float64]
+from harness.world.world import Circle, Polygon, World
+from tests.harness import sensing
+from tests.harness.sensing import FloatArray as FloatArray
+from tests.harness.sensing import off as distance_to  # noqa: F401
+from tests.harness.sensing import world_of as world_of
 
 BOUNDS = (0.0, 0.0, 10_000.0, 10_000.0)
 CLEARANCE, RANGE = 200.0, 3000.0
@@ -25,32 +25,18 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
-    return RangeSensor(world, Sensor(**{"range_m": RANGE} | keys), np.random.SeedSequence(seed))
-
-
-def world_of(*shapes: Circle | Polygon) -> World:
-    return World([Obstacle(shape) for shape in shapes], BOUNDS)
+    return sensing.sensor(world, seed, **{"range_m": RANGE} | keys)
 
 
 def on_circle(count: int, radius_m: float = 300.0) -> list[tuple[float, float]]:
-    return [
-        (
-            MIDDLE[0] + radius_m * math.cos(math.tau * i / count),
-            MIDDLE[1] + radius_m * math.sin(math.tau * i / count),
-        )
-        for i in range(count)
-    ]
+    angles = (math.tau * i / count for i in range(count))
+    return [(MIDDLE[0] + radius_m * math.cos(a), MIDDLE[1] + radius_m * math.sin(a)) for a in angles]
 
 
 def scans(
     eye: RangeSensor, places: Iterable[tuple[float, float]], start_s: float = 0.0, heading_rad: float = 0.0
 ) -> list[RangeScan]:
     return [eye.scan(*place, heading_rad, start_s + 0.5 * i) for i, place in enumerate(places)]
-
-
-def distance_to(world: World, points: FloatArray) -> FloatArray:
-    distance: FloatArray = world.clearance(points, np.zeros(len(points)))
-    return distance
 
 
 WALL = Polygon(((4000.0, 6000.0), (6000.0, 6000.0), (6000.0, 6400.0), (4000.0, 6400.0)))

@@ -6,7 +6,7 @@ ArduPilot alone.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 WAYPOINT, SPLINE_WAYPOINT = 16, 82
 LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE = 17, 18, 19, 31
@@ -61,12 +61,7 @@ RALLY_POINT: Final = 5100
 APART: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
 """Commands of items that are no part of a mission."""
 PX4: Final = 12
-"""MAV_AUTOPILOT of PX4, `firmwareType` of a plan."""
-
-
-def inside_all(firmware: Any) -> bool:
-    """Whether an aircraft has to be inside of all inclusion fences of a plan; inside of one with the firmware PX4."""
-    return bool(firmware != PX4)
+"""`firmwareType` of a plan with which the aircraft has to be inside of one inclusion fence; else inside of all."""
 
 
 def name_of(command: int) -> str:

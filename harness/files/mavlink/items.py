@@ -1,16 +1,21 @@
-"""Mission items as files hold them, and plain-text files of them: "QGC WPL" (.waypoints, .txt).
+"""Mission items and fences as files hold them: "QGC WPL" (.waypoints, .txt), and the geoFence of a QGroundControl plan.
 
-The format: https://mavlink.io/en/file_formats/#mission_plain_text_file
+https://mavlink.io/en/file_formats/#mission_plain_text_file, https://mavlink.io/en/services/mission.html#mission_types
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
 
-from harness.files.input_file import InputError, finite, whole
+from harness.files.input_file import InputError, finite, listed, numbers, whole
 from harness.files.mavlink import commands
+from harness.files.mavlink.commands import CIRCLES, CORNERS, HOME_CIRCLE
+
+if TYPE_CHECKING:
+    from shapely import Geometry
 
 SEA, HOME, GROUND = "sea", "home", "ground"
 MISSION: Final = 2
@@ -66,11 +71,7 @@ class Item:
 def filled(
     params: Sequence[float | None], command: int, frame: int, missing: Callable[[int], str]
 ) -> tuple[float, ...]:
-    """Seven parameters with 0 in place of None for those that are left to the autopilot.
-
-    An InputError says that half of a place is there, or no altitude where one is needed; what it says of the parameter
-    is told by its index.
-    """
+    """Seven parameters, 0 for None; an InputError says which of a place, or an altitude, is `missing`."""
     latitude, longitude, altitude = params[4:7]
     if command in commands.FLOWN and (latitude is None) != (longitude is None):
         raise InputError(f"{missing(4 if latitude is None else 5)}; a place must have latitude and longitude")
@@ -97,3 +98,132 @@ def _item(cells: list[str], place: str) -> Item:
     given = [None if cell.lower() == "nan" else finite(cell, place) for cell in cells[4:11]]
     params = filled(given, command, frame, lambda index: f"{place}: field {5 + index} is nan")
     return Item(place, number, command, frame, params, finite(cells[11], place) == 0.0)
+
+
+Place = tuple[float, float]
+Keys = dict[str, Any]
+
+CIRCLE_SIDES: Final = 720
+"""A circle is compared as a polygon of so many sides: one of 10 km is off by 0.1 m."""
+
+
+@dataclass(frozen=True)
+class Fence:
+    """An area to stay inside of, or out of; its places are east and north in metres, or degrees while it is read."""
+
+    name: str
+    """Its place in its file, for messages."""
+    inclusion: bool
+    rings: tuple[tuple[Place, ...], ...] = ()
+    """The outer ring and its holes; empty for a circle."""
+    center: Place | None = None
+    radius_m: float = 0.0
+
+    @property
+    def kind(self) -> str:
+        """`inclusion` or `exclusion`."""
+        return "inclusion" if self.inclusion else "exclusion"
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """All its positions."""
+        return (
+            tuple(place for ring in self.rings for place in ring) if self.center is None else (self.center,)
+        )
+
+    @cached_property
+    def area(self) -> Geometry:
+        """The polygon or disc that it encloses."""
+        import shapely
+
+        if self.center is not None:
+            return shapely.Point(self.center).buffer(self.radius_m, quad_segs=CIRCLE_SIDES // 4)
+        return shapely.Polygon(self.rings[0], self.rings[1:])
+
+    def moved(self, place: Callable[[Place], Place]) -> Fence:
+        """The same fence with every position put elsewhere."""
+        rings = tuple(tuple(map(place, ring)) for ring in self.rings)
+        return replace(self, rings=rings, center=place(self.center) if self.center is not None else None)
+
+    def plain(self) -> dict[str, Any]:
+        """Its content for `metrics.json`."""
+        shape: dict[str, Any] = {"rings_m": [[list(point) for point in ring] for ring in self.rings]}
+        if self.center is not None:
+            shape = {"center_m": list(self.center), "radius_m": self.radius_m}
+        return {"name": self.name, "kind": self.kind, **shape}
+
+
+def plan_fences(geofence: Any, source: str) -> tuple[Fence, ...]:
+    """The geoFence of a plan, in degrees; `source` begins an InputError, `path: ` or nothing."""
+    if geofence is None:
+        return ()
+    if not isinstance(geofence, dict):
+        raise InputError(f"{source}geoFence: must be a mapping")
+    found = []
+    if old := geofence.get("polygon"):  # before version 2: one, to stay inside of
+        found.append(_polygon({"polygon": old, "inclusion": True}, source, "geoFence"))
+    for kind, read in (("polygons", _polygon), ("circles", _circle)):
+        for number, each in enumerate(listed(geofence.get(kind) or [], f"{source}geoFence.{kind}")):
+            key = f"geoFence.{kind}[{number}]"
+            if not isinstance(each, dict) or not isinstance(each.get("inclusion"), bool):
+                raise InputError(f"{source}{key}.inclusion: must be true or false")
+            found.append(read(each, source, key))
+    return tuple(found)
+
+
+def _polygon(each: Keys, source: str, key: str) -> Fence:
+    corners = listed(each.get("polygon"), f"{source}{key}.polygon", " of [latitude, longitude]")
+    ring = [_place(corner, f"{source}{key}.polygon[{number}]") for number, corner in enumerate(corners)]
+    return Fence(key, each["inclusion"], (tuple(ring),))
+
+
+def _circle(each: Keys, source: str, key: str) -> Fence:
+    circle = each.get("circle")
+    if not isinstance(circle, dict):
+        raise InputError(f"{source}{key}.circle: must have center and radius")
+    radius = finite(circle.get("radius"), f"{source}{key}.circle.radius")
+    if not radius > 0.0:
+        raise InputError(f"{source}{key}.circle.radius: is {radius:g}; must be greater than 0")
+    center = _place(circle.get("center"), f"{source}{key}.circle.center")
+    return Fence(key, each["inclusion"], center=center, radius_m=radius)
+
+
+def _place(value: Any, where: str) -> Place:
+    latitude, longitude, *_ = numbers(value, where, "[latitude, longitude]", (2, 3))
+    return latitude, longitude
+
+
+def item_fences(items: Sequence[Item], home: Place | None) -> tuple[Fence, ...]:
+    """The fences among some items, in degrees; an InputError says that one is torn, or has no radius or place."""
+    found: list[Fence] = []
+    corners: list[Item] = []
+    for item in (each for each in items if each.command in (*CORNERS, *CIRCLES)):
+        if corners and item.command != corners[0].command:
+            raise _torn(corners)
+        if item.command in CIRCLES:
+            found.append(_item_circle(item, home))
+            continue
+        corners.append(item)
+        if len(corners) >= corners[0].params[0]:
+            ring = tuple((each.params[4], each.params[5]) for each in corners)
+            name = f"items {corners[0].number} to {item.number}"
+            found.append(Fence(name, CORNERS[item.command], (ring,)))
+            corners = []
+    if corners:
+        raise _torn(corners)
+    return tuple(found)
+
+
+def _torn(corners: Sequence[Item]) -> InputError:
+    begun = f"{corners[0].place}: item {corners[0].number} begins a fence of {corners[0].params[0]:g} corners"
+    return InputError(f"{begun}, of which {len(corners)} follow; it may be torn")
+
+
+def _item_circle(item: Item, home: Place | None) -> Fence:
+    radius, told = item.params[0], f"{item.place}: item {item.number} is a fence"
+    if not radius > 0.0:
+        raise InputError(f"{told} of radius {radius:g} m; must be greater than 0")
+    center = home if item.command == HOME_CIRCLE else (item.params[4], item.params[5])
+    if center is None:
+        raise InputError(f"{told} about home, which has no position; give a circle with a place")
+    return Fence(f"item {item.number}", CIRCLES[item.command], center=center, radius_m=radius)

@@ -9,8 +9,18 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError, finite, listed, numbers, parsed_json, shown, whole
 from harness.files.mavlink import commands
-from harness.files.mavlink.fences import item_fences, plan_fences
-from harness.files.mavlink.items import FRAMES, HOME, MISSION, SEA, WPL, Item, filled, wpl_items
+from harness.files.mavlink.items import (
+    FRAMES,
+    HOME,
+    MISSION,
+    SEA,
+    WPL,
+    Item,
+    filled,
+    item_fences,
+    plan_fences,
+    wpl_items,
+)
 from harness.files.wording import counted
 from harness.run_files.fences import Fences
 from harness.run_files.mission.program import Program, program
@@ -109,7 +119,7 @@ def read_plan(text: str, source: str) -> Program:
     home = _home(mission.get("plannedHomePosition"), f"{source}: mission.plannedHomePosition", notes)
     items = _every_item(mission["items"], f"{source}: mission.items", notes)
     geofence, rally = plan.get("geoFence") or {}, plan.get("rallyPoints") or {}
-    fences = Fences(plan_fences(geofence, f"{source}: "), commands.inside_all(mission.get("firmwareType")))
+    fences = Fences(plan_fences(geofence, f"{source}: "), mission.get("firmwareType") != commands.PX4)
     if geofence.get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
     return _mission(source, items, home, fences, len(rally.get("points") or ()), notes)

@@ -10,8 +10,7 @@ import shapely
 
 from harness.files.input_file import InputError
 from harness.files.mavlink import commands
-from harness.files.mavlink.fences import Fence, item_fences, plan_fences
-from harness.files.mavlink.items import WPL, wpl_items
+from harness.files.mavlink.items import WPL, Fence, item_fences, plan_fences, wpl_items
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, json_of, read_bytes, text_of
 from harness.world_files.parts import WGS84, Contents, Part, Reading
@@ -27,7 +26,7 @@ def read_plan(path: Path, reading: Reading) -> Contents:
     firmware = mission.get("firmwareType") if isinstance(mission, dict) else None
     points = rally.get("points") if isinstance(rally, dict) else None
     fences = plan_fences(content["geoFence"], "")
-    return _contents("plan_fence", fences, not commands.inside_all(firmware), len(points or ()))
+    return _contents("plan_fence", fences, firmware == commands.PX4, len(points or ()))
 
 
 def read_ardupilot(path: Path, reading: Reading) -> Contents:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.analysis.breaches import kept
-from harness.files.mavlink.fences import Fence
+from harness.files.mavlink.items import Fence
 from harness.flight.record import Track
 from harness.run_files.fences import Fences
 from harness.world.obstacle import Circle, Obstacle, Polygon
