@@ -22,8 +22,6 @@ class WriteError(OSError):
 
 MOST_LETTERS = 2000
 """Most characters of a text from other code that stand in a sentence."""
-HALF_TRACE_LETTERS = 20_000
-"""Most characters of a traceback that are kept from its beginning, and as many from its end."""
 
 
 class PlannerError(RuntimeError):
@@ -46,7 +44,7 @@ def sentence(error: BaseException) -> str:
 
 def trace(error: BaseException) -> str:
     """Its traceback; the middle of a very long one is left out."""
-    told, half = "".join(traceback.format_exception(error)), HALF_TRACE_LETTERS
+    told, half = "".join(traceback.format_exception(error)), 20_000
     if len(told) > 2 * half:
         told = f"{told[:half]}\n... {len(told) - 2 * half:,} characters left out ...\n{told[-half:]}"
     return _same(told)

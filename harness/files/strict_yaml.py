@@ -100,11 +100,12 @@ def key_path(loc: Loc) -> str:
     return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in loc).lstrip(".")
 
 
-def loc_of(path: str) -> Loc:
-    """`obstacles[2].circle` as `("obstacles", 2, "circle")`; a ValueError says that a path is none."""
+def loc_of(path: str, source: str = "") -> Loc:
+    """`obstacles[2].circle` as `("obstacles", 2, "circle")`; `source` begins the InputError on one that is none."""
     steps = path.replace("[", ".").replace("]", "").split(".")
     if not all(steps) or not all(map(_is_key, steps)) or len(steps) > MAX_DEPTH:
-        raise ValueError(f"{path[:60]!r} is not a key path; write it as sensor.range_m")
+        told = f"{path[:60]!r} is not a key path; write it as sensor.range_m"
+        raise InputError(f"{source}: {told}" if source else told)
     return tuple(int(step) if step.isdecimal() else step for step in steps)
 
 

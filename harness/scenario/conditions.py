@@ -20,10 +20,8 @@ from harness.scenario.sections import MOST_SHARE, MOST_SHIFT_M, ActuatorsSpec, D
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe
 
-CONDITIONS_STREAM: Final = 4
-"""Number of the stream, of those that derive from the scenario's seed, that a day is drawn from."""
-DEVIATION_STREAM: Final = 5
-"""Number of the stream that the deviations of the aircraft are drawn from."""
+CONDITIONS_STREAM, DEVIATION_STREAM = 4, 5
+"""Streams, of those that derive from the scenario's seed, that a day and the aircraft's deviations are drawn from."""
 MOST_SIGMAS: Final = 3.0
 """What is drawn from a normal distribution is at most so many sigma from its mean."""
 WIND_FROM_M: Final = 10.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
@@ -97,12 +98,11 @@ class Wind(Section):
 
     @model_validator(mode="after")
     def _times_rise(self) -> Wind:
-        before = 0.0
-        for index, (time_s, _, _) in enumerate(self.changes):
+        times = (0.0, *(time_s for time_s, _, _ in self.changes))
+        for index, (before, time_s) in enumerate(itertools.pairwise(times)):
             if not before < time_s:
                 told = f"is at {time_s:g} s; must be later than {before:g} s, the one before"
                 raise KeyFault(("changes", index), told)
-            before = time_s
         return self
 
     @property

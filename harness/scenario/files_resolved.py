@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from harness.scenario.environment import GroundSpec, SourceSpec
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.obstacles import Obstacle, Polygon, WorldFile
-from harness.scenario.sections import Area, Geodetic, Interval, Point
+from harness.scenario.sections import Interval, Point
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
@@ -88,12 +88,3 @@ def _parts(source: Source, active_s: Interval | None) -> list[Obstacle]:
         polygon = Polygon.model_construct(vertices_m=outline, holes_m=tuple(holes) or None)
         parts.append(Obstacle.model_construct(polygon=polygon, active_s=active_s, heights_m=heights_m))
     return parts
-
-
-def plane_point(place: Geodetic, area: Area) -> Point:
-    """Where a place lies in the plane, to a millimetre."""
-    from aircraft.frames import LocalPlane
-
-    plane = LocalPlane(area.origin.latitude_deg, area.origin.longitude_deg)
-    east, north = plane.plane(place.latitude_deg, place.longitude_deg)
-    return round(east, 3), round(north, 3)

@@ -16,7 +16,7 @@ Error = Annotated[float, Field(ge=0, le=MAX_ERROR_M)]
 Offset = Annotated[float, Field(ge=-MAX_ERROR_M, le=MAX_ERROR_M)]
 
 SIGMAS: Final = 3.0
-"""The planner's margin covers so many sigma of the position error: 98.9 % of all errors in the plane are smaller."""
+"""The planner's margin covers this many sigma of the position error: 1 - exp(-9 / 2) of all errors in the plane."""
 
 _ZERO: Final = (
     *(
@@ -125,8 +125,7 @@ def planning_margin_m(
 
     `SIGMAS` of the position error, its bias, what is flown at `speed_mps`, wind included, while the state grows old,
     and the drift of the longest outage, up to `time_limit_s`. The map drifts as the aircraft does: what stands in it is
-    off only by what was drifted since it was last seen, half a turn ago at most. Of an error with two normal components
-    of one sigma, 1 - exp(-k^2 / 2) lies within k sigma.
+    off only by what was drifted since it was last seen, half a turn ago at most.
 
     A heading error turns the scan: an edge at distance d is misplaced by d times the error, square to where it is seen.
     The map places an edge anew whenever it is seen from 0.7 of the distance (`harness.mapping.obstacle_map`), the last

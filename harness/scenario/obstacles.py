@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, FailFast, Field, Strict, field_validator, model_validator
+from pydantic import ConfigDict, FailFast, Field, Strict, ValidationInfo, field_validator, model_validator
 
 from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity
 
@@ -140,19 +140,14 @@ class Obstacle(Section):
             raise ValueError("is a file with velocity_mps; what a file holds stands still")
         return self
 
-    @field_validator("heights_m")
+    @field_validator("heights_m", "active_s")
     @classmethod
-    def _has_its_bottom_below(cls, heights_m: tuple[float, float] | None) -> tuple[float, float] | None:
-        if heights_m and not heights_m[0] <= heights_m[1]:
-            raise ValueError(f"is {list(heights_m)}; must be [bottom, top] with bottom <= top")
-        return heights_m
-
-    @field_validator("active_s")
-    @classmethod
-    def _starts_before_it_stops(cls, active_s: Interval | None) -> Interval | None:
-        if active_s and not active_s[0] < active_s[1]:
-            raise ValueError(f"is {list(active_s)}; must be [start, stop] with start < stop")
-        return active_s
+    def _in_order(cls, span: Interval | None, info: ValidationInfo) -> Interval | None:
+        heights = info.field_name == "heights_m"
+        if span and (span[0] > span[1] or (span[0] == span[1] and not heights)):
+            first, last, than = ("bottom", "top", "<=") if heights else ("start", "stop", "<")
+            raise ValueError(f"is {list(span)}; must be [{first}, {last}] with {first} {than} {last}")
+        return span
 
     @property
     def fixed(self) -> bool:

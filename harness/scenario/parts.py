@@ -114,15 +114,10 @@ def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False
 
 def resolved_guidance(spec: GuidanceSpec, aircraft: AircraftSpec, as_flown: bool = False) -> GuidanceSpec:
     """The same of the guidance section, for an aircraft whose airspeed is filled in."""
-    if as_flown and not is_here(spec):
+    if as_flown and spec.kind not in guidance_kinds():
         return spec
     kind = _named("guidance", spec, guidance_kinds())
     return spec.model_copy(update=_resolved_keys("guidance", spec, kind, limits_of(aircraft)))
-
-
-def is_here(spec: GuidanceSpec) -> bool:
-    """Whether the law is; of one that was given by a source file, or in Python, another process knows nothing."""
-    return spec.kind in guidance_kinds()
 
 
 def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
@@ -183,7 +178,7 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
 
 
 def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
-    if not is_here(spec):
+    if spec.kind not in guidance_kinds():
         told = f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
         raise KeyFault(("guidance", "kind"), told)
     kind = guidance_kinds()[spec.kind]

@@ -16,11 +16,12 @@ import numpy as np
 
 from aircraft.interface import GRAVITY_MPS2
 from harness.scenario.conditions import with_day, with_servos
-from harness.scenario.files_resolved import plane_point, with_files_expanded
+from harness.scenario.files_resolved import with_files_expanded
 from harness.scenario.keys import ScenarioKeys, step_rate_hz
+from harness.scenario.kinds import guidance_kinds
 from harness.scenario.navigation import planning_margin_m
 from harness.scenario.obstacles import Obstacle
-from harness.scenario.parts import airframe_of, is_here, limits_of, resolved_guidance, resolved_planner
+from harness.scenario.parts import airframe_of, limits_of, resolved_guidance, resolved_planner
 from harness.scenario.performance import (
     LEAST_CLEARANCE,
     check_level_flight,
@@ -59,7 +60,7 @@ def resolve(
         aircraft = aircraft.model_copy(update={"autopilot": autopilot})
     guidance = resolved_guidance(keys.guidance, aircraft, as_flown)
     scenario = keys.updated(aircraft=aircraft, guidance=guidance)
-    if as_flown and not is_here(guidance):
+    if as_flown and guidance.kind not in guidance_kinds():
         return scenario  # what follows from how the law tracks stands there
 
     performance = performance_of(scenario)
@@ -105,9 +106,14 @@ def resolve(
 
 
 def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
-    """A mission whose start and goal are in metres, where they were given in degrees."""
-    ends = {"start_m": mission.start, "goal_m": mission.goal}
-    given = {name: plane_point(place, area) for name, place in ends.items() if place}
+    """A mission whose start and goal are in metres, to a millimetre where they were given in degrees."""
+    from aircraft.frames import LocalPlane
+
+    plane, given = LocalPlane(area.origin.latitude_deg, area.origin.longitude_deg), {}
+    for name, place in {"start_m": mission.start, "goal_m": mission.goal}.items():
+        if place:
+            east, north = plane.plane(place.latitude_deg, place.longitude_deg)
+            given[name] = round(east, 3), round(north, 3)
     return mission.model_copy(update={"start": None, "goal": None, **given})
 
 

@@ -34,7 +34,7 @@ OWN_KEYS: Final[Mapping[Loc, type[Section]]] = {
 def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
     """A scenario's keys with some replaced, as `load_scenario` takes them; their faults name the command line."""
     for name, text in overrides:
-        loc = _loc(name, "command line")
+        loc = loc_of(name, "command line")
         if not text.strip():
             raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
         root = with_key(root, loc, strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE))
@@ -64,16 +64,9 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
     plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}
     root = node_of(plain, IN_PYTHON)
     for name, value in keys.items():
-        loc, new = _loc(name, "with_"), node_of(_plain(value), IN_PYTHON)
+        loc, new = loc_of(name, "with_"), node_of(_plain(value), IN_PYTHON)
         root = strict_yaml.without(root, loc) if value is None else with_key(root, loc, new)
     return root
-
-
-def _loc(name: str, where: str) -> Loc:
-    try:
-        return loc_of(name)
-    except ValueError as error:
-        raise InputError(f"{where}: {error}") from error
 
 
 def _plain(value: Any) -> Any:
