@@ -19,6 +19,7 @@ from harness.cli.app import main
 ROOT = Path(__file__).parents[2]
 FOREST = ROOT / "scenarios" / "aerosonde_forest.yaml"
 TIMEOUT_S = 120.0
+PIPES = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
 PROGRESS = re.compile(r"^wayproof: (starting up|\d+ s flown, .*|\d+ of \d+.*)\n", re.MULTILINE)
 """Lines that come every ten seconds, where the machine is slow."""
 CAMPAIGN_FILES = {
@@ -44,14 +45,7 @@ planner: {clearance_m: 40}
 
 
 def start(folder: Path, *arguments: str, file_bytes: int | None = None, **keys: Any) -> subprocess.Popen[str]:
-    """Starts the command in a folder.
-
-    Args:
-        folder: where it is given.
-        arguments: after `wayproof`.
-        file_bytes: no file may become larger than this.
-        **keys: of `subprocess.Popen`.
-    """
+    """Starts the command in a folder; no file may become larger than some bytes. `keys` are those of `Popen`."""
 
     def limit() -> None:
         if file_bytes is not None:
@@ -60,10 +54,9 @@ def start(folder: Path, *arguments: str, file_bytes: int | None = None, **keys: 
     return subprocess.Popen(
         [sys.executable, "-m", "harness", *arguments],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
         preexec_fn=limit if file_bytes is not None else None,
         text=True,
-        **{"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **keys},
+        **{"env": {**os.environ, "PYTHONPATH": str(ROOT)}, "stdin": subprocess.DEVNULL} | PIPES | keys,
     )
 
 

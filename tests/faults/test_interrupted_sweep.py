@@ -153,12 +153,5 @@ def test_an_interrupt_while_modules_are_imported_leaves_no_traceback(
     (place / "sitecustomize.py").write_text(INTERRUPTS)
     keys = {"PYTHONPATH": f"{place}:{ROOT}", "INTERRUPT_AT": module, "IN_CHILD": child}
     words = ["sweep", "campaign.yaml", "--out", "out", "--quiet", "--workers", "1"]
-    done = subprocess.run(
-        [sys.executable, "-m", "harness", *words],
-        cwd=place,
-        env={**os.environ, **keys},
-        capture_output=True,
-        text=True,
-        timeout=240,
-    )
-    assert (done.returncode, "Traceback" in done.stderr) == (status, False)
+    status_then, _, err = run(place, *words, env={**os.environ, **keys})
+    assert (status_then, "Traceback" in err) == (status, False)

@@ -6,15 +6,13 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
-from tests.faults.command import CAMPAIGN_FILES, ROOT, TIMEOUT_S, wait_until
+from tests.faults.command import CAMPAIGN_FILES, ROOT, run, start, wait_until
 
 PLUGIN = '''
 import atexit
@@ -111,25 +109,13 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def begun(place: Path, *arguments: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "harness", *arguments],
-        cwd=place,
-        env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{place / 'site'}"},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+def own_path(place: Path) -> dict[str, str]:
+    """The environment in which the distribution is installed."""
+    return {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{place / 'site'}"}
 
 
 def ran(place: Path, *arguments: str) -> tuple[int, str, str]:
-    process = begun(place, *arguments)
-    try:
-        out, err = process.communicate(timeout=TIMEOUT_S)
-    finally:
-        process.kill()
-    return process.returncode, out, err
+    return run(place, *arguments, env=own_path(place))
 
 
 def flown(place: Path, kind: str, *arguments: str) -> tuple[int, str, str]:
@@ -212,7 +198,7 @@ def test_a_campaign_and_a_command_say_how_an_own_planner_is_named(
 )
 def test_one_interrupt_ends_a_planner_that_hangs(arguments: str, told: str, place: Path) -> None:
     (place / "hangs.yaml").write_text(CAMPAIGN.replace("[gone, rolling_window]", "[hangs]"))
-    process = begun(place, *arguments.split(), "--out", "out")
+    process = start(place, *arguments.split(), "--out", "out", env=own_path(place))
     wait_until((place / "hanging").exists, process)
     process.send_signal(signal.SIGINT)
     try:
