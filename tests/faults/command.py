@@ -51,12 +51,17 @@ def start(folder: Path, *arguments: str, file_bytes: int | None = None, **keys: 
         if file_bytes is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
 
+    usual: dict[str, Any] = {
+        "env": {**os.environ, "PYTHONPATH": str(ROOT)},
+        "stdin": subprocess.DEVNULL,
+        **PIPES,
+    }
     return subprocess.Popen(
         [sys.executable, "-m", "harness", *arguments],
         cwd=folder,
         preexec_fn=limit if file_bytes is not None else None,
         text=True,
-        **{"env": {**os.environ, "PYTHONPATH": str(ROOT)}, "stdin": subprocess.DEVNULL} | PIPES | keys,
+        **usual | keys,
     )
 
 

@@ -14,7 +14,7 @@ from harness.world.range_sensor import RangeSensor
 from harness.world.world import Circle, Polygon, World
 from tests.harness import sensing
 from tests.harness.sensing import FloatArray as FloatArray
-from tests.harness.sensing import off as distance_to  # noqa: F401
+from tests.harness.sensing import off
 from tests.harness.sensing import world_of as world_of
 
 BOUNDS = (0.0, 0.0, 10_000.0, 10_000.0)
@@ -22,6 +22,9 @@ CLEARANCE, RANGE = 200.0, 3000.0
 FREE_CELL = CLEARANCE / 2.0
 MIDDLE = (5000.0, 5000.0)
 SEEDS = st.integers(0, 2**32 - 1)
+
+
+distance_to = off
 
 
 def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
