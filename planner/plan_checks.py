@@ -42,9 +42,7 @@ def start_tolerance_m(mission: Mission) -> float:
 
 
 def checked_plan(answer: object, position_m: tuple[float, float], mission: Mission) -> Plan:
-    """A planner's answer, whatever that is, as a plan that nobody can change any more.
-
-    Returns the answer itself where it is no new path; else a copy of it with its picture made.
+    """A planner's answer: itself where it is no new path; else a copy that nobody can change, with its picture made.
 
     Raises:
         WrongAnswerError: it is no plan, or its path cannot be flown.

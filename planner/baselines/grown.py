@@ -19,10 +19,9 @@ from planner.memory import ObstacleMemory
 
 SIMPLER = 0.2
 """The outline is simplified by this share of the margin."""
-GRAZED_M = 0.01
-"""A line that goes less deep into an obstacle passes it."""
-TOUCH_SHARE = 0.05
-"""A line that begins on a boundary and enters within this share of the kept distance leads inside."""
+GRAZED_M, TOUCH_SHARE = 0.01, 0.05
+"""A line that goes less deep into an obstacle passes it; one that enters within this share of the kept distance from
+where it begins on a boundary leads inside."""
 QUARTER_CORNERS = 12
 """Corners of a quarter of a disc."""
 DENT_SHARE = 4.0

@@ -27,9 +27,8 @@ from planner.interface import BoolArray, FloatArray, Mission, PlanPicture, PlanR
 from planner.keys import MarginConfig
 
 SECTORS = 72
-"""Sectors of the polar histogram."""
 WIDTH_RAD = math.tau / SECTORS
-"""Width of a sector."""
+"""Number of sectors of the polar histogram, and the width of one."""
 
 WINDOW_RADII, WINDOW_CLEARANCES = 12.0, 6.0
 """The radius of the active window is so many turn radii and clearances, at most the sensor range."""

@@ -29,11 +29,8 @@ SHARES = (1.0, 0.5, 0.1)
 """Shares of the clearance that a holding turn keeps, tried in this order: a turn too near is better than none. Turns in
 space that has been seen to be free come first."""
 
-AHEAD_RADII = 4.0
-"""The holding turn begins within so many turn radii ahead of the aircraft."""
-
-APART_RADII = 0.25
-"""Places for the holding turn are this many turn radii apart."""
+AHEAD_RADII, APART_RADII = 4.0, 0.25
+"""The holding turn begins within so many turn radii ahead of the aircraft, at places so many apart."""
 
 
 def stuck(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray) -> Plan:

@@ -22,8 +22,7 @@ MOST_EFFORT = 4
 """A search that found nothing is repeated with twice the effort, this many times; from then on once a turn."""
 
 MOST_RETRIES = 8
-"""Everything is tried again this many times before a flight ends for want of room to turn: a narrower way may be seen
-to be safe from elsewhere on the turn, or at another look."""
+"""Everything is tried again this many times before a flight ends for want of room to turn."""
 
 
 class GivingUp:

@@ -115,9 +115,8 @@ class LocalPlanning:
     def attempts(self) -> list[Attempt]:
         """Distances to search with, in order of preference.
 
-        First as wanted. Then with what of the margin there is room for. Then wide enough for a turn about the end of
-        a wall at the turn radius. Last so wide that a turn can be flown everywhere on the way: a way that
-        leads through no gap that would have to be entered before it can be seen to have an end.
+        First as wanted, then with what of the margin there is room for, then wide enough for a turn about the end of
+        a wall, last so wide that a turn can be flown everywhere on the way.
         """
         clearance, margin, radius = self._mission.clearance_m, self._margin_m, self._mission.turn_radius_m
         attempts = [Attempt(clearance, margin), self._tight]
@@ -140,8 +139,8 @@ class LocalPlanning:
     ) -> Generator[None, None, FlyableRoute | None]:
         """The shortest of the n best candidates, after route optimisation.
 
-        What comes in while this goes on is left for the next search: else the shortest way round something that is
-        just coming into view would be dropped, again and again, for a long one that leads away.
+        What comes in meanwhile is left for the next search: else the shortest way round something that is just coming
+        into view would be dropped, again and again.
         """
         start, _ = now()
         points = self._memory.points_m

@@ -27,11 +27,9 @@ obstacle can be seen."""
 BACK_RAD, AWAY_RAD = 2.1, 0.8
 """Largest turn from one step to the next, and largest turn away from the obstacle that the last step hugged; rad."""
 
-APART = 0.06
-"""Track points that are nearer to each other than this share of the distance kept count as one."""
-
-APART_WIDE = 0.25
-"""The same for a wide search, as a share of the shortest step about a corner: that step has to lead on."""
+APART, APART_WIDE = 0.06, 0.25
+"""Track points count as one that are nearer to each other than this share of the distance kept; in a wide search, of
+the shortest step about a corner: that step has to lead on."""
 
 
 @dataclass(frozen=True)

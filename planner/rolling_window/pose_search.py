@@ -33,10 +33,7 @@ def search_poses(
     terrain: Terrain,
     to_go: Callable[[Point], float],
 ) -> Generator[None, None, FlyableRoute | None]:
-    """The cheapest flyable route by best-first search over (x, y, course), in steps S_0 of one turn radius.
-
-    A left turn never follows a right one without a straight step between.
-    """
+    """The cheapest flyable route over (x, y, course), in steps of one turn radius, with a straight between turns."""
     step_m = limits.radius_m
     largest = 2.0 * math.asin(step_m / (2.0 * limits.radius_m))
     course = math.atan2(start.tangent_north, start.tangent_east)

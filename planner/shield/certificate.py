@@ -49,11 +49,9 @@ MOST_ARC_LENGTHS = 32
 ARC_LENGTHS_AT_ONCE = 4
 """Turns at this many arc lengths are tested together: mostly one of the first is free."""
 
-AHEAD_STEP = 0.25
-"""Turns about places ahead are looked for along a path in steps of this share of the turn radius."""
-
-ASIDE = (0.0, 0.5)
-"""Centres of turns about places ahead lie beside the path by these shares of the turn radius."""
+AHEAD_STEP, ASIDE = 0.25, (0.0, 0.5)
+"""Turns about places ahead are looked for in steps of `AHEAD_STEP` of the turn radius along a path; their centres lie
+beside it by the shares `ASIDE`."""
 
 STRAIGHT_ON = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
 """A path may be left straight on for so many turn radii: where it bends behind an obstacle, only the space straight

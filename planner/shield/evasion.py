@@ -29,26 +29,17 @@ LATER = 0.05
 """For each metre along a way, an obstacle that is met there counts as so many metres further away: there is time left
 to evade it."""
 
-UNKNOWN_MPS = 10.0
-"""An obstacle that has just appeared, whose velocity is not known yet, is taken to come nearer at this speed."""
+UNKNOWN_MPS, UNKNOWN_S = 10.0, 8.0
+"""An obstacle that has just appeared is taken to come nearer at this speed for this time: its velocity is not known."""
 
-UNKNOWN_S = 8.0
-"""An obstacle that has just appeared is taken to come nearer for this time."""
-
-STEP_SHARE = 0.25
-"""Ways are judged in steps of this share of the clearance."""
-
-LEAST_STEP = 0.02
-"""Ways are judged in steps of at least this share of the turn radius."""
+STEP_SHARE, LEAST_STEP = 0.25, 0.02
+"""Ways are judged in steps of the first share of the clearance, at least the second of the turn radius."""
 
 SQUARE_STEPS = 8.0
 """Side of the squares in which edge points that stand still are sorted, in steps."""
 
-FIRST_DEG = (0.0, 20.0, 45.0, 75.0, 110.0, 150.0, 180.0)
-"""Angles of the first turn of a way, to one side, deg."""
-
-BACK_DEG = (0.0, 20.0, 45.0, 75.0, 110.0)
-"""Angles of the second turn of a way, back to the other side, deg."""
+FIRST_DEG, BACK_DEG = (0.0, 20.0, 45.0, 75.0, 110.0, 150.0, 180.0), (0.0, 20.0, 45.0, 75.0, 110.0)
+"""Angles of the first turn of a way, to one side, and of the second, back to the other; deg."""
 
 WAYS = [
     (first, back, straight)

@@ -14,11 +14,8 @@ import numpy as np
 from planner.geometry.curves import Limits, Pose, Segment, along, sample
 from planner.interface import FloatArray, Path
 
-STEP_SHARE = 1.0 / 12.0
-"""Length of a step of the track over the turn radius."""
-
-AHEAD_SHARE = 0.6
-"""The track aims at the place of the path so many turn radii ahead of the nearest one."""
+STEP_SHARE, AHEAD_SHARE = 1.0 / 12.0, 0.6
+"""In turn radii: length of a step of the track, and how far ahead of the nearest place of the path it aims."""
 
 SMOOTH_RAD, SMOOTH_M = math.radians(2.0), 1.0
 """A path whose joints turn and jump by no more than this can be flown as it is."""

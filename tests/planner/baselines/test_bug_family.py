@@ -6,13 +6,11 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 import shapely
-import yaml
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
@@ -30,8 +28,6 @@ from planner.world_stability import SETTLED_S
 from tests.longer import longer
 
 MakePoints = Callable[..., FloatArray]
-
-WORLDS = Path(__file__).parents[3] / "scenarios" / "worlds"
 
 MISSION = replace(
     contract.MISSION,
@@ -375,21 +371,3 @@ def test_plans_begin_where_the_loop_allows_it_beside_the_path_too(kind: str, rin
         aside = 41.0 if n % 2 else -41.0
         place, direction = (x - aside * uy, y + aside * ux), (ux, uy)
     assert found > 2
-
-
-@pytest.mark.flights
-@pytest.mark.parametrize("name", ["slots-001", "slots-018"])
-def test_tangent_bug_finds_the_slots_of_shipped_worlds(name: str) -> None:
-    """In one the border joins two walls; in the other what is followed changes before d_followed has been reached."""
-    keys = yaml.safe_load((WORLDS / "slots" / f"{name}.yaml").read_text())
-    outlines = [shapely.LinearRing(each["polygon"]["vertices_m"]) for each in keys["obstacles"]]
-    mission = replace(
-        MISSION,
-        goal_m=tuple(keys["mission"]["goal_m"]),
-        bounds_m=tuple(keys["area"]["bounds_m"]),
-        clearance_m=keys["planner"]["clearance_m"],
-        sensor_range_m=keys["sensor"]["range_m"],
-    )
-    points = shapely.get_coordinates(shapely.segmentize(outlines, 75.0))
-    flight = walk("tangent_bug", points, tuple(keys["mission"]["start_m"]), mission, 200.0)
-    assert flight.reason == "reached"
