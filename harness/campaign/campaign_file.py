@@ -107,8 +107,10 @@ class Campaign(Section):
 
 
 def _check_entries(section: str, entries: Sequence[Section], taken: Mapping[Loc, str]) -> None:
-    """Refuses an entry that is there twice, and one with a key that is given under `grid` or `random` too."""
-    if index := _repeated(entries):
+    """Refuses an entry that is there twice, its default shield named or not, or with a key of `grid` or `random`."""
+    if index := _repeated(
+        [(getattr(each, "label", ""), each.model_dump(exclude={"shield"})) for each in entries]
+    ):
         raise KeyFault((section, index), "is there already; leave it out or give it another key")
     for index, entry in enumerate(entries):
         for name in entry.model_fields_set | (entry.model_extra or {}).keys():

@@ -44,7 +44,6 @@ TABLES_EVERY_S: Final = 30.0
 TABLES_SHARE: Final = 0.01
 """Tables are made anew at least this far apart, and so seldom that it takes at most this share of the time."""
 MAX_TOLD: Final = 3
-"""Differences that are named where a folder is of another campaign."""
 
 
 def claim_folder(path: Path, what: str, index: str, schema: str, lock: str | None = None) -> FolderLock:

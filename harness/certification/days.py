@@ -29,7 +29,6 @@ from harness.scenario.shipped import scenario_path, shipped_scenarios
 DEFAULT_AIRCRAFT: Final = "aerosonde"
 DEFAULT_SEED: Final = 1
 AS_MEANT: Final = ("uncertainty", json.dumps(dict.fromkeys(UncertaintySpec.model_fields, 0.0)))
-"""The setting by which the aircraft flies as its model says."""
 FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
 
 Settings = Sequence[tuple[str, str]]

@@ -151,6 +151,10 @@ def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:
     part = PLANNER if name == "planner" else GUIDANCE
     shielded = SHIELDED if part is PLANNER and text.endswith(SHIELDED) else ""
     text = text.removesuffix(shielded)
+    if shielded and (not text or text.endswith(SHIELDED)):
+        raise typer.BadParameter(
+            f"is {text + shielded}; must be one kind, then {SHIELDED}", param_hint=f"--{name}"
+        )
     if text.endswith(".py") and text not in part.known():
         told = f"is {text}; must be one of {', '.join(part.known())}, or FILE.py:NAME as {text}:NAME"
         raise typer.BadParameter(told, param_hint=f"--{name}")

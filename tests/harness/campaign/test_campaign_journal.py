@@ -62,7 +62,6 @@ def edited(index: int, cells: dict[str, Any] | None = None, **changes: Any) -> C
 NO_RUN = "is damaged: it tells of no run"
 DAMAGE: dict[str, tuple[Callable[[Lines], Lines], str]] = {
     "no JSON": (lambda lines: [lines[0], b"x" + lines[1][1:], *lines[2:]], f":2: {NO_RUN}"),
-    "not UTF-8": (lambda lines: [b"\xff" + lines[0], *lines[1:]], f":1: {NO_RUN}"),
     "empty": (lambda lines: [b"\n", *lines], f":1: {NO_RUN}"),
     "two in one": (lambda lines: [lines[0][:-1] + lines[1], *lines[2:]], f":1: {NO_RUN}"),
     "deep": (lambda lines: [b"[" * 100_000 + b"\n", *lines], f":1: {NO_RUN}"),
