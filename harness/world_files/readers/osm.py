@@ -121,7 +121,7 @@ class _Found:
         if broken := len(self.ways) - len(whole):
             notes.append(f"{counted(broken, 'building')} whose outline is not there passed over")
         if self.tall:
-            notes.append(f"{counted(self.tall, 'mast or turbine')} without an area passed over")
+            notes.append(f"{counted(self.tall, 'object')} with a height and no area passed over")
         return Contents("osm", WGS84, tuple(self.parts), notes=tuple(notes))
 
 
