@@ -239,7 +239,7 @@ def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]
     The share is epsilon squared (Kelley, Proceedings of the National Academy of Sciences 21, 1935): the correlation
     ratio of failing (n,) over the groups of a quantity (n,), less what one without influence would show.
     """
-    found, count, overall = [], len(failed), failed.mean()
+    found, count, overall = [], len(failed), float(failed.mean()) if len(failed) else 0.0
     total = float(count * overall * (1.0 - overall))
     for key, values in quantities.items() if total else ():
         axis, group = grouped(key, values, drawn=True)

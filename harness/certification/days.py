@@ -74,8 +74,11 @@ class Days(CampaignRuns):
         try:
             return self._drawn_scenario(number, overrides)
         except InputError as error:
-            found = self._drawn_scenario(number, [*overrides, AS_MEANT])  # else it is another mistake
-            self.grounded[number] = str(error).partition("must be smaller: ")[2].rpartition(" (")[0]
+            _, is_deviation, why = str(error).partition("must be smaller: ")
+            if not is_deviation:
+                raise
+            found = self._drawn_scenario(number, [*overrides, AS_MEANT])
+            self.grounded[number] = why.rpartition(" (")[0]
             return found
 
     def _drawn_scenario(self, number: int, overrides: Settings) -> Scenario:

@@ -192,6 +192,7 @@ def test_keys_of_a_path_are_read_as_those_of_a_scenario(
         (["--vary", "seed=0:1"], "seed"),
         (["--runs", "0"], "--runs"),
         (["--planner", "vfh_plus+shield+shield"], "must be one kind, then +shield"),
+        (["--set", "uncertainty.mass=7"], "uncertainty.mass: is 7; must be"),
     ],
 )
 def test_bad_input_is_told_and_nothing_is_written(
