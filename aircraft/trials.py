@@ -14,10 +14,9 @@ from aircraft.airframe import Airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
-from aircraft.guidance.latency import as_it_was
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import RouteProgress, measures_itself
-from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState, Route
+from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState, Route, as_it_was
 from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import AircraftError

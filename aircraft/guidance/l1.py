@@ -66,11 +66,7 @@ class L1Config:
         0.75, "damping ratio of the track error's decay (NAVL1_DAMPING)", "1", minimum=0.1, maximum=2.0
     )
     integrator_gain: float = key(
-        0.02,
-        "gain of the cross-track integrator on legs (NAVL1_XTRACK_I); 0: none",
-        "1/s",
-        minimum=0.0,
-        maximum=0.1,
+        0.02, "gain of the cross-track integrator (NAVL1_XTRACK_I); 0: none", "1/s", minimum=0.0, maximum=0.1
     )
 
     def resolved(self, limits: GuidanceLimits) -> L1Config:

@@ -35,10 +35,7 @@ class PreviewConfig:
     """Keys of `guidance.kind: preview`."""
 
     bandwidth_radps: float | None = key(
-        None,
-        "natural frequency of the cross-track correction; default: the aircraft's guidance bandwidth",
-        "rad/s",
-        above=0.0,
+        None, "natural frequency of the cross-track correction; default: the aircraft's", "rad/s", above=0.0
     )
     damping: float = key(0.9, "damping ratio of the cross-track correction", "1", above=0.0)
 

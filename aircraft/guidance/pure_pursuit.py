@@ -30,10 +30,7 @@ class PurePursuitConfig:
     """Keys of `guidance.kind: pure_pursuit`."""
 
     look_ahead_s: float | None = key(
-        None,
-        "look-ahead distance in flying time over the ground; default: 2.8 over the aircraft's guidance bandwidth",
-        "s",
-        above=0.0,
+        None, "look-ahead in flying time; default: 2.8 over the aircraft's guidance bandwidth", "s", above=0.0
     )
     min_look_ahead_m: float = key(1.0, "least look-ahead distance", "m", above=0.0)
 

@@ -38,29 +38,16 @@ class VectorFieldConfig:
     """Keys of `guidance.kind: vector_field`."""
 
     approach_angle_deg: float = key(
-        50.0,
-        "chi infinity, the angle to a line at which a far-off aircraft approaches it",
-        "deg",
-        above=0.0,
-        maximum=90.0,
+        50.0, "chi infinity, the angle of approach to a line from far off", "deg", above=0.0, maximum=90.0
     )
     path_gain_1pm: float | None = key(
-        None,
-        "k_path, how soon the field turns to a line; default: 0.01 at 25 m/s, less for the faster",
-        "1/m",
-        above=0.0,
+        None, "k_path, the field's turn to a line; default: 0.01 at 25 m/s, less if faster", "1/m", above=0.0
     )
     orbit_gain: float = key(
-        0.0,
-        "k_orbit, how soon the field turns to an orbit; 0: an orbit is approached as soon as a line",
-        "1",
-        minimum=0.0,
+        0.0, "k_orbit, how soon the field turns to an orbit; 0: as soon as to a line", "1", minimum=0.0
     )
     course_bandwidth_radps: float | None = key(
-        None,
-        "natural frequency of course hold; default: a fifth of the bandwidth of the aircraft's roll",
-        "rad/s",
-        above=0.0,
+        None, "natural frequency of course hold; default: a fifth of the roll's", "rad/s", above=0.0
     )
     course_damping: float = key(1.0, "damping ratio of course hold", "1", minimum=0.1, maximum=5.0)
 

@@ -12,8 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from aircraft.guidance.latency import as_it_was
-from aircraft.interface import AircraftState, FloatArray
+from aircraft.interface import AircraftState, FloatArray, as_it_was
 from harness.scenario.navigation import Navigation
 from harness.world.range_sensor import child_stream
 

@@ -10,9 +10,8 @@ import pytest
 
 from aircraft.airframe import AutopilotKeys
 from aircraft.airframes import airframe
-from aircraft.guidance.latency import as_it_was
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw, bandwidth_of_delay_margin
-from aircraft.interface import AircraftState, FloatArray
+from aircraft.interface import AircraftState, FloatArray, as_it_was
 from aircraft.route import weave
 from aircraft.trials import in_flight
 

@@ -9,9 +9,8 @@ import pytest
 
 from aircraft.airframes import airframe
 from aircraft.guidance.interface import GuidanceLimits
-from aircraft.guidance.latency import as_it_was
 from aircraft.guidance.margins import law_margins
-from aircraft.interface import AircraftState, Route
+from aircraft.interface import AircraftState, Route, as_it_was
 from aircraft.start import StartConditions
 from harness.scenario.kinds import guidance_kinds
 from tests.point_mass import PointMass
