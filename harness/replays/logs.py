@@ -36,21 +36,35 @@ TRUE_AIRSPEED: Final = "true_airspeed_m_s"
 AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")
 
 
-class Series(NamedTuple):
-    """What a log holds."""
-
-    places: FloatArray  # (n, 4) time in s, latitude and longitude in degrees, altitude in m
-    others: dict[str, FloatArray]  # (m, 2) time in s and value, by the name of a column of `flown`
+Series = tuple[FloatArray, dict[str, FloatArray]]
+"""(n, 4) time (s), latitude, longitude (deg), altitude (m); (m, 2) time and value, by column of `flown`."""
 
 
 def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list[str]]:
-    """Columns of `flown` from a log, in a plane, and notes on it; InputError if it has no track or cannot be read."""
+    """Columns of `flown` from a log, in a plane, and notes on it; InputError if it has no track or cannot be read.
+
+    One row for each place on earth, in order of time; other series are interpolated there.
+    """
     notes: list[str] = []
     with reading(path):
-        found = READERS[path.suffix.lower()](path, notes)
-    if not any(name.startswith("airspeed") for name, series in found.others.items() if len(series)):
+        found, others = READERS[path.suffix.lower()](path, notes)
+    if not any(name.startswith("airspeed") for name, series in others.items() if len(series)):
         notes.append("airspeed: the log has none; taken to be constant where wind is fitted")
-    return _columns(found, plane, path), notes
+    places = found.reshape(-1, 4)
+    _, latitude, longitude, _ = places.T
+    known = np.isfinite(places).all(axis=1) & (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)
+    places = places[known & ((latitude != 0.0) | (longitude != 0.0))]  # a receiver without a fix says 0, 0
+    places = places[np.unique(places[:, 0], return_index=True)[1]]
+    if len(places) < 2:
+        raise InputError(f"{path}: has {len(places)} rows with a position; a track has at least 2")
+    times = places[:, 0]
+    if times[-1] - times[0] > LONGEST_S:
+        raise InputError(
+            f"{path}: its times reach from {times[0]:g} to {times[-1]:g} s; a flight may take {LONGEST_S:g} s at most"
+        )
+    east, north = np.array([plane.plane(*place) for place in places[:, 1:3].tolist()]).T
+    columns = {"time_s": times - times[0], "east_m": east, "north_m": north, "up_m": places[:, 3]}
+    return columns | {name: np.interp(times, *each.T) for name, each in others.items() if len(each)}, notes
 
 
 class Command(NamedTuple):
@@ -104,28 +118,6 @@ def reading(path: Path) -> Iterator[None]:
         os.close(before)
 
 
-def _columns(found: Series, plane: LocalPlane, path: Path) -> dict[str, FloatArray]:
-    """One row for each place on earth, in order of time; other series are interpolated there."""
-    places = found.places.reshape(-1, 4)
-    times, latitude, longitude, _ = places.T
-    known = np.isfinite(places).all(axis=1) & (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)
-    places = places[known & ((latitude != 0.0) | (longitude != 0.0))]  # a receiver without a fix says 0, 0
-    places = places[np.unique(places[:, 0], return_index=True)[1]]
-    if len(places) < 2:
-        raise InputError(f"{path}: has {len(places)} rows with a position; a track has at least 2")
-    times = places[:, 0]
-    if times[-1] - times[0] > LONGEST_S:
-        raise InputError(
-            f"{path}: its times reach from {times[0]:g} to {times[-1]:g} s; a flight may take {LONGEST_S:g} s at most"
-        )
-    east, north = np.array([plane.plane(*place) for place in places[:, 1:3].tolist()]).T
-    columns = {"time_s": times - times[0], "east_m": east, "north_m": north, "up_m": places[:, 3]}
-    for name, series in found.others.items():
-        if len(series):
-            columns[name] = np.interp(times, *series.T)
-    return columns
-
-
 def _ulog(path: Path, notes: list[str]) -> Series:
     """PX4: the estimator's global position, https://docs.px4.io (ULog file format), airspeed and roll where logged."""
     from pyulog import ULog
@@ -154,7 +146,7 @@ def _ulog(path: Path, notes: list[str]) -> Series:
         w, x, y, z = (attitude[f"q[{axis}]"] for axis in range(4))
         roll = np.degrees(np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)))
         others["roll_deg"] = np.column_stack((attitude["timestamp"] / 1e6, roll))
-    return Series(places[valid], others)
+    return places[valid], others
 
 
 def _is_whole(path: Path) -> bool:
@@ -179,7 +171,7 @@ def _dataflash(path: Path, notes: list[str]) -> Series:
         kind = each.get_type()
         found[kind].append((each._timestamp, *(float(getattr(each, key)) for key in keys[kind])))
     others = {"airspeed_ias_mps": np.array(found["ARSP"]), "roll_deg": np.array(found["ATT"])}
-    return Series(np.array(found["POS"] or found["GPS"]), others)
+    return np.array(found["POS"] or found["GPS"]), others
 
 
 def _messages(path: Path, kinds: tuple[str, ...], notes: list[str]) -> Iterator[Any]:
