@@ -84,13 +84,13 @@ CASES: Final = (
 LIMIT_FACTORS: Final = {
     "aerosonde": 1.0,
     **dict.fromkeys(("c172p", "c172x", "t6texan2"), 4.0),
-    **dict.fromkeys(
-        ("c172r", "DHC6", "OV10", "T38", "A4", "F80C", "F4N", "global5000", "737", "A320", "B747"), 8.0
-    ),
-    **dict.fromkeys(("T37", "f15", "f16", "787-8", "MD11"), 16.0),
+    **dict.fromkeys(("c172r", "DHC6", "OV10", "T38", "A4", "F80C", "F4N", "A320", "B747"), 8.0),
+    **dict.fromkeys(("T37", "f15", "f16", "787-8", "MD11", "global5000", "737"), 16.0),
 }
 """By how much the limits of the Aerosonde are multiplied, for the aircraft whose tracking is verified: the least of 1,
-4, 8 and 16 of which no more than two thirds is flown."""
+4, 8 and 16 of which no more than two thirds is flown; of the 737's altitude in severe turbulence 0.78 of 16."""
+NOT_HELD: Final = frozenset({("f15", "severe"), ("F80C", "severe")})
+"""Aircraft that are out of thrust in turbulence of an intensity: nothing is promised of their altitude there."""
 
 
 def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
@@ -159,7 +159,7 @@ def bench_tracking(
     for done, case in enumerate(CASES):
         if progress is not None:
             progress(done, len(CASES), case.name)
-        limits = case.limits.times(factor) if factor else None
+        limits = case.limits.times(factor) if factor and (name, case.intensity) not in NOT_HELD else None
         row: dict[str, Any] = {"case": case.name, "limits": vars(limits) if limits else None, "lost": None}
         try:
             flown = tracked(name, case, range(1, seeds + 1), guidance=guidance)
