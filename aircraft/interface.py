@@ -60,8 +60,10 @@ class AircraftState(NamedTuple):
         return math.atan2(self.velocity_east_mps, self.velocity_north_mps) % math.tau
 
 
-GROWS_OLD: Final = AircraftState._fields[1 : AircraftState._fields.index("load_factor") + 1]
-"""What of a state is as old as the latency: all from position to load factor."""
+NAMES: Final = AircraftState._fields
+FRESH: Final = NAMES.index("load_factor") + 1
+"""From here on a state is that of now; before, from the position on, it is as old as the latency."""
+EAST, NORTH, HEADING = (NAMES.index(name) - 1 for name in ("east_m", "north_m", "heading_rad"))
 
 
 def as_it_was(past: deque[AircraftState], state: AircraftState, latency_s: float) -> AircraftState:
@@ -80,12 +82,11 @@ def as_it_was(past: deque[AircraftState], state: AircraftState, latency_s: float
     new = past[1] if len(past) > 1 else old
     share = (then_s - old.time_s) / (new.time_s - old.time_s) if then_s > old.time_s else 0.0
     lead_s = min(then_s - old.time_s, 0.0)
-    values = {name: (1.0 - share) * a + share * b for name, a, b in zip(old._fields, old, new, strict=True)}
-    turned_rad = math.remainder(new.heading_rad - old.heading_rad, math.tau)
-    values["heading_rad"] = old.heading_rad + share * turned_rad
-    values["east_m"] += lead_s * old.velocity_east_mps
-    values["north_m"] += lead_s * old.velocity_north_mps
-    return state._replace(**{name: values[name] for name in GROWS_OLD})
+    values = [(1.0 - share) * a + share * b for a, b in zip(old[1:FRESH], new[1:FRESH], strict=True)]
+    values[HEADING] = old.heading_rad + share * math.remainder(new.heading_rad - old.heading_rad, math.tau)
+    values[EAST] += lead_s * old.velocity_east_mps
+    values[NORTH] += lead_s * old.velocity_north_mps
+    return AircraftState(state.time_s, *values, *state[FRESH:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,6 +80,7 @@ PROFILE_M = (3 * FOOT_M, 1000 * FOOT_M)
 """Heights over ground between which the profile of MIL-F-8785C holds; outside the wind is that of the nearer end."""
 
 
+@functools.lru_cache(maxsize=16)  # a flight asks at every step, and reads its height only now and then
 def profile_share(height_m: float, measured_at_m: float) -> float:
     """Wind speed at a height over ground over that at another: ln(h / z0) / ln(h_measured / z0), MIL-F-8785C."""
     low, high = PROFILE_M
@@ -105,6 +108,10 @@ class Atmosphere:
         """Whether the wind is the same at all times and heights, turbulence aside."""
         return not self.changes and self.measured_at_m is None
 
+    @functools.cached_property
+    def _changes_s(self) -> list[float]:
+        return [time_s for time_s, _, _ in self.changes]
+
     @property
     def wind_mps(self) -> float:
         """Largest speed of the wind at any time, at the height that it is told for."""
@@ -113,13 +120,14 @@ class Atmosphere:
 
     def wind_at(self, time_s: float, height_m: float) -> tuple[float, float]:
         """East and north of the wind (m/s) at a time and a height over ground, turbulence left out."""
-        east, north, before_s = self.wind_east_mps, self.wind_north_mps, 0.0
-        for after_s, east_after, north_after in self.changes:
-            if time_s < after_s:
-                share = (time_s - before_s) / (after_s - before_s)
-                east, north = east + share * (east_after - east), north + share * (north_after - north)
-                break
-            east, north, before_s = east_after, north_after, after_s
+        index = bisect_right(self._changes_s, time_s)  # of the first change that is not over
+        before_s, east, north = (
+            self.changes[index - 1] if index else (0.0, self.wind_east_mps, self.wind_north_mps)
+        )
+        if index < len(self.changes):
+            after_s, east_after, north_after = self.changes[index]
+            share = (time_s - before_s) / (after_s - before_s)
+            east, north = east + share * (east_after - east), north + share * (north_after - north)
         if self.measured_at_m is None:
             return east, north
         share = profile_share(height_m, self.measured_at_m)

@@ -6,13 +6,14 @@ planner is told are believed ones. World, sensor, contact, `reached` and metrics
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import deque
 from typing import Final
 
 import numpy as np
 
-from aircraft.interface import AircraftState, FloatArray, as_it_was
+from aircraft.interface import AircraftState, as_it_was
 from harness.scenario.navigation import Navigation
 from harness.world.range_sensor import child_stream
 
@@ -24,9 +25,6 @@ HEADING_CORRELATION_S: Final = 60.0
 
 AIRSPEED_CORRELATION_S: Final = 300.0
 """Correlation time of the airspeed error. Chosen: a pressure sensor drifts with its temperature, over minutes."""
-
-_POSITION, _VELOCITY, _HEADING, _AIRSPEED, _ALTITUDE = slice(0, 2), slice(2, 5), 5, 6, 7
-
 
 LOOKS_APART_S: Final = 5.0
 """What moves is told from looks at it that are about so far apart in time."""
@@ -91,28 +89,29 @@ class Navigator(StateEstimator):
         self._navigation = navigation
         self._rng, directions = (child_stream(seed_sequence, number) for number in range(2))
         turns = directions.uniform(0.0, math.tau, len(navigation.outages_s))
-        self._directions = np.column_stack([np.sin(turns), np.cos(turns)])
+        self._directions = np.column_stack([np.sin(turns), np.cos(turns)]).tolist()
         position_s, position_m = navigation.position_correlation_s, navigation.position_sigma_m
-        self._correlation_s = np.array(
-            [position_s] * 2
-            + [VELOCITY_CORRELATION_S] * 3
-            + [HEADING_CORRELATION_S, AIRSPEED_CORRELATION_S, position_s]
+        self._correlation_s = (
+            *[position_s] * 2,
+            *[VELOCITY_CORRELATION_S] * 3,
+            HEADING_CORRELATION_S,
+            AIRSPEED_CORRELATION_S,
+            position_s,
         )
-        self._sigmas = np.array(
-            [position_m] * 2
-            + [navigation.velocity_sigma_mps] * 3
-            + [
-                math.radians(navigation.heading_sigma_deg),
-                navigation.airspeed_sigma_mps,
-                navigation.altitude_sigma_m,
-            ]
+        self._sigmas = (
+            *[position_m] * 2,
+            *[navigation.velocity_sigma_mps] * 3,
+            math.radians(navigation.heading_sigma_deg),
+            navigation.airspeed_sigma_mps,
+            navigation.altitude_sigma_m,
         )
         self._perfect = navigation.kind == "perfect"
         self._past: deque[AircraftState] = deque()
-        self._unit = np.zeros(8)  # the processes, over their sigmas
-        self._time_s, self._place = math.nan, np.zeros(2)
+        self._unit = [0.0] * 8  # the processes, over their sigmas
+        self._errors = [0.0] * 8
+        self._time_s, self._place = math.nan, (0.0, 0.0)
         self._outage = -1
-        self._fix_error, self._drift = np.zeros(2), np.zeros(2)
+        self._fix_error, self._drift = (0.0, 0.0), (0.0, 0.0)
 
     def believed(self, state: AircraftState) -> AircraftState:
         """What the aircraft believes where this is its true state; `ValueError` if time goes back."""
@@ -121,49 +120,47 @@ class Navigator(StateEstimator):
         state = as_it_was(self._past, state, self._navigation.latency_s)
         if state.time_s < self._time_s:
             raise ValueError(f"time goes back from {self._time_s:g} s to {state.time_s:g} s")
-        place = np.array([state.east_m, state.north_m])
         if state.time_s != self._time_s:
-            self._go_on(state.time_s, place)
-        east_m, north_m = (place + self._fix_error + self._drift).tolist()
-        errors = self._unit * self._sigmas
-        velocity = errors[_VELOCITY]
+            self._go_on(state.time_s, (state.east_m, state.north_m))
+        (fix_east, fix_north), (drift_east, drift_north) = self._fix_error, self._drift
+        _, _, v_east, v_north, v_up, heading, airspeed, altitude = self._errors
         if self._outage >= 0:
             drift_mps = self._navigation.drift_share * state.groundspeed_mps
-            velocity[:2] += drift_mps * self._directions[self._outage]
-        v_east, v_north, v_up = velocity.tolist()
-        airspeed_mps = max(0.0, state.airspeed_mps + float(errors[_AIRSPEED]))
-        self.held_errors = float(errors[_ALTITUDE]), airspeed_mps - state.airspeed_mps
+            east, north = self._directions[self._outage]
+            v_east, v_north = v_east + drift_mps * east, v_north + drift_mps * north
+        airspeed_mps = max(0.0, state.airspeed_mps + airspeed)
+        self.held_errors = altitude, airspeed_mps - state.airspeed_mps
         return state._replace(
-            east_m=east_m,
-            north_m=north_m,
-            up_m=state.up_m + self.held_errors[0],
+            east_m=state.east_m + fix_east + drift_east,
+            north_m=state.north_m + fix_north + drift_north,
+            up_m=state.up_m + altitude,
             velocity_east_mps=state.velocity_east_mps + v_east,
             velocity_north_mps=state.velocity_north_mps + v_north,
             velocity_up_mps=state.velocity_up_mps + v_up,
-            heading_rad=(state.heading_rad + float(errors[_HEADING])) % math.tau,
+            heading_rad=(state.heading_rad + heading) % math.tau,
             airspeed_mps=airspeed_mps,
         )
 
-    def _go_on(self, time_s: float, place: FloatArray) -> None:
+    def _go_on(self, time_s: float, place: tuple[float, float]) -> None:
         """Takes the errors from the call before to this time."""
         first, before_s = math.isnan(self._time_s), self._time_s
-        noise = self._rng.standard_normal(8)
-        if first:
-            self._unit = noise
-        else:
-            steps = (time_s - before_s) / self._correlation_s
-            self._unit = np.exp(-steps) * self._unit + np.sqrt(-np.expm1(-2.0 * steps)) * noise
+        noise = self._rng.standard_normal(8).tolist()
+        if not first:
+            kept, fresh = _shares(time_s - before_s, self._correlation_s)
+            noise = [a * old + b * new for a, old, b, new in zip(kept, self._unit, fresh, noise, strict=True)]
+        self._unit, self._errors = noise, [a * b for a, b in zip(noise, self._sigmas, strict=True)]
         outage = self._outage_at(time_s)
         if outage < 0 or first:
-            fix = (self._unit * self._sigmas)[_POSITION]
-            self._fix_error = fix + np.array(self._navigation.position_bias_m)
+            bias_east, bias_north = self._navigation.position_bias_m
+            self._fix_error = self._errors[0] + bias_east, self._errors[1] + bias_north
         if outage != self._outage:
             self.jumps += self._outage >= 0
-            self._drift = np.zeros(2)
+            self._drift = 0.0, 0.0
         if outage >= 0 and not first:
             begin_s = self._navigation.outages_s[outage][0]
             flown_m = math.dist(place, self._place) * (time_s - max(begin_s, before_s)) / (time_s - before_s)
-            self._drift = self._drift + self._navigation.drift_share * flown_m * self._directions[outage]
+            drift_m, (east, north) = self._navigation.drift_share * flown_m, self._directions[outage]
+            self._drift = self._drift[0] + drift_m * east, self._drift[1] + drift_m * north
         self._outage, self._time_s, self._place = outage, time_s, place
         self.has_fix = outage < 0
 
@@ -173,3 +170,10 @@ class Navigator(StateEstimator):
             if begin_s <= time_s < end_s:
                 return index
         return -1
+
+
+@functools.lru_cache(maxsize=64)
+def _shares(seconds: float, correlation_s: tuple[float, ...]) -> tuple[list[float], list[float]]:
+    """What is left of unit processes after so long, and what is new, over a standard normal number."""
+    steps = seconds / np.array(correlation_s)
+    return np.exp(-steps).tolist(), np.sqrt(-np.expm1(-2.0 * steps)).tolist()

@@ -205,12 +205,15 @@ def _tangents(points: ComplexArray) -> tuple[ComplexArray, NDArray[np.bool_]]:
 
 
 def _is_end(scan: RangeScan, ray: int, side: int, apart_m: float) -> bool:
-    steps = np.arange(1, BEYOND + 1)
-    beyond = ray + side * steps
-    rays = len(scan.ranges_m)
-    if not all_round(scan) and not ((beyond >= 0) & (beyond < rays)).all():
+    ranges, rays, closed = scan.ranges_m, len(scan.ranges_m), all_round(scan)
+    own = float(ranges[ray])
+    if not own < FARTHEST * scan.max_range_m:
         return False
-    own = float(scan.ranges_m[ray])
-    further = scan.ranges_m[beyond % rays] - own
-    away = np.hypot(further, own * scan.spacing_rad * steps)
-    return own < FARTHEST * scan.max_range_m and bool(((further > 0.0) & (away > apart_m)).all())
+    for steps in range(1, BEYOND + 1):
+        beyond = ray + side * steps
+        if not (closed or 0 <= beyond < rays):
+            return False
+        further = float(ranges[beyond % rays]) - own
+        if not (further > 0.0 and math.hypot(further, own * scan.spacing_rad * steps) > apart_m):
+            return False
+    return True
