@@ -49,10 +49,7 @@ class Kml(NamedTuple):
 
 
 def read_kml(data: bytes, source: str, most: int) -> Kml:
-    """Reads the bytes of a KML file, or of an archive with one that unpacks to at most `most` bytes.
-
-    `source`, the file or nothing, begins an InputError.
-    """
+    """Reads a KML file, or an archive with one of at most `most` bytes; `source`, or nothing, begins an InputError."""
     if data.startswith(b"PK"):
         try:
             name, data = unpacked(data, ".kml", most)

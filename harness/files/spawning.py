@@ -16,10 +16,9 @@ _starting = threading.Lock()
 
 @contextmanager
 def without_main() -> Iterator[None]:
-    """Processes that are begun in the block, by `spawn`, do not import the `__main__` of this one.
+    """Processes begun in the block, by `spawn`, do not import the `__main__` of this one, which might begin others.
 
-    Else a script that calls us at its top would begin processes without end. An interrupt, which reaches the whole
-    process group, is blocked in them from their first moment on: the parent decides what it means.
+    An interrupt, which reaches the whole process group, is blocked in them from their first moment on.
     """
     with _starting:
         resource_tracker.ensure_running()  # unblocks the interrupt when it begins its own process

@@ -1,8 +1,7 @@
 """YAML as this project reads it: a strict subset, every value with its line.
 
-Plain scalars are resolved by the core schema of YAML 1.2 (https://yaml.org/spec/1.2.2/#103-core-schema):
-`1e3` is a number; `on`, `yes` and `1_000` are text. Duplicate keys, anchors, aliases, merge keys, tags and a
-second document are errors. Size, depth and number of values are bounded.
+Plain scalars are resolved by the core schema of YAML 1.2 (https://yaml.org/spec/1.2.2/#103-core-schema): `1e3` is a
+number; `on` and `1_000` are text. Duplicate keys, anchors, aliases, merge keys, tags and a second document are errors.
 """
 
 from __future__ import annotations

@@ -31,10 +31,7 @@ def replace_bytes(path: Path, content: bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A new file, which takes the place of `path`, on the disk, when the block ends without an error.
-
-    The `strerror` of an OSError names the file.
-    """
+    """A new file, which takes the place of `path` when the block ends without an error; an OSError names the file."""
     partial = path.with_name(path.name + PARTIAL)
     with _naming(path):
         _check_replaceable(path)

@@ -1,7 +1,6 @@
 """`conditions: ideal | typical | rough`: what kind of day it is, and the figures that are drawn for it from the seed.
 
-A day fills in what a scenario leaves out of its navigation, its servos, its air and the deviations of its aircraft.
-The sources of all figures stand in `aircraft/README.md`.
+A day fills in what a scenario leaves out. The sources of all figures stand in `aircraft/README.md`.
 """
 
 from __future__ import annotations

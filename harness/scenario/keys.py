@@ -36,8 +36,7 @@ class TrackabilitySpec(Section):
     airspeed_mps: Annotated[float, Field(gt=0, le=1000)] = DERIVED
     """Error of the true airspeed, averaged over 20 s. Default: a tenth of aircraft.airspeed_mps."""
     load_factor: Annotated[float, Field(gt=1, le=20)] = DERIVED
-    """Load factor, averaged over 1 s. Default: the limit manoeuvring load factor of 14 CFR 23.337 (amendment 23-48) for
-    the aircraft's mass, 2.1 + 24000 / (weight in lb + 10000) and at most 3.8."""
+    """Load factor, averaged over 1 s. Default: 2.1 + 24000 / (weight in lb + 10000), at most 3.8 (14 CFR 23.337)."""
 
 
 RATES_HZ: Final = (STEP_RATE_HZ, 120)
@@ -50,8 +49,7 @@ class Simulation(Section):
     """How finely the flight is integrated."""
 
     rate_hz: Annotated[int, Field(ge=SLOWEST_HZ, le=1200)] = DERIVED
-    """Integration steps per simulated second, a multiple of 10, the guidance rate; every other rate must divide it.
-    Default: 60, or 120 where sensor.rate_hz does not divide 60."""
+    """Integration steps a simulated second, a multiple of 10. Default: 60, or 120 where sensor.rate_hz needs that."""
 
     @field_validator("rate_hz")
     @classmethod
@@ -95,8 +93,7 @@ class ScenarioKeys(Section):
     navigation: Navigation = Navigation()
     """What it believes of its state."""
     conditions: Literal["ideal", "typical", "rough"] = "ideal"
-    """What kind of day it is: fills what is left out of navigation, aircraft.actuators, environment, uncertainty.
-    typical: an ordinary day of a small aircraft; rough: the worst on which one would fly."""
+    """What kind of day fills what is left out of navigation, aircraft.actuators, environment and uncertainty."""
     uncertainty: UncertaintySpec | None = None
     """By how much the flown aircraft differs from its model, 1 sigma. Default: that of the conditions."""
     simulation: Simulation = Simulation()

@@ -1,9 +1,7 @@
 """Planners and guidance laws by name: built-in ones, those of other distributions, and those given to this process.
 
-Another distribution adds one by an entry point, in a group as below, that names a `PlannerKind` or a `GuidanceKind`. A
-kind may be given in Python; a class or function that makes the part for one flight, from what it may know (a planner
-from the mission, a law from the limits of the aircraft) or from nothing; or the part itself, an object with the part's
-methods.
+Another distribution adds one by an entry point that names a `PlannerKind` or a `GuidanceKind`. In Python a kind may be
+given; a class or function that makes the part for one flight, from what it may know or from nothing; or the part.
 """
 
 from __future__ import annotations

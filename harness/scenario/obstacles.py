@@ -105,8 +105,7 @@ class WorldFile(Section):
     default_height_m: Annotated[float, Field(ge=0, le=1000)] = 6.0
     """Height of a building that gives neither height nor levels."""
     ground_m: Annotated[float | None, Field(ge=-1000, le=9000)] = None
-    """Height above mean sea level of flat ground, for heights above ground where no terrain is known. Default: 0 below
-    buildings; zones with limits above ground are refused."""
+    """Height of flat ground where no terrain is known. Default: 0 below buildings; zones above ground are refused."""
 
 
 class Obstacle(Section):

@@ -106,8 +106,8 @@ SURVEYED_M: Final = 300.0
 """Altitude above the sea at which an aircraft's range of airspeeds is measured."""
 NEAR_M: Final = (50.0, 1000.0)
 MIDDLE: Final = 1.05
-"""Between the altitudes `NEAR_M` an aircraft flies level at an airspeed that is by this factor within the range
-measured at `SURVEYED_M`: the density of the air differs by 7 % at most. It need not be trimmed."""
+"""Between the altitudes `NEAR_M` it need not be trimmed at an airspeed that is by this factor within the range measured
+at `SURVEYED_M`: the density of the air differs by 7 % at most."""
 NEAR_SHARE, NEAR_SHIFT = 0.25, 0.01
 """Nor if its deviations are at most these: shares, and the shift over the cube root of the mass (m/kg^1/3)."""
 STEP_M: Final = 50.0

@@ -1,7 +1,6 @@
 """From what a scenario file says to a complete scenario: defaults that follow from other keys or from the aircraft.
 
-`resolve` reads top to bottom in the order in which defaults depend on one another. What an aircraft can do under a
-guidance law may have to be flown, which is then kept on disk.
+`resolve` reads top to bottom in the order in which defaults depend on one another; it may have to fly the aircraft.
 """
 
 from __future__ import annotations
@@ -80,8 +79,7 @@ def resolve(
         least_width_m=max(clearance_m, LEAST_CLEARANCE * radius_m),
     )
     fastest_mps = aircraft.airspeed_mps + wind_mps
-    limit_s = mission.time_limit_s
-    margin_m = planning_margin_m(keys.navigation, fastest_mps, limit_s, clearance_m, radius_m)
+    margin_m = planning_margin_m(keys.navigation, fastest_mps, mission.time_limit_s, clearance_m, radius_m)
     navigation = keys.navigation.filled(margin_m=margin_m)
     weight_lb = airframe_of(aircraft).mass_kg / POUND_KG
     limits = keys.trackability.filled(

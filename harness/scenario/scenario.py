@@ -1,7 +1,7 @@
 """Scenario files: a complete scenario, reading and writing it, and the same with some keys replaced.
 
-Reading has two steps. The text becomes `ScenarioKeys`, which says what the file says. `resolve` then fills in the
-defaults that depend on other keys or on the aircraft, and refuses keys that contradict each other.
+The text becomes `ScenarioKeys`, which says what the file says; `resolve` then fills in defaults and refuses keys that
+contradict each other.
 """
 
 from __future__ import annotations
@@ -25,9 +25,7 @@ from harness.scenario.sections import GuidanceSpec, PlannerSpec, Section
 from harness.scenario.shipped import scenario_path
 from harness.scenario.validation import KeyFaults
 
-OWN_KEYS: Final[Mapping[Loc, type[Section]]] = {
-    ("planner", "kind"): PlannerSpec, ("guidance", "kind"): GuidanceSpec
-}  # fmt: skip
+OWN_KEYS: Final[Mapping[Loc, Any]] = {("planner", "kind"): PlannerSpec, ("guidance", "kind"): GuidanceSpec}
 """Kinds whose own keys stand in a section, and the section's type, which has the keys of all kinds."""
 
 

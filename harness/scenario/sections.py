@@ -1,7 +1,6 @@
 """The sections of a scenario file as frozen types: attribute = key.
 
-Positions are metres in the local ENU plane, x = east, y = north; courses and wind directions are degrees clockwise
-from north.
+Positions are metres in the local ENU plane, x = east, y = north; directions are degrees clockwise from north.
 """
 
 from __future__ import annotations
@@ -241,8 +240,8 @@ class Sensor(Section):
     beam_deg: Annotated[float, Field(ge=0, le=120)] = DERIVED
     """Width of each beam; 0: pencil rays. Default: field_of_view_deg / rays: beams touch, nothing fits between."""
     least_width_m: Length = DERIVED
-    """Width of the narrowest obstacle that there is. It counts where beams do not touch: space is taken to be seen free
-    only as far as nothing so wide can hide between two of them. Default: planner.clearance_m."""
+    """Width of the narrowest obstacle. It counts where beams do not touch: free is seen only as far as nothing so wide
+    can hide between two of them. Default: planner.clearance_m."""
     range_m: Length = DERIVED
     """Largest distance a beam sees. Default: ten times the planned turn radius, rounded up to 100 m."""
     field_of_view_deg: Annotated[float, Field(gt=0, le=360)] = 360.0
@@ -281,13 +280,11 @@ class PlannerSpec(PartSpec):
     kind: str = "rolling_window"
     """A name that `wayproof list planners` prints."""
     clearance_m: Annotated[float, Field(ge=0, le=MAX_COORDINATE_M)] = DERIVED
-    """Wanted distance from every obstacle edge; the boundary must only not be crossed. Planners keep a fiftieth of the
-    turn radius at the least. Default: the planned turn radius, rounded up to 10 m."""
+    """Wanted distance from every obstacle, at least 0.02 turn radii. Default: the turn radius, rounded up to 10 m."""
     compute_latency_s: Annotated[float, Field(ge=0, le=60)] = 0.0
     """A plan takes effect this much after the scan it used."""
     shield: Literal["none", "loiter"] = DERIVED
-    """loiter: a path is flown only as far as a turn from there has been seen to be free; none: as the planner gives it.
-    A kind with +shield at its end means loiter. Default: loiter for rolling_window, none for every other kind."""
+    """loiter: a path is flown only as far as a turn was seen free. Default: loiter for rolling_window, else none."""
 
     @model_validator(mode="before")
     @classmethod

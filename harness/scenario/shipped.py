@@ -53,8 +53,11 @@ def _named(text: str, shipped: dict[str, Path], folder: Path, what: str) -> Path
 def summary(path: Path) -> str:
     """What a scenario is for: the first line of the comment it begins with, the one for editors left out."""
     with path.open(encoding="utf-8") as file:
-        line = next(line for line in file if not line.startswith("# yaml-language-server:"))
-        return line.lstrip("# ").rstrip()
+        return (
+            next(line for line in file if not line.startswith("# yaml-language-server:"))
+            .lstrip("# ")
+            .rstrip()
+        )
 
 
 def _folder() -> Path:
