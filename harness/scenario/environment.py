@@ -35,7 +35,7 @@ class GroundSpec(Section):
     step_m: Annotated[float, Field(gt=0, le=10)] = STEP_M
     """Height from a number to the next."""
     heights: Annotated[str, Field(min_length=1)]
-    """Heights: base64 of zlib of 16-bit little-endian steps from the west, row by row from the south; 65535: unknown."""
+    """Heights: base64 of zlib of 16-bit little-endian steps from the west, row by row from the south; 65535: none."""
 
     @model_validator(mode="after")
     def _can_be_unpacked(self) -> GroundSpec:
