@@ -37,7 +37,7 @@ def compare(
     from harness.comparison.comparison import fly_and_compare
     from harness.scenario.kinds import GUIDANCE, PLANNER, is_source
 
-    loaded = _loaded([scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios)
+    loaded = _loaded(scenarios)
     told = [each.name for each in loaded]
     kinds = _named(planners, PLANNER, "planners")
     parts = [{"planner.kind": kind} for kind in kinds]
@@ -58,7 +58,8 @@ def compare(
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
 
 
-def _loaded(given: Sequence[Scenario | str | Path]) -> list[Scenario]:
+def _loaded(scenarios: Scenario | str | Path | Sequence[Scenario | str | Path]) -> list[Scenario]:
+    given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     return [each if isinstance(each, Scenario) else load_scenario(each) for each in given]
 
 

@@ -80,9 +80,9 @@ def certify(
         print_json(found.plain())
     elif not quiet:
         _print(found, f"{found.subject}: {found.planner}, {found.aircraft}", folder)
-        kept = (run for run in found.failing_runs if (folder / "runs" / str(run)).is_dir())
-        for run in itertools.islice(kept, 1):
-            say(f"view: {shlex.join(['wayproof', 'view', str(folder / 'runs' / str(run))])}")
+        folders = (folder / "runs" / str(run) for run in found.failing_runs)
+        for kept in itertools.islice(filter(Path.is_dir, folders), 1):
+            say(f"view: {shlex.join(['wayproof', 'view', str(kept)])}")
     return 0 if found.verdict == "shown" else FAILED
 
 
