@@ -1,8 +1,4 @@
-"""A run in the files of other tools: missions of QGroundControl and of MAVLink ground stations, GeoJSON, KML.
-
-A mission is the path's points as waypoints at the altitude that the run held; takeoff, landing and fences are left to
-whoever flies it. Its commands and frames: https://mavlink.io/en/messages/common.html.
-"""
+"""A run in the files of other tools; missions: waypoints at the altitude that it held, without takeoff and fences."""
 
 from __future__ import annotations
 

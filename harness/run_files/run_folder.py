@@ -1,8 +1,7 @@
 """The folder of one run: complete only when the manifest says so.
 
-The manifest comes first and says `complete: false`; every other file is written under a temporary name and renamed when
-it is whole; the manifest that says `complete: true` comes last, with checksums. A process killed at any point leaves a
-folder that cannot be taken for a complete run. One process at a time writes to a folder.
+The manifest comes first and says `complete: false`, files are renamed when they are whole, the manifest with checksums
+comes last: a process killed at any point leaves no folder that can be taken for a complete run.
 """
 
 from __future__ import annotations

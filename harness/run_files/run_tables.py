@@ -32,9 +32,7 @@ if TYPE_CHECKING:
 class PlanRow:
     """One row of `plans.parquet`: a plan, in effect from a simulated time on.
 
-    The status is a value of `planner.interface.PlanStatus`. Waypoints are (k, 2), the dense polyline `path_m` (m, 2)
-    east and north, segments (n, 6) the same path exactly, as in `planner.interface.Path`. A last segment that is a
-    `loiter` is flown for ever. The reason is empty in folders of older versions.
+    Places are east, north (m), segments (n, 6) as in `planner.interface.Path`; a last `loiter` has no end.
     """
 
     plan_index: int
