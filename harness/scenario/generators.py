@@ -39,7 +39,7 @@ class Forest(Section):
     size_m: Annotated[tuple[Length, Length], Strict(False)] = (5000.0, 5000.0)
     """Width and height of the area."""
     room_m: Length = 400.0
-    """Least distance of start and goal, south-western and north-eastern, from obstacles; that from the edges."""
+    """Start (south-west) and goal (north-east) are so far from the edges, and at least so far from obstacles."""
     density_1pkm2: Annotated[float, Field(ge=0, le=1e6)] = 2.0
     """How many copses a square kilometre."""
     gap_m: Annotated[float, Field(ge=0, le=MAX_COORDINATE_M)] = 400.0

@@ -30,7 +30,7 @@ class Polygon(Section):
     """A simple polygon, convex or not, its vertices in either direction; kept without repeated vertices."""
 
     vertices_m: Annotated[tuple[Point, ...], Strict(False), FailFast(), Field(min_length=3)]
-    """Vertices in order round the shape: east, north. One that repeats the vertex before it is dropped."""
+    """Vertices in order round the shape: east, north. Repeated ones, also the first at the end, are dropped."""
     holes_m: Rings | None = None
     """Rings inside the shape, in either direction, within which it is free. Default: none."""
 

@@ -131,7 +131,7 @@ class MissionSpec(Section):
     altitude_m: Annotated[float, Field(ge=ALTITUDES_M[0], le=ALTITUDES_M[1])] = 300.0
     """Above mean sea level, held throughout."""
     time_limit_s: Annotated[float, Field(gt=0, le=1e7)] = DERIVED
-    """Simulated. Default: ten times the straight line at airspeed less wind and a minute, rounded up to a minute."""
+    """Simulated, at most. Default: ten times the straight line at airspeed less wind and 60 s, in whole minutes."""
 
     @model_validator(mode="after")
     def _has_each_end_once(self) -> MissionSpec:
@@ -169,7 +169,7 @@ class AutopilotSpec(Section):
     least_airspeed_mps: Annotated[float | None, Field(gt=0, le=1000)] = None
     """Below this true airspeed height goes before speed. Default: 0.97 of the lowest of level flight."""
     state_latency_s: Annotated[float, Field(ge=0, le=2)] = DERIVED
-    """Age of the attitude, airspeed and height that the autopilot is tuned for. Default: navigation.latency_s."""
+    """Age of the attitude, airspeed and height that the autopilot flies by. Default: navigation.latency_s."""
 
     @model_validator(mode="after")
     def _pitch_in_order(self) -> AutopilotSpec:
