@@ -280,7 +280,7 @@ class PlannerSpec(PartSpec):
     kind: str = "rolling_window"
     """A name that `wayproof list planners` prints."""
     clearance_m: Annotated[float, Field(ge=0, le=MAX_COORDINATE_M)] = DERIVED
-    """Wanted distance from every obstacle, at least 0.02 turn radii. Default: the turn radius, rounded up to 10 m."""
+    """Wanted distance from obstacles; 0.02 turn radii are kept anyway. Default: the turn radius, rounded up to 10 m."""
     compute_latency_s: Annotated[float, Field(ge=0, le=60)] = 0.0
     """A plan takes effect this much after the scan it used."""
     shield: Literal["none", "loiter"] = DERIVED
