@@ -135,7 +135,7 @@ def _airframe(spec: AircraftSpec) -> Airframe:
     try:
         return airframe_of(spec)
     except AircraftError as error:
-        for key in ("autopilot", "actuators"):
+        for key in ("actuators", "autopilot"):
             if getattr(spec, key) is not None:
                 _airframe(spec.model_copy(update={key: None}))
                 raise KeyFault(("aircraft", key), str(error)) from error
