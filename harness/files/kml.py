@@ -57,25 +57,40 @@ def read_kml(data: bytes, source: str, most: int) -> Kml:
             raise InputError(f"{source}: {error}" if source else str(error)) from error
         source = f"{source} ({name})" if source else ""
     root = parsed_xml(data, source, "kml")
-    lines, polygons = [], []
-    for number, each in enumerate(named(root, "Placemark"), start=1):
-        name = shown(text_of(each, "name") or f"Placemark {number}")
-        where = f"{source}: {name}" if source else name
-        kept = {item.get("name", ""): text_of(item, "value") for item in named(each, "Data")}
-        kept |= {item.get("name", ""): (item.text or "").strip() for item in named(each, "SimpleData")}
-        lines += [
-            Shape(name, text_of(line, "altitudeMode"), (_points(line, where, "point"),), kept)
-            for line in named(each, "LineString")
-        ]
-        for area in named(each, "Polygon"):
-            rings = [ring for kind in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(area, kind)]
-            if not rings:
-                raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
-            corners = tuple(_points(ring, where, "corner") for ring in rings)
-            polygons.append(Shape(name, text_of(area, "altitudeMode"), corners, kept))
+    marks = list(enumerate(named(root, "Placemark"), start=1))
+    lines, polygons = (
+        [shape for mark in marks for shape in _shapes(*mark, source, kind)]
+        for kind in ("LineString", "Polygon")
+    )
     others = Counter(kind for each in root.iter() if (kind := name_of(each)) in OTHERS)
     others["LinearRing"] -= sum(len(each.rings) for each in polygons)
     return Kml(source, lines, polygons, others)
+
+
+def _shapes(number: int, placemark: Element, source: str, kind: str) -> list[Shape]:
+    """Lines or polygons of a Placemark, with the names and values of its ExtendedData."""
+    name = shown(text_of(placemark, "name") or f"Placemark {number}")
+    where = f"{source}: {name}" if source else name
+    kept = {item.get("name", ""): text_of(item, "value") for item in named(placemark, "Data")}
+    kept |= {item.get("name", ""): (item.text or "").strip() for item in named(placemark, "SimpleData")}
+    rings = _boundary if kind == "Polygon" else _line
+    return [
+        Shape(name, text_of(each, "altitudeMode"), rings(each, where), kept)
+        for each in named(placemark, kind)
+    ]
+
+
+def _line(line: Element, where: str) -> tuple[tuple[Point, ...], ...]:
+    """Points of a LineString."""
+    return (_points(line, where, "point"),)
+
+
+def _boundary(area: Element, where: str) -> tuple[tuple[Point, ...], ...]:
+    """Corners of the outer ring of a Polygon, then of the inner ones."""
+    rings = [ring for kind in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(area, kind)]
+    if not rings:
+        raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
+    return tuple(_points(ring, where, "corner") for ring in rings)
 
 
 def parsed_xml(data: bytes, source: str, root: str) -> Element:

@@ -116,18 +116,22 @@ def log_solids(
         prism(shape, *ends) for shape, *ends in shapes if isinstance(shape, Polygon) and ends[1] > ends[0]
     ]
     if prisms:
-        vertices, normals, faces = zip(*prisms, strict=True)
-        firsts = np.cumsum([0, *map(len, vertices[:-1])], dtype=np.uint32)
-        mesh = rr.Mesh3D(
-            vertex_positions=np.concatenate(vertices),
-            vertex_normals=np.concatenate(normals),
-            triangle_indices=np.concatenate([own + at for own, at in zip(faces, firsts, strict=True)]),
-            albedo_factor=colour,
-        )
-        rec.log(f"{entity}/polygons", mesh, static=static)
+        rec.log(f"{entity}/polygons", _mesh(prisms, colour), static=static)
     terrain = [each for each, (_, low, high) in zip(obstacles, shapes, strict=True) if high <= low]
     if terrain:
         rec.log(f"{entity}/terrain", rims(scene, terrain, colour), static=static)
+
+
+def _mesh(prisms: Sequence[Prism], colour: Colour) -> rr.Mesh3D:
+    """Prisms as one mesh."""
+    vertices, normals, faces = zip(*prisms, strict=True)
+    firsts = np.cumsum([0, *map(len, vertices[:-1])], dtype=np.uint32)
+    return rr.Mesh3D(
+        vertex_positions=np.concatenate(vertices),
+        vertex_normals=np.concatenate(normals),
+        triangle_indices=np.concatenate([own + at for own, at in zip(faces, firsts, strict=True)]),
+        albedo_factor=colour,
+    )
 
 
 def prism(polygon: Polygon, low_m: float, high_m: float) -> Prism:
