@@ -43,6 +43,17 @@ class NpfgConfig:
     damping: float = key(
         0.7, "damping ratio of the track error's decay (NPFG_DAMPING)", "1", minimum=0.1, maximum=1.0
     )
+    lower_period_bound: bool = key(
+        True, "lengthen the period to what the roll time constant allows (NPFG_LB_PERIOD)"
+    )
+    upper_period_bound: bool = key(
+        True, "shorten the period to what a curved path in wind needs (NPFG_UB_PERIOD)"
+    )
+    min_ground_speed_on: bool = key(True, "raise the airspeed to keep a least ground speed (NPFG_EN_MIN_GSP)")
+    track_keeping: bool = key(
+        True, "raise the airspeed to stay on the track in excessive wind (NPFG_TRACK_KEEP)"
+    )
+    wind_regulation: bool = key(True, "let the law raise the airspeed at all (NPFG_WIND_REG)")
     min_ground_speed_mps: float = key(
         5.0, "least ground speed along the path (FW_GND_SPD_MIN)", "m/s", minimum=0.0
     )
@@ -111,10 +122,8 @@ def npfg(at: NpfgInput, has: NpfgConfig, nominal_mps: float, largest_mps: float)
     side = 1.0 if error < 0.0 else -1.0
     bearing = at.tangent * complex(math.sin(look_ahead), -side * math.cos(look_ahead))
     feasible = feasibility(abs(air), at.wind, bearing) * on_track
-    # The ground speed along the bearing that is kept, for its own sake or to stay on the track.
-    eagerness = min(share / TRACK_KEEPING_SHARE, 1.0)
-    least_mps = max(has.min_ground_speed_mps, (1.0 - feasible) * has.max_track_keeping_speed_mps * eagerness)
-    wanted = air_velocity(nominal_mps, largest_mps, least_mps, at.wind, bearing)
+    least_mps = min_ground_speed(has, share, feasible)
+    wanted = air_velocity(has, nominal_mps, largest_mps, least_mps, at.wind, bearing)
 
     acceleration = turning(4.0 * math.pi * has.damping / period, air, wanted)
     acceleration += feasible * proximity * curvature_feedforward(at, abs(air), error)
@@ -145,7 +154,7 @@ def adapted_period(
 ) -> float:
     """The period between what roll can follow and what a curved path in wind needs, s."""
     roll_s, wind_mps = has.roll_time_constant_s or 0.0, abs(at.wind)
-    if roll_s <= SMALL:
+    if not has.lower_period_bound or roll_s <= SMALL:
         return has.period_s
     beaten = wind_mps > airspeed_mps or airspeed_mps < SMALL
     rate = 2.0 * abs(at.right_curvature_1pm) * airspeed_mps
@@ -159,25 +168,37 @@ def adapted_period(
     near = math.sin(look_ahead_angle(min(distance_m / bound, 1.0))) ** 2
     lower = near * safety * curved + (1.0 - near) * safety * straight
     period = max(has.period_s, lower)
-    if rate > SMALL and on_track > 0.0:
+    if has.upper_period_bound and rate > SMALL and on_track > 0.0:
         upper = 4.0 * math.pi * has.damping / (rate * on_track)
         if period > upper:
             period = near * max(lower, upper) + (1.0 - near) * period
     return period
 
 
+def min_ground_speed(has: NpfgConfig, share: float, feasible: float) -> float:
+    """The least ground speed along the bearing, m/s: the one of the aircraft, or what track keeping asks for."""
+    least = 0.0
+    if has.wind_regulation and has.min_ground_speed_on:
+        least = has.min_ground_speed_mps
+    if has.wind_regulation and has.track_keeping:
+        eagerness = min(share / TRACK_KEEPING_SHARE, 1.0)
+        least = max(least, (1.0 - feasible) * has.max_track_keeping_speed_mps * eagerness)
+    return least
+
+
 def air_velocity(
-    nominal: float, largest: float, least_mps: float, wind: complex, bearing: complex
+    has: NpfgConfig, nominal: float, largest: float, least_mps: float, wind: complex, bearing: complex
 ) -> complex:
-    """The air velocity that makes a bearing good at a least ground speed, or comes nearest to it, m/s."""
+    """The air velocity that makes a bearing good, or comes nearest to it, m/s."""
     along, across = dot(wind, bearing), cross(bearing, wind)
 
     def solvable(airspeed: float) -> bool:
         """Whether the wind triangle has a solution that moves along the bearing."""
         return abs(across) < airspeed and (along > 0.0 or abs(wind) < airspeed)
 
+    asks = has.wind_regulation and (has.min_ground_speed_on or has.track_keeping)
     speed = 0.0  # of the wind triangle; 0: none
-    if least_mps > along:
+    if asks and least_mps > along:
         speed = max(math.hypot(least_mps - along, across), nominal)
         if speed > largest:
             if not solvable(largest):
@@ -185,6 +206,8 @@ def air_velocity(
             speed = largest
     elif solvable(nominal):
         speed = nominal
+    elif not has.wind_regulation:
+        return against_wind(nominal, wind, bearing)
     elif not solvable(largest):
         return against_wind(largest, wind, bearing)
     elif along <= 0.0:
