@@ -33,7 +33,6 @@ from harness.mapping.followed_outline import (
 )
 from harness.mapping.scan import RangeScan, all_round, supported
 from harness.mapping.scan_comparison import (
-    SURE,
     abreast_of,
     grown,
     in_a_row,
@@ -99,7 +98,7 @@ class MovingObstacles:
         self._is_free, self._stands = is_free, stands
         self._clearance = clearance_m
         self._apart = clearance_m + 6.0 * noise_m
-        self._sure = SURE * noise_m + 0.02 * clearance_m
+        self._sure = 4.0 * noise_m + 0.02 * clearance_m
         exact, flawed = noise_m == 0.0, noise_m > 0.0 or false_returns
         self._earlier = EarlierScans(clearance_m, self._sure, exact=exact, flawed=flawed)
         self._gate = max(0.5 * clearance_m, 3.0 * noise_m)

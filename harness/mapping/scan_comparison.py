@@ -20,9 +20,8 @@ MISSING = 3
 """A run of returns goes on where no more of them in a row are lost."""
 ABREAST = 2
 """A place was looked through if so many rays to either side went further, too: one or two may be lost returns."""
-SURE = 4.0
-"""Places are surely not the same where so many standard deviations lie between them."""
-ASIDE = 1.5
+
+ASIDE = 2.0
 """Between scans that lie a minute apart a heading changes by up to so many times what is sure of two in a row."""
 
 
@@ -41,11 +40,9 @@ def any_come(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
 def abreast_of(scan: RangeScan, sure_m: float) -> int:
     """How many rays to either side have to go beyond a place that may lie `sure_m` elsewhere at the sensor's range.
 
-    A heading that errs shifts the rim of what stands before open space aside: the rays beside it go far. Errors of
-    ranges do not.
+    A heading that errs shifts the rim of what stands before open space aside: the rays beside it go far.
     """
-    turned_m = max(ASIDE * (sure_m - SURE * scan.noise_m), 0.0)
-    return ABREAST + int(turned_m / (scan.max_range_m * scan.spacing_rad))
+    return ABREAST + int(ASIDE * sure_m / (scan.max_range_m * scan.spacing_rad))
 
 
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
