@@ -32,15 +32,7 @@ from harness.mapping.followed_outline import (
     extent_m,
 )
 from harness.mapping.scan import RangeScan, all_round, supported
-from harness.mapping.scan_comparison import (
-    abreast_of,
-    grown,
-    in_a_row,
-    joined,
-    looked_through,
-    near_any,
-    runs_of,
-)
+from harness.mapping.scan_comparison import grown, in_a_row, joined, looked_through, near_any, runs_of
 from harness.mapping.scan_matching import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, means, register
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
@@ -296,9 +288,7 @@ class MovingObstacles:
         if self._is_free:
             return True
         first = track.at(scan.time_s).points - track.moved
-        gone = (
-            np.count_nonzero(looked_through(scan, first, self._sure, abreast_of(scan, self._sure))) >= FEWEST
-        )
+        gone = np.count_nonzero(looked_through(scan, first, self._sure)) >= FEWEST
         return bool(gone) or self._earlier.have_come(places, FEWEST)
 
     def _found_again(

@@ -21,28 +21,16 @@ MISSING = 3
 ABREAST = 2
 """A place was looked through if so many rays to either side went further, too: one or two may be lost returns."""
 
-ASIDE = 2.0
-"""Between scans that lie a minute apart a heading changes by up to so many times what is sure of two in a row."""
-
 
 def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
     """(k,) which places were looked through by a scan before: what is there now has come."""
-    if not any_come(before, places, sure_m):
-        return np.zeros(len(places), dtype=np.bool_)
-    return looked_through(before, places, sure_m, abreast_of(before, sure_m))
+    any_ = any_come(before, places, sure_m)
+    return looked_through(before, places, sure_m) if any_ else np.zeros(len(places), dtype=np.bool_)
 
 
 def any_come(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
     """Whether `come` may hold for any of (k,) places: in a still world it mostly does not."""
-    return bool(looked_through(before, places, sure_m, abreast_of(before, sure_m), every=FEWEST).any())
-
-
-def abreast_of(scan: RangeScan, sure_m: float) -> int:
-    """How many rays to either side have to go beyond a place that may lie `sure_m` elsewhere at the sensor's range.
-
-    A heading that errs shifts the rim of what stands before open space aside: the rays beside it go far.
-    """
-    return ABREAST + int(ASIDE * sure_m / (scan.max_range_m * scan.spacing_rad))
+    return bool(looked_through(before, places, sure_m, every=FEWEST).any())
 
 
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
