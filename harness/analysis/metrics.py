@@ -45,10 +45,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     planned = planned_profile(track, flight.plans, window)
     lost = flight.reason if flight.outcome is Outcome.LOST_CONTROL else None
     verdicts = legs(track, flight.plans, limits, lost, given)
-    believed_m = track.believed_cross_track_m if track.has_beliefs else track.cross_track_m
-    assert believed_m is not None
-    under_plan = track.plan_index >= 0
-    off_path, load = error_figures(track.cross_track_m[under_plan]), float(track.load_factor.max())
+    load = float(track.load_factor.max())
     return {
         "outcome": flight.outcome.value,
         "reason": flight.reason,
@@ -58,9 +55,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "min_clearance_m": _least(nearest_m),
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
         "clearance_violation_s": float(np.diff(track.time_s)[nearest_m[1:] < limits.clearance_m].sum()),
-        "cross_track_m": off_path,
-        "total_system_error_m": {**off_path},
-        "flight_technical_error_m": error_figures(believed_m[under_plan]),
+        **_off_path(track),
         **_navigation(track, limits),
         "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
         "smoothness": {
@@ -91,6 +86,16 @@ def _timing(flight: Flight) -> dict[str, Any]:
         "realtime_factor": flight.sim_s / flight.wall_s if flight.wall_s > 0 else None,
         "planner_wall_ms": percentiles(flight.compute_wall_ms),
     }
+
+
+def _off_path(track: Track) -> dict[str, Any]:
+    """How far the true and the believed positions were off the path, while a plan was flown."""
+    under_plan = track.plan_index >= 0
+    believed_m = track.believed_cross_track_m if track.has_beliefs else track.cross_track_m
+    assert believed_m is not None
+    total = error_figures(track.cross_track_m[under_plan])
+    technical = error_figures(believed_m[under_plan])
+    return {"cross_track_m": total, "total_system_error_m": {**total}, "flight_technical_error_m": technical}
 
 
 def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:

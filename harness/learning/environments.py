@@ -75,7 +75,11 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
     metadata = {"render_modes": []}  # noqa: RUF012  as gymnasium declares it
 
     def __init__(
-        self, scenario: Scenario | str | Path, step_s: float = 1.0, beams: int | None = None
+        self,
+        scenario: Scenario | str | Path,
+        step_s: float = 1.0,
+        beams: int | None = None,
+        render_mode: None = None,  # asked for by gymnasium's makers of several environments
     ) -> None:
         own = scenario if isinstance(scenario, Scenario) else load_scenario(scenario_path(str(scenario)))
         self._own = self._flown = own

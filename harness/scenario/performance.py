@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
@@ -182,13 +183,18 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
         raise KeyFault(("aircraft", "deviation"), f"must be smaller: {fault}")
     if not flies(SURVEYED_M):
         raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
-    good, bad = SURVEYED_M, start.altitude_m
+    told = _limit_told(flies, start.altitude_m)
+    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {told}: {fault}")
+
+
+def _limit_told(flies: Callable[[float], bool], bad: float) -> str:
+    """What an altitude must be, by bisection between that of the survey and one at which it cannot be flown."""
+    good = SURVEYED_M
     while abs(good - bad) > STEP_M:
         middle = 0.5 * (good + bad)
         good, bad = (middle, bad) if flies(middle) else (good, middle)
     steps = math.floor(good / STEP_M) if bad > good else math.ceil(good / STEP_M)
-    told = f"{'at most' if bad > good else 'at least'} {STEP_M * steps:g}"
-    raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {told}: {fault}")
+    return f"{'at most' if bad > good else 'at least'} {STEP_M * steps:g}"
 
 
 def _is_as_surveyed(deviation: DeviationSpec | None, mass_kg: float) -> bool:
