@@ -59,7 +59,7 @@ def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
 
 def colours(scene: Scene) -> str:
     """What the colours of the views mean, as Markdown."""
-    return LEGEND.format(error=f"{scene.limits.cross_track_threshold_m:g}")
+    return LEGEND.format(error=f"{scene.limits.cross_track_threshold_m:.4g}")
 
 
 def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
