@@ -14,7 +14,7 @@ MAX_TREE_BYTES: Final = 64_000_000
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> bytes:
-    """The bytes of a regular file of at most `most` bytes, or only the first ones."""
+    """Reads a regular file of at most `most` bytes, or only its first `first` bytes."""
     try:
         with open_regular(path) as file:
             too_large = path.stat().st_size > most
@@ -30,7 +30,7 @@ def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> b
 
 
 def text_of(data: bytes) -> str:
-    """The text of some bytes: UTF-8, else Latin-1."""
+    """Decodes bytes as UTF-8, or else as Latin-1; raises InputError where they hold a zero byte."""
     if b"\0" in data:
         raise InputError("is not a text file; must be one, as UTF-8")
     try:
@@ -40,7 +40,7 @@ def text_of(data: bytes) -> str:
 
 
 def json_of(path: Path, lines: bool = False) -> Any:
-    """The content of a JSON file; where `lines`, a list of JSON texts, as they may stand one a line."""
+    """Parses a JSON file; where `lines`, returns a list of the texts in it, which may stand one a line."""
     text = text_of(read_bytes(path, MAX_TREE_BYTES))
     first, _, more = text.lstrip().partition("\n")
     if lines and first.rstrip().endswith("}") and more.lstrip().startswith("{"):

@@ -22,13 +22,13 @@ from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.solids import Layer, Solid, clipped, placed_cells, simplified, sliced_parts
 
 MARGIN: Final = 0.02
-"""What lies outside the area by more than this share of its longer side is left out."""
+"""Parts of a file that lie outside the area by more than this share of its longer side are left out."""
 DECIMALS: Final = 3
 """Decimals of a corner in metres: corners are rounded to a millimetre."""
 MAX_CORNERS: Final = 900_000
 """Most corners of all files together: a scenario with more could not be read again."""
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
-"""Bottom and top of what has none."""
+"""A polygon without a known bottom or top gets these, in metres above mean sea level."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Expanded:
 
 
 class FileFault(InputError):
-    """A file that cannot be used, and its index among those that were asked for."""
+    """Says what makes a file unusable, and gives its index among the files asked for."""
 
     def __init__(self, index: int, sentence: str) -> None:
         super().__init__(sentence)
@@ -84,7 +84,7 @@ def expanded(
     altitude_m: float,
     ground: HeightField | None = None,
 ) -> Expanded:
-    """Obstacles and ground of files in bounds of the plane of a place; `ground` is taken where no file has terrain."""
+    """Returns the obstacles and the ground in the bounds; `ground` is taken where no file has terrain."""
     margin = MARGIN * max(bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1])
     box = bounds_m[0] - margin, bounds_m[1] - margin, bounds_m[2] + margin, bounds_m[3] + margin
     loaded: list[tuple[Contents, Mapping]] = []
@@ -103,20 +103,20 @@ def expanded(
             reach_m = spec.vertical_clearance_m
             layer = Layer(altitude_m - reach_m, altitude_m + reach_m, field, spec.ground_m, bounds_m)
             sources.append(_cut(spec, contents, mapping, layer, box))
-            _check_size(sources)
+            _check_corner_count(sources)
     return Expanded(tuple(sources), field, tuple(notes))
 
 
 @contextmanager
 def blaming(index: int) -> Iterator[None]:
-    """Turns an error of a file into one that says which file."""
+    """Turns an InputError raised inside the block into a FileFault with the index of the file."""
     try:
         yield
     except InputError as error:
         raise FileFault(index, str(error)) from error
 
 
-def _check_size(sources: Sequence[Source]) -> None:
+def _check_corner_count(sources: Sequence[Source]) -> None:
     every = [each for source in sources for each in source.polygons]
     corners = int(shapely.get_num_coordinates(np.array(every, dtype=object)).sum())
     if corners > MAX_CORNERS:
@@ -127,7 +127,7 @@ def _check_size(sources: Sequence[Source]) -> None:
 
 
 def loaded_file(spec: FileSpec) -> Contents:
-    """Contents of a file; the last few are kept, for who flies the same files many times."""
+    """Reads a file; the last few are cached, for flights that use the same files many times."""
     try:
         stamp = spec.path.stat()
     except (OSError, ValueError) as error:
@@ -154,7 +154,7 @@ def _loaded(path: Path, stamp: tuple[int, int], kind: str | None, reading: Readi
 
 
 def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
-    """X and y, in the file, of the corners of all that it holds, of each part those of its box; empty without any."""
+    """Returns x and y, in the file, of the corners of its raster and of each part's box; empty where it has neither."""
     found = [np.zeros((0, 2))]
     if (raster := contents.raster) is not None:
         rows, columns = raster.values.shape
@@ -185,7 +185,7 @@ def _check_place(contents: Contents, mapping: Mapping, box: Box) -> None:
 
 
 def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box: Box) -> Source:
-    """The polygons of one file."""
+    """Returns the polygons of one file that are solid in a layer of heights, in a box of the plane."""
     notes = list(contents.notes)
     if layer.field is None and layer.flat_m is None and any(part.rigid for part in contents.parts):
         layer = layer._replace(flat_m=0.0)
@@ -207,7 +207,7 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
 
 
 def _tolerance_m(spec: FileSpec, contents: Contents, mapping: Mapping) -> float:
-    """By how much outlines may be simplified: by default a cell of a raster."""
+    """Tells by how many metres outlines may be simplified; by default a cell's side of a raster, else 0.1 m."""
     if spec.tolerance_m is not None or contents.raster is None:
         return 0.1 if spec.tolerance_m is None else spec.tolerance_m
     rows, columns = contents.raster.values.shape
@@ -215,7 +215,7 @@ def _tolerance_m(spec: FileSpec, contents: Contents, mapping: Mapping) -> float:
 
 
 def _solid_cells(raster: Raster, spec: FileSpec, low_m: float, notes: list[str]) -> BoolArray:
-    """Which cells of a raster are solid: occupied, or at least as high as the lowest height of the aircraft."""
+    """Tells which cells of a raster are solid: occupied, or no lower than the lowest altitude of the aircraft."""
     missing = np.isnan(raster.values)
     taken, key = (spec.unknown, "unknown") if raster.occupancy else (spec.nodata, "nodata")
     if missing.any():
@@ -225,7 +225,7 @@ def _solid_cells(raster: Raster, spec: FileSpec, low_m: float, notes: list[str])
 
 
 def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
-    """The union of polygons, simplified, with corners on a fine grid, valid."""
+    """Returns the union of polygons, simplified and valid, with corners rounded to `DECIMALS`."""
     merged = shapely.get_parts(shapely.disjoint_subset_union_all(polygons))
     grown = simplified([each for each in merged if each.geom_type == "Polygon"], tolerance_m)
     shapes = np.array(shapely.get_parts(shapely.disjoint_subset_union_all(grown)), dtype=object)
@@ -237,7 +237,7 @@ def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
 
 
 def _heights(polygons: Sequence[Any], solids: Sequence[Solid]) -> Iterator[tuple[float, float]]:
-    """Bottom and top of each polygon: the lowest and the highest of the solids that it was made of."""
+    """Yields bottom and top of each polygon, the lowest and the highest of the solids that it was made of."""
     tree = shapely.STRtree(shapely.point_on_surface(np.array([each.shape for each in solids], dtype=object)))
     for polygon in polygons:
         inside = [solids[index] for index in tree.query(polygon, predicate="intersects").tolist()]

@@ -14,9 +14,9 @@ from harness.world_files.parts import Box, FloatArray
 
 CELLS_A_SIDE: Final = 320
 """The longer side of an area is divided into this many cells."""
-TURNS: Final = (2.5, 1.5, 1.2)
-"""Room round start and goal beyond the clearance, in turn radii, as much as there is: 2 hold a circle to a side."""
-LEAST_WAY: Final = 8.0
+ROOM_RADII: Final = (2.5, 1.5, 1.2)
+"""Room round start and goal beyond the clearance, in turn radii; the largest that fits. 2 hold a circle to one side."""
+WAY_RADII: Final = 8.0
 """Start and goal are at least this many turn radii apart."""
 DIRECTIONS: Final = 24
 """Places far apart are sought in this many directions."""
@@ -32,7 +32,7 @@ class FreeRoom:
 
 
 def free_room(polygons: Sequence[Any], bounds_m: Box) -> FreeRoom:
-    """Distances in an area from solid polygons and from its border."""
+    """Returns each cell's distance to solid polygons and to the border of an area."""
     from scipy import ndimage
 
     xmin, ymin, xmax, ymax = bounds_m
@@ -52,26 +52,26 @@ def free_room(polygons: Sequence[Any], bounds_m: Box) -> FreeRoom:
 
 
 def ends(room: FreeRoom, turn_radius_m: float, clearance_m: float, turning: bool) -> FloatArray | None:
-    """Start and goal, (2, 2): two places far apart with room to turn, joined by a corridor; None where there are none.
+    """Returns start and goal, (2, 2), far apart, with room to turn and joined by a corridor; None where there are none.
 
-    The corridor has the clearance to both sides of its middle; where `turning`, room to turn round too.
+    The corridor has the clearance on both sides of its middle, and room to turn round too where `turning`.
     """
     from scipy import ndimage
 
     corridors, _ = ndimage.label(room.room_m >= clearance_m + turning * turn_radius_m)
-    for turns in TURNS:
+    for turns in ROOM_RADII:
         fits = (room.room_m >= clearance_m + turns * turn_radius_m) & (corridors > 0)
         numbers = np.unique(corridors[fits]).tolist()
         pairs = [_farthest(np.argwhere(fits & (corridors == number))) for number in numbers]
         pair = max(pairs, key=lambda pair: float(np.hypot(*(pair[1] - pair[0]))), default=np.zeros((2, 2)))
         places: FloatArray = np.array(room.corner_m) + (pair[:, ::-1] + 0.5) * room.cell_m
-        if np.hypot(*(places[1] - places[0])) >= LEAST_WAY * turn_radius_m:
+        if np.hypot(*(places[1] - places[0])) >= WAY_RADII * turn_radius_m:
             return places
     return None
 
 
 def _farthest(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The two of some cells that are furthest apart along one of several directions, the western first."""
+    """Picks the two cells that are furthest apart along one of several directions, the western one first."""
     angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     along = cells @ np.array((np.cos(angle), np.sin(angle)))
     best = along[:, np.ptp(along, axis=0).argmax()]

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from harness.world_files.plane import Mapping
 
 NO_HEIGHT: Final = 65_535
-"""Number that stands for a height that is not known."""
+"""This number stands for a height that is not known."""
 MAX_NODES: Final = 4_000_000
 """A field has at most this many heights."""
-MOST_NODES: Final = 1_000_000
-"""More than these make the field coarser than the file, which is told."""
+COARSER_NODES: Final = 1_000_000
+"""A field that would have more heights than this is made coarser than its file, and a note says so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def bilinear(values: FloatArray, column: FloatArray, row: FloatArray) -> FloatAr
 
 
 def _between(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArray:
-    """Linear between two values; exactly the first at 0 even where the second is NaN, and the second at 1."""
+    """Interpolates linearly; gives exactly the first value at 0 even where the second is NaN, and the second at 1."""
     mixed = first + share * (second - first)
     return np.where(share <= 0.0, first, np.where(share >= 1.0, second, mixed))
 
@@ -84,7 +84,7 @@ def packed(heights_m: FloatArray, lowest_m: float, step_m: float) -> str:
 
 
 def unpacked(text: str, rows: int, columns: int, lowest_m: float, step_m: float) -> FloatArray:
-    """What `packed` was given, to the step; a ValueError says that the text is not that of so many heights."""
+    """Decodes the text of `packed` into heights (m); raises ValueError unless it holds rows x columns of them."""
     size = 2 * rows * columns
     if rows * columns > MAX_NODES:
         raise ValueError(f"has {rows} x {columns} heights; must be at most {MAX_NODES:,}")
@@ -101,7 +101,7 @@ def unpacked(text: str, rows: int, columns: int, lowest_m: float, step_m: float)
 
 
 def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[HeightField | None, list[str]]:
-    """The ground in a box of the plane, at about the files' own spacing, and what there is to say of it.
+    """Returns the ground in a box of the plane, at about the files' own spacing, and notes on what was changed.
 
     A height is bilinear between the middles of a file's cells, and that of the next middle within half a cell of the
     edge. Of several files the first that knows a place counts. None where no file reaches into the box.
@@ -113,8 +113,8 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
     right, up = (_rounded(min(each[k] for each in known)) for k in (0, 1))
     notes = []
     nodes = ((xmax - xmin) / right + 1) * ((ymax - ymin) / up + 1)
-    if nodes > MOST_NODES:
-        factor = math.ceil(math.sqrt(nodes / MOST_NODES))
+    if nodes > COARSER_NODES:
+        factor = math.ceil(math.sqrt(nodes / COARSER_NODES))
         right, up = factor * right, factor * up
         notes.append(f"the ground is kept every {right:g} m, coarser than the file: its area is large")
     columns, rows = int((xmax - xmin) / right) + 2, int((ymax - ymin) / up) + 2
@@ -134,7 +134,7 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
 
 
 def window_of(raster: Raster, mapping: Mapping, box: Box) -> tuple[slice, slice]:
-    """Rows and columns that cover a box of the plane."""
+    """Returns the rows and the columns of a raster that cover a box of the plane."""
     share = np.linspace(0.0, 1.0, 33)
     x, y = (low + share * (high - low) for low, high in ((box[0], box[2]), (box[1], box[3])))
     across, along = np.meshgrid(x, box[1::2]), np.meshgrid(box[::2], y)
@@ -158,7 +158,7 @@ def _spacing(raster: Raster, mapping: Mapping, box: Box) -> tuple[float, float] 
 
 
 def cell_sides(raster: Raster, mapping: Mapping, column: float, row: float) -> tuple[float, float] | None:
-    """Lengths in the plane of the two sides of a cell, metres; None where its place has none."""
+    """Returns the lengths (m) in the plane of the two sides of a cell; None where the cell has no place there."""
     x, y = raster.places(column + np.array([0.0, 1.0, 0.0]), row + np.array([0.0, 0.0, 1.0]))
     east, north = mapping.to_plane(x, y)
     sides = np.hypot(east[1:] - east[0], north[1:] - north[0]).tolist()
@@ -166,6 +166,6 @@ def cell_sides(raster: Raster, mapping: Mapping, column: float, row: float) -> t
 
 
 def _rounded(spacing_m: float) -> float:
-    """Down to two digits."""
+    """Rounds a spacing down to two significant digits."""
     digits = 1 - math.floor(math.log10(spacing_m))
     return math.floor(spacing_m * 10.0**digits) / 10.0**digits

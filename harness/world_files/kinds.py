@@ -46,13 +46,13 @@ GROUPS: Final[dict[str, dict[str, Reader]]] = {
     "fences": {"plan_fence": fences.read_plan, "ardupilot_fence": fences.read_ardupilot},
     "occupancy": {"ros_map": occupancy.read_ros, "moving_ai": occupancy.read_moving_ai},
 }
-"""Readers by the name of their kind, by what they hold. The name of a group may stand for any of its kinds."""
+"""The reader of each kind of file, by what files of the kind hold. A group's name may stand for any of its kinds."""
 KINDS: Final[dict[str, Reader]] = {kind: read for group in GROUPS.values() for kind, read in group.items()}
 
 IMAGE: Final = "an image; give the YAML file of its ROS map"
 GAZEBO: Final = "a Gazebo world; give its footprints as GeoJSON, or its cells as a MovingAI .map"
 FLIGHT: Final = "a flight, not a world; `wayproof check` takes flown paths"
-GIVEN_UP: Final = {
+REFUSED: Final = {
     **{".pgm": IMAGE, ".png": IMAGE, ".world": GAZEBO, ".sdf": GAZEBO, ".igc": FLIGHT, ".gpx": FLIGHT},
     **dict.fromkeys((".gpkg", ".shp", ".fgb"), "a vector file; make GeoJSON of it (ogr2ogr a.geojson FILE)"),
     ".scen": "a list of MovingAI problems; give the .map file that it names",
@@ -60,18 +60,18 @@ GIVEN_UP: Final = {
     "rally": "a list of rally points: places to return to, no obstacles; give the fence",
     "overpass": "JSON of Overpass; ask it for XML ([out:xml]) and give that",
 }
-"""Files that are not read, by their ending or kind, with what would do."""
+"""What a file that is not read is, by its ending or kind, and what to give instead."""
 FAMILIES: Final = "; ".join(f"{group} ({', '.join(kinds)})" for group, kinds in GROUPS.items())
-HEAD: Final = 65_536
-"""Bytes at the begin of a file by which its kind is told, but for JSON."""
-_BINARY: Final = (
+HEAD_BYTES: Final = 65_536
+"""The kind of a file that is not JSON is told from this many bytes at its begin."""
+_BINARY_BEGINS: Final = (
     ("geotiff", re.compile(rb"II[*+]\0|MM\0[*+]")),
     ("osm_pbf", re.compile(rb"(?s).{0,53}OSMHeader")),
 )
-_PACKED: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}
-"""Kind of a ZIP archive by the ending of a file in it."""
-_PLACE: Final = r"[ \t]*[-+]?\d+\.\d+[ \t,]+[-+]?\d+\.\d+[ \t]*\n"
-_TEXT: Final = (
+_KIND_IN_ZIP: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}
+"""The kind of a ZIP archive by the ending of a file in it."""
+_PLACE_LINE: Final = r"[ \t]*[-+]?\d+\.\d+[ \t,]+[-+]?\d+\.\d+[ \t]*\n"
+_TEXTS: Final = (
     ("rally", r"\Arally\b"),
     ("osm", r"\A<(?:[?!][^<]*<)*osm[\s>/]"),
     ("kml", r"\A<(?:[?!][^<]*<)*(?:[a-z_][\w.-]*:)?kml[\s>/]"),
@@ -79,10 +79,10 @@ _TEXT: Final = (
     ("moving_ai", r"\Atype\b(?:.*\n){1,5}?map$"),
     ("ros_map", r"\A(?=[^\0]*^image:)(?=[^\0]*^resolution:)"),
     ("openair", r"^(AC\s|AN\s(.*\n)+?(DP|DC|DA|DB|DY)\s)"),
-    ("ardupilot_fence", rf"\A(?:QGC WPL.*\n.|(?:{_PLACE}){{3}})"),
+    ("ardupilot_fence", rf"\A(?:QGC WPL.*\n.|(?:{_PLACE_LINE}){{3}})"),
 )
-"""Kind of a text, without comments, by what it has; an airspace begins with its class, or with its name and a shape."""
-_JSON: Final = (
+"""Kind of a text without comments by a pattern in it; an airspace begins with its class, or its name and a shape."""
+_JSON_PATTERNS: Final = (
     ("overpass", r'"generator"\s*:\s*"Overpass'),
     ("cityjson", r'"CityObjects"\s*:'),
     ("plan_fence", r'"geoFence"\s*:|"fileType"\s*:\s*"Plan"'),
@@ -90,11 +90,11 @@ _JSON: Final = (
     ("ed318", r'"(?:layer|extent)"\s*:\s*\{'),
     ("geojson", r'"type"\s*:\s*"(?:Feature(?:Collection)?|(?:Multi)?Polygon|GeometryCollection)"'),
 )
-"""Kind of a JSON file by a key that it has somewhere; the first that is found counts."""
+"""The kind of a JSON file by a key that it has somewhere; the first that is found counts."""
 
 
 def read(path: Path, kind: str | None, reading: Reading) -> Contents:
-    """Reads a world file of a kind of `KINDS`; without one, or with one of `GROUPS`, it is told from the file."""
+    """Reads a world file as a kind of `KINDS`; where `kind` is None or of `GROUPS`, the content tells the kind."""
     bounded.read_bytes(path, first=1)  # a library might wait for who writes a pipe
     found = kind if kind in KINDS else kind_of(path)
     if kind in GROUPS and found not in GROUPS[kind]:
@@ -104,7 +104,7 @@ def read(path: Path, kind: str | None, reading: Reading) -> Contents:
 
 
 def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
-    """Notes, those that say the same of several parts made one."""
+    """Joins notes that say the same of several parts into one."""
     names: dict[str, list[str]] = {}
     for note in notes:
         name, its, sentence = note.rpartition(": its ")
@@ -117,52 +117,53 @@ def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def kind_of(path: Path) -> str:
-    """The kind of a file, told from what stands in it; of none of them, an InputError says what would do."""
-    first, ending = bounded.read_bytes(path, first=HEAD), path.suffix.lower()
+    """Tells the kind of a file from its content; for any other file the InputError says what to give instead."""
+    first, ending = bounded.read_bytes(path, first=HEAD_BYTES), path.suffix.lower()
     if not first:
         raise InputError("is empty; get it again")
     if path.name.lower().endswith((".hgt", ".hgt.gz")):
         return "srtm"
-    found = next((kind for kind, pattern in _BINARY if pattern.match(first)), None)
-    found = found or (_packed(path) if first[:2] == b"PK" else _text(path, first))
-    if found is None or found in GIVEN_UP:
-        given_up = GIVEN_UP.get(found or ending)
+    found = next((kind for kind, pattern in _BINARY_BEGINS if pattern.match(first)), None)
+    found = found or (_zip_kind(path) if first[:2] == b"PK" else _text_kind(path, first))
+    if found is None or found in REFUSED:
+        given_up = REFUSED.get(found or ending)
         raise InputError(f"is {given_up}" if given_up else f"is of no kind that is known; give {FAMILIES}")
     return found
 
 
-def _packed(path: Path) -> str:
-    """The kind of a ZIP archive."""
+def _zip_kind(path: Path) -> str:
+    """Tells the kind of a ZIP archive from the names in it."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = [name.lower() for name in archive.namelist() if not name.endswith("/")]
     except (zipfile.BadZipFile, OSError, ValueError) as error:
         raise InputError("is a damaged ZIP archive; get it again") from error
-    found = [kind for end, kind in _PACKED.items() if any(name.endswith(end) for name in names)]
+    found = [kind for end, kind in _KIND_IN_ZIP.items() if any(name.endswith(end) for name in names)]
     if not found:
         held = names[0].rpartition("/")[2][:40] if names else "nothing"
         raise InputError(f"is a ZIP archive with {held!r}; unpack it and give the file")
     return found[0]
 
 
-def _text(path: Path, first: bytes) -> str | None:
-    """The kind of a text."""
+def _text_kind(path: Path, first: bytes) -> str | None:
+    """Tells the kind of a text file; None where no pattern matches."""
     if b"\0" in first:
         return None
     text = bounded.text_of(first).lstrip("\ufeff\x1e \t\r\n")
     if text[:1] in ("{", "["):
-        return _json(path)
+        return _json_kind(path)
     lines = [line.strip() for line in text.splitlines()]
     text = "\n".join(line for line in lines if line and line[0] not in "*#") + "\n"
     return next(
-        (kind for kind, pattern in _TEXT if re.search(pattern, text, re.MULTILINE | re.IGNORECASE)), None
+        (kind for kind, pattern in _TEXTS if re.search(pattern, text, re.MULTILINE | re.IGNORECASE)),
+        None,
     )
 
 
-def _json(path: Path) -> str | None:
-    """The kind of a JSON file."""
+def _json_kind(path: Path) -> str | None:
+    """Tells the kind of a JSON file; raises InputError if it is no JSON."""
     text = bounded.text_of(bounded.read_bytes(path, bounded.MAX_TREE_BYTES))
-    found = next((kind for kind, pattern in _JSON if re.search(pattern, text)), None)
+    found = next((kind for kind, pattern in _JSON_PATTERNS if re.search(pattern, text)), None)
     if found is None:
         bounded.json_of(path)  # says so where it is no JSON at all
     return found

@@ -23,11 +23,11 @@ Box = tuple[float, float, float, float]
 WGS84: Final = "EPSG:4326"
 FOOT_M: Final = 0.3048
 LEVEL_M: Final = 3.0
-"""Height of a storey where a file gives storeys only."""
+"""Height of a storey (m), for a building whose file gives only the number of storeys."""
 
 
 class Datum(Enum):
-    """What a height is counted from."""
+    """The reference that a height is counted from."""
 
     SEA = "above mean sea level"
     GROUND = "above ground"
@@ -77,7 +77,7 @@ class Raster:
 
     @property
     def middle_x(self) -> float:
-        """X of the middle."""
+        """X of the raster's middle, in the coordinates of the file."""
         rows, columns = self.values.shape
         return float(self.affine[0] * columns / 2 + self.affine[1] * rows / 2 + self.affine[2])
 
@@ -95,7 +95,7 @@ class Raster:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """What was read from a file, its crs as pyproj takes it, None for metres of its own, and what was assumed."""
+    """Parts or raster of a file, its crs as pyproj takes it (None for metres of its own), and notes on assumptions."""
 
     kind: str
     crs: str | None
@@ -106,13 +106,13 @@ class Contents:
 
     @property
     def terrain(self) -> Raster | None:
-        """Heights of the ground."""
+        """The raster if it holds heights of the ground, else None."""
         return None if self.raster is None or self.raster.occupancy else self.raster
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How a file is to be read where it leaves that open: side of a cell, coordinates, height of a building without."""
+    """Answers to what a file may leave open: side of a cell, crs, height of a building that has none."""
 
     metres_per_cell: float | None = None
     crs: str | None = None

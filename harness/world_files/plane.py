@@ -20,7 +20,7 @@ from harness.world_files.parts import WGS84, FloatArray
 
 TURN_DEG: Final = 360.0
 METRES: Final = ("m", "metre", "meter", "metres", "meters", "degree")
-"""Units of heights that are metres; of a system in degrees without heights they are metres as well."""
+"""Names of the metre as a unit of heights; a crs in degrees that says nothing of heights counts as metres too."""
 
 
 class Place(NamedTuple):
@@ -39,7 +39,7 @@ class Mapping:
     shift_m: tuple[float, float] = (0.0, 0.0)
 
     def to_plane(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """East and north of places in the file; not finite where there is none."""
+        """Returns east and north (m) of places in the file, not finite where a place has none."""
         if self.crs is None:
             return x + self.shift_m[0], y + self.shift_m[1]
         east, north = self._transformer.transform(x, y)
@@ -48,7 +48,7 @@ class Mapping:
     def from_plane(
         self, east: FloatArray, north: FloatArray, about_x: float
     ) -> tuple[FloatArray, FloatArray]:
-        """X and y in the file of places of the plane, longitudes by the turn that is nearest to `about_x`."""
+        """Returns x and y in the file of places in the plane; longitudes are the equal ones nearest to `about_x`."""
         if self.crs is None:
             return east - self.shift_m[0], north - self.shift_m[1]
         x, y = (np.asarray(each) for each in self._transformer.transform(east, north, direction="INVERSE"))
@@ -57,21 +57,21 @@ class Mapping:
         return np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
 
     def geometries(self, shapes: Any) -> Any:
-        """Shapely geometries of the file in the plane."""
+        """Maps shapely geometries from the file to the plane."""
         return shapely.transform(shapes, lambda p: np.column_stack(self.to_plane(p[:, 0], p[:, 1])))
 
     @cached_property
     def _transformer(self) -> Any:
-        """From the file to the plane. Its datum must be named: of an ellipsoid alone no datum shift is made."""
+        """Transforms from the file to the plane. The datum is named: pyproj shifts none for an ellipsoid alone."""
         latitude, longitude = self.place
         plane = f"+proj=aeqd +lat_0={latitude!r} +lon_0={longitude!r} +datum=WGS84"
-        return Transformer.from_crs(_system(self.crs or WGS84).to_2d(), plane, always_xy=True)
+        return Transformer.from_crs(_pyproj_crs(self.crs or WGS84).to_2d(), plane, always_xy=True)
 
 
-def check_metres(crs: str, named: str = "") -> None:
-    """Raises InputError unless heights are metres: by the name of their unit, the vertical system, or the plane."""
-    axes = _system(crs).axis_info
-    unit = named or next((axis.unit_name for axis in axes if axis.direction == "up"), axes[0].unit_name)
+def check_metres(crs: str, unit: str = "") -> None:
+    """Raises InputError unless heights are in metres: by `unit` if given, else the upward axis, else the plane's."""
+    axes = _pyproj_crs(crs).axis_info
+    unit = unit or next((axis.unit_name for axis in axes if axis.direction == "up"), axes[0].unit_name)
     if unit.strip().lower() not in METRES:
         raise InputError(
             f"has heights in {unit[:20]}; make them metres, or give a crs with heights in metres, as EPSG:2263+5703"
@@ -80,10 +80,10 @@ def check_metres(crs: str, named: str = "") -> None:
 
 def in_degrees(name: str | None) -> bool:
     """Whether coordinates of a coordinate reference system are longitude and latitude in degrees."""
-    return name is not None and bool(_system(name).to_2d().is_geographic)
+    return name is not None and bool(_pyproj_crs(name).to_2d().is_geographic)
 
 
-def _system(name: str) -> Any:
+def _pyproj_crs(name: str) -> Any:
     try:
         return CRS.from_user_input(name)
     except CRSError as error:
@@ -91,7 +91,7 @@ def _system(name: str) -> Any:
 
 
 def short_way(longitudes_deg: FloatArray) -> FloatArray:
-    """Longitudes by the turns that are nearest to the first: across the antimeridian, files go on at its other side."""
+    """Adds whole turns to longitudes to bring each nearest to the first; a file goes on across the antimeridian."""
     from_first = longitudes_deg - longitudes_deg[:1]
     nearest: FloatArray = longitudes_deg - TURN_DEG * np.round(from_first / TURN_DEG)
     return nearest
@@ -99,6 +99,6 @@ def short_way(longitudes_deg: FloatArray) -> FloatArray:
 
 def geodetic(crs: str, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Latitude and longitude (WGS84, degrees) of places in a file."""
-    transformer = Transformer.from_crs(_system(crs).to_2d(), WGS84, always_xy=True)
+    transformer = Transformer.from_crs(_pyproj_crs(crs).to_2d(), WGS84, always_xy=True)
     longitude, latitude = transformer.transform(x, y)
     return np.asarray(latitude, dtype=np.float64), np.asarray(longitude, dtype=np.float64)

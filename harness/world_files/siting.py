@@ -22,22 +22,22 @@ from harness.world_files.expansion import (
     expanded,
     loaded_file,
 )
-from harness.world_files.free_room import LEAST_WAY, TURNS, FreeRoom, ends, free_room
+from harness.world_files.free_room import ROOM_RADII, WAY_RADII, FreeRoom, ends, free_room
 from harness.world_files.parts import WGS84, Box, Contents, FloatArray
 from harness.world_files.plane import TURN_DEG, Mapping, Place, geodetic, short_way
 from harness.world_files.solids import placed_cells
 
 ANY_PLACE: Final = Place(47.0, 8.0)
-"""Where the plane lies of a file that has no place on earth."""
-LARGEST_TURNS, LARGEST_M = 400.0, 400_000.0
-"""Longest side of an area, in turn radii and in metres: a part of a larger file is taken."""
-PAD_TURNS: Final = 12.0
-"""The area reaches this many turn radii beyond buildings and zones, which leaves room around them."""
+"""The plane of a file that has no place on earth lies here."""
+LARGEST_RADII, LARGEST_M = 400.0, 400_000.0
+"""Longest side of an area in turn radii, and in metres; of a larger file a part is taken."""
+PAD_RADII: Final = 12.0
+"""The area reaches this many turn radii beyond buildings and zones."""
 
 
 @dataclass(frozen=True)
 class Craft:
-    """What the area must have room for: the turn radius that plans may ask for, and the wanted clearance."""
+    """The aircraft that the area must have room for: turn radius that plans may ask for, and wanted clearance."""
 
     name: str
     turn_radius_m: float
@@ -46,7 +46,7 @@ class Craft:
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """An area with a mission, start and goal (2, 2); the place is the plane's origin, None without one on earth."""
+    """An area with a mission, start and goal (2, 2); `place` is the plane's origin, None without one on earth."""
 
     specs: tuple[FileSpec, ...]
     place: Place | None
@@ -58,14 +58,14 @@ class Site:
 
 @dataclass(frozen=True)
 class _Files:
-    """Files with what they hold, in the plane of a place; without one they keep their own metres."""
+    """Files with their contents and the origin of the plane; without a `place` they keep their own metres."""
 
     specs: tuple[FileSpec, ...]
     contents: tuple[Contents, ...]
     place: Place | None
 
     def placed(self) -> list[tuple[Contents, Mapping]]:
-        """What each file holds, with the mapping of its coordinates to the plane."""
+        """Pairs each file's contents with the mapping of its coordinates to the plane."""
         each = zip(self.specs, self.contents, strict=True)
         return [(held, Mapping(held.crs, self.place or ANY_PLACE, spec.shift_m)) for spec, held in each]
 
@@ -107,7 +107,7 @@ def _in_area(
     craft: Craft,
     places: FloatArray | None,
 ) -> Site:
-    """A mission in an area, or a sentence with the numbers that say why there is none."""
+    """Returns a site in one area; an InputError gives the numbers that say why there is none."""
     if files.place is None:
         places = None if places is None else places - bounds[:2]
         shifts = (np.subtract(spec.shift_m, bounds[:2]).tolist() for spec in files.specs)
@@ -127,7 +127,7 @@ def _in_area(
 
 
 def _read(specs: Sequence[FileSpec], tell: Callable[[str], None]) -> tuple[Contents, ...]:
-    """What the files hold; either all have a place on earth or none."""
+    """Reads the files; raises FileFault if some have a place on earth and others have none."""
     contents: list[Contents] = []
     for index, spec in enumerate(specs):
         tell(f"reading {spec.path.name}")
@@ -140,25 +140,25 @@ def _read(specs: Sequence[FileSpec], tell: Callable[[str], None]) -> tuple[Conte
 
 
 def _origin(contents: Sequence[Contents], given: FloatArray | None) -> Place:
-    """The origin: between start and goal, else in the middle of what the files hold."""
+    """Returns the plane's origin: between start and goal, else in the middle of the files."""
     if given is not None:
-        return _place(float(np.mean(given[:, 0])), float(np.mean(short_way(given[:, 1]))))
+        return _rounded_place(float(np.mean(given[:, 0])), float(np.mean(short_way(given[:, 1]))))
     found = np.hstack([np.stack(geodetic(str(each.crs), *corners_of(each))) for each in contents])
     latitude, longitude = found[:, np.isfinite(found).all(axis=0)]
     if not len(latitude):
         raise InputError("nothing of these files has a place on earth; their crs may be another")
     north, east = (0.5 * float(x.min() + x.max()) for x in (latitude, short_way(longitude)))
-    return _place(min(max(north, -84.0), 84.0), east)
+    return _rounded_place(min(max(north, -84.0), 84.0), east)
 
 
-def _place(latitude_deg: float, longitude_deg: float) -> Place:
+def _rounded_place(latitude_deg: float, longitude_deg: float) -> Place:
     return Place(round(latitude_deg, 5), round(math.remainder(longitude_deg, TURN_DEG), 5))
 
 
 def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tuple[_Files, Box, list[str]]]:
-    """Bounds about start and goal, else of what the files hold; of large ones the most crowded part and others."""
-    inside, around = _covered(files)
-    pad = PAD_TURNS * craft.turn_radius_m
+    """Yields bounds round start and goal, else round the files; of large files the most crowded part, then others."""
+    inside, around = _file_boxes(files)
+    pad = PAD_RADII * craft.turn_radius_m
     if given is not None:
         reach = max(pad, 0.25 * math.dist(*given))
         about = (*(given.min(axis=0) - reach).tolist(), *(given.max(axis=0) + reach).tolist())
@@ -169,7 +169,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     if whole is None:
         raise InputError("nothing of these files lies in one area; must overlap")
     sides = np.subtract(whole[2:], whole[:2])
-    half = np.minimum(sides, min(LARGEST_TURNS * craft.turn_radius_m, LARGEST_M)) / 2.0
+    half = np.minimum(sides, min(LARGEST_RADII * craft.turn_radius_m, LARGEST_M)) / 2.0
     if (2.0 * half >= sides).all():
         told = f"the area reaches {pad:,.0f} m beyond what the file holds, to leave room to turn"
         yield files, whole, [] if inside else [told]
@@ -177,19 +177,19 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
     over = f"{sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km"
     told = f"the files reach over {over}; the area is a part of that (--start and --goal choose another)"
     corners = [(x, y) for x in whole[::2] for y in whole[1::2]]
-    for middle in (*_crowded(files, half), np.mean(corners, axis=0), *corners):
+    for middle in (*_most_crowded(files, half), np.mean(corners, axis=0), *corners):
         x, y = np.clip(middle, whole[:2] + half, whole[2:] - half).tolist()
         at, box = files, (x - half[0], y - half[1], x + half[0], y + half[1])
         if files.place is not None:  # with its origin in its middle, about which the plane is true to scale
             longitude, latitude = Mapping(WGS84, files.place).from_plane(np.array([x]), np.array([y]), 0.0)
-            at = replace(files, place=_place(float(latitude[0]), float(longitude[0])))
+            at = replace(files, place=_rounded_place(float(latitude[0]), float(longitude[0])))
             box = (*(-half).tolist(), *half.tolist())
-            box = _common(box, *_covered(at)[0], default=box)
+            box = _common(box, *_file_boxes(at)[0], default=box)
         yield at, box, [told]
 
 
-def _crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
-    """The middle of the most corners of obstacles, each its box, that fit in one part; none of rasters alone."""
+def _most_crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
+    """Returns the mean of the obstacles' box corners in the part with the most of them; nothing for rasters alone."""
     drawn = ((replace(each, raster=None), mapping) for each, mapping in files.placed())
     places = np.hstack([np.stack(mapping.to_plane(*corners_of(each))) for each, mapping in drawn]).T
     places = places[np.isfinite(places).all(axis=1)]
@@ -200,8 +200,8 @@ def _crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
     return [places[part.ravel() == count.argmax()].mean(axis=0)]
 
 
-def _covered(files: _Files) -> tuple[list[Box], list[Box]]:
-    """Boxes of rasters and of fences to stay inside of, beyond which nothing is known or free; and of all others."""
+def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
+    """Returns boxes of files that bound the area, which rasters and keep-in fences do, and boxes of all other files."""
     inside: list[Box] = []
     around: list[Box] = []
     for each, mapping in files.placed():
@@ -218,13 +218,13 @@ def _covered(files: _Files) -> tuple[list[Box], list[Box]]:
 
 
 def _common(*boxes: Box, default: Any = None) -> Any:
-    """What lies in all of some boxes; where nothing does, the default."""
+    """Returns the intersection of boxes, or the default where it is empty."""
     (xmin, ymin), (xmax, ymax) = np.max(boxes, axis=0)[:2].tolist(), np.min(boxes, axis=0)[2:].tolist()
     return (xmin, ymin, xmax, ymax) if xmin < xmax and ymin < ymax else default
 
 
 def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[FloatArray, list[str]]:
-    """Start and goal in free room, and what is to be said of the way; or the numbers that say why there are none."""
+    """Chooses start and goal in free room, with notes on the way; an InputError gives the numbers where it cannot."""
     solid = [each for source in found.sources for each in source.polygons]
     for each, mapping in files.placed():
         if each.raster is not None and each.raster.occupancy:  # what is not known is no place for a start
@@ -243,14 +243,14 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
     would = cell or "--start and --goal, another altitude, a smaller clearance or aircraft, or a larger file"
     raise InputError(
         f"{bounds[2] - bounds[0]:,.0f} x {bounds[3] - bounds[1]:,.0f} m, {(room.room_m > 0).mean():.0%} free, are too "
-        f"small for {craft.name}: its start and goal need {clearance_m + TURNS[-1] * turn_m:,.0f} m of free room "
-        f"around and {LEAST_WAY * turn_m:,.0f} m between them, the widest free disc has {room.room_m.max():,.0f} m; "
+        f"small for {craft.name}: its start and goal need {clearance_m + ROOM_RADII[-1] * turn_m:,.0f} m of free room "
+        f"around and {WAY_RADII * turn_m:,.0f} m between them, the widest free disc has {room.room_m.max():,.0f} m; "
         f"{would} would do"
     )
 
 
 def _cell_that_fits(files: _Files, craft: Craft, room: FreeRoom) -> float | None:
-    """Side of a cell, in metres, with which the aircraft has room; None of files whose scale is given."""
+    """Returns the side (m) of a cell with which the aircraft has room; None where the files give their scale."""
     rasters = [each.raster for each in files.contents if each.crs is None and each.raster is not None]
     for scale in 1.1 ** np.arange(1.0, 120.0) if rasters else ():
         if ends(room, craft.turn_radius_m / scale, craft.clearance_m / scale, turning=True) is not None:

@@ -22,12 +22,12 @@ from harness.world_files.plane import Mapping
 MAX_RUNS: Final = 400_000
 """A mask with more runs of cells along its rows is refused."""
 LONGEST_EDGE_CELLS: Final = 64
-"""Outlines of cells are bent into the plane with a point at least this often: to a hundredth of a cell."""
+"""Edges of cells' outlines longer than this get points between, which keeps them within 0.01 cell in the plane."""
 MOST_GROWTH: Final = 0.005
-"""Share of a polygon's area that filling its notches may add."""
-PASSES: Final = 3
+"""Filling a polygon's notches may add at most this share of its area."""
+NOTCH_PASSES: Final = 3
 STRAIGHT_M: Final = 1e-9
-"""A corner so near to the line through its neighbours is none."""
+"""A corner no further than this from the line through its neighbours is dropped."""
 
 
 class Solid(NamedTuple):
@@ -39,10 +39,10 @@ class Solid(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """The heights above mean sea level in which the aircraft may be, and what is known of the ground below.
+    """The altitudes (m, above mean sea level) that the aircraft may have, and what is known of the ground below.
 
-    That is terrain of the files, and the height where there is none. Zones with limits above ground are cut to the area
-    `known_in` where there is terrain.
+    `field` is the files' terrain, and `flat_m` the height where it has none. Zones with limits above ground are cut to
+    the area `known_in` where there is terrain.
     """
 
     low_m: float
@@ -53,7 +53,7 @@ class Layer(NamedTuple):
 
 
 def sliced_parts(parts: Sequence[Part], mapping: Mapping, layer: Layer, box: Box) -> list[Solid]:
-    """What of the parts of one file is solid in a layer, in the plane and near a box."""
+    """Returns the solids of one file's parts in a layer, in the plane and near a box."""
     if not parts:
         return []
     shapes = mapping.geometries(np.array([part.footprint for part in parts], dtype=object))
@@ -77,7 +77,7 @@ def sliced_parts(parts: Sequence[Part], mapping: Mapping, layer: Layer, box: Box
 
 
 def clipped(solids: Sequence[Solid], box: Box) -> list[Solid]:
-    """Valid polygons of what lies in a box, each with the heights of what it is a piece of."""
+    """Cuts solids to a box; returns valid polygons, each with the heights of the solid that it is a piece of."""
     window = shapely.box(*box)
     valid = np.array([each.shape for each in solids], dtype=object)
     bad = ~shapely.is_valid(valid)
@@ -93,7 +93,7 @@ def clipped(solids: Sequence[Solid], box: Box) -> list[Solid]:
 
 
 def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
-    """A part as far as it reaches into the layer, where its limits make it largest; None: the ground is not known."""
+    """Returns a part's solids in a layer, as large as its limits make it there; None where the ground is not known."""
     bottom, top, on_ground = part.bottom, part.top, Datum.GROUND in (part.bottom.datum, part.top.datum)
     if _is_out(part, layer):
         return []
@@ -117,13 +117,13 @@ def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
 
 
 def _is_out(part: Part, layer: Layer) -> bool:
-    """Whether a part lies above or below a layer, whatever the ground."""
+    """Tells whether a part lies above or below a layer whatever the ground is."""
     above = part.bottom.datum is Datum.SEA and part.bottom.height_m > layer.high_m
     return above or (part.top.datum is Datum.SEA and part.top.height_m < layer.low_m)
 
 
 def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, tuple[float, float]]:
-    """Heights of the ground below a part, NaN where it is not known; and the first corner of their cells.
+    """Returns heights of the ground below a part, NaN where not known, and the first corner (m) of their cells.
 
     Of what is rigid they are those at its corners, of which some may lie outside of the terrain; else those of the
     nodes whose cells (the node in the middle) cover it.
@@ -144,7 +144,7 @@ def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, tu
 
 
 def outlines(mask: BoolArray) -> list[Any]:
-    """Polygons (with holes) round the cells that are set.
+    """Returns polygons (with holes) round the cells that are set.
 
     The cell in column i and row j of a (rows, columns) mask covers i to i + 1 and j to j + 1.
     """
@@ -166,7 +166,7 @@ def outlines(mask: BoolArray) -> list[Any]:
 
 
 def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -> list[Any]:
-    """Outlines in the plane of those cells of a raster that are solid, (rows, columns), and lie near a box."""
+    """Returns the outlines in the plane of the solid cells, (rows, columns), of a raster near a box."""
     rows, columns = window_of(raster, mapping, box)
 
     def place(points: FloatArray) -> FloatArray:
@@ -179,24 +179,24 @@ def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -
 
 
 def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
-    """Polygons with fewer corners that cover the given ones, which are valid.
+    """Returns polygons with fewer corners that cover the given ones, which are valid.
 
-    In each of `PASSES` passes corners that make a notch no deeper than the tolerance are left out, small notches first,
-    until `MOST_GROWTH` of the polygon's area has been added; corners on a straight line as well.
+    In each of `NOTCH_PASSES` passes corners that make a notch no deeper than the tolerance are left out, small notches
+    first, until `MOST_GROWTH` of the polygon's area has been added; corners on a straight line as well.
     """
     given = shapely.orient_polygons(np.array(polygons, dtype=object))
     convex = shapely.area(shapely.convex_hull(given)) <= shapely.area(given) * (1.0 + 1e-12)
-    grown = [_grown(polygon, tolerance_m) for polygon in given[~convex]]
+    grown = [_with_notches_filled(polygon, tolerance_m) for polygon in given[~convex]]
     pieces = shapely.get_parts(np.concatenate((given[convex], np.array(grown, dtype=object))))
     return [each for each in pieces if each.geom_type == "Polygon" and each.area > 0]
 
 
-def _grown(polygon: Any, tolerance_m: float) -> Any:
-    """A polygon with its notches filled."""
-    budget = MOST_GROWTH * polygon.area / PASSES
+def _with_notches_filled(polygon: Any, tolerance_m: float) -> Any:
+    """Returns a polygon with its notches filled, which covers the one given."""
+    budget = MOST_GROWTH * polygon.area / NOTCH_PASSES
     before = rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
-    for _ in range(PASSES):
-        rings = [_filled(ring, tolerance_m, budget) for ring in rings]
+    for _ in range(NOTCH_PASSES):
+        rings = [_fill_once(ring, tolerance_m, budget) for ring in rings]
     if sum(map(len, rings)) == sum(map(len, before)):
         return polygon
     grown = shapely.Polygon(rings[0], [ring for ring in rings[1:] if len(ring) >= 4])
@@ -206,8 +206,8 @@ def _grown(polygon: Any, tolerance_m: float) -> Any:
     return grown if shapely.covers(grown, polygon) else shapely.union(grown, polygon)
 
 
-def _filled(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatArray:
-    """One pass over a closed ring with the solid on its left; corners next to one another are not both left out."""
+def _fill_once(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatArray:
+    """Fills notches of a closed ring (solid on its left) in one pass, never at two neighbouring corners."""
     points = ring[:-1]
     turn, base, on, forward = _bends(points)
     straight = forward & (np.abs(turn) <= STRAIGHT_M * on)
@@ -217,20 +217,20 @@ def _filled(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatArra
     if len(points) <= 4:
         return np.vstack((points, points[:1]))
     notch = (turn < 0) & (np.abs(turn) / np.maximum(base, 1e-12) <= tolerance_m)
-    kept = points[~_apart(np.where(notch, 0.5 * np.abs(turn), np.inf), budget_m2)]
+    kept = points[~_cheapest_apart(np.where(notch, 0.5 * np.abs(turn), np.inf), budget_m2)]
     return np.vstack((kept, kept[:1])) if len(kept) >= 3 else ring
 
 
 def _bends(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Of each corner of a ring: twice its area, below 0 in a notch, base, edge on, and whether it goes on forwards."""
+    """Returns per corner of a ring: twice its area (< 0 in a notch), base, edge after it, whether it goes forward."""
     before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
     into, on, base = points - before, after - points, after - before
     turn = into[:, 0] * on[:, 1] - into[:, 1] * on[:, 0]
     return turn, np.hypot(base[:, 0], base[:, 1]), np.hypot(on[:, 0], on[:, 1]), (into * on).sum(axis=1) > 0
 
 
-def _apart(cost: FloatArray, budget: float) -> BoolArray:
-    """Which to leave out: the cheapest first, never two neighbours, until the budget is used up."""
+def _cheapest_apart(cost: FloatArray, budget: float) -> BoolArray:
+    """Tells which corners to leave out: the cheapest first, never two neighbours, until the budget is used up."""
     drop = np.zeros(len(cost), dtype=np.bool_)
     spent = 0.0
     for index in np.argsort(cost, kind="stable").tolist():

@@ -17,14 +17,14 @@ from harness.world_files.parts import Contents, FloatArray, Limit, Part, Reading
 from harness.world_files.plane import check_metres
 from harness.world_files.readers import limits
 
-SOLID: Final = ("Building", "Bridge", "OtherConstruction")
-"""Beginnings of the types that are taken."""
+SOLID_TYPES: Final = ("Building", "Bridge", "OtherConstruction")
+"""CityJSON objects whose type begins with one of these are taken as solid."""
 INSTANCE: Final = "GeometryInstance"
-"""Type of a geometry that is a template of the file, put somewhere."""
+"""The type of a geometry that places a template of the file; such geometries are passed over and counted."""
 LOW_M: Final = 0.1
-"""An object that is lower than this is a footprint without a height of its own."""
-WALL: Final = 1e-9
-"""A surface is a wall where its area from above is less than this share of its length squared."""
+"""An object lower than this is a footprint whose height its attributes may give."""
+WALL_SHARE: Final = 1e-9
+"""A surface is a wall if its area seen from above is less than this share of its length squared."""
 
 
 def read(path: Path, reading: Reading) -> Contents:
@@ -38,8 +38,8 @@ def read(path: Path, reading: Reading) -> Contents:
     for content in contents:
         vertices = _vertices(content, contents[0].get("transform"))
         for name, thing in content["CityObjects"].items():
-            kind = _kind(thing)
-            if kind.startswith(SOLID):
+            kind = _object_type(thing)
+            if kind.startswith(SOLID_TYPES):
                 parts += _parts(name, thing, vertices, buildings, passed)
             else:
                 passed[kind] += 1
@@ -55,20 +55,20 @@ def read(path: Path, reading: Reading) -> Contents:
     return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
 
 
-def _kind(thing: Any) -> str:
+def _object_type(thing: Any) -> str:
     return str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
 
 
 def _parts(
     name: str, thing: dict[str, Any], vertices: FloatArray, buildings: limits.Buildings, passed: Counter[str]
 ) -> list[Part]:
-    """The part that an object is: its surfaces from above; one that is flat is as high as its attributes say."""
+    """Returns the part that an object is, its surfaces seen from above; a flat one is as high as its attributes say."""
     instances = sum(each["type"] == INSTANCE for each in _geometries(thing))
     passed[INSTANCE] += instances
     surfaces = list(_best_surfaces(name, thing, vertices))
     drawn = [shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]]) for rings in surfaces]
     shapes = np.array(shapely.make_valid(drawn, method="structure", keep_collapsed=False), dtype=object)
-    footprint = shapely.union_all(shapes[shapely.area(shapes) > WALL * shapely.length(shapes) ** 2])
+    footprint = shapely.union_all(shapes[shapely.area(shapes) > WALL_SHARE * shapely.length(shapes) ** 2])
     if footprint.is_empty:
         passed["building without a shape"] += not (thing.get("children") or instances)
         return []
@@ -94,23 +94,23 @@ def _vertices(content: dict[str, Any], common: Any) -> FloatArray:
 
 
 def _geometries(thing: dict[str, Any]) -> list[dict[str, Any]]:
-    """Geometries of an object that say of what type they are."""
+    """Returns the geometries of an object that say of what type they are."""
     shapes = thing.get("geometry") or ()
     return [each for each in shapes if isinstance(each, dict) and isinstance(each.get("type"), str)]
 
 
 def _best_surfaces(name: str, thing: dict[str, Any], vertices: FloatArray) -> Iterator[list[FloatArray]]:
-    """Surfaces of an object at its highest level of detail: rings of corners, those of fewer than three left out."""
+    """Yields the surfaces of an object at its highest level of detail, as rings of at least three corners."""
     areal = [each for each in _geometries(thing) if each["type"].endswith(("Surface", "Solid"))]
     best = max((str(each.get("lod", "0")) for each in areal), default="")
     for geometry in areal:
         if str(geometry.get("lod", "0")) == best:
             for surface in _surfaces(geometry.get("boundaries")):
                 if surface and len(surface[0]) >= 3:
-                    yield [_places(ring, vertices, name) for ring in surface if len(ring) >= 3]
+                    yield [_ring_corners(ring, vertices, name) for ring in surface if len(ring) >= 3]
 
 
-def _places(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:
+def _ring_corners(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:
     if not all(isinstance(index, int) and 0 <= index < len(vertices) for index in ring):
         raise InputError(f"has an object {name[:40]!r} with a vertex that is not there")
     found: FloatArray = vertices[ring]
@@ -118,7 +118,7 @@ def _places(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:
 
 
 def _surfaces(boundaries: Any) -> Iterator[list[list[Any]]]:
-    """Surfaces, each a list of rings of indices, of a MultiSurface, Solid or MultiSolid."""
+    """Yields the surfaces of a MultiSurface, Solid or MultiSolid, each a list of rings of vertex indices."""
     if not isinstance(boundaries, list) or not all(isinstance(each, list) for each in boundaries):
         raise InputError("has boundaries that are not lists of rings")
     if boundaries and boundaries[0] and not isinstance(boundaries[0][0], list):

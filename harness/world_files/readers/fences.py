@@ -51,7 +51,7 @@ def read_ardupilot(path: Path, reading: Reading) -> Contents:
     return _contents("ardupilot_fence", (fence,), False, 0, told)
 
 
-def _shape(fence: Fence) -> Any:
+def _fence_shape(fence: Fence) -> Any:
     places = [on_earth(east, north) for north, east in fence.places]
     if fence.center is not None:
         return circle(places[0], fence.radius_m)
@@ -63,7 +63,7 @@ def _shape(fence: Fence) -> Any:
 def _contents(
     kind: str, fences: Sequence[Fence], any_of: bool, rally: int, told: tuple[str, ...] = ()
 ) -> Contents:
-    """The fences as parts; where the aircraft has to be inside any of several, as with PX4, those are one."""
+    """Returns fences as parts; where `any_of`, as with PX4, the union of all inclusion fences is one part."""
     points = counted(rally, "rally point")
     if not fences:
         held = f", but {points}, which are no obstacles" if rally else ""
@@ -71,10 +71,10 @@ def _contents(
             f"has an empty fence{held}; must have at least one polygon or circle (a mission is flown by `wayproof "
             "check`)"
         )
-    inside = [_shape(each) for each in fences if each.inclusion]
+    inside = [_fence_shape(each) for each in fences if each.inclusion]
     inside = [shapely.union_all(inside)] if any_of and inside else inside
     parts = [Part(shape, name="inclusion fence", keep_in=True) for shape in inside]
-    parts += [Part(_shape(each), name="exclusion fence") for each in fences if not each.inclusion]
+    parts += [Part(_fence_shape(each), name="exclusion fence") for each in fences if not each.inclusion]
     notes = ["a fence has no heights: taken as solid at every altitude", *told]
     if rally:
         notes.append(f"{points} passed over: places to return to, no obstacles")

@@ -17,7 +17,7 @@ from harness.world_files.parts import Contents, FloatArray
 from harness.world_files.plane import TURN_DEG, in_degrees
 
 CIRCLE_POINTS: Final = 96
-"""Corners of the polygon round a circle, whose area is 0.04 % larger."""
+"""A circle becomes a polygon round it with this many corners, whose area is 0.04 % larger."""
 LARGEST_M: Final = 2_000_000.0
 """Largest radius of a circle."""
 
@@ -27,7 +27,7 @@ Place = tuple[float, float]
 
 
 def finished(contents: Contents) -> Contents:
-    """Contents whose footprints are valid, on earth, have an area (others are counted), and go the short way round."""
+    """Makes footprints valid and take the short way round the earth, and drops and counts those without an area."""
     if contents.raster is not None:
         return contents
     if not contents.parts:
@@ -66,7 +66,7 @@ def _check_degrees(bounds: FloatArray) -> None:
 
 
 def circle(center: Place, radius_m: float) -> Any:
-    """A polygon round a circle on the ellipsoid."""
+    """Returns a polygon round a circle on the ellipsoid."""
     if not 0.0 < radius_m <= LARGEST_M:
         raise InputError(f"has a circle of radius {radius_m:g} m; must be above 0 and at most {LARGEST_M:g}")
     away_m = radius_m / math.cos(math.pi / CIRCLE_POINTS)
@@ -75,7 +75,7 @@ def circle(center: Place, radius_m: float) -> Any:
 
 
 def _around(center: Place, azimuth_deg: FloatArray, distance_m: FloatArray) -> list[Place]:
-    """Places at azimuths and distances from another."""
+    """Returns the places at azimuths and distances from a centre."""
     east, north = (np.full(len(azimuth_deg), each) for each in center)
     longitude, latitude, _ = GEOD.fwd(east, north, azimuth_deg, distance_m)
     return list(zip(longitude.tolist(), latitude.tolist(), strict=True))
@@ -84,20 +84,20 @@ def _around(center: Place, azimuth_deg: FloatArray, distance_m: FloatArray) -> l
 def arc(
     center: Place, from_deg: float, to_deg: float, distance_m: tuple[float, float], clockwise: bool
 ) -> list[Place]:
-    """Places along an arc between two azimuths, one a degree; the distance goes evenly from first to second."""
+    """Returns places along an arc between two azimuths, one a degree; the distance goes evenly from first to second."""
     sweep = (to_deg - from_deg) % TURN_DEG if clockwise else -((from_deg - to_deg) % TURN_DEG)
     count = max(int(abs(sweep)), 1) + 1
     return _around(center, from_deg + np.linspace(0.0, sweep, count), np.linspace(*distance_m, count))
 
 
 def polar(center: Place, place: Place) -> tuple[float, float]:
-    """Azimuth (deg) and distance (m) of a place from another."""
+    """Returns the azimuth (deg) and the distance (m) of a place from a centre."""
     azimuth, _, distance = GEOD.inv(*center, *place)
     return float(azimuth), float(distance)
 
 
 def corridor(line: Sequence[Place], width_m: float) -> Any:
-    """All that lies within half a width of a line."""
+    """Returns the polygon of all places within half of `width_m` of a line."""
     (east, north), stretch = line[0], math.cos(math.radians(line[0][1]))
     # The short way from the first place of the line.
     plane = [((math.remainder(x - east, TURN_DEG)) * stretch, y - north) for x, y in line]
@@ -106,7 +106,7 @@ def corridor(line: Sequence[Place], width_m: float) -> Any:
 
 
 def on_earth(longitude: float, latitude: float) -> Place:
-    """The place, which must be on earth."""
+    """Returns the place; raises InputError if it is not on earth."""
     if not (abs(longitude) <= TURN_DEG and abs(latitude) <= 90.0):
         raise InputError(f"has a place at {latitude:g}, {longitude:g}; must be degrees, WGS84")
     return longitude, latitude

@@ -14,47 +14,47 @@ from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum,
 
 _FEET: Final = dict.fromkeys(("FEET", "FOOT", "FT", "F"), FOOT_M)
 _METRES: Final = dict.fromkeys(("METRES", "METERS", "METRE", "METER", "MTR", "M"), 1.0)
-_UNITS: Final = {"FL": 100.0 * FOOT_M, **_FEET, **_METRES}
-_ON_GROUND: Final = ("SURFACE", "GROUND", "RELATIVE", "ASFC", "AGL", "GND", "SFC")
-_AT_SEA: Final = ("AMSL", "MSL", "SEA", "STD", "QNH", "ALT", "GEOID", "MEAN", "LEVEL")
-_DATUMS: Final = {**dict.fromkeys(_ON_GROUND, Datum.GROUND), **dict.fromkeys(_AT_SEA, Datum.SEA)}
-_WORD: Final = re.compile("|".join(sorted((*_UNITS, *_DATUMS, "ABOVE"), key=len, reverse=True)))
-_BESIDE: Final = rf"((?:{_WORD.pattern}|[\s()'./+\N{{DEGREE SIGN}}])*)"
-_LIMIT: Final = re.compile(rf"{_BESIDE}(-?\s*(?:\d+(?:\.\d*)?|\.\d+)){_BESIDE}")
+_UNIT_M: Final = {"FL": 100.0 * FOOT_M, **_FEET, **_METRES}
+_GROUND_WORDS: Final = ("SURFACE", "GROUND", "RELATIVE", "ASFC", "AGL", "GND", "SFC")
+_SEA_WORDS: Final = ("AMSL", "MSL", "SEA", "STD", "QNH", "ALT", "GEOID", "MEAN", "LEVEL")
+_DATUMS: Final = {**dict.fromkeys(_GROUND_WORDS, Datum.GROUND), **dict.fromkeys(_SEA_WORDS, Datum.SEA)}
+_LIMIT_WORD: Final = re.compile("|".join(sorted((*_UNIT_M, *_DATUMS, "ABOVE"), key=len, reverse=True)))
+_WORDS_BESIDE: Final = rf"((?:{_LIMIT_WORD.pattern}|[\s()'./+\N{{DEGREE SIGN}}])*)"
+_LIMIT: Final = re.compile(rf"{_WORDS_BESIDE}(-?\s*(?:\d+(?:\.\d*)?|\.\d+)){_WORDS_BESIDE}")
 """A number among words that a limit may consist of. Nothing is guessed of a limit with others, as `ASK 123.5`."""
-_PLAIN: Final = (
+_WORDED_LIMITS: Final = (
     (re.compile(r"SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?"), NO_BOTTOM),
     (re.compile(r"(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b.*"), NO_TOP),
     (re.compile("MSL|AMSL|SEA LEVEL"), Limit(0.0)),
 )
-"""Limits without a number."""
+"""Limits that are written without a number."""
 _LOWEST_M: Final = {Datum.SEA: -2700.0, Datum.GROUND: 0.0}
-"""A lower limit stands for one that is not known, as -9998 (ft) in files of the FAA, or is two, as in SFC-2500."""
-_SIDES: Final = (("lower", "floor", "bottom", "min"), ("upper", "ceiling", "top", "max"))
-"""Beginnings of the names of attributes with a limit; the last belong to altitudes only."""
-_NAME: Final = re.compile(
+"""A lower number means a limit that is not known (-9998 ft in files of the FAA), or is two limits (SFC-2500)."""
+_SIDE_PREFIXES: Final = (("lower", "floor", "bottom", "min"), ("upper", "ceiling", "top", "max"))
+"""Beginnings of the names of attributes with a lower and with an upper limit; min and max belong to altitudes only."""
+_LIMIT_KEY: Final = re.compile(
     "(?:(?:lower|floor|bottom|upper|ceiling|top)(?:limit)?(?:val|altitude)?|(?:min|max)alt(?:itude)?)"
     "((?:ft|feet|m|metres|agl|amsl|msl|gnd)*)"
 )
-"""Names of attributes with a limit, without underscores; unit and reference may follow, as in `floor_ft_agl`."""
-_OWN: Final = re.compile("uom|unit|ref|code|datum|type")
-"""Parts of the names of attributes with the unit or the reference of one limit."""
-_BOTH: Final = re.compile(
+"""Matches the name of an attribute with a limit, without underscores; unit and datum may follow (`floor_ft_agl`)."""
+_OWN_UNIT_KEY: Final = re.compile("uom|unit|ref|code|datum|type")
+"""Occurs in the name of an attribute with the unit or the datum of one limit."""
+_SHARED_UNIT_KEY: Final = re.compile(
     r"uom|units?|uomdimensions|altitudeunit|(altitude|vertical|height)?reference|(vertical)?datum"
 )
-"""Names of attributes with the unit or the reference of both."""
+"""Matches the name of an attribute with the unit or the datum of both limits."""
 
-_LENGTH: Final = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*([a-z]*)\.?")
+_LENGTH_AND_UNIT: Final = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*([a-z]*)\.?")
 _FEET_AND_INCHES: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(?:'|ft)\s*(?:(\d+(?:\.\d+)?)\s*(?:''|\"|in)?)?")
 _THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")
-"""Numbers such as `1,200`, which are twelve hundred to some and one and a fifth to others."""
+"""Matches numbers such as `1,200`, which mean 1200 to some and 1.2 to others, and are not read."""
 _LENGTHS_M: Final = {
     **{name.lower(): metres for name, metres in (*_FEET.items(), *_METRES.items()) if name != "F"},
     **dict.fromkeys(("in", "inch", "inches"), FOOT_M / 12.0),
     **{"": 1.0, "cm": 0.01, "km": 1000.0},
 }
 """Metres of the units that OpenStreetMap has: https://wiki.openstreetmap.org/wiki/Map_features/Units."""
-_HEIGHT: Final = (
+_HEIGHTS: Final = (
     "height",
     "building:height",
     "building_height",
@@ -65,30 +65,30 @@ _HEIGHT: Final = (
 _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")
 
 
-def _told(words: Sequence[str]) -> tuple[str | None, Datum | None]:
-    """Unit and datum that words name; the ground goes before the sea, a flight level before other units."""
-    unit = "FL" if "FL" in words else next((each for each in words if each in _UNITS), None)
+def _unit_and_datum(words: Sequence[str]) -> tuple[str | None, Datum | None]:
+    """Returns the unit and the datum that words name; ground goes before sea, and a flight level before other units."""
+    unit = "FL" if "FL" in words else next((each for each in words if each in _UNIT_M), None)
     datums = [_DATUMS[each] for each in words if each in _DATUMS] + [Datum.SEA] * (unit == "FL")
     return unit, Datum.GROUND if Datum.GROUND in datums and unit != "FL" else next(iter(datums), None)
 
 
 def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | None:
-    """A height as airspace files write it, NO_BOTTOM for the surface, by default in this unit above this datum."""
+    """Reads a height as airspace files write it, by default in `unit` above `datum`; None where it is not known."""
     word = " ".join(text.upper().split())
-    plain = next((limit for pattern, limit in _PLAIN if pattern.fullmatch(word)), None)
+    plain = next((limit for pattern, limit in _WORDED_LIMITS if pattern.fullmatch(word)), None)
     match = _LIMIT.fullmatch(word)
     if plain is not None or match is None:
         return plain
-    own_unit, own_datum = _told(_WORD.findall(f"{match[1]} {match[3]}"))
-    limit = Limit(float(match[2].replace(" ", "")) * _UNITS[own_unit or unit], own_datum or datum)
+    own_unit, own_datum = _unit_and_datum(_LIMIT_WORD.findall(f"{match[1]} {match[3]}"))
+    limit = Limit(float(match[2].replace(" ", "")) * _UNIT_M[own_unit or unit], own_datum or datum)
     return limit if limit.height_m >= _LOWEST_M[limit.datum] else None
 
 
 def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | None:
-    """A limit whose unit and reference may stand apart in `said`; what is missing is metres above the sea, noted."""
+    """Reads a limit whose unit and datum may stand in `said`; a missing one is metres, or sea level, with a note."""
     text = str(value) if isinstance(value, str | int | float) else ""
-    own_unit, own_datum = _told(_WORD.findall(text.upper()))
-    unit, datum = _told(re.findall("[A-Z]+", said.upper()))
+    own_unit, own_datum = _unit_and_datum(_LIMIT_WORD.findall(text.upper()))
+    unit, datum = _unit_and_datum(re.findall("[A-Z]+", said.upper()))
     limit = limit_of(text, unit or "M", datum or Datum.SEA)
     if limit is None or not re.search(r"[1-9]", text):  # the surface, or nothing that is known
         return limit
@@ -102,7 +102,7 @@ def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | No
 
 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:
-    """Bottom and top: what is not known, or an upper limit of 0, is no limit; those the wrong way round are turned."""
+    """Returns bottom and top; an unknown limit or an upper one of 0 is none; limits the wrong way up are swapped."""
     told = f"{name}: its"
     for side, limit in (("lower", lower), ("upper", upper)):
         if limit is None:
@@ -118,71 +118,71 @@ def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: st
 
 
 def _plain_names(tags: Mapping[str, Any]) -> dict[str, Any]:
-    """Attributes that have a value, by their names in small letters without underscores."""
+    """Returns the attributes that have a value, by their names in lower case without underscores."""
     return {key.lower().replace("_", ""): value for key, value in tags.items() if value is not None}
 
 
 def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
-    """Limits of an airspace from attributes, named in any case; a number alone is metres above mean sea level."""
+    """Reads the limits of an airspace from attributes named in any case; a bare number is metres above sea level."""
     given = _plain_names(tags)
     if "ceiling" in given and any(key.startswith(("apt1", "mapeff")) for key in given):
         raise InputError("is a facility map: one may fly up to its ceilings; give the airspace")
     found: list[Limit | None] = []
-    for begins, none in zip(_SIDES, (NO_BOTTOM, NO_TOP), strict=True):
+    for begins, none in zip(_SIDE_PREFIXES, (NO_BOTTOM, NO_TOP), strict=True):
         side = {key: value for key, value in given.items() if key.startswith(begins)}
-        match = next(filter(None, map(_NAME.fullmatch, side)), None)
+        match = next(filter(None, map(_LIMIT_KEY.fullmatch, side)), None)
         if match is None:
             found.append(none)
             continue
         words = re.findall("ft|feet|metres|agl|amsl|msl|gnd|m", match[1])
-        words += [str(value) for key, value in side.items() if _OWN.search(key)]
-        words += [str(value) for key, value in given.items() if _BOTH.fullmatch(key)]
+        words += [str(value) for key, value in side.items() if _OWN_UNIT_KEY.search(key)]
+        words += [str(value) for key, value in given.items() if _SHARED_UNIT_KEY.fullmatch(key)]
         found.append(limit_told(side[match[0]], " ".join(words), notes, name))
     return band_of(found[0], found[1], notes, name)
 
 
 def has_limits(tags: Mapping[str, Any]) -> bool:
-    """Whether attributes give the limits of an airspace."""
-    return any(map(_NAME.fullmatch, _plain_names(tags)))
+    """Tells whether attributes give a limit of an airspace."""
+    return any(map(_LIMIT_KEY.fullmatch, _plain_names(tags)))
 
 
 def metres_of(value: Any) -> float | None:
-    """A length in metres unless it says otherwise: `12`, `12.5 m`, `40 ft`, `7'4"`; None where it says none."""
+    """Reads a length (`12`, `12.5 m`, `40 ft`, `7'4"`), in metres unless it names a unit; None where it is none."""
     if isinstance(value, bool) or value is None or _THOUSANDS.search(str(value)):
         return None
     if isinstance(value, int | float):
         return float(value) if math.isfinite(value) else None
     text = str(value).strip().lower().replace("\N{RIGHT SINGLE QUOTATION MARK}", "'").replace(",", ".")
-    if (match := _LENGTH.fullmatch(text)) and match[2] in _LENGTHS_M:
+    if (match := _LENGTH_AND_UNIT.fullmatch(text)) and match[2] in _LENGTHS_M:
         return float(match[1]) * _LENGTHS_M[match[2]]
     if match := _FEET_AND_INCHES.fullmatch(text):
         return (float(match[1]) + float(match[2] or 0.0) / 12.0) * FOOT_M
     return None
 
 
-def _largest(value: Any) -> float:
-    """A length, of a text that is none the largest number in it: lists and ranges stand for the highest."""
+def _largest_m(value: Any) -> float:
+    """Reads a length (m); of any other text, such as a list or a range, it takes the largest number, else 0."""
     plain = metres_of(value)
     numbers = map(float, re.findall(r"\d+(?:\.\d*)?", str(value)[:100])) if plain is None else (plain,)
     return max((each for each in numbers if math.isfinite(each)), default=0.0)
 
 
 class Buildings:
-    """The buildings of one file, and what has to be said of their heights."""
+    """The buildings of one file, with counts of heights that are missing or odd for the notes."""
 
     def __init__(self, reading: Reading) -> None:
         self._default_m, self._guessed = reading.default_height_m, 0
         self._odd = Counter[str]()  # heights that are no plain length, and how often each comes
 
     def part(self, tags: Mapping[str, Any], footprint: Any, name: str = "") -> Part:
-        """A building from its tags, as OpenStreetMap has them, named in any case.
+        """Returns a building as a part, by its OpenStreetMap tags, named in any case.
 
         `height` is that of the whole building; else there are storeys (`building:levels`) of 3 m each and above them
         the roof, `roof:height` or else `roof:levels` of 3 m each; else `default_height_m`. It begins at `min_height`,
         else at `building:min_level` times 3 m, else at the ground. A height of zero or less says nothing.
         """
         tags = {key.lower(): value for key, value in tags.items()}
-        top = self._length_m(tags, _HEIGHT)
+        top = self._length_m(tags, _HEIGHTS)
         if not top and (levels := self._length_m(tags, _LEVELS)):
             roof = self._length_m(tags, ("roof:height", "roof_height"))
             top = LEVEL_M * levels + (roof or LEVEL_M * self._length_m(tags, ("roof:levels",)))
@@ -195,20 +195,20 @@ class Buildings:
         return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
 
     def _length_m(self, tags: Mapping[str, Any], names: Sequence[str], bottom: bool = False) -> float:
-        """The first of some attributes that is above zero, of a bottom that is a plain length; 0 where none is."""
+        """Reads the first of some attributes that is above zero, or of a `bottom` a plain length; 0 where none is."""
         for name in names:
             if (given := tags.get(name)) is None:
                 continue
             plain = metres_of(given)
             if plain is None or (plain < 0.0 and not bottom):
                 self._odd[f"{name}={str(given)[:20]!r}"] += 1
-            found = (plain or 0.0) if bottom else _largest(given)
+            found = (plain or 0.0) if bottom else _largest_m(given)
             if found > 0.0 or (bottom and plain is not None):
                 return found
         return 0.0
 
     def notes(self) -> list[str]:
-        """A line on those without a height, and on odd heights."""
+        """Returns notes on buildings without a height and on heights that are no plain length."""
         told = f"taken as {self._default_m:g} m high (default_height_m)"
         notes = [f"{counted(self._guessed, 'building')} without height and levels {told}"] * bool(
             self._guessed
@@ -222,16 +222,16 @@ class Buildings:
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:
-    """Whether attributes are those of a building: it is named one, or has a height and no limits."""
+    """Tells whether attributes are a building's: by a `building` key, or by a height without airspace limits."""
     if any(str(tags.get(name) or "no") != "no" for name in ("building", "building:part")):
         return True
     lower = {key.lower(): value for key, value in tags.items()}
-    high = any(_largest(lower[name]) > 0.0 for name in (*_HEIGHT, *_LEVELS) if lower.get(name) is not None)
+    high = any(_largest_m(lower[name]) > 0.0 for name in (*_HEIGHTS, *_LEVELS) if lower.get(name) is not None)
     return high and not has_limits(tags)
 
 
 def name_of(tags: Mapping[str, Any]) -> str:
-    """The name of a feature for messages."""
+    """Returns the name of a feature, for messages; empty where it has none."""
     named = {key.lower(): value for key, value in tags.items()}
     name = named.get("name") or named.get("identifier") or ""
     return (name if isinstance(name, str) else str(named.get("identifier") or ""))[:40]
@@ -240,7 +240,7 @@ def name_of(tags: Mapping[str, Any]) -> str:
 def parts_of(
     features: Sequence[tuple[Mapping[str, Any], Any]], reading: Reading, notes: list[str]
 ) -> tuple[Part, ...]:
-    """Features, attributes and footprint each, as parts: buildings by their heights, all others by their limits."""
+    """Turns features (attributes, footprint) into parts: buildings by their heights, all others by their limits."""
     parts, buildings, bare = [], Buildings(reading), 0
     for tags, footprint in features:
         name = name_of(tags)

@@ -17,7 +17,7 @@ from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Datum,
 from harness.world_files.readers import limits
 
 DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
-"""What an altitude of KML is above, by its altitudeMode; clamped to the ground it means nothing."""
+"""Datum of a KML altitude by its altitudeMode; an altitude that is clamped to the ground has none."""
 
 
 def read_geojson(path: Path, reading: Reading) -> Contents:
@@ -37,7 +37,7 @@ def read_geojson(path: Path, reading: Reading) -> Contents:
 
 
 def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any]]:
-    """Attributes and geometry of each feature; its `id` is an attribute where it has no name."""
+    """Yields attributes and geometry of each feature; its `id` is the attribute `identifier`."""
     kind = content.get("type") if isinstance(content, dict) else None
     features = content.get("features") if kind == "FeatureCollection" else [content]
     if not isinstance(features, list) or not all(isinstance(each, dict) for each in features):
@@ -52,7 +52,7 @@ def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any]]:
 
 
 def simple(geometry: Any) -> Iterator[dict[str, Any]]:
-    """The geometries of a collection one after the other; an empty one where there is none."""
+    """Yields the geometries of a collection one after the other, and an empty one for what is no geometry."""
     if not isinstance(geometry, dict):
         yield {}
     elif geometry.get("type") == "GeometryCollection":
@@ -63,7 +63,7 @@ def simple(geometry: Any) -> Iterator[dict[str, Any]]:
 
 
 def polygon_of(geometry: dict[str, Any]) -> Any:
-    """The shapely geometry of a Polygon or MultiPolygon; None of anything else."""
+    """Returns the shapely geometry of a Polygon or MultiPolygon, None for any other type."""
     if geometry.get("type") not in ("Polygon", "MultiPolygon"):
         return None
     try:
@@ -77,7 +77,7 @@ def read_kml_polygons(path: Path, reading: Reading) -> Contents:
     """Reads the polygons of a KML file, or of a KMZ archive with one, by limits in their ExtendedData or altitudes."""
     found = read_kml(read_bytes(path, MAX_TREE_BYTES), "", MAX_TREE_BYTES)
     notes: list[str] = []
-    parts = tuple(_part(each, notes) for each in found.polygons if each.rings)
+    parts = tuple(_kml_part(each, notes) for each in found.polygons if each.rings)
     flat = sum((part.bottom, part.top) == (NO_BOTTOM, NO_TOP) for part in parts)
     if flat:
         notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
@@ -88,8 +88,8 @@ def read_kml_polygons(path: Path, reading: Reading) -> Contents:
     return Contents("kml", reading.crs or WGS84, parts, notes=tuple(notes))
 
 
-def _part(shape: Shape, notes: list[str]) -> Part:
-    """The part that a polygon of KML is."""
+def _kml_part(shape: Shape, notes: list[str]) -> Part:
+    """Returns a polygon of KML as a part."""
     rings = [[(longitude, latitude) for latitude, longitude, _ in ring] for ring in shape.rings]
     name, datum = shape.name[:40], DATUMS.get(shape.mode)
     try:

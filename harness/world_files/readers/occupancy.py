@@ -16,10 +16,10 @@ from harness.world_files.bounded import read_bytes, text_of
 from harness.world_files.parts import Contents, FloatArray, Raster, Reading
 from harness.world_files.readers import raster
 
-FREE, BLOCKED = b".GS", b"@OTW"
-"""Ground and shallow water; out of bounds, trees and deep water of the MovingAI format (Sturtevant, 2012)."""
+FREE_CELLS, BLOCKED_CELLS = b".GS", b"@OTW"
+"""Ground and shallow water are free; out of bounds, trees and deep water block (MovingAI format, Sturtevant, 2012)."""
 MODES: Final = ("trinary", "scale")
-"""Ways of ROS map_server to tell occupied, free and unknown from a grey; `raw` is not read."""
+"""Modes of ROS map_server that tell occupied, free and unknown from a grey; `raw` is not read."""
 IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}
 """GDAL's driver of an image by its first byte."""
 
@@ -37,9 +37,9 @@ def read_moving_ai(path: Path, reading: Reading) -> Contents:
     if len(body) != rows or set(map(len, body)) != {columns} or columns == 0:
         raise InputError(f"has {len(body)} rows, not {rows} of {columns} cells: it may be torn")
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
-    if strange := set(np.unique(cells).tolist()) - set(FREE + BLOCKED):
+    if strange := set(np.unique(cells).tolist()) - set(FREE_CELLS + BLOCKED_CELLS):
         raise InputError(f"has the cell {chr(min(strange))!r}; must be one of . G S @ O T W")
-    occupied = np.isin(cells, list(BLOCKED)).astype(np.float64)
+    occupied = np.isin(cells, list(BLOCKED_CELLS)).astype(np.float64)
     size = reading.metres_per_cell or 1.0
     notes = () if reading.metres_per_cell else ("says not how large a cell is: 1 m (metres_per_cell)",)
     place = (size, 0, 0, 0, -size, rows * size)
@@ -81,7 +81,7 @@ def read_ros(path: Path, reading: Reading) -> Contents:
 
 
 def _greys(path: Path) -> FloatArray:
-    """(rows, columns) greys of an image from 0 to 1, of colours their mean."""
+    """Returns the (rows, columns) greys of an image, from 0 to 1; a colour counts as the mean of its bands."""
     try:
         with raster.opened(path, IMAGES.get(read_bytes(path, first=1), "PNM")) as source:
             if source.colorinterp[0].name == "palette" or source.count in (2, 4):

@@ -24,7 +24,7 @@ _PLACE: Final = re.compile(r"([\d.:\s°'\",]+)([NS])([\d.:\s°'\",]+)([EW])")
 
 @dataclass
 class _Airspace:
-    """One airspace while it is read; of its limits, by their commands, each that is given."""
+    """One airspace while it is read; `limits` collects every limit given by each of the two commands AL and AH."""
 
     kind: str
     name: str = ""
@@ -37,7 +37,7 @@ class _Airspace:
     shapes: list[Any] = field(default_factory=list)
 
     def take(self, command: str, rest: str) -> None:
-        """One command of it."""
+        """Takes one command of the airspace, `rest` being the text behind it."""
         name, _, value = (part.strip() for part in rest.upper().partition("="))
         if command == "AN":
             self.name = rest[:40]
@@ -55,7 +55,7 @@ class _Airspace:
             self.width_m = _numbers(value, 1)[0] * MILE_M
 
     def draw(self, command: str, rest: str) -> None:
-        """A circle or an arc."""
+        """Adds the circle or the arc of a command."""
         if self.center is None:
             raise InputError("has an arc or circle before its centre `V X=`")
         if command == "DB":
@@ -73,7 +73,7 @@ class _Airspace:
             self.ring += [first, *drawn[1:-1], last] if command == "DB" else drawn
 
     def parts(self, notes: list[str]) -> list[Part]:
-        """What it is; a limit that is missing, or given more than once, is not known."""
+        """Returns one part for each shape; a limit that is missing, or given more than once, is not known."""
         found = self.shapes + ([shapely.Polygon(self.ring)] if len(set(self.ring)) >= 3 else [])
         found += [corridor(self.line, self.width_m)] if len(self.line) > 1 and self.width_m > 0 else []
         if not found:
@@ -84,7 +84,7 @@ class _Airspace:
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads every airspace, whatever its class; a fault names its line."""
+    """Reads every airspace of whatever class; an InputError names the line at fault."""
     spaces, ignored, notes = list[_Airspace](), Counter[str](), list[str]()
     for number, line in enumerate(text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines(), 1):
         command, _, rest = (part.strip() for part in line.partition("*")[0].strip().partition(" "))
@@ -108,7 +108,7 @@ def read(path: Path, reading: Reading) -> Contents:
 
 
 def _take(spaces: list[_Airspace], command: str, rest: str, ignored: Counter[str]) -> None:
-    """One line of a file; an airspace begins with its class, or without one with its name."""
+    """Takes one line of a file; an airspace begins with its class, or without one with its name."""
     last = spaces[-1] if spaces else _Airspace("none", shapes=[None])  # as behind one that is whole
     is_drawn = any((last.ring, last.line, last.shapes))
     if command == "AC" and not last.kind and not is_drawn:
@@ -139,7 +139,7 @@ def _places(text: str, count: int) -> list[Place]:
 
 
 def _degrees(text: str, digits: int, negative: bool) -> float:
-    """An angle of degrees, minutes and seconds; unmarked ones follow `digits` of degrees, as in `0500434.00E`."""
+    """Reads an angle of degrees, minutes and seconds; unmarked ones follow `digits` of degrees, as in `0500434.00E`."""
     numbers = re.findall(r"\d+(?:\.\d+)?", text)
     whole, _, part = numbers[0].partition(".") if numbers else ("", "", "")
     if len(numbers) == 1 and len(whole) in (digits + 2, digits + 4):

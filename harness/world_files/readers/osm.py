@@ -18,11 +18,11 @@ from harness.world_files.bounded import MAX_BYTES, read_bytes
 from harness.world_files.parts import WGS84, Contents, Part, Reading
 from harness.world_files.readers import limits
 
-TALL: Final = frozenset(
+TALL_MAN_MADE: Final = frozenset(
     ("chimney", "communications_tower", "cooling_tower", "gasometer", "mast", "silo", "storage_tank", "tower",
      "water_tower")
 )  # fmt: skip
-"""Values of `man_made` for what stands up like a building; piers, pipelines and the like do not."""
+"""Values of `man_made` for what stands up like a building, which piers, pipelines and the like do not."""
 
 
 def read_xml(path: Path, reading: Reading) -> Contents:
@@ -32,13 +32,13 @@ def read_xml(path: Path, reading: Reading) -> Contents:
         raise InputError("has places inside its ways (`out geom`); ask for `out body; >; out skel`")
     if re.search(rb"<way id=['\"]-|action=['\"]delete", data):
         raise InputError("has ways of JOSM that are new or deleted; give a file without them")
-    osmium = _osmium()
+    osmium = _imported_osmium()
     if data.rfind(b"<node ") < data.find(b"<way "):
         return read_pbf(path, reading)
     # Written again with nodes before ways before relations, as osmium needs them and Overpass does not.
     with TemporaryDirectory() as folder:
         ordered = Path(folder) / "ordered.osm.pbf"
-        with _readable(), osmium.SimpleWriter(str(ordered)) as writer:
+        with _osmium_errors(), osmium.SimpleWriter(str(ordered)) as writer:
             for kind in (osmium.osm.NODE, osmium.osm.WAY, osmium.osm.RELATION):
                 for each in osmium.FileProcessor(str(path), kind):
                     writer.add(each)
@@ -46,15 +46,15 @@ def read_xml(path: Path, reading: Reading) -> Contents:
 
 
 @contextmanager
-def _readable() -> Iterator[None]:
-    """Turns what osmium raises, of entities of XML too, into what is wrong with the file."""
+def _osmium_errors() -> Iterator[None]:
+    """Turns whatever osmium raises, for XML entities too, into an InputError that names the fault of the file."""
     try:
         yield
     except Exception as error:  # of kinds of its own, too
         raise InputError(f"cannot be read by osmium ({' '.join(str(error).split())[:60]})") from error
 
 
-def _osmium() -> Any:
+def _imported_osmium() -> Any:
     try:
         import osmium
     except ImportError as error:
@@ -64,10 +64,10 @@ def _osmium() -> Any:
 
 def read_pbf(path: Path, reading: Reading) -> Contents:
     """Reads an OpenStreetMap PBF file."""
-    osmium = _osmium()
+    osmium = _imported_osmium()
     keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
     found = _Found(limits.Buildings(reading), osmium.geom.WKBFactory())
-    with _readable():
+    with _osmium_errors():
         for each in osmium.FileProcessor(str(path)).with_locations().with_areas().with_filter(keys):
             found.take(each, {tag.k: tag.v for tag in each.tags})
     return found.contents()
@@ -75,7 +75,7 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
 
 @dataclass
 class _Found:
-    """What was found so far; `ways` are buildings whose area comes later, or never, by their names."""
+    """What has been found so far; `ways` are buildings, by name, whose area may come later or never."""
 
     buildings: limits.Buildings
     shape_of: Any
@@ -84,7 +84,7 @@ class _Found:
     ways: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = field(default_factory=dict)
 
     def take(self, each: Any, tags: dict[str, str]) -> None:
-        """An object of osmium."""
+        """Takes an object of osmium: adds it if it is a building's area, keeps it in `ways`, or counts it as tall."""
         if each.is_area():
             name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
             if is_building(tags) and each.num_rings()[0]:
@@ -109,7 +109,7 @@ class _Found:
         self.parts.append(self.buildings.part(tags, shape, name))
 
     def contents(self) -> Contents:
-        """All buildings, those with an open outline closed."""
+        """Returns all buildings, with open outlines closed."""
         whole = {name: (tags, ring) for name, (tags, ring) in self.ways.items() if len(set(ring)) >= 3}
         for name, (tags, ring) in whole.items():
             self._add(tags, shapely.Polygon(ring), name)
@@ -126,6 +126,6 @@ class _Found:
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:
-    """Whether tags are those of a building, of a part of one, or of what stands up like one."""
+    """Tells whether tags are those of a building, of a part of one, or of what stands up like one."""
     named = any(tags.get(key, "no") not in ("no", "entrance") for key in ("building", "building:part"))
-    return named or tags.get("man_made") in TALL
+    return named or tags.get("man_made") in TALL_MAN_MADE

@@ -19,20 +19,20 @@ from harness.world_files.parts import WGS84, Contents, Raster, Reading
 from harness.world_files.plane import check_metres
 
 MAX_CELLS: Final = 60_000_000
-"""Most cells of a raster: half a gigabyte of heights."""
+"""A raster has at most this many cells: half a gigabyte of heights."""
 CACHE_MB: Final = 64
 """Size of GDAL's cache, which is a twentieth of the machine's memory otherwise."""
 MAX_TILE_BYTES, MAX_NUMPY_BYTES = 30_000_000, 500_000_000
-"""An archive with an SRTM tile, and one with NumPy arrays, unpacks to at most this."""
+"""A ZIP archive with an SRTM tile, and one with NumPy arrays, unpack to at most this many bytes."""
 VOIDS: Final = (-9999.0, -32767.0, -32768.0)
-"""Values of cells without a height in files that do not say so."""
+"""Values that mean a cell without a height in files that name no such value."""
 HEIGHTS_M: Final = (-12_000.0, 9_000.0)
 """Heights of the ground on earth lie between these."""
 
 
 @contextmanager
 def opened(path: Path | str, driver: str) -> Iterator[Any]:
-    """A raster of rasterio; no other driver of GDAL than the one that is named may open it."""
+    """Opens a raster with rasterio, by no other driver of GDAL than `driver`."""
     try:
         import rasterio
         from rasterio.errors import RasterioError
@@ -58,7 +58,7 @@ def opened(path: Path | str, driver: str) -> Iterator[Any]:
 def read(path: Path, reading: Reading) -> Contents:
     """Reads a raster of one band of heights in metres; an SRTM tile may be packed as .zip or .gz."""
     notes: tuple[str, ...] = ()
-    with opened(*_inside(path)) as source:
+    with opened(*_path_and_driver(path)) as source:
         if source.count > 1 or source.colorinterp[0].name == "palette":
             raise InputError(f"has {source.count} bands or a palette; must have one band, of heights")
         if source.driver == "AAIGrid":
@@ -83,8 +83,8 @@ def read(path: Path, reading: Reading) -> Contents:
     return Contents("raster", crs, raster=Raster(values, affine), notes=notes)
 
 
-def _inside(path: Path) -> tuple[Path | str, str]:
-    """What GDAL opens, the file or the tile that is packed in it, and by which driver."""
+def _path_and_driver(path: Path) -> tuple[Path | str, str]:
+    """Returns the path that GDAL opens, of the file or of a tile packed in it, and the driver's name."""
     begin = read_bytes(path, first=2)
     if begin in (b"II", b"MM"):
         return path, "GTiff"
@@ -100,7 +100,7 @@ def _inside(path: Path) -> tuple[Path | str, str]:
 
 
 def _check_grid(path: Path, source: Any) -> None:
-    """Raises InputError if an ESRI ASCII grid has more or fewer numbers than cells: GDAL fills up with zeros."""
+    """Raises InputError if an ESRI ASCII grid has more or fewer numbers than cells, which GDAL fills up with zeros."""
     found = 0
     with path.open("rb") as file:
         for line in file:
@@ -115,7 +115,7 @@ def _check_grid(path: Path, source: Any) -> None:
 
 
 def _crs(source: Any, affine: tuple[float, ...]) -> str | None:
-    """The coordinate reference system that a raster names; degrees where a grid without one can be nothing else."""
+    """Returns the crs that a raster names, or WGS84 for a grid that can only be in degrees; else None."""
     if source.crs:
         return str(source.crs.to_wkt())
     degrees = affine[0] < 0.1 and 0.0 < abs(affine[2]) <= 180.0 and abs(affine[5]) <= 90.0

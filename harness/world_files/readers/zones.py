@@ -16,14 +16,14 @@ from harness.world_files.readers.footprints import circle
 from harness.world_files.readers.maps import features_of, polygon_of, simple
 
 UNITS: Final = {"": "m", "m": "m", "ft": "ft", "feet": "ft", "fl": "fl"}
-"""Units of limits by the names that files use."""
-PASSED: Final = (
+"""The unit of a limit by the name that a file uses."""
+NOTES: Final = (
     ("empty", "zone", "without a geometry passed over"),
     ("flat", "geometry", "without an area passed over"),
     ("free", "zone", "without restriction passed over"),
     ("at times", "zone", "that apply at times only taken as always there"),
 )
-"""What is said of zones that are passed over or simplified."""
+"""Notes on zones that are passed over or simplified, by the key under which they are counted."""
 
 
 class _Zones:
@@ -36,14 +36,14 @@ class _Zones:
         self.told = Counter[str]()
 
     def passes(self, restriction: Any, geometry: Any, at_times: bool) -> bool:
-        """Whether a zone is passed over, as it forbids nothing or has no geometry."""
+        """Counts a zone, and tells whether it is passed over because it forbids nothing or has no geometry."""
         why = "free" if restriction == "NO_RESTRICTION" else "" if geometry else "empty"
         self.told[why] += 1
         self.told["at times"] += at_times and not why
         return bool(why)
 
     def add(self, shape: Any, says: Mapping[str, Any], unit: str, name: str) -> None:
-        """A zone between the limits that a mapping says."""
+        """Adds a zone of a shape, between the limits in a mapping."""
         found: list[Limit | None] = []
         for side, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
             value, reference = (says.get(f"{side}{end}") for end in self._ends)
@@ -52,17 +52,17 @@ class _Zones:
         self.parts.append(Part(shape, *limits.band_of(found[0], found[1], self.notes, name), name=name))
 
     def contents(self, kind: str) -> Contents:
-        """All zones."""
+        """Returns all zones as parts, with the notes on them."""
         if not self.parts:
             raise InputError("has no zone with an area that forbids something; must have some")
         told = [
-            f"{counted(self.told[why], what)} {sentence}" for why, what, sentence in PASSED if self.told[why]
+            f"{counted(self.told[why], what)} {sentence}" for why, what, sentence in NOTES if self.told[why]
         ]
         return Contents(kind, WGS84, tuple(self.parts), notes=(*self.notes, *told))
 
 
 def read_ed269(path: Path, reading: Reading) -> Contents:
-    """Reads all zones of ED-269 but those without restriction, whatever the time."""
+    """Reads the zones of an ED-269 file, whatever their times, except those without restriction."""
     content = json_of(path)
     if isinstance(content, dict):
         content = content.get("features", content.get("UASZoneList"))
@@ -101,7 +101,7 @@ def _add_volume(found: _Zones, volume: Any, name: str) -> None:
 
 
 def read_ed318(path: Path, reading: Reading) -> Contents:
-    """Reads all zones of ED-318: each geometry has a layer, and a circle is a point with an extent."""
+    """Reads the zones of an ED-318 file: each geometry has a layer, and a circle is a point with an extent."""
     found = _Zones(("", "Reference"))
     for tags, geometry in features_of(json_of(path)):
         name, at_times = limits.name_of(tags), bool(tags.get("limitedApplicability"))
