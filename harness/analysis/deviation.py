@@ -12,13 +12,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.flight.record import FloatArray, Track
 from harness.run_files.given_path import CutCorner
 
-BLOCK = 256
-"""Points that are measured together: numpy is then quick, and what is near them is a short part of the other line."""
+Rows = np.ndarray[tuple[int], np.dtype[np.intp]]
+
+BLOCK = 64
+"""Points that are measured together: what is near them is a short part of the other line, and fits into the cache."""
 MOST_SAMPLES = 400_000
 """A path has no more points measured than this, however long it is."""
 
@@ -34,7 +35,7 @@ class Deviation:
     """(n,) of each row of the track from the path."""
     points_m: FloatArray
     """(k,) of points along the path from the track, as far along it as the flight came."""
-    point_rows: np.ndarray[tuple[int], np.dtype[np.intp]]
+    point_rows: Rows
     """(k,) the row of the track that is as far along as each of these."""
 
     @property
@@ -68,28 +69,44 @@ def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: flo
     return Deviation(rows, distances_m(points, line, window_m), flown[_row(line[:, 2], points[:, 2])])
 
 
-def allowed_m(track: Track, tolerance_m: float, corners: Iterable[CutCorner]) -> FloatArray:
-    """(n,) what each row may be off the path as given: the tolerance, or about a corner what that may be passed at."""
-    of_corners = np.full(len(track), -np.inf)
-    for corner in corners:
-        about = at_corner(track, corner)
-        of_corners[about] = np.maximum(of_corners[about], corner.allowed_cut_m)
-    return np.where(np.isfinite(of_corners), of_corners, tolerance_m)
+class Stations:
+    """The rows of a track by how far along its path they are."""
 
+    def __init__(self, track: Track) -> None:
+        self._along_m = track.arc_length_m
+        self._flown = np.flatnonzero(np.isfinite(self._along_m))
+        along = self._along_m[self._flown]
+        # Both rise, so that the rows about a place are found without a look at all others.
+        self._furthest_m = np.maximum.accumulate(along)
+        self._least_ahead_m = np.minimum.accumulate(along[::-1])[::-1]
 
-def at_corner(track: Track, corner: CutCorner) -> NDArray[np.bool_]:
-    """(n,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
+    def at_corner(self, corner: CutCorner) -> Rows:
+        """(k,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
 
-    They reach one limit further than the planned path is off the corner's legs, and at least `ABOUT` limits to each
-    side: within these an aircraft that overshoots has come back to the next leg.
-    """
-    reach_m = max(corner.half_m + corner.allowed_cut_m, ABOUT * corner.allowed_cut_m)
-    about: NDArray[np.bool_] = np.abs(track.arc_length_m - corner.arc_length_m) <= reach_m
-    flown = np.flatnonzero(np.isfinite(track.arc_length_m))
-    if len(flown):
-        along = np.maximum.accumulate(track.arc_length_m[flown])
-        about[flown[_row(along, corner.arc_length_m)]] = True
-    return about
+        They reach one limit further than the planned path is off the corner's legs, and at least `ABOUT` limits to each
+        side: within these an aircraft that overshoots has come back to the next leg.
+        """
+        reach_m = max(corner.half_m + corner.allowed_cut_m, ABOUT * corner.allowed_cut_m)
+        at_m, wider_m = corner.arc_length_m, 1.001 * reach_m
+        first = np.searchsorted(self._furthest_m, at_m - wider_m)
+        end = np.searchsorted(self._least_ahead_m, at_m + wider_m, side="right")
+        near = self._flown[first:end]
+        near = near[np.abs(self._along_m[near] - at_m) <= reach_m]
+        passes = self._flown[_row(self._furthest_m, at_m)] if len(self._flown) else near
+        rows: Rows = np.union1d(near, passes)
+        return rows
+
+    def come_as_far(self, corner: CutCorner) -> bool:
+        """Whether the aircraft came as far along as a corner."""
+        return bool(len(self._flown)) and bool(self._furthest_m[-1] >= corner.arc_length_m)
+
+    def allowed_m(self, tolerance_m: float, corners: Iterable[CutCorner]) -> FloatArray:
+        """(n,) what each row may be off the path as given: the tolerance, or what a corner about it allows."""
+        of_corners = np.full(len(self._along_m), -np.inf)
+        for corner in corners:
+            about = self.at_corner(corner)
+            of_corners[about] = np.maximum(of_corners[about], corner.allowed_cut_m)
+        return np.where(np.isfinite(of_corners), of_corners, tolerance_m)
 
 
 def distances_m(points: FloatArray, line: FloatArray, window_m: float) -> FloatArray:
@@ -106,7 +123,7 @@ def distances_m(points: FloatArray, line: FloatArray, window_m: float) -> FloatA
     return found
 
 
-def _row(along_m: FloatArray, at_m: FloatArray | float) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+def _row(along_m: FloatArray, at_m: FloatArray | float) -> Rows:
     """The first rows that are as far along as this, or the last of all."""
     return np.minimum(np.searchsorted(along_m, at_m), len(along_m) - 1)
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.guidance.altitude import slewed
 from harness.analysis.breaches import CONTACT, Breach, Kept, crossings, inside_m, kept
-from harness.analysis.deviation import allowed_m, at_corner, deviation
+from harness.analysis.deviation import Stations, deviation
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.analysis.metrics import error_figures, metrics
@@ -48,7 +50,8 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
     corners = [replace(each, allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
     window_m = WINDOW_RADII * limits.turn_radius_m
     found = believed = deviation(track, way.given_m, SPACING_SHARE * tolerance, window_m)
-    asked = _as_given(check.plan, track, corners, np.nan_to_num(found.by_row_m), tolerance)
+    passing = _Passing(track, np.nan_to_num(found.by_row_m), tolerance, corners)
+    asked = _as_given(check.plan, passing)
     if track.has_beliefs:
         east, north = track.believed_m[:, :2].T
         as_believed = replace(track, east_m=east, north_m=north)
@@ -61,7 +64,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         first = seen.contacts[0]
         figures["outcome"] = Outcome.COLLISION.value
         figures["reason"] = f"touched {first.name} after {first.start_s:.0f} s; {flight.reason}"
-    told = _told(check, flight, limits, asked, corners)
+    told = _told(check, flight, limits, asked, passing)
     figures["trackable"] &= figures["outcome"] == "reached" and all(each["kept"] for each in told["corners"])
     told["ok"], told["verdict"] = verdict(figures, told, seen, limits)
     return {
@@ -79,14 +82,13 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
 
 
 def _told(
-    check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven, corners: Sequence[CutCorner]
+    check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven, passing: _Passing
 ) -> dict[str, Any]:
     """What stands under `check`; whether it is ok, and the verdict, follow from it."""
     track, given, plan = flight.track, check.given, check.plan
-    off_m, tolerance_m = asked.deviation_m, limits.cross_track_threshold_m
     # The place where the track is furthest off the path in relation to what is allowed there.
-    row = int((off_m / np.maximum(asked.allowed_m, 1e-9)).argmax())
-    worst_m, most_m = float(off_m[row]), float(asked.allowed_m[row])
+    row = int((passing.off_m / np.maximum(asked.allowed_m, 1e-9)).argmax())
+    worst_m, most_m = float(passing.off_m[row]), float(asked.allowed_m[row])
     line, speed = _line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
     return {
         "ok": False,
@@ -100,16 +102,16 @@ def _told(
             "north_m": float(track.north_m[row]),
             "off_m": worst_m,
             "allowed_m": most_m,
-            "waypoint": next((each.waypoint for each in corners if at_corner(track, each)[row]), None),
+            "waypoint": passing.waypoint_at(row),
         },
         "limit_used": {
             "off_path": worst_m / most_m if most_m else None,
             "altitude": float(np.abs(track.up_m - asked.altitude_m).max()) / limits.max_altitude_error_m,
             "bank": _bank_used(check, flight, limits, asked),
         },
-        "corner_m_that_would_do": _sufficient_m(track, off_m, tolerance_m, corners),
+        "corner_m_that_would_do": _sufficient_m(passing),
         "given": dataclasses.asdict(smoothness(polyline_profile(line, speed), speed)),
-        "corners": [_passed(corner, track, off_m, tolerance_m) for corner in corners],
+        "corners": [passing.of(corner) for corner in passing.corners],
         "fences": [fence.plain() for fence in given.fences.every],
         "items": [dataclasses.asdict(item) for item in given.mission.items] if given.mission else [],
         "notes": [*given.notes, *plan.notes],
@@ -153,9 +155,11 @@ def _yes(told: Mapping[str, Any], limits: FlightLimits) -> str:
     wide_m = max((corner["allowed_cut_m"] for corner in told["corners"]), default=0.0)
     corners = f", corners within {wide_m:.3g} m" if wide_m > tolerance_m else ""
     most = max(used["off_path"] or 0.0, used["altitude"])
-    bank_deg = math.degrees(math.atan((used["bank"] or 0.0) * math.tan(limits.bank_limit_rad)))
-    turns = f", turns take {bank_deg:.0f} of {math.degrees(limits.bank_limit_rad):.0f} deg of bank"
-    bank = turns if bank_deg >= 1.0 else ""
+    share, limit_deg = used["bank"] or 0.0, f"{math.degrees(limits.bank_limit_rad):.0f} deg of bank"
+    bank_deg = math.degrees(math.atan(share * math.tan(limits.bank_limit_rad)))
+    bank = f", turns take {bank_deg:.0f} of {limit_deg}" if bank_deg >= 1.0 else ""
+    if share > 1.0:
+        bank = f", a turn that needs more than {limit_deg} was flown on a larger radius"
     return f"yes: flown {how}, within {tolerance_m:.3g} m{corners}; {most:.0%} of a limit used at most{bank}"
 
 
@@ -199,18 +203,17 @@ def _how_far(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
     return faults
 
 
-def _sufficient_m(
-    track: Track, off_m: FloatArray, tolerance_m: float, corners: Sequence[CutCorner]
-) -> float | None:
+def _sufficient_m(passing: _Passing) -> float | None:
     """The limit at all corners that would have been kept, rounded up to 1 m; None where none would, or no other."""
-    reached = [_passed(corner, track, off_m, tolerance_m) for corner in corners]
+    reached = [passing.of(corner) for corner in passing.corners]
     if all(each["kept"] for each in reached) or any(each["flown_cut_m"] is None for each in reached):
         return None
     limit_m = 0.0
     for _ in range(MOST_TRIES):
-        tried = [replace(corner, allowed_cut_m=limit_m) for corner in corners]
-        needed_m = max(_passed(corner, track, off_m, tolerance_m)["most_off_m"] for corner in tried)
-        if needed_m <= limit_m and bool((off_m <= allowed_m(track, tolerance_m, tried)).all()):
+        tried = [replace(corner, allowed_cut_m=limit_m) for corner in passing.corners]
+        needed_m = max(passing.of(corner)["most_off_m"] for corner in tried)
+        allowed_m = passing.stations.allowed_m(passing.tolerance_m, tried)
+        if needed_m <= limit_m and bool((passing.off_m <= allowed_m).all()):
             return limit_m
         limit_m = float(math.ceil(max(needed_m, WIDER * limit_m)))
         if limit_m > MOST_WIDER * needed_m:  # it is off where no corner is
@@ -227,10 +230,9 @@ def _line(plan: PathPlan) -> FloatArray:
     return every
 
 
-def _as_given(
-    plan: PathPlan, track: Track, corners: list[CutCorner], off_m: FloatArray, tolerance_m: float
-) -> AsGiven:
+def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:
     """What the path asks for, row by row."""
+    track, corners = passing.track, passing.corners
     along, profile = np.nan_to_num(track.arc_length_m), plan.profile
     asked = np.maximum(np.searchsorted(profile.speed_from_m, along, side="right") - 1, 0)
     fastest = np.full((len(track), 2), np.inf)
@@ -239,8 +241,8 @@ def _as_given(
         fastest = np.array([rates[speed] for speed in profile.airspeeds(along).tolist()]).reshape(-1, 2)
     return AsGiven(
         _ends(plan, corners),
-        off_m,
-        allowed_m(track, tolerance_m, corners),
+        passing.off_m,
+        passing.stations.allowed_m(passing.tolerance_m, corners),
         altitude_m=profile.altitudes(along),
         climb_mps=profile.slopes(along) * track.groundspeed_mps,
         fastest_mps=fastest,
@@ -249,7 +251,7 @@ def _as_given(
     )
 
 
-def _ends(plan: PathPlan, corners: list[CutCorner]) -> list[CutCorner]:
+def _ends(plan: PathPlan, corners: Sequence[CutCorner]) -> list[CutCorner]:
     """Where legs end: at every item of a mission; at the corners of a drawn line, and where its slope changes."""
     known = {(corner.waypoint, round(corner.arc_length_m, 3)): corner for corner in corners}
     plain = {
@@ -261,21 +263,43 @@ def _ends(plan: PathPlan, corners: list[CutCorner]) -> list[CutCorner]:
     return sorted(ends, key=lambda each: each.arc_length_m)
 
 
-def _passed(corner: CutCorner, track: Track, off_m: FloatArray, tolerance_m: float) -> dict[str, Any]:
-    """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there.
+@dataclass(frozen=True, eq=False)
+class _Passing:
+    """A track and the corners that it passes; `off_m`, (n,), is how far it is off the path as given."""
 
-    What it is off counts up to where it is within the tolerance of the path again.
-    """
-    about = at_corner(track, corner)
-    flown, most = None, 0.0
-    if about.any() and bool((track.arc_length_m >= corner.arc_length_m).any()):
-        last = int(np.flatnonzero(about)[-1])
-        back = np.flatnonzero(off_m[last:] <= tolerance_m)
-        about[last : last + int(back[0]) if len(back) else len(track)] = True
-        flown = float(np.hypot(track.east_m - corner.east_m, track.north_m - corner.north_m)[about].min())
-        most = max(flown, float(off_m[about].max()))
-    kept_there = flown is not None and most <= corner.allowed_cut_m
-    return {**vars(corner), "flown_cut_m": flown, "most_off_m": most, "kept": kept_there}
+    track: Track
+    off_m: FloatArray
+    tolerance_m: float
+    corners: Sequence[CutCorner]
+
+    @cached_property
+    def stations(self) -> Stations:
+        """Its rows by how far along the path they are."""
+        return Stations(self.track)
+
+    @cached_property
+    def _within(self) -> NDArray[np.intp]:
+        """Rows that are within the tolerance, and the end."""
+        return np.append(np.flatnonzero(self.off_m <= self.tolerance_m), len(self.track))
+
+    def waypoint_at(self, row: int) -> int | None:
+        """Number of the first corner about which a row of the track lies."""
+        return next((each.waypoint for each in self.corners if row in self.stations.at_corner(each)), None)
+
+    def of(self, corner: CutCorner) -> dict[str, Any]:
+        """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there.
+
+        What it is off counts up to where it is within the tolerance of the path again.
+        """
+        about, flown, most = self.stations.at_corner(corner), None, 0.0
+        if len(about) and self.stations.come_as_far(corner):
+            back = self._within[np.searchsorted(self._within, about[-1])]
+            about = np.append(about, np.arange(about[-1], back))
+            off = self.track.east_m[about] - corner.east_m, self.track.north_m[about] - corner.north_m
+            flown, most = float(np.hypot(*off).min()), float(self.off_m[about].max())
+            most = max(flown, most)
+        kept_there = flown is not None and most <= corner.allowed_cut_m
+        return {**vars(corner), "flown_cut_m": flown, "most_off_m": most, "kept": kept_there}
 
 
 def layer_contacts(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
-from harness.analysis.deviation import allowed_m, deviation, distances_m
+from harness.analysis.deviation import Stations, deviation, distances_m
 from harness.flight.record import FloatArray, Track
 from harness.run_files.given_path import CutCorner
 from tests.harness.conftest import track as make_track
@@ -66,9 +66,21 @@ def test_a_corner_may_be_cut_by_its_own_figure() -> None:
         CutCorner(1, 0.0, along_m, 90.0, 80.0, 33.0, along_m, half_m, allowed_cut)
         for along_m, half_m, allowed_cut in ((250.0, 80.0, 60.0), (600.0, 60.0, 20.0), (750.0, 0.5, 0.5))
     ]
-    allowed = allowed_m(track, 10.0, corners)
+    allowed = Stations(track).allowed_m(10.0, corners)
     assert sorted(set(allowed.tolist())) == [0.5, 10.0, 20.0, 60.0]
     # Three times the limit to each side, or as far as the arc is off the legs.
     assert track.north_m[allowed == 60.0] == pytest.approx(np.arange(70.0, 432.0, 2.5))
     assert track.north_m[allowed == 20.0] == pytest.approx(np.arange(520.0, 682.0, 2.5))
     assert track.north_m[allowed == 0.5] == pytest.approx([750.0])
+
+
+def test_rows_about_a_corner_are_those_that_a_look_at_every_row_finds() -> None:
+    """The track goes back along its path again and again, and the first rows fly no plan."""
+    rng = np.random.default_rng(5)
+    along_m = np.append([math.nan] * 9, np.cumsum(rng.uniform(-40.0, 45.0, 700)))
+    stations = Stations(make_track(len(along_m), arc_length_m=along_m))
+    for at_m in rng.uniform(np.nanmin(along_m), np.nanmax(along_m), 50).tolist():
+        corner = CutCorner(1, 0.0, at_m, 90.0, 80.0, 33.0, at_m, 0.0, 8.0)
+        about = np.flatnonzero(np.abs(along_m - at_m) <= 24.0)
+        passes = int(np.flatnonzero(along_m >= at_m)[0])
+        assert stations.at_corner(corner).tolist() == sorted({*about.tolist(), passes})

@@ -119,6 +119,9 @@ def test_a_circle_tighter_than_the_bank_limit_gives_is_no_and_a_near_yes_can_be_
     near, _ = flown(path, settings={"trackability.cross_track_m": str(most * 1.02)})
     assert near["check"]["limit_used"]["off_path"] == pytest.approx(1.0 / 1.02, abs=0.01)
     assert f"; {near['check']['limit_used']['off_path']:.0%} of a limit used" in near["check"]["verdict"]
+    assert near["check"]["limit_used"]["bank"] == pytest.approx(25.0**2 / (9.80665 * 60.0), rel=0.01)
+    told = ", a turn that needs more than 45 deg of bank was flown on a larger radius"
+    assert near["check"]["verdict"].endswith(told)
 
 
 def test_what_lies_beyond_a_corner_counts_and_a_no_names_the_limit_that_would_be_a_yes(
