@@ -116,13 +116,13 @@ def _refuse(folder: Path) -> None:
             told = f"{size / 1e6:.0f} MB; must be at most {MAX_FOLDER_BYTES // 10**6} MB together"
             raise AircraftError(f"{path}: with it the files of {folder} have {told}")
         if path.suffix.lower() == ".xml":
+            if path.stat().st_size > MAX_BYTES:
+                raise AircraftError(f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a JSBSim file")
             _refuse_file(path)
 
 
 def _refuse_file(path: Path) -> None:
-    """Raises AircraftError if an XML file is large or deep, refers to other places, or has entities that grow."""
-    if path.stat().st_size > MAX_BYTES:
-        raise AircraftError(f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a JSBSim file")
+    """Raises AircraftError if an XML file is deep, refers to other places, or has entities that grow."""
     parser, depth = expat.ParserCreate(), 0
 
     def fault(said: str) -> AircraftError:

@@ -201,11 +201,7 @@ def load_campaign(
     bases: dict[str, Base] = {}
     for index, name in enumerate(campaign.scenarios):
         loc: Loc = ("scenarios", index)
-        for file in _files(name, path.parent, partial(fault, loc)):
-            keys = strict_yaml.read(file)
-            if not isinstance(keys.value, dict):
-                raise InputError(f"{file}:{keys.line}: must be a mapping that begins with `schema:`")
-            base = Base(file.name, str(file), absolute_paths(keys, file.parent))
+        for base in map(_base_of, _files(name, path.parent, partial(fault, loc))):
             if base.name in bases:
                 raise fault(loc, f"is a second scenario called {base.name}; rename one")
             bases[base.name] = base
@@ -213,6 +209,14 @@ def load_campaign(
         node = node_of({"schema": "wayproof/scenario/1", "name": campaign.name}, root.line_of(("worlds",)))
         bases[""] = Base(campaign.name, source, node)
     return CampaignFile(campaign, source, root, tuple(bases.values()))
+
+
+def _base_of(file: Path) -> Base:
+    """A scenario file as a campaign takes it."""
+    keys = strict_yaml.read(file)
+    if not isinstance(keys.value, dict):
+        raise InputError(f"{file}:{keys.line}: must be a mapping that begins with `schema:`")
+    return Base(file.name, str(file), absolute_paths(keys, file.parent))
 
 
 def is_a(what: Literal["campaign", "scenario"], path: Path) -> bool:

@@ -65,12 +65,8 @@ class MissionEnd:
         world, mission = self._world, self._mission
         east, north = state.east_m, state.north_m
         clearance = self._surely_clear_m(east, north, state.time_s)
-        if clearance < 0.0:
-            return Ending(Outcome.COLLISION, f"inside an obstacle by {-clearance:.2g} m")
-        if self.contact_m < 0.0:
-            return Ending(Outcome.COLLISION, "touched an obstacle between two steps")
-        if world.ground is not None and (hit := self._ground_hit(world.ground, state)):
-            return Ending(Outcome.COLLISION, hit)
+        if touched := self._touched(state, clearance):
+            return Ending(Outcome.COLLISION, touched)
         if not world.inside_bounds(east, north):
             return Ending(Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m")
         to_go = self.to_go_m(state)
@@ -92,6 +88,14 @@ class MissionEnd:
             self._appears_s = world.next_appearance(state.time_s)
         self._next_look_s = min(state.time_s + wait, self._appears_s, self._time_limit_s)
         return None
+
+    def _touched(self, state: AircraftState, clearance_m: float) -> str:
+        """A sentence if the aircraft touches something, or did since the last look; else empty."""
+        if clearance_m < 0.0:
+            return f"inside an obstacle by {-clearance_m:.2g} m"
+        if self.contact_m < 0.0:
+            return "touched an obstacle between two steps"
+        return "" if self._world.ground is None else self._ground_hit(self._world.ground, state)
 
     def _ground_hit(self, ground: Ground, state: AircraftState) -> str:
         """A sentence if the aircraft is below the ground, or was since the last look; else empty."""

@@ -122,8 +122,7 @@ def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArra
         begins[key[i] + 1] += 1
     used = 0
     for square in range(1, len(begins)):
-        if begins[square]:
-            used += 1
+        used += begins[square] > 0
         begins[square] += begins[square - 1]
     first, circles = np.empty(used + 1, dtype=np.intp), np.empty((3, used))
     at = np.empty(len(begins), dtype=np.intp)
