@@ -60,6 +60,12 @@ class DubinsTree(Replanner):
         self._iterations, self._margin_m = config.iterations, config.margin(mission)
         self._random = np.random.default_rng(config.tree_seed)
 
+    def plan(self, request: PlanRequest) -> Plan:
+        """As seldom in a turn that a shield holds as in one of its own."""
+        if request.committed and not request.flown and request.time_s - self._planned_s < HOLDING_S:
+            return Plan(PlanStatus.NO_PATH, "no new tree is due")
+        return super().plan(request)
+
     def due(self, path: Path, left_m: float, age_s: float) -> bool:
         """A way is flown to its end; from a turn to hold in another way is looked for."""
         return age_s >= HOLDING_S if path.loiter else left_m <= 0.0

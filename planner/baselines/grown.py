@@ -126,6 +126,16 @@ class GrownObstacles:
         first = int(np.argmin(np.where(entered, begins, math.inf)))
         return float(begins[first]), int(met[which[first]])
 
+    def hiding(self, place: Point, corners: list[Point]) -> set[int]:
+        """The obstacles that lines from a place to corners enter first."""
+        lines = shapely.linestrings(np.array([(place, corner) for corner in corners]).reshape(-1, 2, 2))
+        self._unite()
+        met = shapely.intersects(self._cores[:, None], lines)
+        inside = shapely.intersects_xy(self._cores, *place).any()
+        alone = (met.sum(axis=0) == 1) & ~inside
+        doubtful = {self.first_hit(place, corners[i])[1] for i in np.flatnonzero(~alone).tolist()}
+        return doubtful | set(np.flatnonzero(met[:, alone].any(axis=1)).tolist())
+
     def leads_inside(self, place: Point, target: Point) -> bool:
         """Whether the line from a place on the boundary to a target begins inside the obstacle."""
         return self.first_hit(place, target)[0] < TOUCH_SHARE * self.keep_m

@@ -151,8 +151,8 @@ class TangentBug(Walker[TangentBugState]):
             parts.add(self.known.part_at(also))
         touched = self.known.tangents(place, parts, reach)
         # Where something hides an edge, the edges of that are taken as well.
-        hiding = {self.known.first_hit(place, each.place)[1] for each in touched if not each.seen} - parts
-        touched += self.known.tangents(place, hiding, reach)
+        hiding = self.known.hiding(place, [each.place for each in touched if not each.seen])
+        touched += self.known.tangents(place, hiding - parts, reach)
         nodes = []
         for touch in [free, *touched]:
             to_goal_m = math.dist(touch.place, self.goal)

@@ -71,6 +71,18 @@ def test_from_a_turn_to_hold_in_another_way_is_looked_for(ring: MakePoints) -> N
     assert asked(2.0 * HOLDING_S, gone) is PlanStatus.FOUND
 
 
+def test_in_a_turn_that_a_shield_holds_a_tree_is_grown_as_seldom(ring: MakePoints) -> None:
+    planner, points = DubinsTree(DubinsTreeConfig(), EAST), ring(5000.0, 5200.0, 1200.0, 50.0)
+    held = Path(np.array([(*START, 1.0, 0.0, 1.0 / EAST.turn_radius_m, math.tau * EAST.turn_radius_m)]))
+
+    def asked(time_s: float) -> PlanStatus:
+        return planner.plan(PlanRequest(time_s, START, (1.0, 0.0), GivenMap(points), committed=held)).status
+
+    assert asked(0.0) is PlanStatus.FOUND
+    assert asked(0.9 * HOLDING_S) is PlanStatus.NO_PATH
+    assert asked(HOLDING_S) is PlanStatus.FOUND
+
+
 def test_a_path_stays_inside_the_area_where_the_way_round_leads_along_its_border(wall: MakePoints) -> None:
     points = wall((8000.0, 1500.0), (8000.0, 13_500.0), 50.0)
     path = first(points).path

@@ -108,6 +108,15 @@ def test_tangents_touch_a_disc_on_either_side() -> None:
         )
 
 
+def test_what_hides_is_what_a_line_enters_first() -> None:
+    near, far, place = (2000.0, 5000.0), (4000.0, 5000.0), (1000.0, 5000.0)
+    known = grown(np.array([near, far]))
+    which = {each: known.part_at((each[0] - KEEP, each[1])) for each in (near, far)}
+    assert known.hiding(place, [(5000.0, 5000.0)]) == {which[near]}
+    assert known.hiding(place, []) == set()
+    assert known.hiding((3000.0, 5000.0), [(5000.0, 5000.0), (0.0, 5000.0)]) == {which[near], which[far]}
+
+
 def test_a_line_past_one_disc_and_onto_another_of_the_same_obstacle_touches_a_dent() -> None:
     """Two discs that overlap: the line north past the first one runs into the second one."""
     known = grown(np.array([(5000.0, 5000.0), (5300.0, 5150.0)]))
