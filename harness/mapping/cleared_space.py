@@ -15,23 +15,23 @@ from harness.mapping.scan import Beams
 from planner.compiled import COUNT, FLOAT, FLOATS, PLACES, compiled
 from planner.interface import BoolArray, ComplexArray, FloatArray
 
-CELLS, CELLS_OUT, LOOKS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]", "uint8[:, :]"
-"""Parts of grids."""
+FLAGS, FLAGS_OUT, LOOKS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]", "uint8[:, :]"
+"""Numba types of parts of grids; _OUT is written to."""
 BEAMS = "UniTuple(float64, 5)"
 
 
 @compiled(FLOAT, FLOAT, FLOAT, COUNT)
 def first_over(bearing_rad: float, spacing_rad: float, beam_rad: float, aside: int) -> int:
-    """The last beam that begins before a bearing, counted from the first; where beams do not touch it may end before.
+    """Returns the last beam that begins before a bearing, less `aside`; where beams do not touch, it may end before it.
 
-    The bearing is clockwise from the axis of the first beam. The beam `aside` before it is told.
+    Beams are counted from the first, and the bearing is clockwise from the axis of the first beam.
     """
     return math.floor((bearing_rad + 0.5 * min(beam_rad, spacing_rad)) / spacing_rad) - aside
 
 
 @compiled(FLOAT, FLOAT, FLOAT)
 def clockwise_of(east: float, north: float, start_rad: float) -> float:
-    """The bearing of an offset, clockwise from another one in [0, 2 pi); not negative."""
+    """Returns the bearing (rad) of an offset, clockwise from `start_rad`, in [0, 2 pi)."""
     turned = math.atan2(east, north) - start_rad
     while turned < 0.0:
         turned += math.tau
@@ -40,7 +40,7 @@ def clockwise_of(east: float, north: float, start_rad: float) -> float:
 
 @compiled(FLOATS, COUNT, COUNT, FLOAT)
 def first_short(ranges: FloatArray, first: int, many: int, beyond: float) -> int:
-    """The first of so many neighbouring beams that does not go beyond a distance; -1 where all do."""
+    """Returns the first of `many` neighbouring beams that does not go beyond a distance; -1 where all do."""
     rays = len(ranges)
     beside = first % rays
     for _ in range(many):
@@ -50,7 +50,7 @@ def first_short(ranges: FloatArray, first: int, many: int, beyond: float) -> int
     return -1
 
 
-@compiled(CELLS_OUT, LOOKS_OUT, CELLS, FLOATS, BEAMS, *[FLOAT] * 5, COUNT, COUNT)
+@compiled(FLAGS_OUT, LOOKS_OUT, FLAGS, FLOATS, BEAMS, *[FLOAT] * 5, COUNT, COUNT)
 def through_cells(
     seen: BoolArray,
     looks: NDArray[np.uint8],
@@ -65,13 +65,13 @@ def through_cells(
     aside: int,
     needed: int,
 ) -> None:
-    """Marks the cells of a disc about the sensor that all beams which meet them went beyond.
+    """Marks the cells of a disc about the sensor if all beams that meet them went beyond.
 
-    Beams that touch cover all of a cell. Where they do not, one more to either side has to go beyond it, and what is
-    too narrow to be missed between them is up to who chooses `reach`.
+    Beams that touch cover all of a cell. Where they do not, one more to either side has to go beyond it, and the caller
+    chooses `reach` so that nothing is narrow enough to be missed between them.
 
-    Of the cells of a `disc` those not `seen` to be free are asked; `looks` tells how often each was looked through, and
-    it is free where that was as often as `needed`. The first cell's corner lies at `x_low`, `y_low`. Ranges count up to
+    Only the cells of `disc` that are not yet `seen` to be free are tested. `looks` counts how often each was looked
+    through, and `needed` times make it free. The first cell's corner lies at `x_low`, `y_low`. Ranges count up to
     `reach`; beams have to go beyond a cell by `noise`, and so have `aside` more to either side.
     """
     east, north, start_rad, spacing_rad, beam_rad = beams
@@ -115,10 +115,10 @@ def through_places(
     aimed_m: float,
     every: int,
 ) -> BoolArray:
-    """(k,) which of (k,) places, east + i north, all beams to either side went beyond.
+    """Tells which of (k,) places, east + i north, all beams to either side went beyond.
 
-    Only places nearer than `within_m` are asked, and of these one in `every`. The beams, the one towards a place and
-    `abreast` to either side, have to go further by `sure_m`, and the middle of that one to pass by no further than
+    Only one place in `every` is tested, and only if it is nearer than `within_m`. The beam towards a place and
+    `abreast` to either side have to go further by `sure_m`, and the middle of that one beam to pass by no further than
     `aimed_m`.
     """
     east, north, start_rad, spacing_rad, beam_rad = beams

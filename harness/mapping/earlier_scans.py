@@ -31,19 +31,19 @@ COMPARED_S = 12.0
 SLOW_MPS = 5.0
 """The time of `COMPARED_S` is longer by that in which an obstacle of this speed moves further than the noise."""
 LOOK_EVERY_S = 3.0
-"""Least time between two looks for obstacles that have come into free space."""
-LOOK_EVERY = 0.6
+"""Looks for obstacles that have come into free space are at least this far apart."""
+LOOK_EVERY_SHARE = 0.6
 """The time between two looks is at least that in which the fastest obstacle moves by this share of the clearance."""
 NO_STEP = 0.25
 """Neighbouring returns nearer to each other than this share of the clearance belong to one obstacle."""
-OWN = 0.1
+OWN_SHARE = 0.1
 """A return within this share of the clearance from where a followed obstacle was belongs to that obstacle."""
-OFF = 3.0
+VELOCITY_SIGMAS = 3.0
 """A velocity is taken to be off by at most this many standard errors."""
 
 
 class Look(NamedTuple):
-    """A scan that was looked at, the rays that returned something, and where."""
+    """A scan that was looked at, its rays that returned something, and the places of these returns."""
 
     scan: RangeScan
     hits: IntArray
@@ -62,16 +62,16 @@ class EarlierScans:
 
     def __init__(self, clearance_m: float, sure_m: float, *, exact: bool, flawed: bool) -> None:
         self.compared_s = COMPARED_S + sure_m / SLOW_MPS
-        self.own_m = max(OWN * clearance_m, sure_m)
+        self.own_m = max(OWN_SHARE * clearance_m, sure_m)
         self._clearance, self._sure, self._exact = clearance_m, sure_m, exact
         # A scan that errs may be wrong about a place; two are not.
         self._many = 2 if flawed else 1
-        self._every_s = max(LOOK_EVERY_S, LOOK_EVERY * clearance_m / MOST_MPS)
+        self._every_s = max(LOOK_EVERY_S, LOOK_EVERY_SHARE * clearance_m / MOST_MPS)
         self._looked_s = -math.inf
         self._looks: deque[Look] = deque()
 
     def due(self, time_s: float) -> bool:
-        """Whether it is time to look at a scan; then it is taken as looked at."""
+        """Tells whether a scan is to be looked at now, and takes it as looked at if so."""
         if time_s - self._looked_s < self._every_s:
             return False
         self._looked_s = time_s
@@ -80,11 +80,11 @@ class EarlierScans:
         return True
 
     def keep(self, look: Look) -> None:
-        """Keeps one more."""
+        """Keeps a scan that was looked at, to compare later ones with it."""
         self._looks.append(look)
 
     def changed(self, now: Look) -> BoolArray | None:
-        """(k,) which returns have come to places that were looked through, or have drawn back; None: surely none."""
+        """(k,) which returns have come to places once looked through, or have drawn back; None if surely none has."""
         if len(self._looks) < 2 or now.scan.nearest_m == math.inf or not self._may_differ(now):
             return None
         scan, hits, places = now
@@ -100,20 +100,19 @@ class EarlierScans:
         return changed
 
     def have_come(self, places: ComplexArray, fewest: int) -> bool:
-        """Whether so many of some places at least were looked through by one of the scans."""
+        """Tells whether at least `fewest` of the places were looked through by one of the scans."""
         return any(np.count_nonzero(come(each.scan, places, self._sure)) >= fewest for each in self._looks)
 
     def met(self, places: ComplexArray) -> BoolArray:
-        """(k,) whether something was met at places by the first of the scans."""
+        """(k,) which places are near to what the first of the scans met."""
         return near_line(places, self._looks[0].places, self.own_m, self._clearance)
 
     def of_it(self, track: FollowedOutline, places: ComplexArray, now: RangeScan) -> IntArray:
-        """Which places may be of something that moves.
+        """Returns the indices of places that may belong to a followed obstacle.
 
-        Those where the first of the scans met nothing else that has not gone since, or looked through; and, where its
-        outline tells all of its velocity, which none of the scans looked through where they would have been then, if
-        they were its. If that were few of those near it, its velocity would be wrong, or it has only appeared: then
-        that is not asked.
+        The first of the scans met nothing else there that has not gone since, or looked through. Where the outline
+        shows all of the velocity, no scan may have looked through where a place was then either, moved back by it. If
+        fewer than half of the places near the obstacle pass that, the velocity is wrong, and it is not asked.
         """
         first, near_m = self._looks[0], NO_STEP * self._clearance
         own = near_any(first.places, track.shown_at(first.scan.time_s), self.own_m)
@@ -124,14 +123,14 @@ class EarlierScans:
         was = may.copy()
         for before in self._looks:
             past_s = now.time_s - before.scan.time_s
-            off_m = max(self._sure, near_m) + OFF * track.error_mps * past_s
+            off_m = max(self._sure, near_m) + VELOCITY_SIGMAS * track.error_mps * past_s
             was &= ~looked_through(before.scan, places - track.velocity * past_s, off_m)
         near = may & near_any(places, track.at(now.time_s).points, near_m)
         some = was if 2 * np.count_nonzero(was & near) >= np.count_nonzero(near) else may
         return some.nonzero()[0]
 
     def _may_differ(self, now: Look) -> bool:
-        """Whether anything at all has come since a scan before, or drawn back: in a still world mostly nothing."""
+        """Tells whether anything may have come or drawn back since a scan before; in a still world mostly nothing."""
         if any_come(self._looks[0].scan, now.places, self._sure):
             return True
         late = self._looks[-1]
@@ -140,6 +139,6 @@ class EarlierScans:
         )
 
     def _drawn_back(self, before: Look, scan: RangeScan) -> BoolArray:
-        """(n,) which rays of a scan meet what may have drawn back since another."""
+        """(n,) which rays of a scan meet something that may have drawn back since an earlier one."""
         most_m = MOST_MPS * (scan.time_s - before.scan.time_s)
         return drawn_back(before.places, scan, self._sure, most_m)

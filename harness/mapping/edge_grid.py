@@ -13,7 +13,7 @@ from harness.mapping.scan_comparison import near_any
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 MOST_CELLS = 16_000_000
-"""Cells are wider than a quarter of the clearance where more of them would be needed."""
+"""A grid has at most this many cells; in a larger area they are wider than a quarter of the clearance."""
 
 
 class EdgePoints(ABC):
@@ -49,11 +49,11 @@ class EdgePoints(ABC):
 
     @abstractmethod
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
-        """Takes in one scan, but for some of its rays."""
+        """Takes in one scan except the rays that are `ignored`, (n,)."""
 
     @abstractmethod
     def forget(self, points_m: FloatArray, within_m: float) -> None:
-        """Forgets all that is no further from some points, (k, 2)."""
+        """Drops every edge point within `within_m` of any of the (k, 2) points."""
 
     @abstractmethod
     def _are_edges(self, slots: IntArray) -> BoolArray:
@@ -70,12 +70,12 @@ class EdgePoints(ABC):
         return self._points[slots].view(np.float64).reshape(-1, 2)
 
     def _slots_within(self, points_m: FloatArray, within_m: float) -> IntArray:
-        """Slots of all that is no further from some points, (k, 2)."""
+        """Returns the slots of points within `within_m` of any of the (k, 2) points."""
         places = points_m[:, 0] + 1j * points_m[:, 1]
         return near_any(self._points[: self._count], places, within_m).nonzero()[0]
 
     def _make_room(self, slots: int, *names: str) -> None:
-        """Arrays by slot get room for as many slots, and as much again; what is new is 0."""
+        """Lengthens the named arrays by slot, at least to twice their length where they are too short, with zeros."""
         for name in names:
             array = getattr(self, name)
             if slots > len(array):
@@ -88,12 +88,12 @@ class EdgePoints(ABC):
         self.last_removal_revision = self.revision
 
     def _column_and_row(self, places: ComplexArray) -> tuple[IntArray, IntArray, BoolArray]:
-        """Cells of places seen from the corner of the grid, and which of them lie on it."""
+        """Returns the cells of places, seen from the corner of the grid, and which of them lie on the grid."""
         column, row = (places.view(np.float64).reshape(-1, 2).T * (1.0 / self._cell)).astype(np.int64)
         return column, row, (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
 
     def _in_reach(self, sensor: complex, renewed_m: float) -> NDArray[np.int32]:
-        """Slots of points that are no further than the range, and some more; looked up anew after a way."""
+        """Returns the slots of points within range, looked up anew once the sensor has moved by `renewed_m`."""
         if not abs(sensor - self._near_at) < renewed_m:
             near = np.abs(self._points[: self._count] - sensor) < self._range + renewed_m
             self._near = near.nonzero()[0].astype(np.int32)

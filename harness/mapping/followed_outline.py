@@ -15,19 +15,18 @@ from harness.mapping.scan_matching import FEWEST, Outline
 from planner.interface import ComplexArray, FloatArray
 
 LEAST_MPS = 0.5
-"""What is slower than this stands still."""
+"""An obstacle slower than this counts as standing still."""
 MOST_MPS = 30.0
-SURE = 8.0
-"""A speed is known to be above or below a limit when it is so many of its standard errors away from it."""
+SURE_SIGMAS = 8.0
+"""A speed is known to be above or below a limit if it is this many of its standard errors away."""
 VAGUE_MPS = 1.5
-"""With a velocity that errs more than this it is not told where a thing will be."""
-FAR = 5.0
-"""Something of which only a straight face is seen moves when it has come so many times as far across it as another
-has to."""
+"""A velocity with a larger standard error than this is not used to predict."""
+FACE_FACTOR = 5.0
+"""If only a straight face is seen, it must have come this many times further, across the face, to count as moving."""
 HISTORY_S = 40.0
-"""Velocity is that of so long a time."""
+"""The velocity is fitted to the shifts of this last time."""
 FEWEST_SHIFTS = 4
-"""Velocity is told by so many at least."""
+"""The velocity is fitted to at least this many shifts."""
 
 
 @dataclass(eq=False)
@@ -62,17 +61,17 @@ class FollowedOutline:
         self.shifts = deque([(self.outline_s, self.base)])
 
     def at(self, time_s: float) -> Outline:
-        """The outline where it is at a time."""
+        """Returns the outline where it is at a time."""
         return self.outline.moved(self.velocity * (time_s - self.outline_s))
 
     def shown_at(self, time_s: float) -> ComplexArray:
-        """All that is known of it, where it is at a time."""
+        """Returns all points known of it where they are at a time."""
         if self.shown is None:
             return self.at(time_s).points
         return self.shown + self.velocity * (time_s - self.seen_s)
 
     def note(self, time_s: float, further: complex) -> None:
-        """Takes in that the outline was found elsewhere than expected by a shift."""
+        """Takes in that the outline was found away from its expected place by the shift `further`."""
         moved = self.base + self.velocity * (time_s - self.outline_s) + further
         self.shifts.append((time_s, moved))
         while time_s - self.shifts[0][0] > HISTORY_S:
@@ -81,7 +80,7 @@ class FollowedOutline:
             self._measure()
 
     def renew(self, outline: Outline, time_s: float) -> None:
-        """Goes on with an outline as it was just found.
+        """Replaces the outline by one as it was just found.
 
         Where the one before told nothing of shifts along its face, and this one does, only what is found from now on
         tells the velocity.
@@ -92,14 +91,14 @@ class FollowedOutline:
 
     @property
     def moved(self) -> complex:
-        """How far it was found from where it was first, of what is remembered of it."""
+        """The shift from the first remembered place to the last."""
         return self.shifts[-1][1] - self.shifts[0][1]
 
     def seems_to_move(self, sure_m: float) -> bool:
-        """Whether it was found to move: surely, and further than returns err.
+        """Tells whether it has moved surely, and further than returns err.
 
-        Of a straight face without both of its ends other parts come into view along it: there only motion across
-        it tells, and by far.
+        Of a straight face without both of its ends other parts come into view along it. There only motion across it
+        counts, and only if it is far.
         """
         if len(self.shifts) < FEWEST_SHIFTS or self.error_mps >= VAGUE_MPS:
             return False
@@ -108,15 +107,15 @@ class FollowedOutline:
             back = self.outline.along.conjugate()
             times_s, shifts = self._remembered()
             _, error_mps = _slope(times_s, (shifts * back).imag)
-            moved, velocity, further_m = (moved * back).imag, (velocity * back).imag, FAR * sure_m
-        return abs(velocity) >= LEAST_MPS + SURE * error_mps and abs(moved) > further_m
+            moved, velocity, further_m = (moved * back).imag, (velocity * back).imag, FACE_FACTOR * sure_m
+        return abs(velocity) >= LEAST_MPS + SURE_SIGMAS * error_mps and abs(moved) > further_m
 
     def surely_stands(self) -> bool:
-        """Whether its velocity is surely too little."""
-        return abs(self.velocity) + SURE * self.error_mps < LEAST_MPS
+        """Tells whether its speed is surely below `LEAST_MPS`."""
+        return abs(self.velocity) + SURE_SIGMAS * self.error_mps < LEAST_MPS
 
     def _measure(self) -> None:
-        """Velocity: the slope of the shifts over time."""
+        """Sets the velocity to the slope of the shifts over time."""
         velocity, self.error_mps = _slope(*self._remembered())
         if self.error_mps > VAGUE_MPS:
             velocity = self.velocity if self.moves else 0j
@@ -127,13 +126,13 @@ class FollowedOutline:
         self.velocity = velocity * min(1.0, MOST_MPS / max(abs(velocity), MOST_MPS))
 
     def _remembered(self) -> tuple[FloatArray, ComplexArray]:
-        """When it was found, s, and how far from where it was first."""
+        """Returns the times (s) at which it was found, and the shifts from its first place."""
         times, shifts = zip(*self.shifts, strict=True)
         return np.array(times), np.array(shifts)
 
 
 def _slope(times_s: FloatArray, shifts: FloatArray | ComplexArray) -> tuple[complex, float]:
-    """The slope of some shifts over time, by least squares, and its standard error."""
+    """Fits a slope over time to shifts by least squares; returns it and its standard error."""
     times = times_s - times_s.mean()
     spread = float((times * times).sum())
     slope = (times * shifts).sum() / spread
@@ -142,12 +141,12 @@ def _slope(times_s: FloatArray, shifts: FloatArray | ComplexArray) -> tuple[comp
 
 
 def extent_m(points: ComplexArray) -> float:
-    """How far the ends of an outline lie apart."""
+    """Returns the distance between the ends of an outline."""
     return float(abs(points[-1] - points[0]))
 
 
 def bow(places: ComplexArray, apart_m: float) -> ComplexArray:
-    """The parabola that suits (k,) places best, from end to end: points no further apart than some distance."""
+    """Fits a parabola to (k,) places and returns points on it, end to end, at most `apart_m` apart."""
     chord = places[-1] - places[0]
     chord /= max(abs(chord), 1e-9)
     turned = (places - places[0]) * chord.conjugate()

@@ -19,16 +19,14 @@ from planner.compiled import FLOAT, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
 NARROWEST_RAD = 1e-3
-"""Finest step of bearing in which the space that an obstacle hides is known."""
-MISSED = 1e-2
-"""If returns get lost, a cell is free once so many scans looked through it that the probability that all of them missed
-an obstacle in it is at most this."""
+"""The space that an obstacle hides is known in steps of bearing no finer than this."""
+MISSED_CHANCE = 1e-2
+"""If returns get lost, a cell is free after so many looks that all miss an obstacle with at most this probability."""
 MOST_LOOKS = 255
 """If a cell would need more scans than this, no space is ever seen to be free."""
-BESIDE = 3
-"""If returns get lost or err, this many more beams to either side of a cell must go beyond it: an obstacle as wide as
-these is then missed only if all its returns are."""
-TOUCHING = 1e-6
+MORE_BEAMS = 3
+"""If returns get lost or err, this many more beams on each side of a cell must go beyond it to make it free."""
+TOUCHING_SHARE = 1e-6
 """Beams touch if at most this share of their spacing lies between two of them."""
 
 
@@ -60,7 +58,7 @@ class FreeSpace:
         self._least_width = clearance_m if least_width_m is None else least_width_m
         self._needed = looks_needed(lost)
         self._looks = np.zeros(self._seen.shape, dtype=np.uint8)
-        self._aside = BESIDE if lost > 0.0 or noise_m > 0.0 else 0
+        self._aside = MORE_BEAMS if lost > 0.0 or noise_m > 0.0 else 0
         self._last = (math.inf, math.inf)
         self._reach = 0.0
         self._disc = _disc(0)  # cells in reach, about the one that the sensor is in
@@ -100,12 +98,12 @@ class FreeSpace:
     def _reach_m(self, scan: RangeScan) -> float:
         """Range up to which nothing as wide as the narrowest obstacle can hide between two beams."""
         between_rad = scan.spacing_rad - scan.beam_rad
-        if between_rad <= TOUCHING * scan.spacing_rad:
+        if between_rad <= TOUCHING_SHARE * scan.spacing_rad:
             return scan.max_range_m
         return min(scan.max_range_m, self._least_width / between_rad)
 
     def take_back(self, scan: RangeScan, edges_m: FloatArray) -> bool:
-        """What a scan saw to stand, (k, 2) edge points, and what it hides, is not known to be free any more.
+        """Takes back from free space what (k, 2) edge points of a scan stand in and what they hide.
 
         Returns:
             Whether any of it stands in space that was seen to be free: an edge point with free cells all about it.
@@ -142,7 +140,7 @@ class FreeSpace:
         return hidden_from
 
     def _window(self, scan: RangeScan, across: int) -> tuple[int, int, int, int, int, int]:
-        """First column and row within so many cells of the sensor, and the spans of those on the grid."""
+        """Returns the first column and row within `across` cells of the sensor, and the spans of those on the grid."""
         x_first = math.floor((scan.east_m - self._x0) / self._cell) - across
         y_first = math.floor((scan.north_m - self._y0) / self._cell) - across
         size = 2 * across + 1
@@ -163,10 +161,10 @@ class FreeSpace:
 
 
 def looks_needed(missed: float) -> int:
-    """How many scans have to look through a cell to make it free, if each misses what is in it with a probability."""
+    """Returns how many scans must look through a cell to make it free if each misses with the probability `missed`."""
     if missed <= 0.0:
         return 1
-    return MOST_LOOKS + 1 if missed >= 1.0 else max(math.ceil(math.log(MISSED) / math.log(missed)), 1)
+    return MOST_LOOKS + 1 if missed >= 1.0 else max(math.ceil(math.log(MISSED_CHANCE) / math.log(missed)), 1)
 
 
 @compiled(GRID, ROWS, FLOAT, FLOAT, FLOAT)
@@ -180,7 +178,7 @@ def _are_free(seen: BoolArray, points: FloatArray, x0: float, y0: float, cell: f
 
 
 def _disc(cells: int) -> BoolArray:
-    """(2 k + 1, 2 k + 1) which cells lie within k cells of the middle one."""
+    """Returns which of (2 k + 1, 2 k + 1) cells lie within k cells of the middle one."""
     away = np.arange(-cells, cells + 1)
     # Row by row, so that of a large disc nothing but the answer takes room.
     halves = np.floor(np.sqrt(cells * cells - away * away)).astype(np.int64)

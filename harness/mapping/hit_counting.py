@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from planner.compiled import BOOL, COUNT, COUNTS, COUNTS_OUT, FLOAT, FLOATS, PLACES, PLACES_OUT, compiled
 from planner.interface import ComplexArray, FloatArray, IntArray
 
-CONFIRMED = 2
-"""An edge is believed from this score on; a hit adds one, a look through takes one."""
-CERTAIN = 6
+CONFIRMED_SCORE = 2
+"""An edge is believed from this score on. A hit adds one, and a scan that looks through takes one."""
+CERTAIN_SCORE = 6
 """Scores do not rise above this."""
-PARTS = 8
-"""Hits that are joined lie no further apart than so many cells: points put between them, one cell."""
-CORNER = 0.3
-"""Sine of the turn from which on a wall has a corner."""
+GAP_PARTS = 8
+"""A gap between joined hits is split into this many parts; it spans no more cells, so points are one cell apart."""
+CORNER_SINE = 0.3
+"""A wall has a corner where it turns by an angle of at least this sine."""
 
 SCORES, SLOTS = "Array(int8, 1, 'C', readonly=True)", "Array(int32, 1, 'C', readonly=True)"
 SCORES_OUT, SLOTS_OUT, PLACE = "int8[::1]", "int32[::1]", "complex128"
@@ -38,18 +38,18 @@ def new_edges(
     join_m: float,
     first_score: int,
 ) -> tuple[IntArray, ComplexArray]:
-    """Cells and places to be counted: hits that are not certain, and what lies between two that are joined.
+    """Returns cells and places to be counted: hits that are not certain, and points between hits that are joined.
 
     (n,) `hits` are the rays that met something, `places` where they did. `score` and `slot` are by cell, the latter
-    negative where it has no point. `closed`: the last hit is the neighbour of the first. Hits nearer to each other than
-    `join_m` are joined. A cell that was hit has at least `first_score`, unless it was looked through.
+    negative where it has no point. `closed` means that the last hit is the neighbour of the first. Hits nearer to each
+    other than `join_m` are joined. A cell that was hit has at least `first_score`, unless it was looked through.
     """
     n, per_m = len(hits), 1.0 / cell_m
     cells, uncertain = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_)
     fresh = 0
     for i in range(n):
         cells[i] = int(places[i].real * per_m) * rows + int(places[i].imag * per_m)
-        uncertain[i] = score[cells[i]] < CERTAIN
+        uncertain[i] = score[cells[i]] < CERTAIN_SCORE
         fresh += uncertain[i]
     wide, gaps = np.empty(n, dtype=np.int64), 0
     for i in range(n if closed else n - 1):
@@ -60,17 +60,17 @@ def new_edges(
             if (missing if j else missing + rays) <= 2 and cell_m < gap_m < join_m:
                 wide[gaps] = i
                 gaps += 1
-    most = fresh + (PARTS - 1) * gaps
+    most = fresh + (GAP_PARTS - 1) * gaps
     counted, found = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.complex128)
     k = 0
     for i in range(n):
         if uncertain[i]:
             counted[k], found[k] = cells[i], places[i]
             k += 1
-    for part in range(1, PARTS):
+    for part in range(1, GAP_PARTS):
         for gap in range(gaps):
             i = wide[gap]
-            place = places[i] + part / PARTS * (places[(i + 1) % n] - places[i])
+            place = places[i] + part / GAP_PARTS * (places[(i + 1) % n] - places[i])
             cell = int(place.real * per_m) * rows + int(place.imag * per_m)
             # Where one was looked through, it is not put again: what ends there is seen to end there.
             if slot[cell] < 0 or score[cell] >= first_score:
@@ -89,7 +89,7 @@ def ends(
     join_m: float,
     corners: bool,
 ) -> IntArray:
-    """(k,) which hits lie at an end of an outline, as the sensor sees it; one may be told several times.
+    """Returns the indices of hits at an end of an outline, as the sensor sees it; one may be there several times.
 
     Hits and places are those of `new_edges`, `ranges` of all rays. With `corners` a wall that turns away from the
     sensor ends there, too, though both of its sides are in sight.
@@ -115,7 +115,7 @@ def ends(
         k += 2
     for i in range(pairs - 1 if corners else 0):
         turn = (step[i + 1] * step[i].conjugate()).imag
-        if joined[i] & joined[i + 1] & (turn > CORNER * gap_m[i + 1] * gap_m[i]):
+        if joined[i] & joined[i + 1] & (turn > CORNER_SINE * gap_m[i + 1] * gap_m[i]):
             found[k] = i + 1
             k += 1
     for i in range(pairs):
@@ -158,16 +158,16 @@ def count_hits(
         before[i] = score[cells[i]]
     unconfirmed, raised = False, 0
     for i in range(len(cells)):
-        if before[i] >= CERTAIN:
+        if before[i] >= CERTAIN_SCORE:
             continue
         cell, risen = cells[i], max(before[i] + 1, first_score)
         score[cell] = risen
         if slot[cell] < 0:
             slot[cell], cell_of[known], points[known], since[known] = known, cell, places[i] + corner, 0
             known += 1
-        if risen < CONFIRMED:
+        if risen < CONFIRMED_SCORE:
             unconfirmed = True
-        elif before[i] < CONFIRMED:
+        elif before[i] < CONFIRMED_SCORE:
             raised = 1
             since[slot[cell]] = revision + 1
     return known, revision + raised, unconfirmed

@@ -36,33 +36,32 @@ from harness.mapping.scan_comparison import grown, in_a_row, joined, looked_thro
 from harness.mapping.scan_matching import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, means, register
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
-NOWHERE = np.zeros((0, 2))
+NO_PLACES = np.zeros((0, 2))
 DECIDED_S = 5.0
-"""Whether a followed outline moves is decided once this is certain, but not before this time."""
+"""No outline followed for less than this time is decided to move or to stand."""
 UNDECIDED_S = 30.0
 """An outline that is not known to move after this time is taken to stand still."""
 LOST_S = 2.0
-"""An outline that may move is followed no longer once it has not been seen for this time."""
+"""An outline not known to move is dropped once it has not been seen for this time."""
 COASTS_S = 15.0
-"""An obstacle that is known to move is taken to move on for this time after it was last seen."""
+"""An obstacle known to move is taken to move on for this time after it was last seen."""
 NEW_OUTLINE_S = 12.0
 """An outline is compared with one of the same obstacle that is at most this old."""
-GROWN = 1.3
-"""A new outline replaces the one that is compared with if it shows this many times as much of the obstacle."""
+GROWN_FACTOR = 1.3
+"""A new outline replaces the one followed if it shows this many times as much of the obstacle."""
 SLANT = 4.0
 """Neighbouring returns of one face lie at most this many times as far apart as on a face across the beams."""
 LATELY_S = 5.0
 """An edge that has stood for this time does not belong to an obstacle that has just come into view."""
-NEAR = 1.5
-"""Returns within this many standard deviations of ranges from an outline may belong to it."""
-BENT = 14.0
-"""This times noise over spacing, to the power of two thirds, is how many points of a straight face a mean has to
-be of for the face not to look bent (`scan_matching.FLAT`)."""
-NARROW = 4.0
-"""Returns on a width below this many standard deviations of ranges show no outline; those about them are added."""
-MEDIANS = 0.5
-"""Neighbouring medians of ranges, which share returns, differ by less than this many standard deviations of ranges."""
-FACES = 1.5
+NEAR_SIGMAS = 1.5
+"""A hit within this many standard deviations of range noise of an outline stays a candidate in every matching round."""
+BENT_FACTOR = 14.0
+"""This times noise over spacing, to the power 2/3, is how many points a mean needs lest a straight face look bent."""
+NARROW_SIGMAS = 4.0
+"""A run of hits narrower than this many standard deviations of range noise is joined by all hits about it."""
+MEDIAN_SIGMAS = 0.5
+"""Neighbouring medians of ranges, which share returns, differ by less than this many standard deviations of noise."""
+FACE_GAPS = 1.5
 """Another face of a moving obstacle is looked for within this many times the gap at which runs of returns break."""
 
 
@@ -100,12 +99,12 @@ class MovingObstacles:
 
     @property
     def follows(self) -> bool:
-        """Whether anything may move."""
+        """Whether any outline is followed, which may move."""
         return len(self._tracks) > 0
 
     @property
     def found(self) -> tuple[MovingEdges, ...]:
-        """What is known to move, or has just appeared, as it was at the time of the last scan."""
+        """Obstacles known to move, or just appeared, as they were at the time of the last scan."""
         return tuple(
             MovingEdges(
                 self._time_s,
@@ -118,9 +117,9 @@ class MovingObstacles:
 
     @property
     def trail_m(self) -> FloatArray:
-        """(k, 2) places, one a gate, where what the last scan showed to move was before; mostly none."""
+        """(k, 2) earlier places, about a gate apart, of obstacles that the last scan showed to move; mostly none."""
         if not self._new:
-            return NOWHERE
+            return NO_PLACES
         step_s = [self._gate / max(abs(track.velocity), LEAST_MPS) for track in self._new]
         compared_s = 0.0 if self._is_free else self._earlier.compared_s
         past = [
@@ -132,7 +131,7 @@ class MovingObstacles:
         return points[np.unique(np.floor(points / self._gate), axis=0, return_index=True)[1]]
 
     def update(self, scan: RangeScan) -> BoolArray | None:
-        """Takes in one scan: (n,) which of its rays met something that moves; None where none did."""
+        """Takes in one scan; returns (n,) which of its rays met an obstacle that moves, or None where none did."""
         self._time_s = scan.time_s
         self._new = []
         moving = self._follow(scan) if self._tracks else None
@@ -161,9 +160,9 @@ class MovingObstacles:
                 self._begin(scan, changed[run], hits[run], places[run])
 
     def _begin(self, scan: RangeScan, changed: BoolArray, hits: IntArray, places: ComplexArray) -> None:
-        """Begins to follow what has changed in a run of returns, without what stood there before beside it.
+        """Begins to follow what has changed in a run of returns, without what already stood beside it.
 
-        Of a straight face all is followed: where it slides along itself it only seems to have stood.
+        All of a straight face is followed, since one that slides along itself only seems to have stood.
         """
         others = (changed | ~self._earlier.met(places)).nonzero()[0]
         apart = np.abs(np.diff(places[others])) > self._clearance
@@ -178,9 +177,10 @@ class MovingObstacles:
             self._tracks.append(FollowedOutline(outline, scan.time_s))
 
     def _step(self, scan: RangeScan, hits: IntArray) -> FloatArray:
-        """(k,) returns of one face lie no further apart than this where they are so far away."""
+        """(k,) distances (m) up to which neighbouring returns belong to one face, at the range of each."""
         step = np.maximum(
-            NO_STEP * self._clearance + 6.0 * self._noise, SLANT * scan.spacing_rad * scan.ranges_m[hits]
+            NO_STEP * self._clearance + 6.0 * self._noise,
+            SLANT * scan.spacing_rad * scan.ranges_m[hits],
         )
         return np.minimum(step, self._apart)
 
@@ -199,28 +199,28 @@ class MovingObstacles:
         for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), closed):
             if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
                 whole = self._whole(come[run], hits, places, scan)
-                if extent_m(places[whole]) < NARROW * self._noise:
+                if extent_m(places[whole]) < NARROW_SIGMAS * self._noise:
                     whole = self._about(come[run], hits, places, scan)
                 self._tracks.append(
                     FollowedOutline(self._outline(scan, hits[whole], places[whole]), scan.time_s)
                 )
 
     def _not_standing(self, hits: IntArray, places: ComplexArray) -> tuple[IntArray, ComplexArray]:
-        """Rays that returned something, and where, but for those from where something has long stood."""
+        """Leaves out rays whose return came from where an obstacle has long stood."""
         if not self._stands:
             return hits, places
         others = ~self._stands(_pairs(places))
         return hits[others], places[others]
 
     def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
-        """Rays that returned something, but for false returns, and where."""
+        """Returns the rays that returned something, without false returns, and the places of the returns."""
         if not self._false_returns:
             return scan.returned()
         hits = supported(scan, self._apart).nonzero()[0]
         return hits, scan.ends_m(hits)
 
     def _outline(self, scan: RangeScan, hits: IntArray, places: ComplexArray) -> Outline:
-        """The outline that neighbouring returns show: where they lie closer than they err, means of several."""
+        """Returns the outline of neighbouring returns; a parabola, or means of several, where they err."""
         if self._is_free:
             return Outline(
                 bow(places, NO_STEP * self._clearance),
@@ -235,21 +235,21 @@ class MovingObstacles:
         return Outline(
             points,
             ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
-            math.ceil((BENT * self._noise / apart_m) ** (2.0 / 3.0) / several),
+            math.ceil((BENT_FACTOR * self._noise / apart_m) ** (2.0 / 3.0) / several),
         )
 
     def _is_followed(self, places: ComplexArray, time_s: float) -> bool:
-        """Whether a run of returns is of something that is followed: its middle, or any of it where that moves."""
+        """Tells whether a run of returns is followed already: its middle, or any of it by an outline that moves."""
         middle = places[len(places) // 2 :][:1]
         for track in self._tracks:
             # What comes into view beside something that moves is another face of it.
-            of, within_m = (places, FACES * self._apart) if track.moves else (middle, self._gate)
+            of, within_m = (places, FACE_GAPS * self._apart) if track.moves else (middle, self._gate)
             if near_any(of, track.at(time_s).points, within_m).any():
                 return True
         return False
 
     def _follow(self, scan: RangeScan) -> BoolArray | None:
-        """Moves the tracks on; which rays met one that moves."""
+        """Moves all tracks on to a scan; returns which rays met one that moves, or None."""
         hits, places = self._not_standing(*self._returns(scan))
         moving = np.zeros(len(scan.ranges_m), dtype=np.bool_)
         kept: list[FollowedOutline] = []
@@ -269,7 +269,7 @@ class MovingObstacles:
         return moving if moving.any() else None
 
     def _goes_on(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
-        """Whether a track is followed on; whether it moves is decided here, once it has been followed long enough."""
+        """Tells whether to go on following a track; once it is old enough, decides whether it moves."""
         if scan.time_s - track.seen_s > (COASTS_S if track.moves else LOST_S):
             return False
         age_s = scan.time_s - track.begun_s
@@ -281,7 +281,7 @@ class MovingObstacles:
         return not (track.surely_stands() or (age_s > UNDECIDED_S and not track.moves))
 
     def _has_come_or_gone(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
-        """Whether it is seen where nothing was, or nothing where it was.
+        """Tells whether a track is now where nothing was, or nothing is now where it was.
 
         Where a corner is rounded, another face comes into view little by little, as if the first one moved.
         """
@@ -294,7 +294,7 @@ class MovingObstacles:
     def _found_again(
         self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
     ) -> IntArray:
-        """Finds an outline in a scan; which of the places belong to it."""
+        """Finds a track's outline in a scan; returns the indices of the places that belong to it."""
         unknown_mps = 0.0 if len(track.shifts) >= FEWEST_SHIFTS else MOST_MPS
         gate = self._gate + unknown_mps * (scan.time_s - track.outline_s)
         stiff = STIFF_IN_NOISE if self._is_free else STIFF
@@ -303,7 +303,7 @@ class MovingObstacles:
             some = self._earlier.of_it(track, places, scan)
         own_hits, own = hits[some], places[some]
         laid = register(
-            track.at(scan.time_s), own_hits, own, scan, gate, self._apart, stiff, NEAR * self._noise
+            track.at(scan.time_s), own_hits, own, scan, gate, self._apart, stiff, NEAR_SIGMAS * self._noise
         )
         if laid is None:
             return np.zeros(0, dtype=np.intp)
@@ -315,14 +315,14 @@ class MovingObstacles:
     def _renewed(
         self, track: FollowedOutline, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan
     ) -> IntArray:
-        """Which returns are of an outline that was found, which goes on with another one where more of it is seen."""
+        """Returns which returns belong to a track found again, and renews its outline where more of it is seen."""
         track.seen_s = scan.time_s
         shows_all = track.moves and not self._is_free
         whole = self._whole(mine, hits, places, scan) if self._is_free or track.moves else mine
         if self._is_free:
-            more = extent_m(places[whole]) > GROWN * extent_m(track.outline.points)
+            more = extent_m(places[whole]) > GROWN_FACTOR * extent_m(track.outline.points)
         else:
-            more = len(whole) > GROWN * len(mine)
+            more = len(whole) > GROWN_FACTOR * len(mine)
         if more or scan.time_s - track.outline_s > NEW_OUTLINE_S:
             new = whole if more or self._is_free else mine
             track.renew(self._outline(scan, hits[new], places[new]), scan.time_s)
@@ -332,17 +332,17 @@ class MovingObstacles:
         return whole if shows_all else mine
 
     def _whole(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
-        """Returns of something that moves, and those that go on from their ends, but for what was there before."""
+        """Adds to a track's returns those that go on from their ends, except where something stood before."""
         may = np.ones(len(places), dtype=np.bool_)
         if self._stands:
             may = ~self._stands(_pairs(places), LATELY_S)
             may[mine] = True
         some = may.nonzero()[0]
-        step_m = NO_STEP * self._clearance + MEDIANS * self._noise
+        step_m = NO_STEP * self._clearance + MEDIAN_SIGMAS * self._noise
         return some[grown(np.searchsorted(some, mine), hits[some], places[some], step_m, scan)]
 
     def _about(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
-        """All returns about some, clockwise; these where they lie too far apart for any to be about their mean."""
+        """Returns all returns about the mean of some, clockwise, or these where none is near it."""
         near = (np.abs(places - places[mine].mean()) < self._gate).nonzero()[0]
         if not len(near):
             return mine
@@ -352,7 +352,7 @@ class MovingObstacles:
 
 
 def _face(places: ComplexArray, some: slice, along: complex, within_m: float) -> slice:
-    """Some places of a run, and those that go on from their ends in a direction."""
+    """Widens a slice of a run by the places that go on from its ends in a direction."""
     off_m = ((places - places[some.start]) * along.conjugate()).imag
     bent = (np.abs(off_m) > within_m).nonzero()[0]
     before, after = bent[bent < some.start], bent[bent >= some.stop]
@@ -360,5 +360,5 @@ def _face(places: ComplexArray, some: slice, along: complex, within_m: float) ->
 
 
 def _pairs(points: ComplexArray) -> FloatArray:
-    """(k, 2) east and north of points."""
+    """(k, 2) east and north of complex points."""
     return np.column_stack((points.real, points.imag))

@@ -16,39 +16,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.mapping.edge_grid import EdgePoints
-from harness.mapping.hit_counting import CONFIRMED, count_hits, ends, new_edges
+from harness.mapping.hit_counting import CONFIRMED_SCORE, count_hits, ends, new_edges
 from harness.mapping.scan import RangeScan, all_round, supported
 from harness.mapping.scan_comparison import looked_through
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
-SUPPORT = 0.5
-"""Where returns may be false, one is believed only if a ray beside it met something as far, but for this share of
-the clearance: a false return beside a wall seldom lies so near to its range."""
-DETAIL = ((5.0, 4), (2.0, 16))
+SUPPORT_SHARE = 0.5
+"""Where returns may be false, one is believed if a ray beside it met something within this share of the clearance."""
+DETAIL_GRIDS = ((5.0, 4), (2.0, 16))
 """Pairs (reach in clearances, number): within the reach of the aircraft, the ends of outlines are kept in finer cells,
 this number of them along the side of a usual cell."""
-MOVED_OF_LEAST_RANGE = 1.0 / 4.0
+LEAST_RANGE_SHARE = 1.0 / 4.0
 """A scan is counted once the aircraft has moved by this share of the least range since the last counted scan."""
-MOVED_OF_SENSING_RANGE = 1.0 / 64.0
+SENSING_RANGE_SHARE = 1.0 / 64.0
 """A scan is counted once the aircraft has moved by this share of the sensing range, however far away obstacles are."""
-RANGES_READ = 0.75
+RANGES_READ_FACTOR = 0.75
 """The way between two counted scans is shorter by this factor if the map of free space has read the scan's ranges."""
-SOMETHING_MOVES = 0.25
+MOVING_FACTOR = 0.25
 """The way between two counted scans is shorter by this factor while something moves, appears or vanishes."""
 PLACED_ANEW = 8.0
 """If the poses of scans err, edges within this many clearances of the aircraft are moved to where they are seen now."""
-NEARER = 0.7
+NEARER_SHARE = 0.7
 """An edge is moved only if it is seen from less than this share of the least range at which it was seen before."""
-OFF = 0.01
+OFF_SHARE = 0.01
 """An edge is moved only if it is off by more than this share of the clearance."""
-LOOK_THROUGH_EVERY = 12
-"""Every so many scans the map looks for points that the beams went past."""
-LOOK_THROUGH_AGAIN = 2
-"""Every so many scans the map looks for such points while it found some the last time."""
+LOOK_EVERY_SCANS = 12
+"""Once in this many scans the map looks for points that the beams went past."""
+LOOK_AGAIN_SCANS = 2
+"""Once in this many scans the map looks for such points after it found some the last time."""
 
 
 class ObstacleMap(EdgePoints):
-    """What stands still, as a sensor with exact ranges shows it.
+    """Obstacles that stand still, from a sensor with exact ranges.
 
     Hits nearer to each other than twice the clearance leave no way between them and are joined. Edge points lie about a
     quarter of it apart.
@@ -76,41 +75,41 @@ class ObstacleMap(EdgePoints):
         self._slot = np.full(self._coarse + 1024, -1, dtype=np.int32)  # by cell, -1 where there is no point
         self._key = np.zeros(1024, dtype=np.int64)  # by slot: its cell
         self._join = 2.0 * clearance_m
-        self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
-        self._doubtful, self._first_score = doubtful, 1 if doubtful else CONFIRMED
+        self._clearance, self._near_by = clearance_m, DETAIL_GRIDS[0][0] * clearance_m
+        self._doubtful, self._first_score = doubtful, 1 if doubtful else CONFIRMED_SCORE
         self._shifted, self._scanned_at = shifted, 0j  # the latter: from where the scan before was taken
         self._seen_from_m = np.zeros(0)  # by slot: least range at which it was seen, where poses err
         self._scans = 0
         self._all_stands = True  # no point was looked through the last time
         self._unconfirmed = False  # a cell was hit in the last scan taken in, and has yet to be believed
-        self._same_view = max(MOVED_OF_SENSING_RANGE * range_m, self._cell)
+        self._same_view = max(SENSING_RANGE_SHARE * range_m, self._cell)
         self._taken_at, self._taken_nearest = complex(math.inf, math.inf), math.inf
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
-        """Takes in one scan, but for some of its rays."""
+        """Takes in one scan except the rays that are `ignored`, (n,)."""
         nearest = scan.nearest_m
         if nearest < math.inf:
             sensor = complex(scan.east_m, scan.north_m)
             moved = abs(sensor - self._taken_at)
-            same = min(MOVED_OF_LEAST_RANGE * nearest, self._same_view)
+            same = min(LEAST_RANGE_SHARE * nearest, self._same_view)
             if ignored is not None or not self._all_stands:
-                same *= SOMETHING_MOVES
+                same *= MOVING_FACTOR
             elif scan.followed:
-                same *= RANGES_READ
+                same *= RANGES_READ_FACTOR
             # What is nearer than the way flown explains has only just appeared.
             if not moved < same or nearest < self._taken_nearest - 1.001 * moved or self._unconfirmed:
                 self._taken_at, self._taken_nearest = sensor, nearest
                 self._take_in(scan, nearest, ignored)
-        if not self._scans % (LOOK_THROUGH_EVERY if self._all_stands else LOOK_THROUGH_AGAIN) and self._count:
+        if not self._scans % (LOOK_EVERY_SCANS if self._all_stands else LOOK_AGAIN_SCANS) and self._count:
             self._all_stands = not self._look_through(scan)
         self._scans += 1
 
     def _are_edges(self, slots: IntArray) -> BoolArray:
-        confirmed: BoolArray = self._score[self._key[slots]] >= CONFIRMED
+        confirmed: BoolArray = self._score[self._key[slots]] >= CONFIRMED_SCORE
         return confirmed
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
-        """Forgets all that is no further from some points, (k, 2)."""
+        """Drops every edge point within `within_m` of any of the (k, 2) points."""
         slots = self._slots_within(points_m, within_m)
         slots = slots[self._score[self._key[slots]] > 0]
         if len(slots):
@@ -118,7 +117,7 @@ class ObstacleMap(EdgePoints):
             self._note_removal()
 
     def _take_in(self, scan: RangeScan, nearest_m: float, ignored: BoolArray | None) -> None:
-        """Counts hits; where they are new, also what lies between them; and near outlines in detail.
+        """Counts hits, points between new ones, and the ends of near outlines in detail.
 
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
@@ -138,28 +137,28 @@ class ObstacleMap(EdgePoints):
         if nearest_m >= self._near_by:
             self._count_hits(cells, found)
             return
-        corners = nearest_m < DETAIL[-1][0] * self._clearance
+        corners = nearest_m < DETAIL_GRIDS[-1][0] * self._clearance
         near = ends(hits, places, scan.ranges_m, cell, closed, join, corners)
         ranges, places = scan.ranges_m[hits[near]], places[near]
         again: list[tuple[IntArray, ComplexArray]] = []
-        for reach, finer in DETAIL:
+        for reach, finer in DETAIL_GRIDS:
             within = ranges < reach * self._clearance
             at = places[within]
             if len(at):
                 fine = self._fine_keys(at, finer)
                 cells, found = np.concatenate((cells, fine)), np.concatenate((found, at))
-                if first < CONFIRMED:
+                if first < CONFIRMED_SCORE:
                     # Where the wall is known, this only tells where it ends: once is enough.
                     column, row, _ = self._column_and_row(at)
-                    sure = self._score[column * self._ny + row] >= CONFIRMED
+                    sure = self._score[column * self._ny + row] >= CONFIRMED_SCORE
                     again.append((fine[sure], at[sure]))
         for each in ((cells, found), *again):
             self._count_hits(*each)
 
     def _place_anew(self, scan: RangeScan, ranges_m: FloatArray, places: ComplexArray) -> None:
-        """Moves edges to where they are seen now, within their cells, if that is from much nearer by than before.
+        """Moves edges within their cells to where they are seen now, if that is from much nearer by than before.
 
-        Ranges and places, from the corner of the grid, are those of its hits.
+        Ranges and places, from the corner of the grid, are those of the scan's hits.
         """
         new = self._points[len(self._seen_from_m) : self._count]  # came in with the scan before
         self._seen_from_m = np.concatenate((self._seen_from_m, np.abs(new - self._scanned_at)))
@@ -169,22 +168,24 @@ class ObstacleMap(EdgePoints):
         cells, first = np.unique(column[among] * self._ny + row[among], return_index=True)
         held = self._slot[cells] >= 0
         hits, slots = among[first[held]], self._slot[cells[held]]
-        nearer = ranges_m[hits] < NEARER * self._seen_from_m[slots]
+        nearer = ranges_m[hits] < NEARER_SHARE * self._seen_from_m[slots]
         hits, slots = hits[nearer], slots[nearer]
         self._seen_from_m[slots] = ranges_m[hits]
         found = places[hits] + self._origin
-        off = np.abs(self._points[slots] - found) > OFF * self._clearance
+        off = np.abs(self._points[slots] - found) > OFF_SHARE * self._clearance
         self._points[slots[off]] = found[off]
-        moved = slots[off & (self._score[self._key[slots]] >= CONFIRMED)]
+        moved = slots[off & (self._score[self._key[slots]] >= CONFIRMED_SCORE)]
         if len(moved):
             self.revision += 1
             self._since[moved] = self.last_removal_revision = self.revision
 
     def _hits(self, scan: RangeScan, ignored: BoolArray | None) -> tuple[IntArray, ComplexArray]:
-        """Rays that met an edge, and where they did, from the corner of the grid."""
+        """Returns the rays that met an edge, and where they did, from the corner of the grid."""
         if ignored is None and not self._doubtful:
             return scan.returned(self._origin)
-        taken = supported(scan, SUPPORT * self._clearance) if self._doubtful else scan.ranges_m < math.inf
+        taken = (
+            supported(scan, SUPPORT_SHARE * self._clearance) if self._doubtful else scan.ranges_m < math.inf
+        )
         hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
         return hits, scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
 
@@ -199,7 +200,7 @@ class ObstacleMap(EdgePoints):
         self._unconfirmed |= unconfirmed
 
     def _fine_keys(self, places: ComplexArray, finer: int) -> NDArray[np.int64]:
-        """Numbers of the cells of a finer grid at some places."""
+        """Returns the numbers of the cells at places on a grid with `finer` cells along a usual one."""
         cells = _pairs(places * (finer / self._cell)).astype(np.int64).tolist()
         keys = [self._fine.setdefault((finer, x, y), self._coarse + len(self._fine)) for x, y in cells]
         if self._coarse + len(self._fine) > len(self._score):
@@ -210,7 +211,7 @@ class ObstacleMap(EdgePoints):
         return np.array(keys, dtype=np.int64)
 
     def _look_through(self, scan: RangeScan) -> bool:
-        """Takes a point off every known point that three neighbouring rays looked past; whether any was."""
+        """Lowers the score of every known point that three neighbouring rays went past; tells whether there was any."""
         sensor = complex(scan.east_m, scan.north_m)
         slots = self._in_reach(sensor, self._range / 8.0)
         # Only a ray that passes close by says anything about a point.
@@ -226,7 +227,7 @@ class ObstacleMap(EdgePoints):
         weaker = weaker[self._score[weaker] > 0]
         if len(weaker):
             self._score[weaker] -= 1
-            if (self._score[weaker] == CONFIRMED - 1).any():
+            if (self._score[weaker] == CONFIRMED_SCORE - 1).any():
                 self._note_removal()
                 # What was seen from afar to be somewhere in a beam is elsewhere: the next scan tells where.
                 self._taken_at = complex(math.inf, math.inf)
@@ -234,5 +235,5 @@ class ObstacleMap(EdgePoints):
 
 
 def _pairs(points: ComplexArray) -> FloatArray:
-    """(k, 2) east and north of points east + i north."""
+    """(k, 2) east and north of complex points."""
     return points.view(np.float64).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""The map as a planner is handed it: to be read, not to be changed."""
+"""The map as a planner is handed it, which can be read and not changed."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class ReadOnlyMap:
 
     @property
     def moving(self) -> tuple[MovingEdges, ...]:
-        """What is known to move; its edges are not among the others."""
+        """Obstacles known to move; their edges are not among the others."""
         return self._seen.moving
 
     @property

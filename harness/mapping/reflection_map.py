@@ -20,18 +20,17 @@ from harness.mapping.scan import RangeScan, all_round, clockwise_from
 from planner.compiled import BOOL, FLOAT, FLOATS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
-LEAST_STOPPED = 5.0
+LEAST_STOPPED_RAYS = 5.0
 """A cell is an edge only if it stopped at least this many rays."""
-STOPPED_SHORT = 0.25
+SHORT_SHARE = 0.25
 """A ray that ended before a cell, within two standard deviations, counts as this share of a ray that ended in it."""
-REFLECTIVITY = 0.25
+REFLECTED_SHARE = 0.25
 """A cell is an edge only if it stops at least this share of the rays, if the noise is at most the size of a cell."""
-HAZARD = 0.5
-"""With more noise that share is this times the size of a cell over the noise: the hazard half a standard deviation
-before a wall."""
-DOUBT = 0.3
-"""A cell that is an edge remains one down to this share of both bounds."""
-FORGET_AT = 48.0
+HAZARD_SHARE = 0.5
+"""With noise above a cell's size the share is this times size over noise: the hazard half a sigma before a wall."""
+KEEP_SHARE = 0.3
+"""A cell that is an edge remains one as long as it keeps this share of both bounds."""
+HALVE_AT = 48.0
 """Counts of rays are halved when they reach this number, so that a wall that has gone fades."""
 STOOD_S = 20.0
 """A cell that has been an edge for this time belongs to an obstacle that stands: a moving one has left it by then."""
@@ -41,7 +40,7 @@ COUNTED_OUT = "float32[:, ::1]"
 
 
 class ReflectionMap(EdgePoints):
-    """What stands still, as a sensor with noisy ranges shows it; `noise_m` is their stated standard deviation."""
+    """Obstacles that stand still, from a sensor with noisy ranges; `noise_m` is their stated standard deviation."""
 
     def __init__(
         self,
@@ -53,7 +52,7 @@ class ReflectionMap(EdgePoints):
     ) -> None:
         super().__init__(bounds_m, clearance_m, range_m, revision)
         self._noise = noise_m
-        self._least_share = min(REFLECTIVITY, HAZARD * self._cell / noise_m)
+        self._least_share = min(REFLECTED_SHARE, HAZARD_SHARE * self._cell / noise_m)
         self._slot = np.full(self._nx * self._ny, -1, dtype=np.int32)  # by cell; points are middles of cells
         # By slot: rays that it stopped, that it let through, that ended before it; whether it is an edge, since when.
         self._counts = np.zeros((1024, 3), dtype=np.float32)
@@ -65,7 +64,7 @@ class ReflectionMap(EdgePoints):
         return self._edge[slots]
 
     def stands(self, points_m: FloatArray, since_s: float = STOOD_S) -> BoolArray:
-        """(k,) which of (k, 2) places lie no further than ranges err from a cell that has been an edge so long."""
+        """(k,) which of (k, 2) places lie within the noise of a cell that has been an edge for `since_s`."""
         reach = math.ceil(self._noise / self._cell)
         around = np.arange(-reach, reach + 1)
         at = np.floor((points_m - (self._origin.real, self._origin.imag)) / self._cell).astype(np.int64)
@@ -76,7 +75,7 @@ class ReflectionMap(EdgePoints):
         return stands
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
-        """Takes in one scan, but for some of its rays."""
+        """Takes in one scan except the rays that are `ignored`, (n,)."""
         self._time_s = scan.time_s
         taken = scan.ranges_m < math.inf
         self._add_cells(scan, (taken if ignored is None else taken & ~ignored).nonzero()[0])
@@ -84,7 +83,7 @@ class ReflectionMap(EdgePoints):
             self._ask_cells(scan, ignored)
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
-        """Forgets all that is no further from some points, (k, 2)."""
+        """Drops every edge point within `within_m` of any of the (k, 2) points."""
         slots = self._slots_within(points_m, within_m)
         if len(slots):
             self._counts[slots] = 0.0
@@ -92,7 +91,7 @@ class ReflectionMap(EdgePoints):
             self._note_removal()
 
     def _add_cells(self, scan: RangeScan, hits: IntArray) -> None:
-        """Cells that returned a ray for the first time get a slot."""
+        """Gives a slot to each cell that returned a ray for the first time."""
         places = scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
         column, row, on_grid = self._column_and_row(places)
         keys = np.unique(column[on_grid] * self._ny + row[on_grid])
@@ -123,17 +122,17 @@ class ReflectionMap(EdgePoints):
                 # Beyond, a return is lost where noise takes it out of range.
                 scan.max_range_m - 2.0 * self._noise,
                 self._noise,
-                FORGET_AT,
+                HALVE_AT,
                 all_round(scan),
             )
         )
 
     def _decide(self, slots: NDArray[np.int32]) -> None:
-        """Tells which cells are edges now."""
+        """Decides which cells of the slots are edges now."""
         counts, was = self._counts[slots], self._edge[slots]
-        stopped = counts[:, 0] + np.float32(STOPPED_SHORT) * counts[:, 2]
-        reached, share = stopped + counts[:, 1], np.where(was, DOUBT, 1.0)
-        now = (stopped >= share * LEAST_STOPPED) & (stopped >= share * self._least_share * reached)
+        stopped = counts[:, 0] + np.float32(SHORT_SHARE) * counts[:, 2]
+        reached, share = stopped + counts[:, 1], np.where(was, KEEP_SHARE, 1.0)
+        now = (stopped >= share * LEAST_STOPPED_RAYS) & (stopped >= share * self._least_share * reached)
         changed = (now != was).nonzero()[0]
         if len(changed):
             self.revision += 1
@@ -145,7 +144,7 @@ class ReflectionMap(EdgePoints):
 
 @compiled(COUNTED_OUT, "int32", FLOAT, FLOAT, FLOAT, rare=True)
 def _count(counts: NDArray[np.float32], slot: int, beyond: float, half: float, noise: float) -> None:
-    """Counts a ray that went so much further than a cell: it was stopped, passed, or ended before it."""
+    """Counts a ray that went `beyond` (m) a cell's middle: the cell stopped it, let it pass, or it ended before."""
     if abs(beyond) <= half:
         counts[slot, 0] += np.float32(1.0)
     elif beyond > half:
@@ -169,12 +168,12 @@ def _count_rays(
     forget_at: float,
     closed: bool,
 ) -> NDArray[np.int32]:
-    """Counts what the rays towards cells did. Near by, where several rays meet a cell, two more of them are asked.
+    """Counts what the rays towards cells did; near by, where several meet a cell, two more of them.
 
-    `slots` are the cells that are asked; by cell are told `distances` (m) and `positions`, bearings in rays from the
+    `slots` are the cells that are tested; by cell are `distances` (m) and `positions`, bearings in rays from the
     first on, and by slot `counts` (n, 3), which are written: rays that the cell stopped, that it let through, that
     ended before it. `ignored` rays are not counted. `half` is half the width of a cell; cells beyond
-    `within` are not asked; counts are halved from `forget_at` on.
+    `within` are not tested; counts are halved from `forget_at` on.
 
     Returns:
         (k,) the slots that a ray was aimed at.

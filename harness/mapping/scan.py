@@ -31,15 +31,14 @@ from planner.compiled import (
 from planner.interface import ComplexArray, FloatArray, IntArray
 
 Beams = tuple[float, float, float, float, float]
-"""What `RangeScan.beams` gives."""
+"""The value of `RangeScan.beams`."""
 
-GRAZING = 30.0
-"""Neighbouring beams show one face only if their ranges differ by at most this many widths of a beam there: a face that
-is seen at 2 degrees."""
-NEARER = 0.5
+GRAZING_WIDTHS = 30.0
+"""Neighbouring beams show one face if their ranges differ by at most this many beam widths: a face at 2 degrees."""
+NEARER_SHARE = 0.5
 """Neighbouring beams show one face only if the smaller range is less by at most this share of the larger one."""
-SURELY = 3.0
-"""A range that is less by this many standard deviations of the noise is that of something nearer."""
+SURE_SIGMAS = 3.0
+"""A range shorter by this many standard deviations of the noise is that of a nearer obstacle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +87,10 @@ class RangeScan:
                 object.__setattr__(self, name, array)
 
     def returned(self, origin_m: complex = 0j) -> tuple[IntArray, ComplexArray]:
-        """(k,) beams that returned something, and from where, east + i north from an origin."""
+        """Returns the (k,) beams that returned something, and the places, east + i north from an origin."""
         most, sensor = len(self.ranges_m), complex(self.east_m, self.north_m) - origin_m
         rays, places = np.empty(most, dtype=np.intp), np.empty(most, dtype=np.complex128)
-        many = _returned(
+        many = _fill_returned(
             rays,
             places,
             self.fan,
@@ -107,39 +106,39 @@ class RangeScan:
         return rays[:many], places[:many]
 
     def from_sensor_m(self, rays: IntArray) -> ComplexArray:
-        """(k,) from where some beams returned something, east + i north of the sensor."""
+        """(k,) places of the returns of some beams, east + i north of the sensor."""
         turned: ComplexArray = self.fan.take(rays) * self.ranges_m.take(rays)
         if self.beam_rad:
             sides = np.empty(len(self.ranges_m))
-            _sides(sides, self.ranges_m, self.beam_rad, self.noise_m, all_round(self), self.lossy)
+            _fill_sides(sides, self.ranges_m, self.beam_rad, self.noise_m, all_round(self), self.lossy)
             turned *= np.exp((-0.5j * self.beam_rad) * sides.take(rays))
         turned *= cmath.rect(1.0, -self.heading_rad)
         return turned
 
     def ends_m(self, rays: IntArray) -> ComplexArray:
-        """(k,) from where some beams returned something, east + i north."""
+        """(k,) places of the returns of some beams, east + i north."""
         return self.from_sensor_m(rays) + complex(self.east_m, self.north_m)
 
     def taken_from(self, east_m: float, north_m: float, heading_rad: float) -> RangeScan:
-        """The same ranges, as from another pose of the sensor: east and north (m), bearing of the nose (rad)."""
+        """Returns the same ranges from another pose of the sensor: east and north (m), bearing of the nose (rad)."""
         values = {each.name: getattr(self, each.name) for each in fields(RangeScan) if each.init}
         start_rad = (self.start_rad + heading_rad - self.heading_rad) % math.tau
         pose = {"east_m": east_m, "north_m": north_m, "heading_rad": heading_rad, "start_rad": start_rad}
         return RangeScan(**{**values, **pose})
 
     def kept(self) -> RangeScan:
-        """The same, its rays followed by now: nothing leads from it to the world any more."""
+        """Returns itself with all ranges computed, so that it no longer refers to the world."""
         _ = self.ranges_m
         return self
 
     @property
     def beams(self) -> Beams:
-        """Where they come from, east and north; bearing of the first axis, from axis to axis, and width, rad."""
+        """Sensor's east and north (m); bearing of the first axis, angle from axis to axis, and width (rad)."""
         return self.east_m, self.north_m, self.start_rad, self.spacing_rad, self.beam_rad
 
     @property
     def followed(self) -> bool:
-        """Whether its rays have been followed: ranges that nobody has read yet cost more than others."""
+        """Whether its ranges have been computed, which happens when they are first read."""
         return "ranges_m" in self.__dict__
 
     @property
@@ -152,7 +151,7 @@ class RangeScan:
 
 @compiled(FLOATS, COUNT, COUNT, BOOL, BOOL)
 def _beside(ranges: FloatArray, ray: int, step: int, closed: bool, lossy: bool) -> float:
-    """What the next beam to one side returned; where that may have been lost, the one after it."""
+    """Returns the range of the next beam to one side, or where that may be lost, of the one after it."""
     rays, beside = len(ranges), math.inf
     for steps in range(1, 3 if lossy else 2):
         other = ray + steps * step
@@ -163,13 +162,13 @@ def _beside(ranges: FloatArray, ray: int, step: int, closed: bool, lossy: bool) 
 
 @compiled(FLOATS, COUNT, FLOAT, FLOAT, BOOL, BOOL)
 def _side(ranges: FloatArray, ray: int, beam_rad: float, noise_m: float, closed: bool, lossy: bool) -> float:
-    """Where within a beam its return comes from: 1 its right side, -1 its left side, 0 the axis.
+    """Tells where within a beam its return comes from: 1 its right side, -1 its left side, 0 the axis.
 
-    `closed`: the last beam is the neighbour of the first. `lossy`: returns get lost.
+    `closed` means that the last beam is the neighbour of the first, and `lossy` that returns get lost.
     """
     own = ranges[ray]
     before, after = _beside(ranges, ray, -1, closed, lossy), _beside(ranges, ray, 1, closed, lossy)
-    least, most = own - min(GRAZING * beam_rad, NEARER) * own, own - SURELY * noise_m
+    least, most = own - min(GRAZING_WIDTHS * beam_rad, NEARER_SHARE) * own, own - SURE_SIGMAS * noise_m
     from_left, from_right = least <= before <= most, least <= after <= most
     if from_left == from_right:  # a corner that points away, or all as far: no side is nearer than the axis
         return 0.0
@@ -177,7 +176,7 @@ def _side(ranges: FloatArray, ray: int, beam_rad: float, noise_m: float, closed:
 
 
 @compiled(FLOATS_OUT, FLOATS, FLOAT, FLOAT, BOOL, BOOL, rare=True)
-def _sides(
+def _fill_sides(
     sides: FloatArray, ranges: FloatArray, beam_rad: float, noise_m: float, closed: bool, lossy: bool
 ) -> None:
     for ray in range(len(ranges)):
@@ -185,7 +184,7 @@ def _sides(
 
 
 @compiled(COUNTS_OUT, PLACES_OUT, PLACES, FLOATS, *[FLOAT] * 5, BOOL, BOOL)
-def _returned(
+def _fill_returned(
     rays: IntArray,
     places: ComplexArray,
     fan: ComplexArray,
@@ -215,7 +214,7 @@ def _returned(
 
 
 def all_round(scan: RangeScan) -> bool:
-    """Whether the first beam is the neighbour of the last."""
+    """Tells whether the scan goes all round, so that its first beam is the neighbour of its last."""
     return len(scan.ranges_m) * scan.spacing_rad > math.tau - 1e-9
 
 
@@ -227,7 +226,7 @@ def clockwise_from(start_rad: float, east: FloatArray, north: FloatArray) -> Flo
 
 
 def supported(scan: RangeScan, apart_m: float) -> NDArray[np.bool_]:
-    """(n,) which beams returned something that one of the two to either side returned, too: no false return."""
+    """(n,) which beams returned a range that one of the two to either side returned too, so that it is not false."""
     ranges = scan.ranges_m if all_round(scan) else np.concatenate((scan.ranges_m, np.full(2, math.inf)))
     supported = np.zeros(len(ranges), dtype=np.bool_)
     for side in (1, 2):

@@ -1,4 +1,4 @@
-"""What is other in one scan than in another: what has come to places looked through before, and what has gone.
+"""What differs between two scans: what has come to places that one looked through, and what has gone.
 
 Places are complex: east + i north, m.
 """
@@ -17,24 +17,24 @@ from planner.compiled import FLOAT, PLACES, compiled
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 MISSING = 3
-"""A run of returns goes on where no more of them in a row are lost."""
+"""A run of returns goes on over at most this many lost ones in a row."""
 ABREAST = 2
-"""A place was looked through if so many rays to either side went further, too: one or two may be lost returns."""
+"""A place was looked through if this many rays on each side went further too, since one or two may be lost returns."""
 
 
 def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
-    """(k,) which places were looked through by a scan before: what is there now has come."""
+    """(k,) which places a scan before looked through, so that what is there now has come."""
     any_ = any_come(before, places, sure_m)
     return looked_through(before, places, sure_m) if any_ else np.zeros(len(places), dtype=np.bool_)
 
 
 def any_come(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
-    """Whether `come` may hold for any of (k,) places: in a still world it mostly does not."""
+    """Tells quickly whether `come` may hold for any of (k,) places; in a still world mostly it does not."""
     return bool(looked_through(before, places, sure_m, every=FEWEST).any())
 
 
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
-    """(n,) which rays of a scan look through (k,) places where something was: what they meet may have drawn back.
+    """(n,) which rays look through (k,) places where something was, so that what they meet may have drawn back.
 
     What lies further behind than `sure_m` is surely another place; nothing has drawn back by more than `most_m`.
     """
@@ -50,7 +50,7 @@ def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float
 
 
 def rays_towards(scan: RangeScan, places: ComplexArray) -> IntArray:
-    """(k,) the rays of a scan nearest to the bearings of places; of a narrow fan also what would be beyond."""
+    """(k,) the rays of a scan nearest to the bearings of places; a narrow fan also numbers rays beyond its ends."""
     offsets = places - complex(scan.east_m, scan.north_m)
     bearing = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
     ray = np.rint(bearing / scan.spacing_rad).astype(np.int64)
@@ -66,16 +66,16 @@ def looked_through(
     within_m: float = math.inf,
     every: int = 1,
 ) -> BoolArray:
-    """(k,) which places a scan looked through, surely: with the ray towards each and some to either side.
+    """(k,) which places a scan surely looked through: the ray towards each and `abreast` to either side went further.
 
-    Arguments are those of `through_places`.
+    The arguments are those of `through_places`.
     """
     within_m = min(within_m, scan.max_range_m - sure_m)
     return through_places(places, scan.ranges_m, scan.beams, within_m, sure_m, abreast, aimed_m, every)
 
 
 def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, closed: bool) -> list[IntArray]:
-    """Returns of neighbouring rays that lie near to each other, run by run."""
+    """Splits returns into runs of neighbouring rays whose places lie at most `apart_m` apart."""
     breaks = ((np.abs(np.diff(places)) > apart_m[1:]) | (np.diff(hits) > MISSING + 1)).nonzero()[0] + 1
     runs = np.split(np.arange(len(hits)), breaks)
     if closed and len(runs) > 1 and abs(places[-1] - places[0]) <= apart_m[0]:
@@ -84,7 +84,7 @@ def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, closed: b
 
 
 def grown(mine: IntArray, hits: IntArray, places: ComplexArray, step_m: float, scan: RangeScan) -> IntArray:
-    """Some returns in clockwise order, and those that go on from their ends, each nearer than a step to the one before.
+    """Adds to some returns, in clockwise order, those that go on from their ends by less than a step each.
 
     (k,) `mine` are their indices among (n,) `hits`, the rays of the scan that returned something, and `places`.
     """
@@ -102,20 +102,20 @@ def grown(mine: IntArray, hits: IntArray, places: ComplexArray, step_m: float, s
 
 
 def joined(places: ComplexArray, apart_m: FloatArray) -> BoolArray:
-    """(k,) which places of a run are near to one before or after them: false returns are not."""
+    """(k,) which places of a run are near to the one before or after, as false returns are not."""
     away = np.abs(np.diff(places, prepend=math.inf, append=math.inf))
     near: BoolArray = np.minimum(away[:-1], away[1:]) < apart_m
     return near
 
 
 def near_any(places: ComplexArray, others: ComplexArray, within_m: float) -> BoolArray:
-    """(k,) which of (k,) places lie no further than that from one of (m,) others."""
+    """(k,) which of (k,) places lie within `within_m` of one of (m,) others."""
     return near_line(places, others, within_m, 0.0)
 
 
 @compiled(PLACES, PLACES, FLOAT, FLOAT, rare=True)
 def near_line(places: ComplexArray, line: ComplexArray, within_m: float, apart_m: float) -> BoolArray:
-    """(k,) which of (k,) places lie no further than that from a line through (m,) others, broken where it is apart."""
+    """(k,) which of (k,) places lie within `within_m` of a line through (m,) points, broken at gaps over `apart_m`."""
     near = np.zeros(len(places), dtype=np.bool_)
     if not len(line):
         return near
@@ -142,7 +142,7 @@ def near_line(places: ComplexArray, line: ComplexArray, within_m: float, apart_m
 
 
 def in_a_row(flags: Sequence[bool] | BoolArray) -> int:
-    """The longest row of true ones."""
+    """Returns the length of the longest row of true flags."""
     longest = row = 0
     for flag in flags:
         row = row + 1 if flag else 0
@@ -151,7 +151,7 @@ def in_a_row(flags: Sequence[bool] | BoolArray) -> int:
 
 
 def in_all(flags: Iterable[BoolArray]) -> BoolArray:
-    """Which are true in all of some arrays; those after one without any are not asked for."""
+    """Tells which flags are true in all arrays; stops to read arrays once none is."""
     common: BoolArray | None = None
     for each in flags:
         common = each if common is None else common & each

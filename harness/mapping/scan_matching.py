@@ -1,9 +1,8 @@
-"""How far an outline has moved, told by the returns of a later scan.
+"""How far an outline has moved, found by matching it to the returns of a later scan.
 
 The translation is sought that lays the outline upon the returns (point-to-line registration; Y. Chen and G. Medioni,
 "Object modelling by registration of multiple range images", 1992). A flat face tells nothing of a shift along
 itself; there its ends do, where they are ends: what is hidden, out of range or out of view further on has none.
-
 Points are complex: east + i north, m.
 """
 
@@ -22,25 +21,25 @@ from planner.interface import ComplexArray, IntArray
 Ends = tuple[bool, bool]
 
 FEWEST = 3
-"""Neighbouring rays that must tell the same."""
+"""An outline, a match or a change needs at least this many returns."""
 ROUNDS = 3
-"""Registrations in a row, each with the nearest points of the one before."""
-STRAIGHT = 0.9
-"""Cosine of the turn between neighbours: places that bend more than that are no good for registration."""
-CLOSER = 0.5
-"""Each round goes by returns so much nearer: what stands beside something that moves is not its."""
-FLAT = 0.99
-"""Mean of the tangents of an outline, each turned by twice its angle: 1 for a straight one."""
-BESIDE = 0.2
-"""So much of the gate a return may lie beyond the points of the outline, along it."""
-ENDS = 0.01
-"""Each end has this share of the weight of all that lies between."""
+"""A match is refined this many times, each time with the nearest points of the one before."""
+STRAIGHT_COSINE = 0.9
+"""Points of an outline where it turns by an angle of a smaller cosine are not matched."""
+CLOSER_FACTOR = 0.5
+"""Each round of a match uses returns within this many times the distance of the round before."""
+FLAT_MEAN = 0.99
+"""An outline is straight if the mean of its unit tangents squared, as complex numbers, is at least this long."""
+BESIDE_SHARE = 0.2
+"""A return may lie beyond the points of the outline, along it, by this share of the gate."""
+END_WEIGHT = 0.01
+"""Each end has this share of the weight of all points between."""
 STIFF, STIFF_IN_NOISE = 1e-4, 0.05
-"""Weight that holds the shift at the prediction; the more returns err, the less a bend in an outline tells."""
-BEYOND = 5
-"""Number of rays beyond an end of an outline that are compared: chance hardly ever loses all of them."""
-FARTHEST = 0.95
-"""Share of the sensing range: an outline that is lost further away does not end there."""
+"""Weight, as a share of all returns', that holds the shift at its prediction; the second is for noisy ranges."""
+BEYOND_RAYS = 5
+"""This many rays beyond an end of an outline are compared; chance hardly ever loses all of them."""
+FARTHEST_SHARE = 0.95
+"""An outline that is lost beyond this share of the sensing range does not end there."""
 
 
 class Outline(NamedTuple):
@@ -58,10 +57,10 @@ class Outline(NamedTuple):
 
     @property
     def is_definite(self) -> bool:
-        """Whether it tells of shifts in every direction: it shows both of its ends, or is not straight."""
+        """Whether it shows shifts in every direction: it has both of its ends, or is not straight."""
         if all(self.ends):
             return True
-        return abs(self._turned) < FLAT
+        return abs(self._turned) < FLAT_MEAN
 
     @property
     def along(self) -> complex:
@@ -70,7 +69,7 @@ class Outline(NamedTuple):
 
     @property
     def _turned(self) -> complex:
-        """Mean of its tangents, each turned by twice its angle; of its chord where it is straight nowhere."""
+        """Mean of its unit tangents squared; of its chord where it is straight nowhere."""
         points = self.points
         if self.several > 1 and len(points) >= FEWEST * self.several:
             points = means(points, self.several)
@@ -81,12 +80,12 @@ class Outline(NamedTuple):
         return (chord / abs(chord)) ** 2 if chord else 1.0 + 0j
 
     def moved(self, by: complex) -> Outline:
-        """The outline elsewhere."""
+        """Returns the outline shifted `by` a vector."""
         return Outline(self.points + by, self.ends, self.several)
 
 
 def means(points: ComplexArray, several: int) -> ComplexArray:
-    """The mean of every so many points, in order; of what is left of them at the end."""
+    """(k,) means of each `several` points in order; the last of those left over."""
     first = np.arange(0, len(points), several)
     counts = np.diff(np.append(first, len(points)))
     return (np.add.reduceat(points, first) / counts).astype(np.complex128)
@@ -105,7 +104,7 @@ class Registration(NamedTuple):
 
 
 def ends_of(scan: RangeScan, first_ray: int, last_ray: int, apart_m: float) -> Ends:
-    """Whether what neighbouring rays returned ends with them: those beyond go on, and end `apart_m` away or more."""
+    """Tells at both ends of a run of rays whether the obstacle ends: rays beyond it end `apart_m` away or further."""
     return _is_end(scan, first_ray, -1, apart_m), _is_end(scan, last_ray, 1, apart_m)
 
 
@@ -119,11 +118,11 @@ def register(
     stiff: float = STIFF,
     near_m: float = 0.0,
 ) -> Registration | None:
-    """Lays an outline, where it is expected, upon the returns of a scan: (n,) rays `hits`, at (n,) places.
+    """Matches an outline, where it is expected, to the returns of a scan: (n,) rays `hits`, at (n,) places.
 
-    Returns further from the outline than `gate_m` are not its; those no further off than `near_m` may be in every
-    round: they err so much. Beyond an end, rays go on, and end `apart_m` away or further. `stiff` is the share of the
-    weight of all returns that holds the outline where it is expected.
+    Returns further from the outline than `gate_m` are not its; those within `near_m` may be in every round, since they
+    err that much. Beyond an end, rays go on, and end `apart_m` away or further. `stiff` is the share of the weight of
+    all returns that holds the outline where it is expected.
 
     Returns:
         None where too few of the returns are near, or it would be laid further away than the gate.
@@ -138,11 +137,11 @@ def register(
     reach = 1.5 * float(np.median(np.abs(np.diff(outline.points)))) + 1e-6
     shift = 0j
     for i in range(ROUNDS):
-        within_m = max(gate_m * CLOSER**i, near_m)
+        within_m = max(gate_m * CLOSER_FACTOR**i, near_m)
         moved = outline.points + shift
         own = nearest(places[near], moved)
         off = (places[near] - moved[own]) * along[own].conj()  # along + i across
-        inside = (np.abs(off.imag) < within_m) & (np.abs(off.real) < reach + BESIDE * gate_m)
+        inside = (np.abs(off.imag) < within_m) & (np.abs(off.real) < reach + BESIDE_SHARE * gate_m)
         inner = inside & straight[own] & (np.abs(off.real) < reach)
         if np.count_nonzero(inner) < FEWEST:
             return None
@@ -154,7 +153,7 @@ def register(
             if was and still
         ]
         # An end that is far off is another one: faces come into view and go out of it.
-        ends = [end for end in ends if abs(end) < reach + BESIDE * gate_m]
+        ends = [end for end in ends if abs(end) < reach + BESIDE_SHARE * gate_m]
         shift += _least_squares(1j * along[own[inner]], off.imag[inner], ends, shift, stiff)
     if abs(shift) > gate_m:
         return None
@@ -163,7 +162,7 @@ def register(
 
 @compiled(PLACES, PLACES, rare=True)
 def nearest(places: ComplexArray, points: ComplexArray) -> IntArray:
-    """(k,) which of (m,) points each of (k,) places is nearest to; no table of all distances is laid."""
+    """(k,) index of the nearest of (m,) points to each of (k,) places, without a table of all distances."""
     which = np.zeros(len(places), dtype=np.intp)
     for i in range(len(places)):
         least = math.inf
@@ -177,16 +176,16 @@ def nearest(places: ComplexArray, points: ComplexArray) -> IntArray:
 def _least_squares(
     normals: ComplexArray, across: NDArray[np.float64], ends: list[complex], shift: complex, stiff: float
 ) -> complex:
-    """The further shift that suits best: points to their lines, ends to ends, and not far from none at all."""
+    """Returns the further shift that fits best: points to their lines, ends to ends, and close to the prediction."""
     a, b, c = (normals.real**2).sum(), (normals.real * normals.imag).sum(), (normals.imag**2).sum()
-    hold, pull = stiff * (a + c), ENDS * (a + c)
+    hold, pull = stiff * (a + c), END_WEIGHT * (a + c)
     right = complex((normals * across).sum()) + pull * sum(ends) - hold * shift
     a, c = a + hold + pull * len(ends), c + hold + pull * len(ends)
     return complex(c * right.real - b * right.imag, a * right.imag - b * right.real) / float(a * c - b * b)
 
 
 def _about(points: ComplexArray, places: ComplexArray, gate_m: float) -> IntArray:
-    """Which places lie in the upright box round some points, or no further off than the gate."""
+    """Returns the indices of places within `gate_m` of the upright box round some points."""
     inside = np.ones(len(places), dtype=np.bool_)
     for of_points, of_places in ((points.real, places.real), (points.imag, places.imag)):
         inside &= (of_places > of_points.min() - gate_m) & (of_places < of_points.max() + gate_m)
@@ -194,22 +193,22 @@ def _about(points: ComplexArray, places: ComplexArray, gate_m: float) -> IntArra
 
 
 def _tangents(points: ComplexArray) -> tuple[ComplexArray, NDArray[np.bool_]]:
-    """(m,) unit vectors along an outline, and whether it is straight there; at its ends it is not."""
+    """Returns (m,) unit vectors along an outline, and whether it is straight there, which it is not at its ends."""
     along = np.empty_like(points)
     along[1:-1] = points[2:] - points[:-2]
     along[0], along[-1] = points[1] - points[0], points[-1] - points[-2]
     along /= np.maximum(np.abs(along), 1e-9)
     straight = np.zeros(len(points), dtype=np.bool_)
-    straight[1:-1] = (along[2:] * along[:-2].conj()).real > STRAIGHT
+    straight[1:-1] = (along[2:] * along[:-2].conj()).real > STRAIGHT_COSINE
     return along, straight
 
 
 def _is_end(scan: RangeScan, ray: int, side: int, apart_m: float) -> bool:
     ranges, rays, closed = scan.ranges_m, len(scan.ranges_m), all_round(scan)
     own = float(ranges[ray])
-    if not own < FARTHEST * scan.max_range_m:
+    if not own < FARTHEST_SHARE * scan.max_range_m:
         return False
-    for steps in range(1, BEYOND + 1):
+    for steps in range(1, BEYOND_RAYS + 1):
         beyond = ray + side * steps
         if not (closed or 0 <= beyond < rays):
             return False

@@ -12,12 +12,12 @@ from harness.mapping.moving_obstacles import MovingObstacles
 from harness.mapping.obstacle_map import ObstacleMap
 from harness.mapping.reflection_map import ReflectionMap
 from harness.mapping.scan import RangeScan
-from harness.mapping.smoothed_scan import ERR, smoothed
+from harness.mapping.smoothed_scan import MEDIAN_ERROR_SHARE, smoothed
 from planner.interface import BoolArray, FloatArray, MovingEdges
 from planner.nearest_edge import NearestEdge
 
-NOISY = 0.1
-"""Ranges that err by more than this share of the clearance are weighed. What moves is then told by medians."""
+NOISY_SHARE = 0.1
+"""Ranges that err by more than this share of the clearance go to a `ReflectionMap`, and moving obstacles to medians."""
 
 
 class SensedMap:
@@ -50,7 +50,7 @@ class SensedMap:
         self._noise, self._false_returns = noise_m, false_returns
         self._lost, self._least_width = lost, least_width_m
         self._pose_error, self._shifted = pose_error_m, math.hypot(noise_m, pose_error_m)
-        self._clearance, self._noisy = clearance_m, noise_m > NOISY * clearance_m
+        self._clearance, self._noisy = clearance_m, noise_m > NOISY_SHARE * clearance_m
         self._begin(revision=0)
         self.moving: tuple[MovingEdges, ...] = ()
         """What is known to move; its edges are not among the others."""
@@ -62,14 +62,14 @@ class SensedMap:
         self._nearest = NearestEdge(self)
 
     def _begin(self, revision: int) -> None:
-        """Makes everything empty."""
+        """Empties the map."""
         self._free = FreeSpace(*self._area, self._noise, self._lost, self._least_width)
         self._edges: EdgePoints
         if self._noisy:
             self._edges = edges = ReflectionMap(*self._area, self._noise, revision)
             self._moving = MovingObstacles(
                 self._clearance,
-                max(ERR * self._noise, self._pose_error),
+                max(MEDIAN_ERROR_SHARE * self._noise, self._pose_error),
                 is_free=self._free.surrounds,
                 stands=edges.stands,
             )
@@ -78,7 +78,7 @@ class SensedMap:
             self._moving = MovingObstacles(self._clearance, self._shifted, self._false_returns)
 
     def start_over(self, time_s: float) -> None:
-        """Forgets everything: the believed position has jumped, and what was entered before lies elsewhere."""
+        """Forgets everything because the believed position has jumped, so that all that was entered lies elsewhere."""
         self._begin(self.revision + 1)
         self.revision, self.moving, self.last_contradiction_s = self._edges.revision, (), time_s
 
@@ -121,7 +121,7 @@ class SensedMap:
         self._free.update(scan)
 
     def _note_moving(self, scan: RangeScan) -> None:
-        """Where something moves, nothing stands, nor is it free."""
+        """Takes away edges and free space where something moves."""
         if len(trail_m := self._moving.trail_m):
             self._edges.forget(trail_m, self._clearance)
             self.revision = self._edges.revision
@@ -130,6 +130,6 @@ class SensedMap:
             self._clear_free_space(scan, each.points_m)
 
     def _clear_free_space(self, scan: RangeScan, edges_m: FloatArray) -> None:
-        """What was seen to be free is not, where edges stand in it."""
+        """Takes back free space where edges stand in it."""
         if self._free.take_back(scan, edges_m):
             self.last_contradiction_s = scan.available_s

@@ -15,9 +15,9 @@ import numpy as np
 from harness.mapping.scan import RangeScan, all_round
 from planner.interface import FloatArray, IntArray
 
-HALVES = (2, 4, 8, 16)
-"""Numbers of rays to either side that a median may take in: the largest that lies within the width, or the first."""
-ERR = 0.55
+HALF_WIDTHS = (2, 4, 8, 16)
+"""A median takes in one of these numbers of rays on each side: the largest within the width, or the first."""
+MEDIAN_ERROR_SHARE = 0.55
 """Standard deviation of the median of five over that of each, for normal errors."""
 
 
@@ -31,25 +31,25 @@ def smoothed(scan: RangeScan, width_m: float) -> RangeScan:
     Returns:
         The same with other ranges; none where most of the rays about one returned nothing.
     """
-    most = HALVES[-1]
+    most = HALF_WIDTHS[-1]
     ring = np.pad(scan.ranges_m, most, mode="wrap" if all_round(scan) else "reflect")
-    rough = _medians(ring, np.arange(len(scan.ranges_m)), HALVES[0])
+    rough = _medians(ring, np.arange(len(scan.ranges_m)), HALF_WIDTHS[0])
     ranges = rough.copy()
     # As rays that met something nearer than this lie within the width, so many to either side.
-    reach_m = [0.5 * width_m / (scan.spacing_rad * half) for half in HALVES] + [0.0]
-    for half, (further, nearer) in zip(HALVES[1:], pairwise(reach_m[1:]), strict=True):
+    reach_m = [0.5 * width_m / (scan.spacing_rad * half) for half in HALF_WIDTHS] + [0.0]
+    for half, (further, nearer) in zip(HALF_WIDTHS[1:], pairwise(reach_m[1:]), strict=True):
         rays = ((rough <= further) & (rough > nearer)).nonzero()[0]
         ranges[rays] = _medians(ring, rays, half)
     return replace(scan.kept(), ranges_m=ranges)
 
 
 def _medians(ring: FloatArray, rays: IntArray, half: int) -> FloatArray:
-    """(k,) medians of what so many rays to either side of each of (k,) returned; infinite where most did not.
+    """(k,) medians of the ranges of `half` rays on each side of (k,) rays; infinite where most returned nothing.
 
     Of an even number of returns it is the lower of the two in the middle.
     """
     width = 2 * half + 1
-    ordered = np.sort(np.lib.stride_tricks.sliding_window_view(ring, width)[rays + HALVES[-1] - half])
+    ordered = np.sort(np.lib.stride_tricks.sliding_window_view(ring, width)[rays + HALF_WIDTHS[-1] - half])
     returned = np.count_nonzero(ordered < math.inf, axis=1)
     medians = ordered[np.arange(len(rays)), np.maximum(returned - 1, 0) // 2]
     return np.where(2 * returned > width, medians, math.inf)

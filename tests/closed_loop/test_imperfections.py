@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from harness.flight.record import Flight, Outcome
-from harness.mapping.sensed_map import NOISY
+from harness.mapping.sensed_map import NOISY_SHARE
 from tests.closed_loop.moving_worlds import TURNED_DEG, moving, popping_up
 from tests.closed_loop.small import flown_by_point_mass, small_world
 from tests.longer import longer
@@ -60,7 +60,7 @@ def assert_reached(flight: Flight, clearance_m: float) -> None:
 @pytest.mark.parametrize("flaws", [{}, {"dropout": 0.1, "false_return": 0.01}], ids=["noise", "all"])
 def test_with_noise_of_a_hundredth_of_the_range_edges_are_weighed(flaws: dict[str, float], seed: int) -> None:
     noisy = small_world(*WORLD, sensor={"range_noise_m": 15.0, **flaws}, planner={"clearance_m": 60.0})
-    assert noisy.sensor.range_noise_m > NOISY * noisy.planner.clearance_m
+    assert noisy.sensor.range_noise_m > NOISY_SHARE * noisy.planner.clearance_m
     flight = flown_by_point_mass(noisy.model_copy(update={"seed": seed}))
     # Edges may be thought of two standard deviations too far back.
     assert_reached(flight, 60.0 - 2.0 * 15.0)
