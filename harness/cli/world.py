@@ -55,9 +55,12 @@ def world(
     from harness.world_files.siting import site
 
     ends = _ends(start, goal)
-    if metres_per_cell is not None and not 0.0 < metres_per_cell < math.inf:
-        told = f"--metres-per-cell is {metres_per_cell:g}; must be a finite number greater than 0"
-        raise typer.BadParameter(told)
+    given = {"altitude-m": altitude_m, "vertical-clearance-m": vertical_clearance_m, "ground-m": ground_m}
+    for name, value in {**given, "metres-per-cell": metres_per_cell}.items():
+        least = 0.0 if name == "metres-per-cell" else -math.inf
+        if value is not None and not least < value < math.inf:
+            wanted = "finite" if least else "a finite number greater than 0"
+            raise typer.BadParameter(f"--{name} is {value:g}; must be {wanted}")
     if not out.absolute().parent.is_dir():
         raise InputError(f"{out}: cannot be written (its folder is not there); make the folder first")
     craft = _craft(aircraft, clearance_m)

@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from harness.files.strict_yaml import Loc
 from harness.scenario.environment import GroundSpec, SourceSpec
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.obstacles import Obstacle, Polygon, WorldFile
@@ -35,8 +36,8 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
     try:
         found = expanded(specs, place, keys.area.bounds_m, keys.mission.altitude_m, ground=known)
     except FileFault as fault:
-        name = specs[fault.index].path.name
-        raise KeyFault(("obstacles", at[fault.index], "file"), f"{name} {fault}") from fault
+        loc: Loc = ("obstacles", at[fault.index], "file", *([fault.key] if fault.key else []))
+        raise KeyFault(loc, f"{specs[fault.index].path.name} {fault}") from fault
     sources = iter(found.sources)
     for index, each in enumerate(keys.obstacles):
         parts, name = [each], f"obstacles[{index}]"

@@ -48,6 +48,32 @@ class FileSpec:
     ground_m: float | None = None
 
 
+USED_BY: Final = {
+    "metres_per_cell": ("ascii_grid", *kinds.GROUPS["occupancy"]),
+    "crs": (*kinds.GROUPS["terrain"], "cityjson", "geojson", "kml"),
+    "nodata": (*kinds.GROUPS["terrain"],),
+    "unknown": (*kinds.GROUPS["occupancy"],),
+    "default_height_m": (*kinds.GROUPS["buildings"],),
+    "ground_m": (*kinds.GROUPS["buildings"], *kinds.GROUPS["airspace"]),
+}
+"""Keys of a file that not every kind uses, and the kinds that do."""
+
+
+def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
+    """Returns the keys that a file was given and does not use, each with a sentence that says so."""
+    told = {}
+    for key, used_by in USED_BY.items():
+        if contents.kind not in used_by and getattr(spec, key) != getattr(FileSpec, key):
+            others = ", ".join(dict.fromkeys(used_by))
+            told[key] = f"is of the kind {contents.kind}; {key} is used by {others} only: leave it out"
+    if contents.crs is not None:
+        given = (
+            key for key in ("shift_m", "metres_per_cell") if getattr(spec, key) != getattr(FileSpec, key)
+        )
+        told |= {key: f"has its place on earth, which {key} does not move; leave {key} out" for key in given}
+    return told
+
+
 @dataclass(frozen=True, eq=False)
 class Source:
     """What became of one file: valid polygons in the plane and area, their bottoms and tops, and what was assumed."""
@@ -70,11 +96,11 @@ class Expanded:
 
 
 class FileFault(InputError):
-    """Says what makes a file unusable, and gives its index among the files asked for."""
+    """Says what makes a file unusable, and gives its index among the files asked for, and its key that is at fault."""
 
-    def __init__(self, index: int, sentence: str) -> None:
+    def __init__(self, index: int, sentence: str, key: str = "") -> None:
         super().__init__(sentence)
-        self.index = index
+        self.index, self.key = index, key
 
 
 def expanded(
@@ -91,8 +117,8 @@ def expanded(
     for index, spec in enumerate(specs):
         with blaming(index):
             contents = loaded_file(spec)
-            if contents.crs is not None and any(spec.shift_m):
-                raise InputError("has its place on earth, which shift_m does not move; leave shift_m out")
+            for key, sentence in unused_keys(spec, contents).items():
+                raise FileFault(index, sentence, key)
             loaded.append((contents, Mapping(contents.crs, place, spec.shift_m)))
             _check_place(*loaded[-1], box)
     field, notes = height_field([(each.terrain, at) for each, at in loaded if each.terrain is not None], box)
@@ -112,6 +138,8 @@ def blaming(index: int) -> Iterator[None]:
     """Turns an InputError raised inside the block into a FileFault with the index of the file."""
     try:
         yield
+    except FileFault:
+        raise
     except InputError as error:
         raise FileFault(index, str(error)) from error
 

@@ -121,6 +121,8 @@ def kind_of(path: Path) -> str:
     first, ending = bounded.read_bytes(path, first=HEAD_BYTES), path.suffix.lower()
     if not first:
         raise InputError("is empty; get it again")
+    if first.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError("is UTF-16; save it as UTF-8")
     if path.name.lower().endswith((".hgt", ".hgt.gz")):
         return "srtm"
     found = next((kind for kind, pattern in _BINARY_BEGINS if pattern.match(first)), None)

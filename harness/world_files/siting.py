@@ -21,6 +21,7 @@ from harness.world_files.expansion import (
     corners_of,
     expanded,
     loaded_file,
+    unused_keys,
 )
 from harness.world_files.free_room import ROOM_RADII, WAY_RADII, FreeRoom, ends, free_room
 from harness.world_files.parts import WGS84, Box, Contents, FloatArray
@@ -84,6 +85,7 @@ def site(
     cannot be used, another InputError that there is no room, with the numbers and what would do.
     """
     contents = _read(specs, tell)
+    specs = _with_used_keys(specs, contents)
     places = None if given is None else np.array(given)
     files = _Files(tuple(specs), contents, None if contents[0].crs is None else _origin(contents, places))
     if places is not None and files.place is not None:
@@ -137,6 +139,16 @@ def _read(specs: Sequence[FileSpec], tell: Callable[[str], None]) -> tuple[Conte
     if len(set(local)) > 1:
         raise FileFault(local.index(True), "names no place on earth, another file does; give crs")
     return tuple(contents)
+
+
+def _with_used_keys(specs: Sequence[FileSpec], contents: Sequence[Contents]) -> list[FileSpec]:
+    """Leaves keys out of the files that do not use them; raises FileFault for a key that no file uses."""
+    unused = [unused_keys(*each) for each in zip(specs, contents, strict=True)]
+    for key, sentence in unused[0].items():
+        if all(key in each for each in unused):
+            raise FileFault(0, sentence, key)
+    left_out = ({key: getattr(FileSpec, key) for key in each} for each in unused)
+    return [replace(spec, **keys) for spec, keys in zip(specs, left_out, strict=True)]
 
 
 def _origin(contents: Sequence[Contents], given: FloatArray | None) -> Place:

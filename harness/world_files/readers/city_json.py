@@ -130,5 +130,7 @@ def _surfaces(boundaries: Any) -> Iterator[list[list[Any]]]:
 
 def _crs(metadata: Any) -> str | None:
     named = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
+    if named is None and isinstance(metadata, dict) and "crs" in metadata:
+        raise InputError("has its crs as CityJSON before 1.0 has it, which is not read; give crs, as EPSG:N")
     match = re.search(r"EPSG[:/]+(?:[\d.]*[:/])?(\d+)", str(named), re.IGNORECASE)
     return f"EPSG:{match[1]}" if match else None

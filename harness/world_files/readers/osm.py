@@ -51,7 +51,10 @@ def _osmium_errors() -> Iterator[None]:
     try:
         yield
     except Exception as error:  # of kinds of its own, too
-        raise InputError(f"cannot be read by osmium ({' '.join(str(error).split())[:60]})") from error
+        said = " ".join(str(error).split())[:120].rstrip(".")
+        raise InputError(
+            f"cannot be read by osmium: {said}; get it again, or save it anew in JOSM"
+        ) from error
 
 
 def _imported_osmium() -> Any:

@@ -68,6 +68,10 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "a picture": (data("a.png", b"\x89PNG\r\n\x1a\n" + bytes(50)), "is an image; give the YAML file"),
     "a program": (data("a.out", b"\x7fELF" + bytes(200)), "is of no kind that is known; give terrain"),
     "prose": (text("a.txt", "Once upon a time\n"), "is of no kind that is known"),
+    "UTF-16": (data("a.txt", "AC R".encode("utf-16")), "is UTF-16; save it as UTF-8"),
+    "the crs of an old CityJSON": (
+        text("a.json", '{"CityObjects": {}, "metadata": {"crs": {"epsg": 28992}}}'),
+        "has its crs as CityJSON before 1.0 has it, which is not read; give crs"),
     "torn JSON": (text("a.geojson", '{"type": "FeatureCollection", "features": [{"ty'), "is not whole JSON"),
     "deep JSON": (text("a.json", "[" * 100_000), "is nested too deeply"),
     "NaN": (_nan_json, "has the number NaN"),
@@ -75,10 +79,10 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "words for numbers": (
         lambda folder: geojson(folder / "a.json", feature({}, [["a", "b"], ["c", "d"], ["e", "f"]])),  # type: ignore[list-item]
         "rings are not lists of positions"),
-    "entities": (text("a.osm", BOMB), "cannot be read by osmium .XML entities are not supported"),
-    "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "cannot be read by osmium .Can not read file"),
+    "entities": (text("a.osm", BOMB), "cannot be read by osmium: XML entities are not supported"),
+    "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "cannot be read by osmium: Can not read file"),
     "a place that is no number": (text("a.osm", "<osm version='0.6'><node id='1' lat='47x' lon='8'/></osm>"),
-        "cannot be read by osmium .characters after coordinate"),
+        "cannot be read by osmium: characters after coordinate"),
     "no building": (_no_building, "has no building"),
     "a ZIP bomb": (_zip_bomb, "unpacks to more than"),
     "a ZIP of something": (lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
@@ -136,6 +140,37 @@ def test_the_command_and_the_scenario_say_it_with_status_2(
     assert main(["validate", str(scenario)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"{scenario}:5: obstacles[0].file: a.geojson line 1: is not whole JSON")
+
+
+@pytest.mark.parametrize(
+    ("key", "sentence"),
+    [
+        (
+            "nodata: free",
+            "is of the kind geojson; nodata is used by geotiff, ascii_grid, srtm, numpy_dem only",
+        ),
+        ("unknown: occupied", "is of the kind geojson; unknown is used by ros_map, moving_ai only"),
+        ("metres_per_cell: 2", "has its place on earth, which metres_per_cell does not move"),
+        ("shift_m: [0, 1]", "has its place on earth, which shift_m does not move"),
+        ("ground_m: 3", None),
+        ("crs: EPSG:4326", None),
+    ],
+)
+def test_a_key_that_the_kind_of_a_file_does_not_use_is_refused_with_its_line(
+    key: str, sentence: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    geojson(tmp_path / "a.geojson", feature({"building": "yes", "height": 400}))
+    scenario = tmp_path / "s.yaml"
+    scenario.write_text(
+        "schema: wayproof/scenario/1\nname: s\n"
+        "area: {bounds_m: [0, 0, 9000, 9000], origin: {latitude_deg: 46.97, longitude_deg: 7.95}}\n"
+        f"obstacles:\n  - file:\n      path: a.geojson\n      {key}\n"
+        "mission: {start_m: [1000, 1000], goal_m: [8000, 8000]}\n"
+    )
+    assert main(["validate", str(scenario)]) == (2 if sentence else 0)
+    if sentence:
+        name, said = key.partition(":")[0], capsys.readouterr().err
+        assert said.startswith(f"{scenario}:7: obstacles[0].file.{name}: a.geojson {sentence}")
 
 
 def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:

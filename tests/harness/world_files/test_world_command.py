@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from harness.cli.app import main
 from harness.run.scenario_flight import fly_to_folder
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import dump_scenario, load_scenario
 from harness.world.world import World
-from tests.harness.world_files.making import feature, geojson, geotiff
+from tests.harness.world_files.making import feature, geojson, geotiff, osm
 
 
 def hill(folder: Path) -> Path:
@@ -97,6 +98,20 @@ def test_start_and_goal_may_be_given_in_degrees(tmp_path: Path) -> None:
     assert "start_m:" in dump_scenario(again)
 
 
+def test_of_several_files_those_are_given_a_key_that_use_it(tmp_path: Path) -> None:
+    zone = geojson(tmp_path / "a.geojson", feature({"name": "zone"}))
+    house = osm(
+        tmp_path / "a.osm", [({"building": "yes"}, [(8.0, 47.0), (8.0, 47.001), (8.001, 47.0), (8.0, 47.0)])]
+    )
+    out = tmp_path / "both.yaml"
+    assert run_world(out, str(zone), str(house), "--altitude-m", "300", "--crs", "EPSG:4326") == 0
+    files = [each["file"] for each in yaml.safe_load(out.read_text())["obstacles"]]
+    assert [(each["path"], each.get("crs")) for each in files] == [
+        ("a.geojson", "EPSG:4326"),
+        ("a.osm", None),
+    ]
+
+
 def moving_ai(folder: Path) -> Path:
     """A map of 32 by 32 cells with a wall in the middle that leaves a gap."""
     rows = ["." * 32] * 6 + ["." * 16 + "@" + "." * 15] * 26
@@ -138,6 +153,8 @@ def test_a_map_too_small_names_the_cell_that_would_do(
         (["--altitude-m", "1"], "at least 5"),
         (["--metres-per-cell", "nan"], "--metres-per-cell is nan; must be a finite number greater than 0"),
         (["--metres-per-cell", "0"], "--metres-per-cell is 0; must be"),
+        (["--metres-per-cell", "5"], "has its place on earth, which metres_per_cell does not move"),
+        (["--altitude-m", "nan"], "--altitude-m is nan; must be finite"),
         (["--out", "no_folder/w.yaml"], "no_folder/w.yaml: cannot be written (its folder is not there)"),
         (
             ["--altitude-m", "12000"],
