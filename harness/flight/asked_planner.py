@@ -1,4 +1,4 @@
-"""Asks a planner, which is code of others: whatever it does, the flight goes on or ends with a sentence."""
+"""Calls a planner, which is foreign code: whatever it does, the flight goes on or ends with a sentence."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport
 
-OWN: Final = ("harness.", "planner.")
-"""Packages of wayproof, whose lines say nothing to whoever wrote a planner."""
+OWN_PACKAGES: Final = ("harness.", "planner.")
+"""Lines of code in these packages, wayproof's own, say nothing to the author of a planner."""
 
 
 class PlannerFailedError(RuntimeError):
@@ -32,16 +32,16 @@ class PlannerFailedError(RuntimeError):
 
 
 class Answer(NamedTuple):
-    """What a planner answered."""
+    """A planner's answer to a request."""
 
     plan: Plan
     """The plan, checked."""
     own: Plan
-    """The same as the object that the planner gave; it gets this one back as `PlanRequest.flown`."""
+    """The object that the planner itself returned, which it gets back as `PlanRequest.flown`."""
 
 
 class AskedPlanner:
-    """A planner as the loop asks it.
+    """A planner as the loop calls it.
 
     The planner reads the map but cannot change it, and prints to standard error. What it answers has been checked
     (`planner.plan_checks`) when the loop gets it.
@@ -69,7 +69,7 @@ class AskedPlanner:
         return str(getattr(self._planner, "backup", "")) if self.shielded else ""
 
     def plan(self, request: PlanRequest) -> Answer:
-        """The answer to a request; its `flown` is the `own` of the answer in effect.
+        """Returns the answer to a request, whose `flown` is the `own` of the answer in effect.
 
         Raises:
             PlannerFailedError: the planner raised, or its answer cannot be flown.
@@ -94,11 +94,11 @@ class AskedPlanner:
 
 
 def _where(error: BaseException) -> str:
-    """File and line of the innermost call in the planner's own file, as ` (bug.py:5)`; empty where none is known."""
+    """Returns file and line of the innermost call in the planner's own file, as ` (bug.py:5)`; empty if unknown."""
     calls = [
         (frame.f_code.co_filename, line)
         for frame, line in walk_tb(error.__traceback__)
-        if not frame.f_globals.get("__name__", "").startswith(OWN)
+        if not frame.f_globals.get("__name__", "").startswith(OWN_PACKAGES)
     ]
     lines = [line for file, line in calls if file == calls[0][0]]
     return f" ({Path(calls[0][0]).name}:{lines[-1]})" if lines else ""

@@ -29,7 +29,7 @@ from harness.world.world import World
 from planner.interface import Mission, Planner
 
 NOT_STEERED = GuidanceOutput(0.0, math.nan, math.nan, bank_saturated=False, past_end=False)
-"""Wings level, on no route: what is commanded before the first plan."""
+"""Wings level and no route, which is commanded before the first plan."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Loop:
 def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None) -> Flight:
     """Flies a mission to its end. Ctrl-C is taken between two guidance intervals.
 
-    The loop is used up by it. `progress` is told of the flight every `PROGRESS_EVERY_S`.
+    The loop is used up by it. `progress` is called every `PROGRESS_EVERY_S` of simulated time.
 
     Raises:
         KeyboardInterrupt: after Ctrl-C; the observers have all rows up to it.
@@ -154,14 +154,14 @@ class ClosedLoop:
                 return
 
     def _read_state(self) -> None:
-        """Reads the true state, and what navigation makes of it."""
+        """Reads the true state, and estimates the believed one from it."""
         self.true = self._model.state()
         self.believed = self._navigator.believed(self.true)
         if self.believed is not self.true:
             self._check_navigation()
 
     def _check_navigation(self) -> None:
-        """Forgets the map if the believed position has jumped: it was entered from elsewhere.
+        """Forgets the map if the believed position has jumped, since the map was entered from elsewhere.
 
         The planner is asked with the next scan, and checks its plan against what that shows.
         """
@@ -237,7 +237,7 @@ class ClosedLoop:
         return None
 
     def _judge(self) -> Ending | None:
-        """How the flight ends at the true state; None while it goes on."""
+        """Returns how the flight ends at the true state; None while it goes on."""
         return self._loop.termination.verdict(self.true, self._model.fault())
 
     def _log_row(self) -> None:
@@ -252,7 +252,7 @@ class ClosedLoop:
             self._log.add(true, steering, index, self.believed, true_m)
 
     def _finish(self, ending: Ending) -> None:
-        """Closes the flight."""
+        """Logs the last row, sets the ending and tells the observers."""
         if self.true.time_s == 0.0:  # a track has at least two rows
             self._log_row()
             self._model.advance(self._first_steps)

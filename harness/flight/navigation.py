@@ -1,4 +1,4 @@
-"""What the aircraft believes of its state: truth and error, seeded.
+"""The believed state of the aircraft: the true one with seeded errors.
 
 Guidance, the altitude and airspeed that are held, the pose with which a scan enters the map, and the position that the
 planner is told are believed ones. World, sensor, contact, `reached` and metrics are of the true state.
@@ -27,7 +27,7 @@ AIRSPEED_CORRELATION_S: Final = 300.0
 """Correlation time of the airspeed error. Chosen: a pressure sensor drifts with its temperature, over minutes."""
 
 LOOKS_APART_S: Final = 5.0
-"""What moves is told from looks at it that are about so far apart in time."""
+"""Motion is measured between looks at an obstacle that are about this far apart in time."""
 
 
 def pose_error_m(navigation: Navigation, range_m: float) -> float:
@@ -47,7 +47,7 @@ def pose_error_m(navigation: Navigation, range_m: float) -> float:
 
 
 class StateEstimator:
-    """Tells what the aircraft believes of its state, for one flight; this one knows it exactly."""
+    """Estimates the state for one flight; this one knows it exactly."""
 
     has_fix = True
     """Whether the position is that of a fix, as of the last call of `believed`; without one it drifts."""
@@ -57,7 +57,7 @@ class StateEstimator:
     """Error of altitude (m) and airspeed (m/s) that the autopilot holds, without the age of the state."""
 
     def believed(self, state: AircraftState) -> AircraftState:
-        """What the aircraft believes where this is its true state; the very object given where it knows it exactly.
+        """Returns the believed state for a true one; the very object given where it is known exactly.
 
         Time never goes back from one call to the next.
         """
@@ -114,7 +114,7 @@ class Navigator(StateEstimator):
         self._fix_error, self._drift = (0.0, 0.0), (0.0, 0.0)
 
     def believed(self, state: AircraftState) -> AircraftState:
-        """What the aircraft believes where this is its true state; `ValueError` if time goes back."""
+        """Returns the believed state for a true one; `ValueError` if time goes back."""
         if self._perfect:
             return state
         state = as_it_was(self._past, state, self._navigation.latency_s)
@@ -142,7 +142,7 @@ class Navigator(StateEstimator):
         )
 
     def _go_on(self, time_s: float, place: tuple[float, float]) -> None:
-        """Takes the errors from the call before to this time."""
+        """Advances the errors from the call before to this time."""
         first, before_s = math.isnan(self._time_s), self._time_s
         noise = self._rng.standard_normal(8).tolist()
         if not first:
@@ -165,7 +165,7 @@ class Navigator(StateEstimator):
         self.has_fix = outage < 0
 
     def _outage_at(self, time_s: float) -> int:
-        """Index of the outage at a time, -1 if there is a fix."""
+        """Returns the index of the outage at a time, -1 if there is a fix."""
         for index, (begin_s, end_s) in enumerate(self._navigation.outages_s):
             if begin_s <= time_s < end_s:
                 return index
@@ -174,6 +174,6 @@ class Navigator(StateEstimator):
 
 @functools.lru_cache(maxsize=64)
 def _shares(seconds: float, correlation_s: tuple[float, ...]) -> tuple[list[float], list[float]]:
-    """What is left of unit processes after so long, and what is new, over a standard normal number."""
+    """Returns the shares of unit processes that remain after a time, and the sizes of their new normal noise."""
     steps = seconds / np.array(correlation_s)
     return np.exp(-steps).tolist(), np.sqrt(-np.expm1(-2.0 * steps)).tolist()

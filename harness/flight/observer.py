@@ -1,4 +1,4 @@
-"""What may look on while a flight is flown."""
+"""Observers, which look on while a flight is flown."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PROGRESS_EVERY_S = 5.0
 
 
 class Caution(str):
-    """The text of an event that should not happen: a recording shows it as a warning."""
+    """The text of an event that should not happen, which a recording shows as a warning."""
 
     __slots__ = ()
 
@@ -34,29 +34,29 @@ class ShieldState(str):
 
 
 class Observer(Protocol):
-    """What may look on while the loop runs; its own methods do nothing. Nothing that it does reaches the loop."""
+    """Looks on while the loop runs; its own methods do nothing, and nothing that it does reaches the loop."""
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
-        """A scan was taken."""
+        """Is called when a scan was taken."""
         return
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        """A plan takes effect."""
+        """Is called when a plan takes effect."""
         return
 
     def on_block(self, block: Track) -> None:
-        """Some hundred more rows of the track."""
+        """Is called with each block of some hundred more rows of the track."""
         return
 
     def on_event(self, time_s: float, text: str) -> None:
-        """Something worth a line in the log; a `Caution` is of what should not happen."""
+        """Is called with a line for the log; a `Caution` is of what should not happen."""
         return
 
 
 @runtime_checkable
 class RowObserver(Observer, Protocol):
-    """What looks on at every row of the track as well, such as a pace that holds the flight back."""
+    """Looks on at every row of the track as well, such as a pace that holds the flight back."""
 
     def on_row(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
-        """One more row: the true state, what guidance decided last, and the plan in effect."""
+        """Is called with each row: the true state, the latest steering, and the index of the plan in effect."""
         ...

@@ -18,11 +18,11 @@ from planner.interface import MapView, Mission, Plan, Planner, PlanRequest, Plan
 from planner.shield.intervention_log import ShieldReport
 
 LATE_S = 1e-9
-"""A plan or a scan whose time has come but for this has come: times are sums of floats."""
+"""A plan or a scan counts as due this much early, because times are sums of floats."""
 
 
 class Plans:
-    """Asks the planner, which sees nothing but the map, and hands its plans to the guidance when they take effect."""
+    """Asks the planner, which sees only the map, and hands its plans to the guidance when they take effect."""
 
     def __init__(
         self, planner: Planner, mission: Mission, seen: MapView, observers: Sequence[Observer]
@@ -135,7 +135,7 @@ class Plans:
         return None
 
     def failure_suffix(self, outcome: Outcome) -> str:
-        """The planner's reason for having found no plan, to be added to the reason of an ending; else empty."""
+        """Returns the planner's reason for having found no plan, to be added to the reason of an ending; else empty."""
         if outcome in (Outcome.PLANNER_FAILED, Outcome.UNREACHABLE):
             return ""
         if not (self.accepted or self.coming) and self._told:

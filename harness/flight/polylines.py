@@ -13,7 +13,7 @@ CHORD_ERROR_M = 0.5
 
 
 def polylines(paths: Sequence[FloatArray], chord_error_m: float = CHORD_ERROR_M) -> list[FloatArray]:
-    """Points along paths, each dense enough that no chord leaves its arc by more than an error.
+    """Returns points along paths, so dense that no chord leaves its arc by more than an error.
 
     A chord that spans the angle `a` of an arc of curvature `k` leaves it by (1 - cos(a / 2)) / k.
 

@@ -20,7 +20,7 @@ class FixEvents:
         self._jumps, self._had_fix = 0, True
 
     def jumped(self, time_s: float) -> bool:
-        """Whether the believed position has jumped to a new fix since the last call."""
+        """Tells whether the believed position has jumped to a new fix since the last call, and reports fixes lost."""
         navigator = self._navigator
         jumped = navigator.jumps != self._jumps
         if jumped:
@@ -40,18 +40,18 @@ class FixEvents:
 
 
 class CrossTrack:
-    """Distance of a position from the plan being flown, where no law of `aircraft.guidance` has measured it."""
+    """Measures the distance from the plan being flown where no law of `aircraft.guidance` has done so."""
 
     def __init__(self, plans: Plans) -> None:
         self._plans, self._index = plans, -1
         self._progress: RouteProgress | None = None
 
     def of(self, state: AircraftState, arc_length_m: float, index: int) -> float:
-        """Distance of a state (m) to the right of the plan of an index, looked for from an arc length on; or NaN."""
+        """Returns a state's distance (m) to the right of a plan, searched from an arc length on; NaN without a plan."""
         return math.nan if index < 0 else self.place(state, arc_length_m, index).cross_track_m
 
     def place(self, state: AircraftState, arc_length_m: float, index: int) -> PathPoint:
-        """The point of the plan of an index that is nearest to a state, looked for from an arc length on."""
+        """Returns the point of a plan that is nearest to a state, searched from an arc length on."""
         if self._progress is None or index != self._index:
             plan, self._index = self._plans.accepted[index], index
             self._progress = RouteProgress(Route(plan.segments, plan.loiter), arc_length_m)

@@ -1,4 +1,4 @@
-"""What a flight leaves behind, as values: the track row by row, the accepted plans, the outcome.
+"""The record of a flight as values: the track row by row, the accepted plans, the outcome.
 
 Everything is SI; angles are degrees in the track, because the track is a file format. Frame: local ENU plane,
 x = east, y = north, z = up above mean sea level; course and heading clockwise from north.
@@ -37,26 +37,26 @@ class Outcome(Enum):
 
 
 class Column(NamedTuple):
-    """What a column of the track is."""
+    """The properties of a column of the track."""
 
     doc: str
-    """What it holds, in the unit that its name says."""
+    """What the column holds, in the unit that its name says."""
     dtype: str = "<f8"
-    """Of its values, as numpy writes it."""
+    """Type of its values, as numpy writes it."""
     in_digest: bool = True
-    """The digest covers it."""
+    """Whether the digest covers it."""
     left_out: float | None = None
-    """Of a column that may be left out, the value of all rows then."""
+    """The value of all rows where an optional column is left out; None if it may not be."""
     believed: bool = False
-    """It is of what the aircraft believed; a track of perfect navigation does without it."""
+    """Whether it holds a believed quantity, which a track of perfect navigation does without."""
 
 
 Floats = FloatArray | None
-"""A column that may be left out when a track is made; a track has all of them."""
+"""A column that may be left out when a track is made, which then fills it in."""
 
 
 def _column(doc: str, *, digested: bool = True, **kind: Any) -> Any:
-    """A column of the track, as a field of `Track`."""
+    """Declares a column of the track, as a field of `Track`."""
     column = Column(doc, in_digest=digested, **kind)
     kept = {"column": column}
     return field(metadata=kept) if column.left_out is None else field(default=None, metadata=kept)
@@ -140,7 +140,7 @@ class Track:
 
     @property
     def has_beliefs(self) -> bool:
-        """Whether it is known what the aircraft believed, which it did not know exactly."""
+        """Whether the track knows a believed state other than the true one."""
         return self.believed_east_m is not None and bool(np.isfinite(self.believed_east_m).any())
 
     @property
@@ -157,7 +157,7 @@ class Track:
         return off
 
     def part(self, first: int, stop: int) -> Track:
-        """Some of its rows."""
+        """Returns the rows from `first` up to `stop`."""
         part = object.__new__(Track)
         part.__dict__.update({name: column[first:stop] for name, column in vars(self).items()})
         return part
@@ -174,16 +174,16 @@ TRACK_COLUMNS: Mapping[str, Column] = {each.name: each.metadata["column"] for ea
 """All columns of `track.parquet`, in its order: the fields of `Track`."""
 
 TRACK_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if not column.believed)
-"""Names of those that every track has."""
+"""Names of the columns that every track has."""
 
 BELIEVED_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if column.believed)
-"""Names of those that a track has where navigation is not perfect."""
+"""Names of the columns that a track has only where navigation is not perfect."""
 
 SURFACES = ("elevator", "aileron", "rudder")
 """Names of the columns of control surfaces."""
 
 COLUMNS = tuple(name for name, column in TRACK_COLUMNS.items() if column.in_digest)
-"""Columns of `track.parquet` that the digest covers, in its order."""
+"""Names of the columns of `track.parquet` that the digest covers, in its order."""
 
 
 def digest(track: Track) -> str:
@@ -224,7 +224,7 @@ class AcceptedPlan:
 
     @property
     def delay_s(self) -> float:
-        """From that scan until the plan took effect; NaN without one."""
+        """Time from the latest scan known to the plan until it took effect; NaN without a scan."""
         return self.time_s - self.scan_s
 
     @property

@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
-ENDING: Final = (signal.SIGTERM, signal.SIGHUP)
-INTERRUPTING: Final = (signal.SIGINT, *ENDING)
+ENDING_SIGNALS: Final = (signal.SIGTERM, signal.SIGHUP)
+HELD_SIGNALS: Final = (signal.SIGINT, *ENDING_SIGNALS)
 AGAIN_S: Final = 2.0
 
 
@@ -39,7 +39,7 @@ def taken_as_interrupt() -> Iterator[list[int]]:
         raise KeyboardInterrupt
 
     main = threading.current_thread() is threading.main_thread()
-    taken = [each for each in ENDING if main and signal.getsignal(each) is signal.SIG_DFL]
+    taken = [each for each in ENDING_SIGNALS if main and signal.getsignal(each) is signal.SIG_DFL]
     for each in taken:
         signal.signal(each, end)
     try:
@@ -88,7 +88,7 @@ def held_back() -> Iterator[Callable[[], None]]:
 
     main = threading.current_thread() is threading.main_thread()
     main_thread = threading.get_ident()
-    found = {each: signal.getsignal(each) for each in INTERRUPTING if main}
+    found = {each: signal.getsignal(each) for each in HELD_SIGNALS if main}
     handlers = {each: handler for each, handler in found.items() if callable(handler)}
     for each in handlers:
         signal.signal(each, hold)

@@ -20,7 +20,7 @@ class Status(NamedTuple):
     state: AircraftState
     """The true state."""
     believed: AircraftState
-    """What the aircraft believes it to be."""
+    """The state as the aircraft believes it to be."""
     to_go_m: float
     """Distance that is left to the goal."""
     plan_index: int
@@ -32,7 +32,7 @@ class Status(NamedTuple):
     outcome: Outcome | None
     """How the flight ended; None while it goes on."""
     reason: str
-    """The same as a sentence; empty while it goes on."""
+    """The outcome as a sentence; empty while the flight goes on."""
 
     @property
     def done(self) -> bool:
@@ -41,14 +41,14 @@ class Status(NamedTuple):
 
 
 class SteppedLoop:
-    """The closed loop of one scenario, made anew and flown as often as it is reset, one guidance interval a step."""
+    """The closed loop of one scenario, one guidance interval a step; each reset makes it anew."""
 
     def __init__(self, make: Callable[[], Loop], observers: Sequence[Observer] = ()) -> None:
         self._make, self._observers = make, observers
         self._flying: ClosedLoop | None = None
 
     def reset(self) -> Status:
-        """Begins a new flight, whatever has become of the one before; it is at its start."""
+        """Begins a new flight, whatever has become of the one before, and returns its status at the start."""
         self._flying = ClosedLoop(self._make(), self._observers)
         return self.status
 

@@ -1,4 +1,4 @@
-"""At which steps of the flight model something is due: guidance, a scan."""
+"""The steps of the flight model at which guidance or a scan is due."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Instant(NamedTuple):
 
 
 def intervals(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[Instant, ...]]:
-    """The instants of consecutive guidance intervals, until all of it begins again; guidance is due at the first.
+    """Returns the instants of consecutive guidance intervals until they repeat; guidance is due at the first.
 
     Without scans `scan_rate_hz` is 0. Raises `ValueError` where a rate does not divide that of the flight model.
     """

@@ -14,12 +14,12 @@ from aircraft.interface import AircraftState
 from harness.flight.record import TRACK_COLUMNS, FloatArray, Track
 
 Clearance = Callable[[FloatArray, FloatArray], FloatArray]
-"""(k, 2) points and (k,) times -> (k,) true distance to the nearest active obstacle edge, m."""
+"""Maps (k, 2) points and (k,) times to (k,) true distances (m) to the nearest active obstacle edge."""
 
 BLOCK_ROWS = 6000
-"""Rows that are handed on together: ten minutes of flight, which is less than a second of the loop."""
+"""A block has this many rows, ten minutes of flight."""
 
-LOGGED = np.dtype(
+ROW_TYPE = np.dtype(
     [
         *((name, np.float64) for name in AircraftState._fields),
         ("roll_command_rad", np.float64),
@@ -28,23 +28,23 @@ LOGGED = np.dtype(
         ("plan_index", np.int64),
     ]
 )
-"""What is kept of a tick until its block is full."""
+"""The fields of a row until its block is full."""
 
-PACKED = struct.Struct(f"{len(AircraftState._fields) + 3}dq")
-"""The same as the standard library writes it."""
+ROW_STRUCT = struct.Struct(f"{len(AircraftState._fields) + 3}dq")
+"""`ROW_TYPE` as the standard library writes it."""
 
-NAMES = tuple(LOGGED.fields or ())
+NAMES = tuple(ROW_TYPE.fields or ())
 
-BELIEVED = np.dtype(
+BELIEVED_TYPE = np.dtype(
     [
         (name, np.float64)
         for name in ("east_m", "north_m", "up_m", "velocity_east_mps", "velocity_north_mps", "cross_track_m")
     ]
 )
-"""What is kept beside that of a tick at which the aircraft did not know its state exactly."""
+"""The further fields of a row where the aircraft does not know its state exactly."""
 
 FINITE = [name for name in AircraftState._fields if name not in AircraftState._field_defaults]
-"""What is finite of a state while the aircraft is under control."""
+"""Fields of the state that are finite while the aircraft is under control."""
 
 
 class TrackLog:
@@ -68,9 +68,9 @@ class TrackLog:
     ) -> None:
         self._clearance, self._ground = clearance, ground
         self._sinks, self._row_sinks = tuple(sinks), tuple(row_sinks)
-        self._rows = np.zeros(block_rows, LOGGED)
+        self._rows = np.zeros(block_rows, ROW_TYPE)
         self._bytes, self._used = self._rows.data.cast("B"), 0
-        self._beliefs = np.full(block_rows, math.nan, BELIEVED)
+        self._beliefs = np.full(block_rows, math.nan, BELIEVED_TYPE)
         self._believes = False
         self._blocks: list[Track] = []
 
@@ -82,7 +82,7 @@ class TrackLog:
         believed: AircraftState | None = None,
         true_cross_track_m: float = math.nan,
     ) -> None:
-        """Adds one row: true state, what guidance decided last, and the plan in effect, -1 before the first.
+        """Adds one row: true state, latest steering, and the index of the plan in effect, -1 before the first.
 
         Where the aircraft does not know its state exactly, `believed` is what it takes it to be, and the true position
         lies `true_cross_track_m` beside the plan; `steering` has that of the believed one. A state that is not finite,
@@ -99,9 +99,9 @@ class TrackLog:
                 steering.cross_track_m,
             )
             steering = steering._replace(cross_track_m=true_cross_track_m)
-        PACKED.pack_into(  # numpy takes twice as long to fill a row
+        ROW_STRUCT.pack_into(  # numpy takes twice as long to fill a row
             self._bytes,
-            self._used * PACKED.size,
+            self._used * ROW_STRUCT.size,
             *state,
             steering.roll_command_rad,
             steering.cross_track_m,

@@ -22,10 +22,10 @@ Position = tuple[float, float, float]
 """East, north and up (m)."""
 
 SAMPLE_M: Final = 0.5
-"""A way is held against the ground at least this often; what is thinner along it is no contact."""
+"""A way is compared with the ground at least this often; ground thinner along it is no contact."""
 
 SQUARES: Final = (64, 16, 4, 1)
-"""Half widths, in cells of the grid, of the squares whose highest ground is looked for."""
+"""Half widths, in cells of the grid, of the squares in which the highest ground is looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +47,13 @@ class Ground:
         return position[2] - self.height_m(position[0], position[1])
 
     def contact_between(self, begin: Position, end: Position) -> bool:
-        """Whether the straight way between two positions goes through the ground."""
+        """Tells whether the straight way between two positions goes through the ground."""
         count = math.ceil(math.dist(begin, end) / SAMPLE_M) + 1
         east, north, up = np.linspace(begin, end, count).T
         return bool((up - self.field.at(east, north) <= 0.0).any())
 
     def reach_m(self, position: Position) -> float:
-        """So far can one fly from a position, in whatever direction, without touching the ground; at least.
+        """Returns a distance that can be flown from a position, in any direction, without touching the ground.
 
         Only the highest ground in squares about the position is known, so that the answer may be much too small, but
         never too large.

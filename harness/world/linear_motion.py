@@ -1,4 +1,4 @@
-"""Straight-line motion and presence of many things at once, and how far their boxes are from a place.
+"""Straight-line motion and presence of many obstacles or faces at once, and distances from their boxes to a place.
 
 Frame: local ENU plane, x = east, y = north, metres; times are simulated seconds.
 """
@@ -15,7 +15,7 @@ from planner.interface import BoolArray, FloatArray
 
 
 class LinearMotions:
-    """Straight-line motion and presence of n things, one column each.
+    """Straight-line motion and presence of n obstacles or faces, one column each.
 
     Args:
         rows: (5, n): velocity east, velocity north, epoch, first and last time of presence.
@@ -28,7 +28,7 @@ class LinearMotions:
 
     @classmethod
     def of(cls, obstacles: Iterable[Obstacle]) -> LinearMotions:
-        """Those of some obstacles."""
+        """Collects the motions of obstacles."""
         rows = [(*o.velocity_mps, o.epoch_s, *o.interval_s) for o in obstacles]
         return cls(np.array(rows, dtype=np.float64).reshape(-1, 5).T.copy())
 
@@ -38,12 +38,12 @@ class LinearMotions:
         return shifts
 
     def present(self, start_s: float, stop_s: float) -> BoolArray:
-        """(n,) whether there at some time of an interval."""
+        """(n,) whether each is there at some time of an interval."""
         present: BoolArray = (self._rows[3] <= stop_s) & (start_s <= self._rows[4])
         return present
 
     def gaps(self, boxes: FloatArray, east: float, north: float, time_s: float) -> FloatArray:
-        """(n,) lower bound of the distance to each thing, there or not, by its rounded box (5, n) at the epoch."""
+        """(n,) lower bounds of the distances to each, there or not, by their rounded boxes (5, n) at the epoch."""
         if self.matter:
             boxes = np.vstack((boxes[:2] + self.shifts(time_s), boxes[2:]))
         return gaps_to(boxes, east, north)

@@ -17,17 +17,17 @@ from harness.world.obstacle import Circle, Obstacle
 from harness.world.world import World
 
 SLOWEST_MPS: Final = 0.5
-"""Slowest speed of an obstacle that is found to move. A slower one is taken to stand still."""
+"""An obstacle slower than this is taken to stand still."""
 
 FASTEST_MPS: Final = 30.0
-"""Fastest speed of an obstacle that is followed from scan to scan."""
+"""An obstacle faster than this is not followed from scan to scan."""
 
 FASTEST_SHARE: Final = 0.8
-"""Fastest speed of an obstacle as a share of the airspeed. The aircraft cannot fly aside from a faster one."""
+"""The aircraft cannot fly aside from an obstacle faster than this share of its airspeed."""
 
 
 def outside_assumptions(scenario: Scenario) -> tuple[str, ...]:
-    """One sentence for each assumption that a moving obstacle of a scenario breaks.
+    """Returns one sentence for each assumption that a moving obstacle of a scenario breaks.
 
     Assumed are a speed from `SLOWEST_MPS` to `FASTEST_MPS` and to `FASTEST_SHARE` of the airspeed, and a width, across
     the velocity, of no more than the sensing range, so that an end comes into sight.
@@ -54,7 +54,7 @@ def outside_assumptions(scenario: Scenario) -> tuple[str, ...]:
 
 
 def _width_m(obstacle: Obstacle) -> float:
-    """Its extent across its velocity."""
+    """Returns the extent of an obstacle across its velocity."""
     if isinstance(obstacle.shape, Circle):
         return 2.0 * obstacle.shape.radius_m
     east, north = np.array(obstacle.velocity_mps) / math.hypot(*obstacle.velocity_mps)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 _PAIRS_AT_ONCE = 1_000_000
-"""Points times edges whose distances are worked out together: what keeps memory small."""
+"""At most this many distances between points and edges are computed together, to keep memory small."""
 LEAST_M2 = float(np.finfo(np.float64).tiny)
-"""Square of the least length of an edge, for who divides by it: both ends of one may be rounded to one place."""
+"""An edge's length squared counts as at least this in a division: both its ends may be rounded to one place."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Polygon:
 
     @property
     def rings_m(self) -> tuple[tuple[tuple[float, float], ...], ...]:
-        """Its outline and then its holes."""
+        """The outline and then the holes."""
         return self.vertices_m, *self.holes_m
 
     @property

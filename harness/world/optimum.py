@@ -59,12 +59,12 @@ def shortest_path(
     Bounds are xmin, ymin, xmax, ymax; a path may touch them. The points stop at the rim of the goal circle.
     """
     if not all(each.stands_for_ever for each in obstacles):
-        return _none("an obstacle moves, appears or disappears: the optimum is defined for standing ones")
+        return _no_path("an obstacle moves, appears or disappears: the optimum is defined for standing ones")
     scene = TangentScene([each.shape for each in obstacles], bounds_m, start_m, goal_m, clearance_m)
     free = scene.free_points(np.array([start_m, goal_m]))
     if not free.all():
         end = ("start", "goal")[int(free.argmin())]
-        return _none(f"the {end} is outside the area or nearer than the clearance to an obstacle")
+        return _no_path(f"the {end} is outside the area or nearer than the clearance to an obstacle")
     found = _search(scene)
     if found.length_m is None or goal_radius_m <= 0.0:
         return found
@@ -80,7 +80,7 @@ def shortest_path(
 
 
 def _to_circle(points_m: FloatArray, goal_m: tuple[float, float], radius_m: float) -> FloatArray:
-    """(k, 2) the part of a way that leads to the rim of the goal circle."""
+    """(k, 2) the part of a path up to the rim of the goal circle."""
     import shapely
 
     line = shapely.LineString(points_m).difference(shapely.Point(goal_m).buffer(radius_m))
@@ -88,12 +88,12 @@ def _to_circle(points_m: FloatArray, goal_m: tuple[float, float], radius_m: floa
     return points
 
 
-def _none(reason: str) -> Optimum:
+def _no_path(reason: str) -> Optimum:
     return Optimum(None, np.zeros((0, 2)), reason)
 
 
 class _Arrival(NamedTuple):
-    """A path so far: it has come to the rim of a disc."""
+    """A path so far, which has come to the rim of a disc."""
 
     disc: int
     side: int
@@ -104,7 +104,7 @@ class _Arrival(NamedTuple):
 
 
 def _search(scene: TangentScene) -> Optimum:
-    """A* over arrivals; the straight distance to the goal never exceeds the way that is left."""
+    """Finds the shortest path with A*; the straight distance to the goal never exceeds the way that is left."""
     tangents: dict[tuple[int, int], Tangents] = {}
     blocked: dict[int, FloatArray] = {}
     arrivals = [_Arrival(scene.start, 1, 0.0, None, 0.0)]
@@ -131,17 +131,17 @@ def _search(scene: TangentScene) -> Optimum:
                     int(out.disc[k]), int(out.side[k]), float(out.arrives_at[k]), arrival, out.leaves_at[k]
                 )
             )
-    return _none("there is no way that keeps the clearance inside the area")
+    return _no_path("there is no way that keeps the clearance inside the area")
 
 
 def _sweep(arrival: _Arrival, leaves_at: FloatArray) -> FloatArray:
-    """(k,) angles from an arrival on along the rim; a backward one of the size of rounding is none."""
+    """(k,) angles along the rim from an arrival; a backward angle of the size of rounding counts as 0."""
     sweep = (arrival.side * (leaves_at - arrival.angle)) % math.tau
     return np.where(sweep > math.tau - ANGLE_SLACK_RAD, 0.0, sweep)
 
 
 def _free_sweep(arrival: _Arrival, blocked: FloatArray) -> float:
-    """Angle (rad) by which a path may turn about a disc from its arrival on, in its sense, before a blocked arc begins.
+    """Returns the angle (rad) that a path may turn about a disc from its arrival until a blocked arc begins.
 
     `blocked` is (k, 2): where each arc begins, and its width. Rounding may put an arrival just inside of an arc. In the
     half where the arc begins it then turns no further; in the other half it leaves the arc.
@@ -153,7 +153,7 @@ def _free_sweep(arrival: _Arrival, blocked: FloatArray) -> float:
 
 
 def _drawn(scene: TangentScene, last: _Arrival) -> FloatArray:
-    """Points along the path that ends with an arrival at the goal."""
+    """Returns points along the path that ends with an arrival at the goal."""
     pieces = [scene.centres[[scene.goal]]]
     here = last
     while here.before is not None:

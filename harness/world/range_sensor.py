@@ -21,25 +21,25 @@ if TYPE_CHECKING:
     from harness.scenario.sections import Sensor
 
 
-_SKIN = 0.25
-"""The list of obstacles near the aircraft reaches this share of the sensor's range further than the range."""
+_SKIN_SHARE = 0.25
+"""The list of obstacles near the aircraft reaches further than the sensor's range by this share of it."""
 _HORIZON_S = 30.0
-"""The list holds what comes near within this time; then it is made anew."""
+"""The list holds obstacles that come near within this time; after it the list is made anew."""
 
 
-class _Unread(RangeScan):
-    """A scan whose rays are followed when somebody first reads their ranges: few scans are news to anybody."""
+class _LazyScan(RangeScan):
+    """A scan whose ranges are computed when they are first read, since few scans are ever read."""
 
     @classmethod
-    def of(cls, attributes: dict[str, Any]) -> _Unread:
-        """A scan of its attributes by name; either the ranges are among them or, as `_follow`, what gives them."""
+    def of(cls, attributes: dict[str, Any]) -> _LazyScan:
+        """Makes a scan of its attributes by name; instead of the ranges there may be `_follow`, which computes them."""
         scan = cls.__new__(cls)
         # At once: a frozen dataclass would set them one by one, and that is most of the cost of a scan.
         scan.__dict__.update(attributes)
         return scan
 
     def __getattr__(self, name: str) -> FloatArray:
-        """The ranges, when they are first read."""
+        """Computes the ranges when they are first read."""
         if name != "ranges_m":
             raise AttributeError(name)
         ranges: FloatArray = self.__dict__.pop("_follow")()
@@ -84,7 +84,7 @@ class RangeSensor:
         self._listed_at = (math.nan, math.nan, math.nan)
 
     def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
-        """Looks around from a place, at a time."""
+        """Takes a scan from a place at a time."""
         faces = self._near(east_m, north_m, time_s).faces(time_s)
         seen = {
             **self._always,
@@ -104,11 +104,11 @@ class RangeSensor:
         else:
             seen["nearest_m"] = face_m
             seen["_follow"] = partial(self._fan.ranges_m, faces, east_m, north_m, heading_rad)
-        return _Unread.of(seen)
+        return _LazyScan.of(seen)
 
     def _near(self, east: float, north: float, time: float) -> Surroundings:
-        """All that is in range, from the neighbour list; this renews the list when it runs out."""
-        skin = _SKIN * self._config.range_m
+        """Returns all faces in range, from the neighbour list, which is renewed when it runs out."""
+        skin = _SKIN_SHARE * self._config.range_m
         listed_east, listed_north, listed_s = self._listed_at
         moved = math.hypot(east - listed_east, north - listed_north)
         listed = self._surroundings
@@ -121,7 +121,7 @@ class RangeSensor:
         return listed
 
     def _degraded(self, ranges: FloatArray) -> FloatArray:
-        """Ranges with the imperfections of the sensor."""
+        """Adds the imperfections of the sensor to ranges."""
         config, n = self._config, len(ranges)
         if config.range_noise_m > 0:
             ranges = np.maximum(ranges + config.range_noise_m * self._noise.standard_normal(n), 0.0)
@@ -135,7 +135,7 @@ class RangeSensor:
 
 
 def child_stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:
-    """The numbered child stream of a root, whatever was spawned from the root before."""
+    """Returns the numbered child stream of a root, which does not depend on what was spawned before."""
     key = (*root.spawn_key, number)
     return np.random.default_rng(
         np.random.SeedSequence(root.entropy, spawn_key=key, pool_size=root.pool_size)

@@ -23,11 +23,11 @@ from planner.interface import ComplexArray, FloatArray
 FACES, PLACE, FOUR = "Array(float64, 2, 'A', readonly=True)", "complex128", "UniTuple(float64, 4)"
 Four = tuple[float, float, float, float]
 
-SAME = 1e-9
-"""Beams touch where their width is their spacing but for this share: both may come from degrees."""
+TOUCHING_SHARE = 1e-9
+"""Beams touch if their width is their spacing but for this share, since both may come from degrees."""
 
-# Beams tried beyond the bearings of a face, in beams: more than bearings err, even at a tangent (1.5e-8 rad).
 _MARGIN_RAYS = 1e-3
+"""Beams are tried this far, in beams, beyond the bearings of a face, which err by at most 1.5e-8 rad (at a tangent)."""
 
 
 class Fan:
@@ -47,7 +47,7 @@ class Fan:
         """Bearing of the axis of beam 0 from the nose."""
         self.beam_rad = self.spacing_rad if beam_rad is None else beam_rad
         """Width of each beam."""
-        self._touching = abs(self.beam_rad - self.spacing_rad) <= SAME * self.spacing_rad
+        self._touching = abs(self.beam_rad - self.spacing_rad) <= TOUCHING_SHARE * self.spacing_rad
         self._range_m = range_m
         offsets = self.first_rad + self.spacing_rad * np.arange(rays)
         self.rays: ComplexArray = np.sin(offsets) + 1j * np.cos(offsets)
@@ -83,10 +83,10 @@ class Fan:
 
 
 @compiled(FLOAT, FLOAT, FLOAT, FLOAT, COUNT)
-def _tried(
+def _beams_between(
     bearing_rad: float, width_rad: float, first_rad: float, spacing_rad: float, rays: int
 ) -> tuple[int, int, int]:
-    """Beams whose axes lie between two bearings: of one span the first and after the last, and of one from 0 on.
+    """Returns the beams whose axes lie between two bearings: begin and stop of one span, and the stop of one from 0 on.
 
     The left one is at `bearing_rad` from the nose, the other `width_rad` clockwise from there, the axis of beam 0 at
     `first_rad`.
@@ -102,13 +102,13 @@ def _tried(
 
 @compiled(PLACE, FLOAT, FLOAT)
 def _side(ray: complex, right: float, ahead: float) -> float:
-    """How far a place lies clockwise of a ray, m; negative: the other way."""
+    """Returns how far (m) a place lies clockwise of a ray, negative if it lies the other way."""
     return ray.imag * right - ray.real * ahead
 
 
 @compiled(PLACE, PLACE, FLOAT, FLOAT)
 def _between(left: complex, right: complex, to_right: float, ahead: float) -> bool:
-    """Whether a place lies between the two sides of a beam that is narrower than a half turn."""
+    """Tells whether a place lies between the two sides of a beam, which is narrower than a half turn."""
     return (
         _side(left, to_right, ahead) >= 0.0
         and _side(right, to_right, ahead) <= 0.0
@@ -120,7 +120,7 @@ def _between(left: complex, right: complex, to_right: float, ahead: float) -> bo
 def _nearest_of(
     start_right: float, start_ahead: float, end_right: float, end_ahead: float
 ) -> tuple[float, float, float]:
-    """The nearest place of an edge, to the right and ahead of the sensor, and how far away it is."""
+    """Returns the nearest place of an edge, to the right and ahead of the sensor (m), and its distance."""
     along_right, along_ahead = end_right - start_right, end_ahead - start_ahead
     length_m2 = max(along_right * along_right + along_ahead * along_ahead, LEAST_M2)
     share = min(max(-(start_right * along_right + start_ahead * along_ahead) / length_m2, 0.0), 1.0)
@@ -130,7 +130,7 @@ def _nearest_of(
 
 @compiled(FACES, COUNT, FOUR)
 def _seen(faces: FloatArray, face: int, pose: Four) -> tuple[Four, tuple[float, float, float], float, float]:
-    """A face as the nose sees it: what `_along` takes, its nearest place and how far away it is, its bearings.
+    """Returns a face as the nose sees it: the argument for `_along`, its nearest place with distance, its bearings.
 
     The nearest place is to the right and ahead; bearings are that of its left end and how far it reaches clockwise.
     """
@@ -154,7 +154,7 @@ def _seen(faces: FloatArray, face: int, pose: Four) -> tuple[Four, tuple[float, 
 
 @compiled(PLACE, FOUR, BOOL)
 def _along(ray: complex, face: Four, circular: bool) -> float:
-    """Distance along a ray to a face; +inf where it does not meet it.
+    """Returns the distance along a ray to a face, +inf where it does not meet it.
 
     A circle is its centre, its radius, and 1, or -1 where the ray begins inside of it and leads to the way out. An edge
     is its two ends; it is met where they lie on different sides of the ray. Two edges that share a vertex agree about
@@ -181,7 +181,7 @@ def _along(ray: complex, face: Four, circular: bool) -> float:
 def _inside(
     left: complex, right: complex, face: Four, foot: tuple[float, float, float], circular: bool
 ) -> float:
-    """Distance to the nearest of those places of a face that may be nearest between the sides of a beam; +inf: none."""
+    """Returns the distance to the nearest place or vertex of a face that lies in a beam; +inf where none does."""
     distance = foot[2] if _between(left, right, foot[0], foot[1]) else math.inf
     if not circular:
         # Both vertices: where the nearest place of the edge is out of the beam, one may be nearest in it.
@@ -202,7 +202,7 @@ def _lower(
     pose: Four,
     fan: Four,
 ) -> None:
-    """Lowers ranges to faces: (3, c) circles or (4, e) edges, as `Faces` has them.
+    """Lowers each beam's range to the nearest of the faces: (3, c) circles or (4, e) edges, as in `Faces`.
 
     `left` and `right` are unit vectors of the sides of the beams as the nose sees them, to its right + i ahead; of
     beams that are `touching` the right side of each is the left side of the next. `pose` is the place of the sensor and
@@ -214,7 +214,7 @@ def _lower(
         face, foot, begins_rad, width_rad = _seen(faces, number, pose)
         if not foot[2] <= range_m:  # or what tells where it is is not a number
             continue
-        low, high, again = _tried(
+        low, high, again = _beams_between(
             begins_rad - 0.5 * beam_rad, width_rad + beam_rad, first_rad, spacing_rad, rays
         )
         for begin, end in ((low, high), (0, again)):
@@ -234,7 +234,7 @@ def _lower(
 
 @compiled(FACES, FACES, FLOAT, FLOAT)
 def nearest_face_m(circles: FloatArray, edges: FloatArray, east: float, north: float) -> float:
-    """Distance from a place to the nearest face, ahead or not; +inf where there is none."""
+    """Returns the distance from a place to the nearest face in any direction, +inf where there is none."""
     nearest = math.inf
     for i in range(circles.shape[1]):
         away = math.hypot(circles[0, i] - east, circles[1, i] - north) - circles[2, i]

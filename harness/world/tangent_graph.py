@@ -20,15 +20,15 @@ from planner.interface import BoolArray, FloatArray
 if TYPE_CHECKING:
     import shapely
 
-SLACK = 1e-8
-"""How far, as a share of the area's longer side, a path may graze what it must not enter: rounding."""
+SLACK_SHARE = 1e-8
+"""A path may enter what blocks it by this share of the area's longer side, which is rounding."""
 
 ANGLE_SLACK_RAD = 1e-9
 
 
 @compiled(ROWS, ROWS, ROWS, FLOATS)
 def _clear(begin: FloatArray, end: FloatArray, hubs: FloatArray, least: FloatArray) -> BoolArray:
-    """(k,) whether each segment between (k, 2) points comes no nearer to (m, 2) hubs than asked of each, (m,)."""
+    """(k,) whether each segment between (k, 2) points keeps from all (m, 2) hubs the distance of each, (m,)."""
     clear = np.ones(len(begin), dtype=np.bool_)
     for i in range(len(begin)):
         x, y = end[i, 0] - begin[i, 0], end[i, 1] - begin[i, 1]
@@ -62,7 +62,7 @@ class Tangents(NamedTuple):
 
 
 class TangentScene:
-    """Discs that a path may bend on, and all that blocks it. The last two discs are start and goal."""
+    """Discs about which a path may bend, and all that blocks it. The last two discs are start and goal."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class TangentScene:
         import shapely
 
         self.low, self.high = np.array(bounds_m[:2]), np.array(bounds_m[2:])
-        self.slack_m = SLACK * float((self.high - self.low).max())
+        self.slack_m = SLACK_SHARE * float((self.high - self.low).max())
         self.clearance_m = clearance_m
         circles = [each for each in shapes if isinstance(each, Circle)]
         self.hubs = np.array([each.center_m for each in circles]).reshape(-1, 2)
@@ -97,7 +97,7 @@ class TangentScene:
         self._walls = self._offset_edges()
 
     def contacts(self, disc: NDArray[np.intp] | int, angle: FloatArray) -> FloatArray:
-        """(k, 2) points of rims."""
+        """(k, 2) points (m) on the rims of discs at angles (rad)."""
         rim: FloatArray = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
         points: FloatArray = self.centres[disc] + self.radii[disc, None] * rim
         return points
@@ -113,7 +113,7 @@ class TangentScene:
         """(k,) whether each of (k, 2) points may lie on a path."""
         import shapely
 
-        free = self._inside(points)
+        free = self._inside_area(points)
         gaps: FloatArray = np.hypot(*(points[:, None] - self.hubs).T).T
         free &= (gaps >= self.hub_radii - self.slack_m).all(axis=1)
         if not len(self._edges):
@@ -125,7 +125,7 @@ class TangentScene:
         """(k,) whether each segment between (k, 2) points may be part of a path."""
         import shapely
 
-        free = self._inside(begin) & self._inside(end)
+        free = self._inside_area(begin) & self._inside_area(end)
         rows = np.flatnonzero(free)
         free[rows] = _clear(begin[rows], end[rows], self.hubs, np.maximum(self.hub_radii - self.slack_m, 0.0))
         if not len(self._edges):
@@ -136,7 +136,7 @@ class TangentScene:
         return free
 
     def _too_near(self, shapes: NDArray[np.object_]) -> NDArray[np.intp]:
-        """Which of some points or lines come nearer than the clearance to a polygon."""
+        """Returns the indices of points or lines that come nearer than the clearance to a polygon."""
         import shapely
 
         (west, south, east, north), reach = shapely.bounds(shapes).T, self.clearance_m
@@ -148,7 +148,7 @@ class TangentScene:
         return found
 
     def tangents(self, disc: int, side: int) -> Tangents:
-        """All free tangents that leave a disc on a side.
+        """Returns all free tangents that leave a disc on a side.
 
         The signed distance of a centre to the left of the path is side * radius; over the length of a tangent
         in direction phi it changes by (s_j r_j - s_i r_i) = d sin(alpha - phi).
@@ -184,7 +184,7 @@ class TangentScene:
         )
 
     def blocked_arcs(self, disc: int) -> FloatArray:
-        """(k, 2) arcs of a rim that no path may use: first angle, width, counter-clockwise."""
+        """(k, 2) arcs of a rim that no path may touch: first angle and width, rad, counter-clockwise."""
         cone_from, cone_width = self.cone_from[disc], self.cone_width[disc]
         outside = [(cone_from + cone_width, math.tau - cone_width)] if cone_width < math.tau else []
         if self.radii[disc] == 0.0:
@@ -199,7 +199,7 @@ class TangentScene:
         arcs = np.column_stack((angles[blocked], widths[blocked]))
         return np.vstack((np.array(outside).reshape(-1, 2), arcs))
 
-    def _inside(self, points: FloatArray) -> BoolArray:
+    def _inside_area(self, points: FloatArray) -> BoolArray:
         low, high = self.low - self.slack_m, self.high + self.slack_m
         within: BoolArray = np.logical_and.reduce((points >= low) & (points <= high), axis=1)
         return within
@@ -215,7 +215,7 @@ class TangentScene:
         return np.vstack((self._edges + aside, self._edges - aside, border))
 
     def _crossings(self, disc: int) -> FloatArray:
-        """Angles at which a rim crosses a grown circle, a grown corner, a grown edge or the border."""
+        """Returns the angles at which a rim crosses a grown circle, a grown corner, a grown edge or the border."""
         centre, radius = self.centres[disc], self.radii[disc]
         away = np.vstack((self.hubs, self._edges[:, 0])) - centre
         reach = np.concatenate((self.hub_radii, np.full(len(self._edges), self.clearance_m)))

@@ -32,25 +32,25 @@ Fix = tuple[float, float, float]
 """East and north (m), and when (s)."""
 
 TOUCH_M = 1e-3
-"""What is thinner along a way is no contact."""
+"""An overlap shorter than this along a way is no contact."""
 
 NO_EDGES = np.zeros((4, 0))
 
-# A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy.
 _BLOCK_ROWS = 256
-# What bounds are given to spare, for rounding.
+"""A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy."""
 _ROUNDING_M = 1e-6
-# Of so few obstacles the exact distance is sooner known than which of them are nearest.
-_SOME = 8
-# Points and boxes that are compared at once: some tens of megabytes.
+"""Bounds are widened by this for rounding."""
+_FEW_LISTED = 8
+"""Of at most this many obstacles the exact distances are computed without first comparing their boxes."""
 _PAIRS_AT_ONCE = 1_000_000
-# The boxes of no more obstacles than these are compared all at once, which is sooner done than to ask the tree.
-_FEW = 512
+"""At most this many pairs of points and boxes are compared at once, which takes some tens of megabytes."""
+_FEW_STANDING = 512
+"""Up to this many obstacles all boxes are compared at once, which is quicker than a query of the tree."""
 
 
 @dataclass(frozen=True, eq=False)
 class Faces:
-    """What a ray can hit, at one instant.
+    """Circles and edges that a ray can hit, at one instant.
 
     Attributes:
         circles_m: (3, c): centre east, centre north, radius.
@@ -66,8 +66,8 @@ class Surroundings:
     """Every face that comes near a place during an interval of time; made by `World.surroundings`.
 
     Args:
-        still: those of what stands for ever.
-        changing: those of what moves or comes and goes, as they are at its epoch.
+        still: faces of obstacles that stand for ever.
+        changing: faces of obstacles that move or come and go, as they are at its epoch.
         motions: of the circles among these, and of the edges.
         until_s: the end of that interval; +inf in a world where nothing ever moves, comes or goes.
     """
@@ -83,7 +83,7 @@ class Surroundings:
         self._still, self._changing, self._motions = still, changing, motions
 
     def faces(self, time_s: float) -> Faces:
-        """Those that are there at a time of the interval, where they are then."""
+        """Returns the faces that are there at a time of the interval, where they are then."""
         if self._changing is None or self._motions is None:
             return self._still
         of_circles, of_edges = self._motions
@@ -125,11 +125,11 @@ class World:
         self._standing, self._changing = np.flatnonzero(stands), np.flatnonzero(~stands)
         self._motions = LinearMotions.of(self.obstacles[index] for index in self._changing.tolist())
         self._standing_boxes = self._boxes[:, self._standing]
-        self._tree = None if len(self._standing) <= _FEW else _tree(self._standing_boxes)
+        self._tree = None if len(self._standing) <= _FEW_STANDING else _tree(self._standing_boxes)
 
     @classmethod
     def from_scenario(cls, scenario: Scenario) -> World:
-        """The world that a scenario describes."""
+        """Makes the world that a scenario describes."""
         obstacles = []
         for each in scenario.obstacles:
             shape: Circle | Polygon
@@ -178,7 +178,7 @@ class World:
         return best
 
     def contact_between(self, begin: Fix, before_m: float, end: Fix, after_m: float) -> float:
-        """Clearance at a contact on the straight way between two fixes; +inf if there surely is none.
+        """Returns the clearance at a contact on the straight way between two fixes; +inf if there surely is none.
 
         While nothing appears or goes, clearance changes no faster than the way is long: parts of it that are too
         short for a contact are left out, down to `TOUCH_M` (Piyavskii 1972, doi:10.1016/0041-5553(72)90115-2). The
@@ -218,7 +218,7 @@ class World:
         return result
 
     def near(self, east_m: float, north_m: float, radius_m: float, time_s: float) -> tuple[int, ...]:
-        """Indices of the obstacles there at a time that come within a radius of a point, in rising order."""
+        """Returns the indices, in rising order, of obstacles that at a time are within a radius of a point."""
         point, time = np.array([[east_m, north_m]]), np.array([time_s])
         close = np.union1d(self._listed(east_m, north_m, radius_m + _ROUNDING_M), self._changing)
         return tuple(i for i in close.tolist() if self.obstacles[i].distance(point, time)[0] <= radius_m)
@@ -226,7 +226,7 @@ class World:
     def surroundings(
         self, east_m: float, north_m: float, radius_m: float, start_s: float, stop_s: float
     ) -> Surroundings:
-        """Every face that comes within a radius of a point at some time of an interval.
+        """Returns every face that comes within a radius of a point at some time of an interval.
 
         A few more may be among them: boxes are compared, not shapes. A caller that moves keeps the answer as
         long as it stays in a smaller circle (a neighbour list; Verlet 1967, doi:10.1103/PhysRev.159.98).
@@ -250,13 +250,13 @@ class World:
         )
 
     def _faces(self, listed: IntArray) -> Faces:
-        """Faces of some obstacles, each at its epoch, in the order in which they are listed."""
+        """Returns the faces of listed obstacles, each at its epoch, in the order of the list."""
         circular = self._circular[listed]
         edges = [self.obstacles[index].shape.edges_m for index in listed[~circular].tolist()]
         return Faces(self._discs[:, listed[circular]], np.hstack(edges) if edges else NO_EDGES)
 
     def _listed(self, east: float, north: float, reach: float) -> IntArray:
-        """Indices of the standing obstacles that may come within a reach of a point, and some more."""
+        """Returns the indices of all standing obstacles within a reach of a point, and of some more."""
         if self._tree is None:
             return self._standing[gaps_to(self._standing_boxes, east, north) <= reach]
         import shapely
@@ -266,7 +266,7 @@ class World:
         return listed
 
     def _nearest(self, east: float, north: float, slack: float) -> list[int]:
-        """Indices of the standing obstacles that may be the nearest one to a point within a slack of a place."""
+        """Returns the indices of standing obstacles that may be the nearest to a point within a slack of a place."""
         if not len(self._standing):
             return []
         if self._tree is None:
@@ -282,20 +282,20 @@ class World:
         return near
 
     def _reach(self, some: int, east: float, north: float, slack: float) -> float:
-        """So near to a place are all standing obstacles that may be the nearest to a point within a slack of it.
+        """Bounds the distance (m) from a place to the nearest standing obstacle of any point within a slack of it.
 
-        `some` is any of the standing obstacles; the nearer, the less.
+        `some` is any of the standing obstacles; a nearer one gives a smaller bound.
         """
         probe = self.obstacles[self._standing[some]]
         nearest = float(probe.distance(np.array([[east, north]]), np.zeros(1))[0])
         return max(nearest, 0.0) + 2.0 * slack + _ROUNDING_M
 
     def _contenders(self, listed: list[int], points: FloatArray) -> list[int]:
-        """Those of some standing obstacles that may be the nearest to one of the points.
+        """Returns those of the listed standing obstacles that may be the nearest to one of the points.
 
         An obstacle touches all sides of its box, so it is no farther from a point than the box and its diagonal are.
         """
-        if len(listed) <= _SOME:
+        if len(listed) <= _FEW_LISTED:
             return listed
         boxes = self._boxes[:, listed, None]
         diagonals = 2.0 * (np.hypot(boxes[2], boxes[3]) + boxes[4])
@@ -326,7 +326,7 @@ class World:
 
 
 def _tree(boxes: FloatArray) -> STRtree:
-    """The bounds of rounded boxes (5, n), to be asked for those near a place."""
+    """Returns a tree of the bounds of rounded boxes (5, n), to be searched for those near a place."""
     import shapely
 
     east, north, half_width, half_height, rounding = boxes

@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 def few(request: pytest.FixtureRequest) -> Iterator[None]:
     """What holds of a world holds whichever way its obstacles are found."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(harness.world.world, "_FEW", request.param)
+        patch.setattr(harness.world.world, "_FEW_STANDING", request.param)
         yield
 
 
