@@ -1,4 +1,4 @@
-"""Runs in groups by a varied key, what a group comes to, and what people are shown of it (`QUESTIONS`)."""
+"""Runs in groups by a varied key, the figures of a group, and the questions about it that people are shown."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Cell:
 
 
 def cell_of(runs: Runs, among: NDArray[np.bool_]) -> Cell:
-    """What the runs among some come to."""
+    """Returns the figures of the runs that `among` marks."""
 
     def known(name: str, of: NDArray[np.bool_] = among) -> FloatArray:
         values = runs.numbers(name)[of]
@@ -88,7 +88,7 @@ def cell_of(runs: Runs, among: NDArray[np.bool_]) -> Cell:
 
 
 def wilson(successes: int, trials: int) -> Share:
-    """Of a number of trials that is at least 1."""
+    """Returns the share of successes with Wilson's interval; there is at least one trial."""
     from scipy import stats
 
     interval = stats.binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
@@ -97,30 +97,30 @@ def wilson(successes: int, trials: int) -> Share:
 
 @dataclass(frozen=True)
 class Question:
-    """What people are shown of a cell: one figure of it or two, by name."""
+    """A question about a cell that people are shown, answered by one figure of it or two, by name."""
 
     title: str
     note: str
     short: str
-    """Heads its column on a terminal."""
+    """Heading of its column on a terminal."""
     figures: tuple[str, ...]
     bad: Callable[[Any], float]
-    """How bad it is, from 0 to 1, where the first figure is known."""
+    """Returns how bad the answer is, from 0 to 1, where the first figure is known."""
     form: Callable[[Any], str] = str
 
     def text(self, cell: Cell) -> str:
-        """The answer; a dash where there is none."""
+        """Returns the answer; a dash where there is none."""
         values = [getattr(cell, name) for name in self.figures]
         texts = [DASH if each is None else self.form(each) for each in values]
         return DASH if {*texts} == {DASH} else "/".join(texts)
 
     def shade(self, cell: Cell) -> str:
-        """How bad it is, as a number for a style sheet; empty where there is no answer."""
+        """Returns how bad the answer is, as a number for a style sheet; empty where there is no answer."""
         known = getattr(cell, self.figures[0]) is not None
         return f"{min(max(self.bad(cell), 0.0), 1.0):.3f}" if known else ""
 
 
-def _below(cell: Cell) -> float:
+def _below_wanted(cell: Cell) -> float:
     return cell.below_wanted.value if cell.below_wanted else 0.0
 
 
@@ -128,40 +128,40 @@ def _digits(value: float) -> str:
     return f"{value:.{0 if value >= 10 else 1 if value >= 1 else 2}f}"
 
 
-INTERVAL: Final = "per cent of the runs, with Wilson's 95 % interval"
-LENGTH: Final = "Median/95th percentile where the goal was reached; full shade at twice the optimum"
-NEAREST: Final = "Least distance to an obstacle edge in any run, in m"
-TRACKED: Final = f"The aircraft tracked every leg; {INTERVAL}"
-TIME: Final = "Milliseconds: largest p99 of a run/longest search; full shade at 20 ms of p99"
+INTERVAL_NOTE: Final = "per cent of the runs, with Wilson's 95 % interval"
+LENGTH_NOTE: Final = "Median/95th percentile where the goal was reached; full shade at twice the optimum"
+CLEARANCE_NOTE: Final = "Least distance to an obstacle edge in any run, in m"
+TRACKED_NOTE: Final = f"The aircraft tracked every leg; {INTERVAL_NOTE}"
+TIME_NOTE: Final = "Milliseconds: largest p99 of a run/longest search; full shade at 20 ms of p99"
 LENGTHS, TIMES = ("length_median", "length_p95"), ("planner_p99_ms", "planner_max_ms")
-BELOW: Final = "Below the wanted clearance"
+BELOW_TITLE: Final = "Below the wanted clearance"
 
 QUESTIONS: Final = (
-    Question("Goal reached", INTERVAL, "reached %", ("success",), lambda cell: 1.0 - cell.success.value),
+    Question("Goal reached", INTERVAL_NOTE, "reached %", ("success",), lambda cell: 1.0 - cell.success.value),
     Question(
-        *("Length over the clairvoyant optimum", LENGTH, "length", LENGTHS),
+        *("Length over the clairvoyant optimum", LENGTH_NOTE, "length", LENGTHS),
         *(lambda cell: cell.length_median - 1.0, "{:.2f}".format),
     ),
-    Question("Least clearance", NEAREST, "clear m", ("least_clearance_m",), _below, number),
-    Question(BELOW, f"At any time; {INTERVAL}", "below %", ("below_wanted",), _below),
-    Question("Trackable", TRACKED, "tracks %", ("trackable",), lambda cell: 1.0 - cell.trackable.value),
-    Question("Planner time", TIME, "plan ms", TIMES, lambda cell: cell.planner_p99_ms / 20.0, _digits),
+    Question("Least clearance", CLEARANCE_NOTE, "clear m", ("least_clearance_m",), _below_wanted, number),
+    Question(BELOW_TITLE, f"At any time; {INTERVAL_NOTE}", "below %", ("below_wanted",), _below_wanted),
+    Question("Trackable", TRACKED_NOTE, "tracks %", ("trackable",), lambda cell: 1.0 - cell.trackable.value),
+    Question("Planner time", TIME_NOTE, "plan ms", TIMES, lambda cell: cell.planner_p99_ms / 20.0, _digits),
 )
-"""In the order in which they are shown."""
+"""The questions in the order in which people are shown them."""
 
 
 def legend() -> list[str]:
-    """What each column of a table for a paper is."""
+    """Returns a line for each column of a table for a paper."""
     return [f"{each.short}: {each.title} ({each.note.partition('; full shade')[0]})." for each in QUESTIONS]
 
 
 MAX_NUMBERS: Final = 8
 """A key with more different numbers than this is taken as drawn at random."""
 BINS: Final = 4
-"""More numbers drawn at random than this are grouped into so many quantiles, directions into as many sectors."""
-NONE: Final = "not set"
-DIRECTIONS: Final = ("from_deg", "course_deg", "heading_deg")
-"""Ends of the paths of keys that are directions: 359 degrees is beside 0."""
+"""More numbers drawn at random than this are grouped into this many quantiles, or directions into as many sectors."""
+NOT_SET: Final = "not set"
+DIRECTION_ENDS: Final = ("from_deg", "course_deg", "heading_deg")
+"""Keys that end so hold directions, of which 359 degrees is beside 0."""
 SECTORS: Final = tuple(
     f"{name}, {low:g} to {low + 90:g}" for name, low in zip("NESW", (-45, 45, 135, 225), strict=True)
 )
@@ -169,7 +169,7 @@ SECTORS: Final = tuple(
 
 @dataclass(frozen=True)
 class Axis:
-    """The values of a key in groups; of quantiles also their limits, each inner one belongs to the group above it."""
+    """The values of a varied key in groups; `edges` are the limits of quantiles, each in the group above it."""
 
     key: str
     labels: tuple[str, ...]
@@ -177,13 +177,13 @@ class Axis:
 
 
 def are_numbers(values: Sequence[Scalar]) -> bool:
-    """Whether values are numbers, but for those that are missing."""
+    """Tells whether all values that are given are numbers."""
     given = [value for value in values if value is not None]
     return bool(given) and all(type(value) in (int, float) for value in given)
 
 
 def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis, IntArray]:
-    """The groups of a key's values, and each value's group: numbers rising, names as they first appear, then `NONE`."""
+    """Returns the groups of a key's values, and each value's group: numbers rising, names as they first appear."""
     given = [*dict.fromkeys(value for value in values if value is not None)]
     if not are_numbers(values):
         names = {value: str(value).lower() if isinstance(value, bool) else str(value) for value in given}
@@ -191,16 +191,16 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
         return _binned(key, values)
     else:
         names = dict(zip(sorted(given), _told_apart(sorted(given)), strict=True))
-    labels = [*dict.fromkeys(names.values()), *([NONE] if None in values else [])]
-    index = [labels.index(NONE if value is None else names[value]) for value in values]
+    labels = [*dict.fromkeys(names.values()), *([NOT_SET] if None in values else [])]
+    index = [labels.index(NOT_SET if value is None else names[value]) for value in values]
     return Axis(key, tuple(labels)), np.array(index, dtype=np.int64)
 
 
 def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
-    """Quantiles of numbers, or quarters of the compass, each about one of its points."""
+    """Groups numbers into quantiles, or directions into quarters of the compass about its points."""
     numbers = np.array([np.nan if value is None else value for value in values], dtype=np.float64)
     missing = np.isnan(numbers)
-    if key.endswith(DIRECTIONS):
+    if key.endswith(DIRECTION_ENDS):
         labels, edges = SECTORS, ()
         index = np.floor(np.nan_to_num((numbers + 45.0) % 360.0) / 90.0)
     else:
@@ -209,10 +209,10 @@ def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
         labels = tuple(f"{low} to {high}" for low, high in itertools.pairwise(_told_apart(edges, 4)))
         index = np.searchsorted(limits[1:-1], numbers, side="right")
     group: IntArray = np.where(missing, len(labels), index).astype(np.int64)
-    return Axis(key, (*labels, NONE) if missing.any() else labels, edges), group
+    return Axis(key, (*labels, NOT_SET) if missing.any() else labels, edges), group
 
 
 def _told_apart(values: Sequence[float], digits: int = 6) -> list[str]:
-    """Different numbers with as many digits as tell them apart."""
+    """Formats different numbers with as many digits as they need to differ."""
     each = ([f"{value:.{count}g}" for value in values] for count in range(digits, 18))
     return next((texts for texts in each if len(set(texts)) == len(texts)), list(map(str, values)))

@@ -8,23 +8,23 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from harness.campaign.cell import DIRECTIONS, are_numbers
+from harness.campaign.cell import DIRECTION_ENDS, are_numbers
 from harness.campaign.results import Runs
 from harness.flight.record import FloatArray
 from harness.report.figure_style import colour, styled
 
-ROW_IN, PANEL_IN = 0.17, 1.5
-"""Heights of a line of small letters and of a panel."""
+LINE_IN, PANEL_IN = 0.17, 1.5
+"""Height of a line of small letters and of a panel, in inches."""
 MAX_OUTLINES: Final = 1500
-"""A figure with more points than this is drawn as a picture of dots: a browser takes seconds for so many outlines."""
+"""A figure with more points than this is drawn as a picture of dots, since a browser takes seconds for the outlines."""
 MAX_KEYS: Final = 4
 """Only the first this many varied numbers have a column of panels."""
-ENOUGH: Final = 20
-"""With at least this many runs the axis ends at percentiles of the figure, and what lies beyond is marked there."""
+PERCENTILE_RUNS: Final = 20
+"""With at least this many runs an axis ends at percentiles, and values beyond it are marked at its edge."""
 
 
 def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
-    """Figures (a row of panels each) against every varied number, a point a run; None where no number was varied.
+    """Plots figures (a row of panels each) against every varied number, a point a run; None where no number was varied.
 
     Runs that did not reach the goal are crosses. A figure's axis ends at its 1st and 99th percentile where others lie
     far beyond them; those are triangles at its edge.
@@ -40,16 +40,16 @@ def scatter(runs: Runs, keys: Sequence[str]) -> Figure | None:
 
 
 def _drawn(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray]) -> Figure:
-    """A row of panels a figure, a column a key."""
+    """Draws a row of panels for each figure and a column for each key."""
     rows, columns, names = len(figures), len(varied), [key.replace(".", ".\n") for key in varied]
     dots = rows * columns * len(runs) > MAX_OUTLINES
-    with styled(0.5 + PANEL_IN * rows + ROW_IN * max(name.count("\n") for name in names)) as figure:
+    with styled(0.5 + PANEL_IN * rows + LINE_IN * max(name.count("\n") for name in names)) as figure:
         grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
         for (label, values), panels in zip(figures.items(), grid, strict=True):
             panels[0].set_ylabel(label)
             for key, axes in zip(varied, panels, strict=True):
                 _panel(axes, runs.numbers(key), values, runs.reached, dots)
-                if key.endswith(DIRECTIONS):
+                if key.endswith(DIRECTION_ENDS):
                     axes.set(xlim=(-10, 370), xticks=range(0, 361, 90))
         for name, axes in zip(names, grid[-1], strict=True):
             axes.set_xlabel(name)
@@ -57,14 +57,14 @@ def _drawn(runs: Runs, varied: Sequence[str], figures: Mapping[str, FloatArray])
 
 
 def _differ(values: FloatArray) -> bool:
-    """Whether there is more than one value."""
+    """Tells whether there is more than one value."""
     return len({*values[np.isfinite(values)]}) > 1
 
 
 def _panel(axes: Any, numbers: FloatArray, values: FloatArray, reached: Any, dots: bool) -> None:
     known = values[np.isfinite(values)]
     least, most = float(known.min()), float(known.max())
-    low, high = np.percentile(known, (1, 99)) if len(known) >= ENOUGH else (least, most)
+    low, high = np.percentile(known, (1, 99)) if len(known) >= PERCENTILE_RUNS else (least, most)
     # The axis ends at a percentile on a side where values lie beyond it by more than what is between the two.
     low, high = (
         low if 0.0 < high - low < low - least else least,

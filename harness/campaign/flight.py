@@ -1,4 +1,4 @@
-"""One run of a campaign, flown where it was sent to: a process of its own, here or on another machine."""
+"""Flies one run of a campaign, in a process of its own, here or on another machine."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from harness.scenario.scenario import Scenario, unpacked
 if TYPE_CHECKING:
     from harness.run.path_check import PathCheck
 
-FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
-"""What a disk that takes no more says, a temporary file's too: that is no fault of the run."""
+DISK_FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+"""Errors of a disk that takes no more, for which a run is not to blame."""
 
 
 @dataclass(frozen=True)
@@ -34,27 +34,27 @@ class Job:
     """The scenario to fly (`harness.scenario.scenario.packed`); empty where a given `path` is flown."""
     folder: Path
     recordings: Literal["all", "thin", "failures", "none", "folders"]
-    """When the run folder is kept; `folders`: always, without recordings."""
+    """Which run folders are kept; with `folders` all are, without recordings."""
     optimum: bool
     again: str = ""
     """The command that flies it again."""
     varied: Mapping[str, str | float | int | bool] = field(default_factory=dict)
     """The keys that the campaign varies and their values in this run, for the recording's properties."""
     claim: Claim = "reached"
-    """A run is a failure where this does not hold of it."""
+    """The run is a failure where this does not hold of it."""
     path: PathCheck | None = None
     cannot_fly: str = ""
     """Why the drawn aircraft cannot begin the flight: control is lost at once then."""
     planners: tuple[str, ...] = ()
-    """Planners that the process has to import, as FILE.py:NAME or MODULE:NAME; `laws`: likewise."""
+    """Planners that the process has to import, as FILE.py:NAME or MODULE:NAME; likewise `laws`."""
     laws: tuple[str, ...] = ()
     identity: str = ""
-    """Of the recording among others; empty: as `fly_to_folder` has it."""
+    """Identifies the recording among others; where empty, `fly_to_folder` chooses."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of a run: cells of its row and of its times, and whether the claim of the campaign holds of it."""
+    """The result of a run: cells of its row and of its times, and whether the campaign's claim holds of it."""
 
     run: int
     row: dict[str, Any]
@@ -63,7 +63,7 @@ class Answer:
 
 
 def fly_job(job: Job) -> Answer | None:
-    """Flies a job. What goes wrong in the flight is an answer too; None where there was no memory for it.
+    """Flies a job. A fault of the flight is an answer too; None where there was no memory for it.
 
     Raises:
         OSError: the run folder cannot be made or written, or the disk is full.
@@ -91,10 +91,10 @@ def fly_job(job: Job) -> Answer | None:
 
 
 def _is_out_of_memory(error: Exception) -> bool:
-    """Whether there was no memory; raises what a full disk said: neither is a fault of the run."""
+    """Tells whether memory ran out; raises the error of a full disk, for which a run is not to blame either."""
     for cause in (error, error.__cause__):
         # Whatever the constructor of a planner raised is its own, a full disk too.
-        if isinstance(cause, OSError) and cause.errno in FULL and not isinstance(error, PlannerError):
+        if isinstance(cause, OSError) and cause.errno in DISK_FULL and not isinstance(error, PlannerError):
             raise cause from None
     return any(isinstance(cause, MemoryError) for cause in (error, error.__cause__))
 
@@ -104,7 +104,7 @@ _imported = cache(registered_source)
 
 
 def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
-    """The metrics of a flight, its run folder kept as the job says."""
+    """Flies a job and returns its metrics; keeps its run folder as the job says."""
     if job.recordings in ("failures", "none"):
         if job.path is not None:
             from harness.run.path_check import fly_check
@@ -117,10 +117,10 @@ def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
         if job.recordings == "none" or holds(job.claim, found):
             return found
         # Failures are few: to fly them again costs less than to record every flight.
-    return _kept(job, scenario)
+    return _fly_to_folder(job, scenario)
 
 
-def _kept(job: Job, scenario: Scenario) -> dict[str, Any]:
+def _fly_to_folder(job: Job, scenario: Scenario) -> dict[str, Any]:
     """Flies into the job's run folder."""
     recording, again = job.recordings != "folders", job.again or None
     if job.path is not None:

@@ -36,18 +36,18 @@ from harness.scenario.kinds import PLANNER
 
 LOCK: Final = "lock"
 JOURNAL: Final = "journal.jsonl"
-SEAL: Final = "sha256"
-"""Key of the SHA-256 of what a line of the journal tells."""
+SEAL_KEY: Final = "sha256"
+"""Key of a journal line under which the SHA-256 of the rest of the line stands."""
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/2"
 MAX_INDEX_BYTES: Final = 10**9
 TABLES_EVERY_S: Final = 30.0
 TABLES_SHARE: Final = 0.01
-"""Tables are made anew at least this far apart, and so seldom that it takes at most this share of the time."""
-MAX_TOLD: Final = 3
+"""Tables are written at most every `TABLES_EVERY_S`, and so seldom that it takes at most this share of the time."""
+MAX_SHOWN: Final = 3
 
 
 def claim_folder(path: Path, what: str, index: str, schema: str, lock: str | None = None) -> FolderLock:
-    """Holds the folder that a command writes (`what`), by its file `lock` if named; or a RunFolderError."""
+    """Locks the folder that a command writes (`what`), with its file `lock` if named; or raises RunFolderError."""
     if path.exists() and not path.is_dir():
         raise RunFolderError(f"{path} is a file, not a folder for a {what}")
     try:
@@ -91,14 +91,14 @@ class CampaignFolder:
             self._stack = stack.pop_all()
 
     def append(self, over: Answer) -> None:
-        """Puts a run that is over on the disk."""
+        """Writes a run that is over to the disk."""
         self._journal.write(sealed(vars(over)))
         self._journal.flush()
         os.fsync(self._journal.fileno())
         self.over[over.run] = over
 
     def write_tables(self, first: int | None = None) -> None:
-        """Makes `results.parquet` and `timings.parquet` of the first runs by number; default: of all that are over."""
+        """Writes `results.parquet` and `timings.parquet` of all runs that are over, or of those before `first`."""
         import pyarrow.parquet as pq
 
         kept = [self.over[run] for run in sorted(self.over) if first is None or run < first]
@@ -112,7 +112,7 @@ class CampaignFolder:
                 pq.write_table(content, file, compression="zstd")
 
     def outcomes(self) -> dict[str, int]:
-        """How many of the runs that are over ended how, the most frequent first."""
+        """Counts the runs that are over by outcome, the most frequent first."""
         return dict(Counter(each.row["outcome"] for each in self.over.values()).most_common())
 
     def __enter__(self) -> CampaignFolder:
@@ -152,7 +152,7 @@ class CampaignFolder:
             replace_text(self.path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
 
     def _check_same(self, before: dict[str, Any], now: dict[str, Any]) -> bool:
-        """Whether a campaign was begun with fewer draws; refuses one that differs otherwise: its runs are others."""
+        """Tells whether the campaign was begun with fewer draws; refuses one that differs otherwise."""
         was, draws = (each["campaign"].get("draws", 1) for each in (before, now))
         grows = self._runs.can_grow and was < draws
         then, today = dict(_leaves(before)), dict(_leaves(now))
@@ -164,9 +164,9 @@ class CampaignFolder:
                 shorter = (textwrap.shorten(each, 60, placeholder="...") for each in texts)
                 told.append("{} was {}, is {}".format(name, *shorter))
         if told:
-            more = "; and more" if len(told) > MAX_TOLD else ""
+            more = "; and more" if len(told) > MAX_SHOWN else ""
             raise RunFolderError(
-                f"{self.path} is of another campaign: {'; '.join(told[:MAX_TOLD])}{more}; change it back or choose "
+                f"{self.path} is of another campaign: {'; '.join(told[:MAX_SHOWN])}{more}; change it back or choose "
                 "another folder"
             )
         return grows or bool(before["grown"])
@@ -179,10 +179,10 @@ def fly_missing(
     progress: Callable[[Answer], None] | None = None,
     enough: Callable[[], bool] = lambda: False,
 ) -> list[int]:
-    """Flies what is missing; whatever ends it, what is done is in the folder's tables.
+    """Flies the missing runs; whatever ends it, all that is done is in the folder's tables.
 
-    `enough`: asked before every look whether what is over answers the question; what still flies is given up then.
-    The numbers that are returned are of runs whose process was killed, or had no memory: they are no results.
+    `enough` tells before every look whether the runs so far answer the question; those still flying are given up then.
+    The numbers returned are of runs whose process was killed, or had no memory: they have no result.
     """
     left: list[int] = []
     tables_due = time.monotonic()
@@ -215,7 +215,7 @@ def fly_missing(
 
 
 def told_left(runs: Sequence[int]) -> str:
-    """A sentence on the runs that the machine kept from their ends."""
+    """Returns a sentence on the runs that the machine kept from their ends."""
     first = ", ".join(map(str, runs[:5])) + (", ..." if len(runs) > 5 else "")
     were, them = ("was", "it") if len(runs) == 1 else ("were", "them")
     return (
@@ -225,7 +225,7 @@ def told_left(runs: Sequence[int]) -> str:
 
 
 def _read_journal(path: Path) -> tuple[dict[int, Answer], int]:
-    """The runs that are over, and the byte at which the last whole line ends; a RunFolderError at damage."""
+    """Returns the runs that are over, and the byte at which the last whole line ends; a RunFolderError at damage."""
     *lines, torn = path.read_bytes().split(b"\n") if path.exists() else (b"",)
     if lines and not torn and not lines[-1].endswith(b"}"):
         lines.pop()
@@ -249,14 +249,14 @@ def _read_journal(path: Path) -> tuple[dict[int, Answer], int]:
 
 
 def sealed(told: Mapping[str, Any]) -> bytes:
-    """A line of the journal: `run`, `row`, `times` and `held`, with the SHA-256 of all that."""
-    text = json.dumps({key: value for key, value in told.items() if key != SEAL}, allow_nan=False)
+    """Returns a line of the journal: `run`, `row`, `times` and `held`, with their SHA-256."""
+    text = json.dumps({key: value for key, value in told.items() if key != SEAL_KEY}, allow_nan=False)
     digest = hashlib.sha256(text.encode()).hexdigest()
-    return f'{text[:-1]}, "{SEAL}": "{digest}"}}\n'.encode()
+    return f'{text[:-1]}, "{SEAL_KEY}": "{digest}"}}\n'.encode()
 
 
 def _leaves(content: Any, where: str = "") -> Iterator[tuple[str, str]]:
-    """The values in a content as JSON, by where they stand."""
+    """Yields the innermost values of JSON content, as text, with their places in it."""
     if content and isinstance(content, dict):
         for name, each in content.items():
             yield from _leaves(each, f"{where}.{name}".lstrip("."))

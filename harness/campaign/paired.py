@@ -17,28 +17,28 @@ from harness.analysis.registry import METRICS
 from harness.campaign.results import IntArray
 from harness.flight.record import FloatArray
 
-CONFIDENCE: Final = 0.95
+BOOTSTRAP_CONFIDENCE: Final = 0.95
 RESAMPLES: Final = 1999
 MIN_CASES: Final = 4
-"""Below this many cases there is no interval: more than a fortieth of all resamples would hold one case only."""
-SEED: Final = 1
-"""Seed of the resampling: the same runs give the same interval."""
+"""With fewer cases there is no interval, since more than a fortieth of all resamples would hold one case only."""
+RESAMPLING_SEED: Final = 1
+"""Fixed, so that the same runs give the same interval."""
 TESTED: Final[tuple[Metric, ...]] = tuple(
     each for each in METRICS if each.title and each.short and each.worse and not each.rare
 )
-"""The figures of the registry that are compared: those that people are shown and of which more, or less, is worse."""
+"""Figures of the registry that are compared: people are shown them, and more or less of them is worse."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean with its bootstrap interval; None where there is none."""
+    """A mean with its bootstrap interval, each None where it is unknown."""
 
     value: float | None = None
     low: float | None = None
     high: float | None = None
 
     def text(self) -> str:
-        """As people are shown it."""
+        """Returns mean and interval as people are shown them."""
         value, *ends = (
             "" if each is None else f"{'+' if each > 0 else ''}{number(each)}"
             for each in (self.value, self.low, self.high)
@@ -48,7 +48,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Tested:
-    """One figure of two planners on the pairs of which both have it: their means, in the unit of the label."""
+    """One figure of two planners on the pairs where both have it: their means, in the unit of the label."""
 
     figure: str
     pairs: int
@@ -57,8 +57,8 @@ class Tested:
     difference: Estimate
     """Mean of the first less the second, with its bootstrap interval over the cases."""
     p: float | None
-    """Of Wilcoxon's signed-rank test over the cases (two-sided), corrected by Holm's method for all figures of the two
-    planners; None where all pairs agree or there are fewer than `MIN_CASES`."""
+    """P-value of Wilcoxon's signed-rank test over the cases (two-sided), corrected by Holm's method over all figures;
+    None where all pairs agree or there are fewer than `MIN_CASES`."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,9 @@ class Duel:
 def duels(
     planners: Sequence[str], cases: Sequence[Any], reached: Sequence[bool], figures: Mapping[str, FloatArray]
 ) -> tuple[Duel, ...]:
-    """Every planner against every other, in the order in which they first appear.
+    """Compares every planner with every other, in the order in which they first appear.
 
-    `cases`: what a pair has in common: case, perhaps aircraft. `figures`: by name of `TESTED`, NaN where there is none.
+    `cases` tells what a pair has in common: case, perhaps aircraft. `figures` are by name, NaN where a run has none.
     """
     flown: dict[str, dict[Any, int]] = {}
     for row, (planner, case) in enumerate(zip(planners, cases, strict=True)):
@@ -105,7 +105,7 @@ def duels(
 
 
 def _tested(label: str, halves: FloatArray, cases: IntArray) -> Tested | None:
-    """One figure of both planners (2, n) on the cases (n,); None where no pair has it."""
+    """Compares one figure (2, n) of both planners over the cases (n,); None where no pair has it."""
     from scipy import stats
 
     known = np.isfinite(halves).all(axis=0)
@@ -121,7 +121,7 @@ def _tested(label: str, halves: FloatArray, cases: IntArray) -> Tested | None:
 
 
 def _corrected(tested: Sequence[Tested]) -> tuple[Tested, ...]:
-    """The same with the p-values corrected by Holm's method (Scandinavian Journal of Statistics 6, 1979)."""
+    """Returns the same with p-values corrected by Holm's method (Scandinavian Journal of Statistics 6, 1979)."""
     order = sorted((each.p, place) for place, each in enumerate(tested) if each.p is not None)
     raised = (min(1.0, (len(order) - rank) * p) for rank, (p, _) in enumerate(order))
     corrected = dict(zip((place for _, place in order), itertools.accumulate(raised, max), strict=True))
@@ -129,7 +129,7 @@ def _corrected(tested: Sequence[Tested]) -> tuple[Tested, ...]:
 
 
 def mean_estimate(differences: FloatArray, cases: IntArray) -> Estimate:
-    """The mean of paired differences (n,), all finite, with the percentile bootstrap interval over the cases.
+    """Returns the mean of finite paired differences (n,), with its percentile bootstrap interval over the cases.
 
     All pairs of a case are drawn together. Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 8 and 13.
     """
@@ -138,8 +138,8 @@ def mean_estimate(differences: FloatArray, cases: IntArray) -> Estimate:
     if np.ptp(differences) == 0.0 or len(different) < MIN_CASES:
         return Estimate(mean)
     sums, counts = np.bincount(index, differences), np.bincount(index)
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(RESAMPLING_SEED)
     drawn = [rng.integers(len(sums), size=len(sums)) for _ in range(RESAMPLES)]
     means = [sums[each].sum() / counts[each].sum() for each in drawn]
-    low, high = np.quantile(means, (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE))
+    low, high = np.quantile(means, (0.5 - 0.5 * BOOTSTRAP_CONFIDENCE, 0.5 + 0.5 * BOOTSTRAP_CONFIDENCE))
     return Estimate(mean, float(low), float(high))

@@ -29,26 +29,26 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 INDEX: Final = "campaign.json"
-"""File in the folder of a campaign that says what is flown."""
+"""File in a campaign's folder that says what is flown."""
 RUNS: Final = "runs"
-"""Folder in the folder of a campaign that holds run folders, each named by the number of its run."""
+"""Folder in a campaign's folder that holds run folders, each named by the number of its run."""
 RESULTS: Final = "results.parquet"
 TIMINGS: Final = "timings.parquet"
 SCHEMA: Final = "wayproof/results/1"
 NAMED: Final = ("planner", "aircraft", "world", "scenario")
-"""Columns of names: varied keys where they have more than one value."""
+"""Columns of names, which count as varied keys where they have more than one value."""
 RUN: Final = {name: "int" if name in ("run", "case", "seed") else "text" for name in (
     "run", "case", "scenario", "world", "planner", "aircraft", "seed",
 )}  # fmt: skip
 """The first columns of `results.parquet`, before those of the varied keys, and the type of each."""
-LAW: Final = "guidance.kind"
+LAW_KEY: Final = "guidance.kind"
 """Key of a scenario that names the guidance law."""
 
-WITHOUT_TIMES: Final = tuple(each for each in FIGURES if not each.timed and not each.derived)
-METRICS: Final = {each.path: each.kind for each in WITHOUT_TIMES} | dict.fromkeys(
+UNTIMED_FIGURES: Final = tuple(each for each in FIGURES if not each.timed and not each.derived)
+METRICS: Final = {each.path: each.kind for each in UNTIMED_FIGURES} | dict.fromkeys(
     ("wanted_clearance_m", "optimum_m", "length_ratio"), "number"
 )
-"""Columns after them: what `metrics.json` has, dots between its levels, times left out, and more.
+"""The columns of `results.parquet` after the varied keys: figures of `metrics.json` without times, and more.
 
 Of the legs of `trackability` there are their number, that of those not trackable, and their causes, each once;
 `wanted_clearance_m` is the planner's `clearance_m`; `optimum_m` is the shortest path of a point that knows the world
@@ -65,10 +65,10 @@ IntArray: TypeAlias = NDArray[np.int64]
 def metric_cells(
     metrics: Mapping[str, Any], wanted_clearance_m: float | None, optimum_m: float | None
 ) -> dict[str, Any]:
-    """The content of `metrics.json` as cells of a row, with the clearance that was wanted and the shortest path."""
+    """Returns the figures of `metrics.json` as cells of a row, with the clearance wanted and the shortest path."""
     reached = metrics["outcome"] == "reached"
     return {
-        **{each.path: each.value(metrics) for each in WITHOUT_TIMES},
+        **{each.path: each.value(metrics) for each in UNTIMED_FIGURES},
         "wanted_clearance_m": wanted_clearance_m,
         "optimum_m": optimum_m,
         "length_ratio": metrics["flown_length_m"] / optimum_m if reached and optimum_m else None,
@@ -76,12 +76,12 @@ def metric_cells(
 
 
 def time_cells(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """The wall-clock times of `metrics.json` as cells of a row, by column."""
+    """Returns the wall-clock times of `metrics.json` as cells of a row, by column."""
     return {each.path.removeprefix("timing."): each.value(metrics) for each in FIGURES if each.timed}
 
 
 def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:
-    """The command line that flies a run of a campaign again; a planner or a law that is code of one's own is named."""
+    """Returns the command line that flies a run again; it names a planner or a law that is code of one's own."""
     words = ["wayproof", "fly", "--from", str(results), "--run", str(run)]
     return shlex.join([*words, *own_words(planner, law)])
 
@@ -89,9 +89,9 @@ def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:
 def table(
     rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], about: Mapping[str, Any]
 ) -> pa.Table:
-    """Rows as a table that says what it is `about`, as JSON has it.
+    """Makes a table of rows, with JSON in its metadata that says what it is `about`.
 
-    `columns`: what each holds: int, number, bool, text; or empty, for what stands there, JSON where mixed.
+    `columns` gives the type of each: int, number, bool, text; or empty, for whatever stands there, JSON where mixed.
     """
     import pyarrow as pa
 
@@ -107,7 +107,7 @@ def table(
 
 
 def sealed(content: pa.Table, about: Mapping[str, Any]) -> pa.Table:
-    """A table with what it says of its campaign, and the SHA-256 of both in its metadata."""
+    """Adds to a table what it is `about` and the SHA-256 of both, in its metadata."""
     told = {"schema": SCHEMA, **about, "sha256": _sha256(content, about)}
     return content.replace_schema_metadata({"wayproof": json.dumps(told, allow_nan=False)})
 
@@ -120,7 +120,7 @@ def _sha256(content: pa.Table, about: Mapping[str, Any]) -> str:
 
 
 def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
-    """A table of a campaign and what it says of it; an InputError at something else, damage or a changed table."""
+    """Reads a table of a campaign and what it is about; an InputError for another file, damage or a changed table."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -146,20 +146,20 @@ def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
 
 
 def results_of(folder: Path) -> pa.Table:
-    """The results of the campaign in a folder; an InputError where there are none, or they cannot be read."""
+    """Reads the results in a campaign's folder; an InputError where there are none, or they cannot be read."""
     if not (folder / RESULTS).is_file():
         raise InputError(f"wayproof: {folder} has no {RESULTS}: it is not the folder of a campaign")
     return read_table(folder / RESULTS)[0]
 
 
 def recordings_of(folder: Path) -> list[Path]:
-    """The recordings that a campaign's folder keeps, by the number of the run."""
+    """Lists the recordings in a campaign's folder, by the number of the run."""
     kept = [path for path in (folder / RUNS).glob(f"*/{RECORDING}") if path.parent.name.isdecimal()]
     return sorted(kept, key=lambda path: int(path.parent.name))
 
 
 class Runs:
-    """The runs of a campaign as its tables have them; `planned` is how many it has, flown or not, where that is known.
+    """The runs in a campaign's tables; `planned` is how many the campaign has, flown or not, where that is known.
 
     A planner or an aircraft that is named more than once is told apart by the keys that each entry gives.
     """
@@ -186,7 +186,7 @@ class Runs:
 
     @classmethod
     def of(cls, folder: Path) -> Runs:
-        """Those in the folder of a campaign; an InputError where it holds none, or a file cannot be read."""
+        """Reads the runs in a campaign's folder; an InputError where it holds none, or a file cannot be read."""
         timings = folder / TIMINGS
         return cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)
 
@@ -194,22 +194,22 @@ class Runs:
         return int(self._count)
 
     def check_columns(self, names: Sequence[str]) -> None:
-        """Raises InputError where there is no such column."""
+        """Raises InputError where one of the columns does not exist."""
         for name in names:
             if name not in self._columns:
                 known = ", ".join(self.varied) or "none"
                 raise InputError(f"wayproof: {RESULTS} has no column {name!r}; varied there: {known}")
 
     def values(self, name: str) -> Sequence[Any]:
-        """A column of any kind, None where there is nothing."""
+        """Returns a column of any kind; all of it is None where the tables lack it."""
         return self._columns.get(name) or (None,) * len(self)
 
     def texts(self, name: str) -> list[str]:
-        """A column of text, empty where there is nothing."""
+        """Returns a column as text, empty where a run has no value."""
         return ["" if value is None else str(value) for value in self.values(name)]
 
     def numbers(self, name: str) -> FloatArray:
-        """A figure of every run, (n,): a column of the results or of the timings, NaN where there is none."""
+        """Returns a figure of every run, (n,), from the results or the timings; NaN where a run has none."""
         return np.array([np.nan if value is None else value for value in self.values(name)], dtype=np.float64)
 
     @property
@@ -221,18 +221,18 @@ class Runs:
 
     @cached_property
     def are_crossed(self) -> bool:
-        """Whether one world was flown with several scenarios: else it stands for its scenario."""
+        """Whether a world was flown with several scenarios; else a world's name stands for its scenario."""
         worlds = self.texts("world")
         return len(set(zip(worlds, self.texts("scenario"), strict=True))) > len(set(worlds))
 
     def name(self, row: int) -> str:
-        """World, planner and aircraft of a run."""
+        """Names a run by its world, planner and aircraft."""
         planner, aircraft, world, scenario = (self.values(name)[row] for name in NAMED)
         place = (scenario, world) if world and self.are_crossed else (world or scenario,)
         return ", ".join(filter(None, (*place, planner, aircraft)))
 
     def _tell_apart(self, name: str, entries: Sequence[Any], first: str) -> None:
-        """Gives entries of one planner, or aircraft, names with the keys that they give."""
+        """Names entries of the same planner, or aircraft, by the keys that they give."""
         given = [entry if isinstance(entry, Mapping) else {first: entry} for entry in entries]
         named = Counter(each.get(first) for each in given)
         keys = [key for key in dict.fromkeys(itertools.chain(*given)) if key != first]

@@ -20,7 +20,7 @@ import numpy as np
 from harness.analysis.metric import Claim
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.flight import Job
-from harness.campaign.results import LAW, RESULTS, RUN, RUNS, fly_again, read_table
+from harness.campaign.results import LAW_KEY, RESULTS, RUN, RUNS, fly_again, read_table
 from harness.campaign.sampling import takes_whole_numbers
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError, Loc, Node, Scalar, fault_line, key_path, loc_of, node_of
@@ -28,19 +28,19 @@ from harness.scenario.generators import generated
 from harness.scenario.scenario import Scenario, overridden, packed, scenario_from, unpacked, with_key
 from harness.scenario.validation import KeyFaults, in_lines
 
-SEED, WORLD, DRAW = range(3)
-"""Random streams of a case."""
+SEED_STREAM, WORLD_STREAM, DRAW_STREAM = range(3)
+"""Numbers of the random streams of a case."""
 
-MOST_KEPT: Final = 100_000_000
-"""Bytes of scenarios that are kept from the check on: to make one takes some six times as long as to unpack it."""
+MOST_KEPT_BYTES: Final = 100_000_000
+"""Scenarios made by the check are kept up to this size: making one takes six times as long as unpacking it."""
 KIND, MODEL = ("planner", "kind"), ("aircraft", "model")
-"""The section of a scenario that an entry of a list replaces, and its key that a bare entry gives."""
-LISTED: Final = {"planner": "planners", "aircraft": "aircraft"}
-"""The list of a campaign, by section."""
+"""The key of a scenario that a bare entry of `planners`, and one of `aircraft`, replaces."""
+LIST_OF_SECTION: Final = {"planner": "planners", "aircraft": "aircraft"}
+"""The list of a campaign whose entries replace a section of the scenario."""
 
 
 class _Change(NamedTuple):
-    """One key of a scenario replaced, and where in the campaign file that is said."""
+    """One key of a scenario with its new value, and the place in the campaign file that gives it."""
 
     loc: Loc
     node: Node
@@ -48,11 +48,11 @@ class _Change(NamedTuple):
 
 
 _Axis: TypeAlias = list[list[_Change]]
-"""What each value of a key of the grid, or each entry of `planners` or `aircraft`, replaces in a scenario."""
+"""The changes for each value of a key of the grid, or for each entry of `planners` or `aircraft`."""
 
 
 class _Place(NamedTuple):
-    """Where in the campaign a run lies: indices of its case, scenario, world, grid values and entries."""
+    """A run's place in the campaign: indices of its case, scenario, world, grid values and entries."""
 
     case: int
     base: int
@@ -72,7 +72,7 @@ class CampaignRuns:
     def __init__(
         self, file: CampaignFile, planners: tuple[str, ...] = (), laws: tuple[str, ...] = ()
     ) -> None:
-        """`planners` and `laws`: what who flies has to import, as FILE.py:NAME or MODULE:NAME."""
+        """`planners` and `laws` are those that a process has to import, as FILE.py:NAME or MODULE:NAME."""
         self._sources = planners, laws
         self.file, self.campaign = file, file.campaign
         campaign, bases = file.campaign, file.bases
@@ -85,7 +85,7 @@ class CampaignRuns:
         self.planners = [each.label for each in campaign.planners] or planners_of
         self.aircraft = [each.model for each in campaign.aircraft] or models_of
         self._made: dict[int, bytes] = {}  # by `check`
-        self._world = lru_cache(maxsize=1)(self._generated)  # runs of one case follow each other
+        self._world = lru_cache(maxsize=1)(self._world_changes)  # runs of one case follow each other
         self.cases = campaign.draws * math.prod(self._sizes)
         if len(self) > MAX_RUNS:
             sentence = f"makes {len(self)} runs with what is combined; must be at most {MAX_RUNS}"
@@ -96,14 +96,14 @@ class CampaignRuns:
 
     @cached_property
     def varied(self) -> list[str]:
-        """Key paths that differ between runs: of the grid, of what is drawn, and of the entries."""
+        """Key paths that differ between runs: those of the grid, drawn at random, and of the entries."""
         drawn = map(strict_yaml.as_spelt, (*self.campaign.grid, *self.campaign.random))
         entries = [change.loc for axis in self._entries for entry in axis for change in entry]
         return [*dict.fromkeys([*drawn, *(key_path(loc) for loc in entries if loc not in (KIND, MODEL))])]
 
     @cached_property
-    def _whole(self) -> list[str]:
-        """Keys drawn at random that take whole numbers alone, from ranges that end at such."""
+    def _whole_keys(self) -> list[str]:
+        """Keys drawn at random that take whole numbers only, from ranges that end at whole numbers."""
         drawn = {name: each for name, each in self.campaign.random.items() if not each.choice}
         middle = [
             _Change(loc_of(name), Node(each.whole_number(0.5) if each.is_whole else each.number(0.5), 0), ())
@@ -116,14 +116,14 @@ class CampaignRuns:
         return []
 
     def cells(self, number: int) -> dict[str, Any]:
-        """The first columns of `results.parquet` for run `number`, from 0: `RUN`, then what varies by key path.
+        """Returns the first columns of `results.parquet` for run `number`, from 0: `RUN`, then varied keys.
 
         Runs of one `case` fly the same world with the same seed and draws; `world` is the name of its file, or of the
         generator. Lists and mappings are JSON text.
         """
         place = self._place(number)
         base, campaign = self.file.bases[place.base], self.campaign
-        changes = [*_chosen(self._entries, place.entries), *_chosen(self._grid, place.grid)]
+        changes = [*_chosen_changes(self._entries, place.entries), *_chosen_changes(self._grid, place.grid)]
         given = {key_path(each.loc): _cell(each.node) for each in [*changes, *self._drawn(place.case)]}
         planner = self.planners[place.entries[0] if campaign.planners else place.base]
         model = self.aircraft[place.entries[1] if campaign.aircraft else place.base]
@@ -135,7 +135,7 @@ class CampaignRuns:
         return {name: row.get(name) for name in self.varied}
 
     def scenario(self, number: int, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-        """What run `number` flies, keys replaced as by `load_scenario`; an InputError names what makes it none."""
+        """Returns the scenario of run `number`, keys replaced as by `load_scenario`; an InputError names its fault."""
         if number in self._made and not overrides:
             return unpacked(self._made[number])
         root, changes = self._root(number, self._drawn(self._place(number).case))
@@ -147,13 +147,13 @@ class CampaignRuns:
             raise in_lines(lines, self.file.source) from error
 
     def _root(self, number: int, drawn: Sequence[_Change]) -> tuple[Node, list[_Change]]:
-        """The keys of a run's scenario, and what was replaced in them, in order."""
+        """Returns the keys of a run's scenario, and the changes that were made to them, in order."""
         place, root = self._place(number), self.file.bases[self._place(number).base].root
         seed = Node(self._seed(place.case), self.file.root.line_of(("seed",)))
         changes = [
             *(self._change(loc_of(name), ("set", name)) for name in self.campaign.set_),
-            *_chosen(self._entries[::-1], place.entries[::-1]),
-            *_chosen(self._grid, place.grid),
+            *_chosen_changes(self._entries[::-1], place.entries[::-1]),
+            *_chosen_changes(self._grid, place.grid),
             *drawn,
             _Change(("seed",), seed, ("seed",)),
         ]
@@ -169,11 +169,11 @@ class CampaignRuns:
         return root, changes
 
     def packed(self, number: int) -> bytes:
-        """The same as `harness.scenario.scenario.packed` has it."""
+        """Returns the scenario of run `number` packed by `harness.scenario.scenario.packed`."""
         return self._made.get(number) or packed(self.scenario(number))
 
     def job(self, number: int, folder: Path) -> Job:
-        """Run `number`, from 0, as it is handed to who flies it; `folder` is the campaign's."""
+        """Returns run `number`, from 0, as a job for a worker; `folder` is the campaign's."""
         return Job(
             number,
             self.packed(number),
@@ -189,17 +189,17 @@ class CampaignRuns:
         )
 
     def again(self, number: int, folder: Path) -> str:
-        """The command that flies run `number` again."""
-        law = self.campaign.set_.get(LAW, "")
+        """Returns the command that flies run `number` again."""
+        law = self.campaign.set_.get(LAW_KEY, "")
         return fly_again(folder / RESULTS, number, self.cells(number)["planner"], law)
 
     def plain(self) -> dict[str, Any]:
-        """All that says what is flown, as JSON."""
+        """Returns the campaign with all scenarios, as JSON."""
         return self.file.plain()
 
     def check(self, progress: Callable[[int], None] | None = None) -> None:
         """Makes every scenario of the campaign once, or raises InputError; the first ones are kept to be flown."""
-        room = MOST_KEPT
+        room = MOST_KEPT_BYTES
         for number in range(len(self)):
             scenario = self.scenario(number)
             if room > 0:
@@ -216,25 +216,25 @@ class CampaignRuns:
     def _stream(self, case: int, stream: int) -> np.random.SeedSequence:
         return np.random.SeedSequence(self.campaign.seed, spawn_key=(case, stream))
 
-    def _seed(self, case: int, stream: int = SEED) -> int:
-        """A whole number of 53 bits, which every reader of JSON and YAML keeps."""
+    def _seed(self, case: int, stream: int = SEED_STREAM) -> int:
+        """Returns a seed of 53 bits, which every reader of JSON and YAML keeps whole."""
         return int(self._stream(case, stream).generate_state(1, np.uint64)[0] >> np.uint64(11))
 
-    def _generated(self, case: int, index: int) -> list[_Change]:
-        """The generated world of a case."""
-        made = generated(self.campaign.worlds[index], self._seed(case, WORLD))
-        origin: Loc = ("worlds", index, "forest")
+    def _world_changes(self, case: int, world: int) -> list[_Change]:
+        """Returns the changes that put a world of the campaign, generated with the case's seed, into a scenario."""
+        made = generated(self.campaign.worlds[world], self._seed(case, WORLD_STREAM))
+        origin: Loc = ("worlds", world, "forest")
         line = self.file.root.line_of(origin)
         return [_Change(loc, node_of(plain, line), origin) for loc, plain in made.items()]
 
     def _grid_axis(self, name: str) -> _Axis:
-        """The values of a key of the grid."""
+        """Returns the changes for each value of a key of the grid."""
         origins: list[Loc] = [("grid", name, index) for index in range(len(self.campaign.grid[name]))]
         return [[self._change(loc_of(name), origin)] for origin in origins]
 
     def _entry_axis(self, section: str, first: str) -> _Axis:
-        """The entries of `planners` or `aircraft`: bare text, or keys of that section of a scenario."""
-        listed = LISTED[section]
+        """Returns the changes for each entry of `planners` or `aircraft`: bare text, or keys of that section."""
+        listed = LIST_OF_SECTION[section]
         entries = self.file.root.plain().get(listed, ())
         axis = []
         for index, each in enumerate(entries):
@@ -244,15 +244,15 @@ class CampaignRuns:
         return axis or [[]]
 
     def _drawn(self, case: int) -> list[_Change]:
-        """What is drawn for a case: each key by a number in [0, 1) of its stream."""
-        shares = np.random.default_rng(self._stream(case, DRAW)).random(len(self.campaign.random))
+        """Returns the changes drawn for a case, each key by a number in [0, 1) of its stream."""
+        shares = np.random.default_rng(self._stream(case, DRAW_STREAM)).random(len(self.campaign.random))
         changes = []
         for (name, each), share in zip(self.campaign.random.items(), shares.tolist(), strict=True):
             origin: Loc = ("random", name)
             if each.choice:
                 changes.append(self._change(loc_of(name), (*origin, "choice", each.chosen(share))))
                 continue
-            number = each.whole_number(share) if name in self._whole else each.number(share)
+            number = each.whole_number(share) if name in self._whole_keys else each.number(share)
             changes.append(_Change(loc_of(name), Node(number, self.file.root.line_of(origin)), origin))
         return changes
 
@@ -262,7 +262,7 @@ class CampaignRuns:
         return _Change(loc, node, origin)
 
     def _fault(self, number: int, root: Node, changes: Sequence[_Change], loc: Loc, sentence: str) -> str:
-        """The fault at `loc` of a run's scenario as a person reads it, and which line it comes from."""
+        """Returns a line for people on the fault at `loc` of a run's scenario, with the line it comes from."""
         for change in reversed(changes):
             shared = min(len(loc), len(change.loc))
             if shared and change.loc[:shared] == loc[:shared]:
@@ -278,19 +278,19 @@ class CampaignRuns:
         return fault_line(self.file.source, self.file.root.line_of(origin), origin, sentence)
 
 
-def _chosen(axes: Sequence[_Axis], indices: Sequence[int]) -> list[_Change]:
+def _chosen_changes(axes: Sequence[_Axis], indices: Sequence[int]) -> list[_Change]:
     return [change for axis, index in zip(axes, indices, strict=True) for change in axis[index]]
 
 
 def _cell(node: Node) -> Scalar:
-    """A value as its column of `results.parquet` has it: lists and mappings as JSON text."""
+    """Returns a value for its column of `results.parquet`: lists and mappings as JSON text."""
     return json.dumps(node.plain()) if isinstance(node.value, tuple | dict) else node.value
 
 
 def flown_run(
     results: Path, run: int, overrides: Sequence[tuple[str, str]] = ()
 ) -> tuple[Scenario, str | None]:
-    """What a run of a campaign flew, and the digest of its row, by `results.parquet` alone; or an InputError.
+    """Returns the scenario that a run flew, and the digest of its row, from `results.parquet` alone; or an InputError.
 
     There is no digest where the row is missing, or `overrides` change what is flown.
     """

@@ -1,4 +1,4 @@
-"""Random values: what a campaign may draw a key from.
+"""Distributions from which a campaign may draw the value of a key.
 
 Every value comes from a number in [0, 1) through the inverse of its distribution.
 """
@@ -15,8 +15,8 @@ from harness.scenario.scenario import Scenario
 from harness.scenario.sections import Section
 from harness.scenario.validation import KeyFault
 
-LEAST: Final = 1e-12
-"""Nearest to 0 and 1 that a normal distribution is asked for its inverse: 7 standard deviations off."""
+LEAST_PROBABILITY: Final = 1e-12
+"""The inverse of a normal distribution is taken no nearer to 0 and 1 than this, at 7 standard deviations."""
 FORMS: Final = ("uniform", "normal", "choice")
 
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
@@ -37,7 +37,7 @@ class Normal(Section):
     @model_validator(mode="after")
     def _leaves_something(self) -> Normal:
         low, high = self.limits
-        if not high - low > LEAST:
+        if not high - low > LEAST_PROBABILITY:
             raise ValueError("leaves nothing between least and most; must be least < most, not far from mean")
         return self
 
@@ -72,19 +72,19 @@ class Distribution(Section):
         return self
 
     def number(self, share: float) -> float:
-        """The value below which `share` of the draws lie; only without a choice."""
+        """Returns the value below which `share` of the draws lie; only without a choice."""
         if self.uniform:
             low, high = self.uniform
             return min(low + (high - low) * share, high)
         assert self.normal
         low, high = self.normal.limits
-        reached = min(max(low + (high - low) * share, LEAST), 1.0 - LEAST)
+        reached = min(max(low + (high - low) * share, LEAST_PROBABILITY), 1.0 - LEAST_PROBABILITY)
         drawn = NormalDist(self.normal.mean, self.normal.sigma).inv_cdf(reached)
         least, most = self.normal.least, self.normal.most
         return min(max(drawn, drawn if least is None else least), drawn if most is None else most)
 
     def whole_number(self, share: float) -> int:
-        """The same for a key that takes whole numbers alone, and a range that ends at whole numbers."""
+        """Returns the same for a key that takes whole numbers only, from a range that ends at whole numbers."""
         if not self.uniform:
             return round(self.number(share))
         low, high = map(int, self.uniform)
@@ -92,17 +92,17 @@ class Distribution(Section):
 
     @property
     def is_whole(self) -> bool:
-        """Whether its range ends at whole numbers, as far as it has ends."""
+        """Whether the ends that its range has are whole numbers."""
         normal = (self.normal.least, self.normal.most) if self.normal else ()
         return all(end is None or end.is_integer() for end in self.uniform or normal)
 
     def chosen(self, share: float) -> int:
-        """Index of the choice that a number in [0, 1) stands for."""
+        """Returns the index of the choice for a number in [0, 1)."""
         assert self.choice
         return min(int(share * len(self.choice)), len(self.choice) - 1)
 
 
 def takes_whole_numbers(scenario: Scenario, loc: Loc) -> bool:
-    """Whether a key of a scenario takes whole numbers alone; a whole one was given, which others keep with a point."""
+    """Tells whether a key of a scenario takes whole numbers only: given a whole number, it still holds one."""
     node = node_of(scenario.model_dump(by_alias=True), 0).at(loc)
     return node is not None and type(node.value) is int

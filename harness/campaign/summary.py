@@ -1,6 +1,6 @@
-"""The answers of a campaign: what its runs say by two varied keys, which ran worst, which planner did better.
+"""The summary of a campaign: its runs by two varied keys, the worst runs, and which planner did better.
 
-They are written as `summary.html`, a page that needs nothing but itself, as `summary.json`, and as a table for papers.
+It is written as `summary.html`, a page that needs nothing but itself, as `summary.json`, and as a table for papers.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from harness.analysis.causes import FINDINGS
 from harness.analysis.metric import number, severity
 from harness.campaign.cell import CONFIDENCE, QUESTIONS, Axis, Cell, cell_of, grouped
 from harness.campaign.paired import TESTED, Duel, duels
-from harness.campaign.results import LAW, NAMED, RESULTS, RUNS, Runs, fly_again
+from harness.campaign.results import LAW_KEY, NAMED, RESULTS, RUNS, Runs, fly_again
 from harness.files.errors import WriteError
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
@@ -28,12 +28,12 @@ from harness.report.page import Picture, rendered
 from harness.run_files.run_folder import RECORDING
 
 PAGE: Final = "summary.html"
-PLAIN: Final = "summary.json"
+SUMMARY_JSON: Final = "summary.json"
 SCHEMA: Final = "wayproof/campaign-summary/5"
-BY_DEFAULT: Final = 3
+DEFAULT_KEYS: Final = 3
 """Without a choice, tables are made of every two of the first this many varied keys."""
 WORST_OUTCOMES: Final = ("collision", "lost_control", "out_of_bounds")
-"""Outcomes of which a campaign without any says how frequent they may still be."""
+"""A campaign without one of these outcomes says how frequent it may still be."""
 WORST: Final = 10
 """At most this many failures are listed."""
 CLOSEST: Final = 3
@@ -60,7 +60,7 @@ class WorstRun:
     reason: str
     min_clearance_m: float | None
     clearance_ratio: float | None
-    """Its least clearance over the wanted one, where that is known."""
+    """Least clearance over the wanted one, where both are known."""
     varied: Mapping[str, Any]
     folder: str
     """Its run folder relative to the campaign's, and `view` the command that shows its recording; or empty."""
@@ -70,7 +70,7 @@ class WorstRun:
 
 @dataclass(frozen=True)
 class Summary:
-    """The answers."""
+    """The answers of a campaign."""
 
     name: str
     varied: tuple[str, ...]
@@ -88,7 +88,7 @@ class Summary:
 
     @property
     def never(self) -> str:
-        """Which of the worst outcomes no run had, and how frequent each may still be; empty where each was had.
+        """Names the worst outcomes that no run had, and how frequent each may still be; empty where all were had.
 
         The upper bound is that of Clopper and Pearson (1934) for none of n: 1 - (1 - confidence)^(1 / n).
         """
@@ -101,12 +101,12 @@ class Summary:
 
     @property
     def missing(self) -> int:
-        """How many runs are still to be flown, as far as is known."""
+        """Number of runs still to be flown, as far as is known."""
         return 0 if self.planned is None else self.planned - self.total.runs
 
 
 def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summary:
-    """The answers of the campaign in a folder, with a table for each one or two keys in `by`; or an InputError."""
+    """Summarises the campaign in a folder, with a table for each one or two keys in `by`; or raises InputError."""
     runs = Runs.of(folder)
     for each in by or ():
         if len(each) not in (1, 2) or len(set(each)) < len(each):
@@ -136,16 +136,16 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
 
 
 def _default_choice(runs: Runs) -> Sequence[Sequence[str]]:
-    """Every two of the first keys, but for one by which nearly every run would be a row of its own."""
+    """Chooses every two of the first keys, except one by which nearly every run would be a row of its own."""
     varied = runs.varied
     useful = [key for key in varied if key != "scenario" or runs.are_crossed or "world" not in varied]
     useful = [key for key in useful if key not in NAMED[2:] or 2 * len(set(runs.texts(key))) <= len(runs)]
-    first = useful[:BY_DEFAULT]
+    first = useful[:DEFAULT_KEYS]
     return [first] if len(first) == 1 else list(itertools.combinations(first, 2))
 
 
 def _table(runs: Runs, *keys: str) -> Table:
-    """The runs by one key or two."""
+    """Returns the runs by one key or two."""
     drawn = runs.campaign.get("random", ())
     (rows, row_of), *others = (grouped(key, runs.values(key), key in drawn) for key in keys)
     columns, column_of = others[0] if others else (None, np.zeros(len(runs), dtype=np.int64))
@@ -158,7 +158,7 @@ def _table(runs: Runs, *keys: str) -> Table:
 
 
 def _worst(runs: Runs, folder: Path) -> tuple[WorstRun, ...]:
-    """Failures by severity, then by clearance over the wanted one or alone; if none failed, the closest few."""
+    """Returns failures by severity, then by clearance over the wanted one or alone; if none failed, the closest few."""
     ratio, outcomes, numbers = runs.clearance_ratio, runs.texts("outcome"), runs.values("run")
     near = np.nan_to_num(ratio if np.isfinite(ratio).any() else runs.numbers("min_clearance_m"), nan=np.inf)
     order = sorted(range(len(runs)), key=lambda row: (-severity(outcomes[row]), near[row], numbers[row]))
@@ -172,7 +172,7 @@ def _worst_run(runs: Runs, row: int, folder: Path) -> WorstRun:
 
     inner = Path(RUNS) / str(cell("run"))
     kept, planner = folder / inner, str(cell("planner")).partition(", ")[0]
-    law = (runs.campaign.get("set") or {}).get(LAW, "")
+    law = (runs.campaign.get("set") or {}).get(LAW_KEY, "")
     ratio = float(runs.clearance_ratio[row])
     return WorstRun(
         cell("run"),
@@ -190,10 +190,10 @@ def _worst_run(runs: Runs, row: int, folder: Path) -> WorstRun:
 
 
 def write_summary(summary: Summary, folder: Path) -> Path:
-    """Writes the page, whose path it returns, and the answers as JSON into a campaign's folder; or a WriteError."""
+    """Writes the answers as a page, whose path it returns, and as JSON, into a campaign's folder; or WriteError."""
     try:
         plain = {"schema": SCHEMA, **asdict(summary)}
-        replace_text(folder / PLAIN, json.dumps(plain, indent=2, allow_nan=False) + "\n")
+        replace_text(folder / SUMMARY_JSON, json.dumps(plain, indent=2, allow_nan=False) + "\n")
         text = rendered(
             "campaign.html",
             summary=summary,
@@ -213,7 +213,7 @@ def write_summary(summary: Summary, folder: Path) -> Path:
 
 
 def _pictures(folder: Path, varied: Sequence[str]) -> list[Picture]:
-    """Every run against what was varied, where numbers were."""
+    """Returns the plot of every run against the varied numbers, if there are any."""
     from harness.campaign.figures import scatter
     from harness.report.figure_style import svg
 
@@ -227,7 +227,7 @@ def _pictures(folder: Path, varied: Sequence[str]) -> list[Picture]:
 
 
 def rows_for_paper(summary: Summary) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of the table for a paper: the groups of the first table, and all runs."""
+    """Returns headings and rows of the table for a paper: the groups of the first table, and all runs."""
     keys, found = [""], []
     for table in summary.tables[:1]:
         columns = table.columns.labels if table.columns else None

@@ -1,4 +1,4 @@
-"""Who flies the runs of a campaign: processes of this machine, or the workers of a Dask cluster."""
+"""Workers that fly the runs of a campaign: processes of this machine, or the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from harness.files.versions import versions
 from harness.flight.signals import held_back
 from planner.compiled import own_this_process
 
-ONE_THREAD: Final = dict.fromkeys(
+ONE_THREAD_ENVIRONMENT: Final = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_IO_THREADS"), "1"
 )
-"""Environment of a worker: one flight a processor, and no threads of numpy or Arrow beside it."""
+"""Environment of a worker, which has one flight a processor, and no threads of numpy or Arrow beside it."""
 
 CONNECT_S: Final = 10.0
 SCHEDULER_PORT: Final = 8786
-GONE: Final = "the Dask scheduler has gone"
+SCHEDULER_GONE: Final = "the Dask scheduler has gone"
 INTERRUPT_S: Final = 0.1
-"""How often it is looked whether the process was asked to end, at the least."""
+"""Requests to end the process are looked for at least this often."""
 JOBS_EACH: Final = 2
-"""Jobs handed out for each that can be flown at a time: nobody waits for the next while an answer is written down."""
+"""This many jobs are handed out for each that can be flown at a time, so that no process waits for its next."""
 
 Flown: TypeAlias = tuple[int, Answer | None]
-"""Number of a run that is over, and what came of it; None where the machine kept it from its end."""
+"""Number of a run that is over, and its result; None where the machine kept it from its end."""
 
 
 class Workers(ABC):
-    """Who flies: an executor of `concurrent.futures`, and the jobs that it was handed."""
+    """An executor of `concurrent.futures` that flies, and the jobs that it was handed."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
@@ -53,14 +53,14 @@ class Workers(ABC):
 
     @abstractmethod
     def free(self) -> int:
-        """How many jobs more may be handed out now; 0 or less for none."""
+        """Returns how many more jobs may be handed out now; 0 or less for none."""
 
     def start(self, job: Job) -> None:
         """Hands out a job."""
         self._flying[self._executor.submit(fly_job, job)] = job
 
     def over(self, timeout_s: float) -> list[Flown]:
-        """The jobs that have come to an end since, waited for at most so long; an OSError as `fly_jobs` has it."""
+        """Returns the jobs that have ended since, waited for up to a time; an OSError as `fly_jobs` has it."""
         done = [(self._flying.pop(each).run, each) for each in finished(self._flying, timeout_s)]
         return [(run, self._answer(each)) for run, each in done]
 
@@ -75,9 +75,9 @@ def fly_jobs(
     between: Callable[[], None] = lambda: None,
     enough: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Hands out jobs until none is left; an OSError where a run folder cannot be written, or who flies has gone.
+    """Hands out jobs until none is left; an OSError where a run folder cannot be written, or the workers have gone.
 
-    `over`: told of every job that is over, by its number; None where the machine kept it from its end.
+    `over` is called with the number of every job that is over and its answer, None where the machine gave it up.
     """
     ahead, flying = next(jobs, None), 0
     # An interrupt that is raised inside `concurrent.futures` leaves a future locked, and who ends the workers waits for
@@ -96,7 +96,7 @@ def fly_jobs(
 
 
 def finished(futures: Collection[Future[Any]], timeout_s: float) -> set[Future[Any]]:
-    """Those that are done, waited for until the first is."""
+    """Returns the futures that are done, after waiting for the first one."""
     if not futures:
         time.sleep(timeout_s)
     return wait(futures, timeout_s, FIRST_COMPLETED).done
@@ -115,11 +115,11 @@ class LocalWorkers(Workers):
         self._again: deque[Job] = deque()
 
     def free(self) -> int:
-        """Room for a job that flies and one that waits for each process."""
+        """Returns the room for jobs: for each process one that flies and one that waits."""
         return 0 if self._again else JOBS_EACH * self._number - len(self._flying)
 
     def start(self, job: Job) -> None:
-        """Hands a job to the pool; to a new one where a process died while it had nothing to do."""
+        """Hands a job to the pool, or to a new pool where a process died while idle."""
         with without_main():
             try:
                 super().start(job)
@@ -128,7 +128,7 @@ class LocalWorkers(Workers):
                 super().start(job)
 
     def over(self, timeout_s: float) -> list[Flown]:
-        """The jobs that have come to an end."""
+        """Returns the jobs that have ended, and flies those again whose process died."""
         done = finished(self._flying, timeout_s)
         if any(map(_died, done)):
             done = wait(self._flying).done  # the pool has ended: so do they all, at once
@@ -146,7 +146,7 @@ class LocalWorkers(Workers):
         return found
 
     def end(self) -> None:
-        """Waits for what handed out jobs, once the processes have ended: at its end Python wakes it without a lock."""
+        """Ends the pool and waits for its thread, which Python's exit would wake without a lock."""
         self._executor.shutdown(cancel_futures=True)
 
     def _renew(self) -> None:
@@ -155,7 +155,7 @@ class LocalWorkers(Workers):
 
 
 def _pool(number: int) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(number, multiprocessing.get_context("spawn"), _begin)
+    return ProcessPoolExecutor(number, multiprocessing.get_context("spawn"), _begin_process)
 
 
 def _died(future: Future[Answer | None]) -> bool:
@@ -164,16 +164,16 @@ def _died(future: Future[Answer | None]) -> bool:
 
 @contextmanager
 def local_workers(number: int) -> Iterator[LocalWorkers]:
-    """So many processes of this machine; they end with the context, in mid-flight if need be."""
+    """Starts processes of this machine, which end with the context, in mid-flight if need be."""
     open_standard_files()
     before = set(multiprocessing.active_children())
-    kept = {name: os.environ[name] for name in ONE_THREAD if name in os.environ}
-    os.environ.update(ONE_THREAD)
+    kept = {name: os.environ[name] for name in ONE_THREAD_ENVIRONMENT if name in os.environ}
+    os.environ.update(ONE_THREAD_ENVIRONMENT)
     workers = LocalWorkers(number)
     try:
         yield workers
     finally:
-        for name in ONE_THREAD:
+        for name in ONE_THREAD_ENVIRONMENT:
             os.environ.pop(name)
         os.environ.update(kept)
         for child in set(multiprocessing.active_children()) - before:
@@ -186,7 +186,7 @@ def local_workers(number: int) -> Iterator[LocalWorkers]:
 def dask_workers(
     address: str, unencrypted: bool = False, tell: Callable[[str], None] = warnings.warn
 ) -> Iterator[Workers]:
-    """The workers of a Dask cluster, as many as there are at any time; an InputError where there are none like us.
+    """Gives the workers of a Dask cluster, as many as there are at any time; an InputError where none is like us.
 
     A job whose worker dies is flown again by another one; after the scheduler's `allowed-failures` it is given up.
     Scheduler and workers are trusted: Dask sends pickles, which run code, in both directions. `unencrypted`: whether an
@@ -203,7 +203,7 @@ def dask_workers(
 
 
 def _client(address: str, unencrypted: bool) -> Any:
-    """A connection to a scheduler."""
+    """Connects to a scheduler."""
     if not re.fullmatch(r"[a-z]+://.+", address):
         raise InputError(
             f"wayproof: --scheduler {address}: is no address; give it as tcp://HOST:PORT, or beyond this machine as "
@@ -244,11 +244,11 @@ class DaskWorkers(Workers):
         self._known = set(client.nthreads())
 
     def free(self) -> int:
-        """Room for jobs that fly and for as many that wait."""
+        """Returns the room for jobs that fly and for as many that wait."""
         try:
             threads_of = self._client.nthreads()
         except OSError as error:
-            raise OSError(GONE) from error
+            raise OSError(SCHEDULER_GONE) from error
         for gone in sorted(self._known - set(threads_of)):
             self._tell(f"the Dask worker {gone} has gone; others fly its runs again")
         self._known = set(threads_of)
@@ -259,12 +259,12 @@ class DaskWorkers(Workers):
         from distributed import KilledWorker
 
         if future.cancelled():
-            raise OSError(GONE)
+            raise OSError(SCHEDULER_GONE)
         return None if isinstance(future.exception(), KilledWorker) else super()._answer(future)
 
 
-def _begin() -> None:
-    """What a process of ours does first."""
+def _begin_process() -> None:
+    """Prepares a worker process: no interrupts, no standard output, and an end with its parent."""
     # An interrupt reaches the whole process group; the parent decides what it means.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Standard output is the parent's alone: what a planner prints goes to standard error.
@@ -274,7 +274,7 @@ def _begin() -> None:
 
 
 def _end_with_parent() -> None:
-    """A parent that is killed takes its processes along."""
+    """Waits for the parent process and then ends this one."""
     if parent := multiprocessing.parent_process():
         parent.join()
         os._exit(1)

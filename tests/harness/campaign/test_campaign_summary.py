@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from harness.analysis.causes import FINDINGS
-from harness.campaign.cell import BINS, NONE, Cell, Share, grouped, wilson
+from harness.campaign.cell import BINS, NOT_SET, Cell, Share, grouped, wilson
 from harness.campaign.paired import duels, mean_estimate
 from harness.campaign.results import sealed
-from harness.campaign.summary import PAGE, PLAIN, Summary, summarise, write_summary
+from harness.campaign.summary import PAGE, SUMMARY_JSON, Summary, summarise, write_summary
 from harness.cli.app import main
 from harness.cli.sweep import print_summary
 from harness.files.strict_yaml import InputError
@@ -301,7 +301,7 @@ def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[s
     page = write_summary(summary, folder).read_text()
     assert "6 of 8 runs" in page
     assert "2 runs are missing" in page
-    assert json.loads((folder / PLAIN).read_text())["planned"] == 8
+    assert json.loads((folder / SUMMARY_JSON).read_text())["planned"] == 8
 
 
 def test_what_a_table_of_others_holds_reaches_no_terminal_raw(
@@ -387,7 +387,7 @@ def test_thin_campaigns_have_answers_too(
     page = write_summary(summary, folder).read_text()
     assert ("Nothing has been flown" in page) == (not rows)
     assert "nan" not in page.lower().replace("nanosecond", "")
-    assert json.loads((folder / PLAIN).read_text())["total"]["runs"] == len(rows)
+    assert json.loads((folder / SUMMARY_JSON).read_text())["total"]["runs"] == len(rows)
 
 
 @given(st.lists(st.none() | st.floats(-1e6, 1e6, allow_nan=False), max_size=60))
@@ -397,7 +397,7 @@ def test_every_number_has_one_group_between_its_edges(values: list[float | None]
     assert len(index) == len(values)
     for value, group in zip(values, index, strict=True):
         label = axis.labels[group]
-        assert (label == NONE) == (value is None)
+        assert (label == NOT_SET) == (value is None)
         if value is not None and axis.edges:
             low, high = axis.edges[group : group + 2]
             assert low <= value <= high
@@ -496,7 +496,7 @@ def test_a_key_is_grouped_by_values_quantiles_or_quarters_of_the_compass() -> No
     values = [350.0, 10.0, 44.9, 45.1, 90.0, 180.0, 225.1, 314.9, 360.0, None]
     axis, index = grouped("environment.wind.from_deg", values, drawn=True)
     assert index.tolist() == [0, 0, 0, 1, 1, 2, 3, 3, 0, 4]
-    assert (axis.labels[0], axis.labels[-1]) == ("N, -45 to 45", NONE)
+    assert (axis.labels[0], axis.labels[-1]) == ("N, -45 to 45", NOT_SET)
 
 
 @pytest.mark.parametrize("form", ["latex", "csv"])
