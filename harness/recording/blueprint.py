@@ -1,4 +1,4 @@
-"""How recordings look: their entities and colours. Nothing here depends on a flight."""
+"""Names of the entities in recordings, and their colours. Nothing here depends on a flight."""
 
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ STATES = "states"
 EVENTS = "events"
 SUMMARY = "summary"
 COLOURS = "colours"
-"""What the colours of the views mean, as a page."""
+"""A page that explains the colours of the views."""
 END = "end"
-"""Below WORLD and PLAN: where a flight ended that did not end at the goal."""
+"""Below WORLD and PLAN: the place where a flight ended that did not end at the goal."""
 FRAME = "frame"
 """Property of the recording that holds the `Frame`."""
 WHOLE = "whole_track"
 FLOWN = "flown"
 """Below WORLD and PLAN: the trail, one piece a time stamp; the views show all pieces up to the cursor."""
 BELIEVED = "believed"
-"""Below WORLD and PLAN: where the aircraft believed to be, as the trail; only where navigation is not perfect."""
+"""Below WORLD and PLAN: the believed positions, drawn as the trail is; only where navigation is not perfect."""
 NAVIGATION = "navigation_error"
-"""Below SERIES: likewise."""
+"""Below SERIES: the navigation error, only where navigation is not perfect."""
 THROTTLE, PLAN_DELAY = "throttle", "plan_delay"
-"""Below SERIES: throttle in per cent, how late plans took effect."""
+"""Below SERIES: throttle in per cent, and the delay with which plans took effect."""
 SENSED = "sensed"
 """Below WORLD and PLAN: places that the sensor has shown, each once; drawn up to the cursor as well."""
 TRUE = "true_obstacles"
 """Below WORLD: the standing obstacles as solids."""
 TRACKED, MET = "tracked", "met"
-"""Below PLAN: what the map takes to move (below that `velocity`, the arrows), and where the plan expects to meet it."""
+"""Below PLAN: obstacles that the map knows to move (and their `velocity`), and where the plan expects to meet them."""
 
 PLANNER_LANE, BANK_LANE, TRACKING_LANE, SHIELD_LANE = "planner", "saturation", "tracking", "shield"
 """Lanes of the state timeline, below STATES; shown in the order of their names."""
@@ -60,15 +60,16 @@ OUTLINE: Colour = (104, 112, 128)
 OBSTACLE: Colour = (112, 120, 138)
 EDGE: Colour = (214, 218, 226)
 MOVING: Colour = (176, 116, 92)
+"""Moving and timed obstacles are filled in MOVING and outlined in MOVING_OUTLINE."""
 MOVES: Colour = (255, 150, 96)
-"""Colour of obstacles that the map takes to move."""
+"""Colour of obstacles that the map knows to move."""
 MET_DOTS: Colour = (196, 124, 232)
-MOVING_DIM: Colour = (96, 68, 56)
+MOVING_OUTLINE: Colour = (96, 68, 56)
 GOAL: Colour = (52, 160, 92)
 START_LIGHT: Colour = (222, 230, 244)
 GOAL_LIGHT: Colour = (160, 246, 190)
 END_LIGHT: Colour = (255, 216, 210)
-"""Colour of the label where a flight ends, as the two before are those of start and goal."""
+"""Colours of labels at the start (START_LIGHT), at the goal (GOAL_LIGHT), and where a flight ended elsewhere."""
 GOAL_DIM: Colour = (48, 112, 72)
 AIRCRAFT: Colour = (255, 255, 255)
 TRACK: Colour = (255, 179, 64)
@@ -92,7 +93,7 @@ ERROR_COLOURS: tuple[Colour, ...] = ((255, 214, 92), (255, 138, 48), (255, 44, 8
 TOLD_PLAN: Colour = (58, 150, 214)
 TOLD: Colour = (134, 142, 156)
 WARNED: Colour = (214, 120, 20)
-"""Colour of warnings in the event log, as the two before are those of plans and events: legible on black and white."""
+"""Colours in the event log, legible on black and white: of plans (TOLD_PLAN), events (TOLD) and warnings (this)."""
 
 BELIEVED_OFF = "cross_track/believed"
 """Below SERIES: the cross-track error that guidance sees."""
@@ -123,7 +124,7 @@ OVERLAY: tuple[Colour, ...] = (TRACK, CHOSEN, GUIDE, GOAL, WINDOW, HIT, (240, 22
 
 
 def error_colours(share: FloatArray) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """(n, 3) colours of the track for errors, as shares of the one from which on it is not tracked."""
+    """(n, 3) colours of the track for errors, as shares of the error limit."""
     scale = np.array(ERROR_COLOURS, dtype=np.float64).T
     place = 0.5 * np.arange(len(ERROR_COLOURS))
     return np.column_stack([np.interp(share, place, part) for part in scale]).astype(np.uint8)
@@ -131,7 +132,7 @@ def error_colours(share: FloatArray) -> np.ndarray[Any, np.dtype[np.uint8]]:
 
 @dataclass(frozen=True)
 class Frame:
-    """What the views are framed on; kept in every recording, so that several can be shown in one.
+    """The area that the views are framed on; kept in every recording, so that several can be shown in one.
 
     `bank_limit_deg` is None where several flights are shown; `world` is a hash of the obstacles, empty where they are
     not known.
@@ -145,7 +146,7 @@ class Frame:
 
     @property
     def kept(self) -> dict[str, Any]:
-        """What a recording keeps of it."""
+        """The values that a recording keeps of it."""
         return {name: getattr(self, name) for name in ("bounds_m", "altitude_m", "clearance_m", "world")}
 
     @property
@@ -156,7 +157,7 @@ class Frame:
 
 
 def series_lines(name: str, colour: tuple[int, ...], width: float) -> rr.SeriesLines:
-    """Style of a curve. Where a pixel has many values it shows their least and greatest, so that no peak is lost."""
+    """Returns the style of a curve; where a pixel has many values it shows the least and the greatest of them."""
     return rr.SeriesLines(
         names=[name],
         colors=[colour],
@@ -167,7 +168,7 @@ def series_lines(name: str, colour: tuple[int, ...], width: float) -> rr.SeriesL
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is known before the flight, the true obstacles and ground included.
+    """All that is known before the flight, the true obstacles and ground included.
 
     A planner `searches`, but not where a given path is flown; the aircraft `believes` where it does not know its state
     exactly. `profile` gives altitudes to be held at places along the path, above mean sea level; None: one all along.
@@ -194,7 +195,7 @@ class Scene:
 
     @property
     def base_m(self) -> float:
-        """From where drawings stand: the lowest ground, mean sea level where it is not known."""
+        """Height that drawings stand on: the lowest ground, or mean sea level where it is not known."""
         return 0.0 if self.ground is None else float(np.floor(np.nanmin(self.ground.heights_m)))
 
     @property
@@ -204,37 +205,37 @@ class Scene:
 
     @property
     def empty_series(self) -> tuple[str, ...]:
-        """Time series that have nothing to show: clearance where there is no obstacle, search where nothing is."""
+        """Names of time series with nothing to show: clearance without obstacles, search where nothing is searched."""
         shown = {"clearance": bool(self.obstacles), NAVIGATION: self.believes}
         shown |= dict.fromkeys(("search", PLAN_DELAY), self.searches)
         return tuple(name for name, has in shown.items() if not has)
 
     @cached_property
     def frame(self) -> Frame:
-        """What the views are framed on."""
+        """The area that the views are framed on."""
         limit_deg = round(math.degrees(self.limits.bank_limit_rad), 1)
         world = hashlib.sha256(repr(self.obstacles).encode()).hexdigest()[:16]
         return Frame(self.mission.bounds_m, self.altitude_m, self.limits.clearance_m, limit_deg, world)
 
     @property
     def obstacle_top_m(self) -> float:
-        """How high obstacles are drawn: above the flight altitude, and high enough to be seen from afar."""
+        """Height up to which obstacles are drawn: above the flight altitude, and visible from afar."""
         above_m = self.altitude_m - self.base_m
         return self.altitude_m + max(0.3 * above_m, 0.012 * self.frame.span_m)
 
 
 def time_column(time_s: FloatArray) -> rr.TimeColumn:
-    """Simulated time, rounded to nanoseconds (rerun truncates floats)."""
+    """Returns simulated times as a column, rounded to nanoseconds (rerun truncates floats)."""
     return rr.TimeColumn(TIMELINE, duration=np.round(time_s * 1e9).astype("timedelta64[ns]"))
 
 
 def nanoseconds(time_s: float) -> np.timedelta64:
-    """Simulated time, likewise."""
+    """Returns a simulated time rounded to nanoseconds."""
     return np.timedelta64(round(time_s * 1e9), "ns")
 
 
 def apart(times_s: Sequence[float], after_s: float = -math.inf) -> FloatArray:
-    """Rising times, none of them twice: of several at once each is a nanosecond later.
+    """Returns rising times, all different: of several at once each is a nanosecond later.
 
     A table by time keeps one event of each time.
     """

@@ -30,18 +30,17 @@ COLUMNS: Final = {
     **{name: name for name in ("planner", "aircraft", "seed")},
     "wind_mps": "wind, m/s",
 }
-"""Figures of a run that the table shows, in this order, and how they are headed.
-
+"""Figures of a run that the table shows, in this order, with their headings.
 A browser cuts a heading that is longer than the name of its figure by more than a letter."""
 LEADING_COLUMNS: Final = 3
 """Number of columns before the varied keys, of which more may be varied than fit a window."""
 ENDING_S: Final = 2.0
-"""The server has so long to end."""
+"""The server is given this time to end."""
 
 
 @contextlib.contextmanager
 def catalog(name: str, recordings: Sequence[Path]) -> Iterator[tuple[str, Any]]:
-    """Serves recordings as one dataset on 127.0.0.1, as long as the block lasts. To read a thousand takes seconds.
+    """Serves recordings as one dataset on 127.0.0.1 for the length of the block; reading a thousand takes seconds.
 
     Gives the address that a viewer opens, and rerun's handle of the dataset. A ViewerError says that rerun's server is
     not installed or does not start.
@@ -64,7 +63,7 @@ def catalog(name: str, recordings: Sequence[Path]) -> Iterator[tuple[str, Any]]:
 
 @contextlib.contextmanager
 def ended_in_time(server: Any) -> Iterator[None]:
-    """Ends a server with the block; it would wait for who is still connected, a browser's page for ever."""
+    """Ends a server with the block, without waiting for clients that are still connected."""
     try:
         yield
     finally:
@@ -78,7 +77,7 @@ def _figure(name: str) -> str:
 
 
 def _lay_out(dataset: Any, scratch: Path) -> None:
-    """Has the table of runs show its figures under plain headings, the worst run first, and a run our layout."""
+    """Lays out the table of runs, the worst run first under plain headings, and each run as our recordings are."""
     import rerun.blueprint as rrb
     from rerun.blueprint.table import Column, SortBy, TableLayout
 
@@ -109,7 +108,7 @@ def _lay_out(dataset: Any, scratch: Path) -> None:
 
 
 def common_frame(runs: pa.Table) -> Frame:
-    """What all recordings of a table are framed on; those that were not closed have nothing."""
+    """Returns an area that holds those of all recordings in a table; unfinished ones have none."""
     given = {
         name: [each for each in runs[column].to_pylist() if each]
         for name in ("bounds_m", "altitude_m", "clearance_m")

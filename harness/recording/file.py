@@ -1,4 +1,4 @@
-"""Where a recording goes: into its file, in a way that a full disk cannot stop, or to a viewer that is running.
+"""Sinks of a recording: its file, written so that a full disk cannot stop the flight, or a viewer that is running.
 
 rerun's own file sink gives up for ever at the first write that fails: whoever flushes or ends the recording then
 waits without end. So rerun writes into a pipe, and a thread of ours moves what comes out into the file.
@@ -17,17 +17,17 @@ import rerun as rr
 from harness.files.whole_file import fresh
 from harness.recording.layout import Layout
 
-ANSWER_S: Final = 5.0
-"""A viewer that has not taken what was sent after so long is taken to be gone."""
+VIEWER_TIMEOUT_S: Final = 5.0
+"""A viewer that has not taken what was sent within this time counts as gone."""
 _AT_ONCE_BYTES = 1 << 20
 _HEADER_BYTES = 12
-"""What an .rrd file begins with."""
-_MESSAGE = struct.Struct("<QQ")
-"""What each message in it begins with: its kind, and the number of bytes that follow."""
+"""Length of the header of an .rrd file."""
+_MESSAGE_HEADER = struct.Struct("<QQ")
+"""Header of a message in an .rrd file: its kind, and the number of bytes that follow."""
 
 
 def recording_stream(recording_id: str) -> rr.RecordingStream:
-    """What a recording is logged to. Threads and memory of those that were ended before are set free.
+    """Opens a stream for logging a recording, and frees threads and memory of streams that have ended.
 
     In the fork of a process that has recorded rerun cannot do that: there they stay.
     """
@@ -43,7 +43,7 @@ def recording_stream(recording_id: str) -> rr.RecordingStream:
 
 
 class RunningViewer:
-    """A viewer, or a server of rerun, that a recording is sent to."""
+    """A sink: a viewer, or a server of rerun, that takes a recording."""
 
     def __init__(self, rec: rr.RecordingStream, url: str, default_blueprint: Layout) -> None:
         self._rec, self._url = rec, url
@@ -51,9 +51,9 @@ class RunningViewer:
         default_blueprint.let_go()
 
     def flush(self) -> None:
-        """Has the viewer take what was logged; an OSError says that it does not."""
+        """Makes the viewer take what was logged; an OSError says that it does not."""
         try:
-            self._rec.flush(timeout_sec=ANSWER_S)
+            self._rec.flush(timeout_sec=VIEWER_TIMEOUT_S)
         except RuntimeError as error:
             raise OSError(f"the viewer at {self._url} has gone: {error}") from error
 
@@ -63,14 +63,14 @@ class RunningViewer:
 
 
 class RecordingFile:
-    """Where a recording goes. `end` must be called, also when the flight breaks off."""
+    """A sink: the file of a recording. `end` must be called, also when the flight breaks off."""
 
     def __init__(self, rec: rr.RecordingStream, path: Path, default_blueprint: Layout) -> None:
         self._rec, self._path = rec, path
         self._file = fresh(path)
         self._out, into = os.pipe()
         self._fault: OSError | None = None
-        self._mover = threading.Thread(target=self._move, name="recording", daemon=True)
+        self._mover = threading.Thread(target=self._pipe_to_file, name="recording", daemon=True)
         self._mover.start()
         try:
             rec.save(f"/dev/fd/{into}", default_blueprint=default_blueprint)
@@ -79,19 +79,19 @@ class RecordingFile:
             os.close(into)  # rerun has opened the pipe for itself
 
     def flush(self) -> None:
-        """Has rerun write out what was logged; an OSError says that some of it could not be written."""
+        """Makes rerun write out what was logged; an OSError says that some of it could not be written."""
         self._rec.flush()
-        self._check()
+        self._raise_fault()
 
     def end(self) -> None:
-        """Ends the recording, again it does nothing; an OSError says that some of it could not be written."""
+        """Ends the recording; a second call does nothing. An OSError says that some of it could not be written."""
         if not self._file.closed:
             self._rec.disconnect()
             self._mover.join()
             self._file.close()
-        self._check()
+        self._raise_fault()
 
-    def _move(self) -> None:
+    def _pipe_to_file(self) -> None:
         waiting = bytearray()
         begin = _HEADER_BYTES
         while data := os.read(self._out, _AT_ONCE_BYTES):
@@ -105,24 +105,24 @@ class RecordingFile:
         os.close(self._out)
 
     def _write(self, data: bytearray) -> None:
-        """Writes to the file; after a fault nothing more, but what rerun sends is taken: it must never wait."""
+        """Writes to the file; after a fault it drops data, since rerun must never wait."""
         while data and self._fault is None:
             try:
                 data = data[self._file.write(data) :]
             except OSError as error:
                 self._fault = error
 
-    def _check(self) -> None:
+    def _raise_fault(self) -> None:
         if self._fault is not None:
             raise OSError(self._fault.errno, self._fault.strerror, str(self._path))
 
 
 def end_of_whole(data: bytearray, begin: int) -> int:
-    """Where the last whole message ends."""
+    """Returns the index at which the last whole message ends."""
     end = 0
-    while begin + _MESSAGE.size <= len(data):
-        _, length = _MESSAGE.unpack_from(data, begin)
-        begin += _MESSAGE.size + length
+    while begin + _MESSAGE_HEADER.size <= len(data):
+        _, length = _MESSAGE_HEADER.unpack_from(data, begin)
+        begin += _MESSAGE_HEADER.size + length
         if begin > len(data):
             break
         end = begin

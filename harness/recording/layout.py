@@ -14,7 +14,7 @@ from harness.recording.blueprint import NAVIGATION, PLAN, SERIES, STATES, WORLD,
 
 
 class Layout(rrb.Blueprint):
-    """A blueprint that can be let go of.
+    """A blueprint whose stream can be closed.
 
     rerun 0.41 keeps what it writes one to for as long as the process lives: two threads and 3 MB each
     (rerun-io/rerun#2116).
@@ -30,7 +30,7 @@ class Layout(rrb.Blueprint):
         super()._log_to_stream(stream)
 
     def let_go(self) -> None:
-        """Once it has been sent."""
+        """Closes the stream, once the blueprint has been sent."""
         if self._stream is not None:
             self._stream.disconnect()
             self._stream = None
@@ -85,7 +85,7 @@ def blueprint(
 
 
 def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = ("",)) -> Layout:
-    """The layout of a recording, or of an overlay, by what it holds."""
+    """Returns the layout of a recording, or of an overlay, by the entities in it."""
     lanes = sum(each.startswith(f"/{STATES}/") for each in entities)
     runs = runs if lanes or len(runs) > 1 else ()
     drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{SERIES}/")}
@@ -98,14 +98,14 @@ PLOTS: Final = (
     (4, ("clearance", "search", look.PLAN_DELAY)),
     (5, ("bank",)),
 )
-"""Rows of the time series: share of the height, and names."""
+"""Rows of the time series: share of the height, and names of the series."""
 THIN_SERIES: Final = ("cross_track", "clearance", "bank")
 """Time series of a thin recording."""
-NOT_THIN: Final = tuple(name for _, names in PLOTS for name in names if name not in THIN_SERIES)
+WHOLE_ONLY_SERIES: Final = tuple(name for _, names in PLOTS for name in names if name not in THIN_SERIES)
 
 
 def _events_view() -> rrb.TextLogView:
-    """The log of events: one column, for each event says its time."""
+    """Shows the events in one column, without the time: the text of each says it."""
     return rrb.TextLogView(
         origin=look.EVENTS,
         name="Events",
@@ -117,7 +117,7 @@ def _events_view() -> rrb.TextLogView:
 
 
 def plan_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial2DView:
-    """The plan view, north up, framed on the area.
+    """Returns the plan view, north up, framed on the area.
 
     A 2-D view counts its second axis downwards; the transform at PLAN turns it round.
     """
@@ -140,7 +140,7 @@ def plan_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial2DView:
 
 
 def flight_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial3DView:
-    """The 3-D view: the whole area, seen from the south-west and above."""
+    """Returns the 3-D view of the whole area, seen from the south-west and above."""
     xmin, ymin, xmax, ymax = frame.bounds_m
     middle = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), frame.altitude_m)
     away = 1.25 * frame.span_m
@@ -166,7 +166,7 @@ def flight_view(frame: Frame, trails: Sequence[str]) -> rrb.Spatial3DView:
 
 
 def _plots(frame: Frame, runs: Sequence[str], without: Sequence[str]) -> rrb.Vertical:
-    """Three plots, the others in tabs behind them: so few that each is high enough for its axis to have numbers.
+    """Returns three plots, the others in tabs behind them, so that each is high enough for numbers on its axis.
 
     rerun numbers an axis at powers of ten that are 20 pixels apart; a bank of 45 degrees to both sides needs 210.
     """
@@ -202,7 +202,7 @@ def _plots(frame: Frame, runs: Sequence[str], without: Sequence[str]) -> rrb.Ver
 
 
 def _titles(frame: Frame, runs: Sequence[str], believes: bool) -> dict[str, str]:
-    """What the time series are called.
+    """Returns the titles of the time series.
 
     What the colours of a single flight's lines are stands in the title: a legend would cover the end of the curves. So
     does the limit of the bank: the axis of a low plot, as an overlay of many may have, has no number but 0.

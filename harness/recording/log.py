@@ -23,7 +23,7 @@ from harness.flight.observer import NOMINAL, Caution, ShieldState
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, RunningViewer, recording_stream
-from harness.recording.layout import NOT_THIN, blueprint
+from harness.recording.layout import WHOLE_ONLY_SERIES, blueprint
 from harness.recording.moving import Changing, Tracked
 from harness.recording.plans import send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
@@ -33,7 +33,7 @@ from harness.recording.solids import strips_3d
 from harness.recording.states import (
     TRACKABLE,
     Change,
-    Nearness,
+    NearMisses,
     States,
     log_colours,
     mode_of,
@@ -51,24 +51,24 @@ if TYPE_CHECKING:
 SCAN_SHARE = 0.004
 """A scan is drawn after every flight of this share of the area, and before every plan."""
 LEAST_PERIOD_S = 2.0
-"""Scans are not drawn more often than this, but before plans: an hour has to stay small in any area."""
+"""Except before plans, scans are drawn no more often than this, so that an hour stays small in any area."""
 CELL_SHARE = 0.0015
-"""Side of the cells in which sensed places are kept, as a share of the area."""
+"""Side of the cells in which sensed places are gathered, as a share of the area."""
 PIECE_SHARE = 0.001
 """Length of a piece of the trail, which has one colour, as a share of the area."""
 MARKER_STEP_ROWS, THIN_STEP_ROWS = 5, 20
-"""Rows of the track from one that is drawn to the next: of the marker in the plan view, of a thin recording."""
-THIN_CHORD_ERROR = 1e-2
-"""How far a plan of a thin recording may be off the true one, as a share of the turn radius: less than a pixel."""
+"""Every this many rows of the track one is drawn: of the marker in the plan view, and of a thin recording."""
+THIN_CHORD_ERROR_SHARE = 1e-2
+"""A plan in a thin recording is off the true one by up to this share of the turn radius: less than a pixel."""
 
 
 class RerunLog:
     """Writes one recording. A process that is killed leaves it readable up to the last block.
 
     It goes into a file, or, where `into` is text, to the viewer that runs at this address and then follows the flight.
-    The same run gives the same `recording_id`. `moving` tells what the map takes to move. A `thin` recording, of which
-    campaigns keep thousands, has no more than track, plans, obstacles and few rows of three time series. An OSError
-    says that the file cannot be written.
+    The same run gives the same `recording_id`. `moving` returns the obstacles known to move. A `thin` recording, which
+    campaigns keep thousands of, has only track, plans, obstacles and few rows of three time series. An OSError says
+    that the file cannot be written.
     """
 
     def __init__(
@@ -83,10 +83,10 @@ class RerunLog:
             raise FileNotFoundError(f"no folder {into.parent} for the recording")
         self._scene, self._thin = scene, thin
         self._rec = recording_stream(recording_id)
-        self._sink = self._opened(into)
+        self._sink = self._opened_sink(into)
         self._rec.send_recording_name(recording_id if thin else scene.name)
         span_m = scene.frame.span_m
-        self._chord_error_m = THIN_CHORD_ERROR * scene.mission.turn_radius_m if thin else 1e-5 * span_m
+        self._chord_error_m = THIN_CHORD_ERROR_SHARE * scene.mission.turn_radius_m if thin else 1e-5 * span_m
         self._scan_period_s = max(SCAN_SHARE * span_m / scene.mission.speed_mps, LEAST_PERIOD_S)
         piece_rows = min(max(round(10 * PIECE_SHARE * span_m / scene.mission.speed_mps), 10), 100)
         self._scan: RangeScan | None = None
@@ -104,13 +104,13 @@ class RerunLog:
         self._last: Track | None = None
         self._known_to_move, self._tracked = moving, Tracked()
         self._changing = Changing(scene)
-        self._nearness = Nearness(scene.limits.clearance_m)
+        self._nearness = NearMisses(scene.limits.clearance_m)
         log_scene(self._rec, scene, thin)
         log_styles(self._rec, scene, thin)
         self.flush()
 
-    def _opened(self, into: Path | str) -> RecordingFile | RunningViewer:
-        runs, without = ((), NOT_THIN) if self._thin else (("",), self._scene.empty_series)
+    def _opened_sink(self, into: Path | str) -> RecordingFile | RunningViewer:
+        runs, without = ((), WHOLE_ONLY_SERIES) if self._thin else (("",), self._scene.empty_series)
         lanes = 0 if self._thin else None
         layout = blueprint(self._scene.frame, runs, without, follows=isinstance(into, str), lanes=lanes)
         if isinstance(into, str):
@@ -145,7 +145,7 @@ class RerunLog:
             self._shield_states.setdefault(NOMINAL, look.CALM)
 
     def on_block(self, block: Track) -> None:
-        """Draws consecutive rows of the track, and what happened meanwhile."""
+        """Draws consecutive rows of the track, and the scans, plans and events meanwhile."""
         self._events += [(*event, look.TOLD) for event in self._nearness.events(block)]
         self._last = block
         position = np.column_stack((block.east_m, block.north_m, block.up_m))
@@ -182,7 +182,7 @@ class RerunLog:
             self._send_believed(block)
 
     def _send_believed(self, block: Track) -> None:
-        """Shows where the aircraft believed to be, and how far off that was."""
+        """Shows the believed positions and their errors."""
         assert block.believed_cross_track_m is not None
         shade = np.array(look.CHOSEN, dtype=np.uint8)
         self._trails[1].send(
@@ -264,7 +264,7 @@ class RerunLog:
         self._told_s = send_events(self._rec, events, self._told_s)
 
     def _send_scans(self, scans: Sequence[RangeScan]) -> None:
-        """Shows what scans returned, and which of it had not been seen before: dots, and posts in the 3-D view."""
+        """Shows the returns of scans, and the new ones among them: dots, and posts in the 3-D view."""
         times = [look.time_column(np.array([scan.time_s for scan in scans]))]
         returned = [returns_m(scan) for scan in scans]
         new = [self._sensed.new(points) for points in returned]
@@ -278,7 +278,7 @@ class RerunLog:
         self._rec.send_columns(f"{look.WORLD}/{look.SENSED}", times, strips)
 
     def _send_aircraft(self, block: Track, position_m: FloatArray, rows: IntArray, step: int) -> None:
-        """Moves the aircraft in the 3-D view at some rows, and at every so many of these in the plan view."""
+        """Moves the aircraft in the 3-D view at the given rows, and in the plan view at each `step`-th of them."""
         turn = quaternions(block.heading_deg[rows], block.pitch_deg[rows], block.roll_deg[rows])
         pose = rr.Transform3D.columns(translation=position_m[rows], quaternion=turn)
         self._rec.send_columns(f"{look.WORLD}/aircraft", [look.time_column(block.time_s[rows])], pose)

@@ -1,4 +1,4 @@
-"""What moves, in a recording: what the map takes to, with arrows of where it goes, and obstacles that truly do."""
+"""Moving obstacles in a recording: those the map knows to move, with arrows, and those that truly move."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from harness.recording.scene import log_moving
 from harness.recording.solids import strips_2d
 from planner.interface import MovingEdges
 
-EVERY_S = 1.0
-"""It is drawn no more often than this."""
-AHEAD_S = 30.0
-"""Arrows end where an obstacle will be after so long."""
+DRAWN_EVERY_S = 1.0
+"""Obstacles known to move are drawn no more often than this."""
+ARROW_S = 30.0
+"""An arrow ends where its obstacle will be after this time."""
 MOTION_STEP_ROWS = 10
-"""True obstacles are moved at every so many rows of the track."""
+"""True obstacles are moved at every this many rows of the track."""
 
 
 class Tracked:
-    """Gathers what is known to move, and draws it."""
+    """Gathers the obstacles that the map knows to move, and draws them."""
 
     def __init__(self) -> None:
         self._rows: list[tuple[float, tuple[MovingEdges, ...]]] = []
-        self._drawn_s, self._shown = -EVERY_S, False
+        self._drawn_s, self._shown = -DRAWN_EVERY_S, False
 
     def take(self, time_s: float, moving: Sequence[MovingEdges]) -> None:
-        """Takes what is known at a time; keeps it when it is due to be drawn, or gone."""
-        if (moving and time_s - self._drawn_s >= EVERY_S) or (self._shown and not moving):
+        """Takes the moving obstacles at a time; keeps them when they are due to be drawn, or gone."""
+        if (moving and time_s - self._drawn_s >= DRAWN_EVERY_S) or (self._shown and not moving):
             self._rows.append((time_s, tuple(moving)))
             self._drawn_s, self._shown = time_s, bool(moving)
 
@@ -50,7 +50,7 @@ class Tracked:
             rr.LineStrips2D.columns(strips=strips_2d(outlines)).partition(counts),
         )
         middles = np.array([outline.mean(axis=0) for outline in outlines]).reshape(-1, 2)
-        vectors = AHEAD_S * np.array([each.velocity_mps for each in every]).reshape(-1, 2)
+        vectors = ARROW_S * np.array([each.velocity_mps for each in every]).reshape(-1, 2)
         rec.send_columns(
             f"{look.PLAN}/{look.TRACKED}/velocity",
             times,
@@ -59,14 +59,14 @@ class Tracked:
 
 
 class Changing:
-    """Obstacles that move, come or go: shows, moves and hides them as the flight goes on."""
+    """Shows, moves and hides obstacles that move, come or go, as the flight goes on."""
 
     def __init__(self, scene: look.Scene) -> None:
         self._scene, self._shown_until_s = scene, -math.inf
         self._obstacles = [each for each in enumerate(scene.obstacles) if not each[1].stands_for_ever]
 
     def send(self, rec: rr.RecordingStream, time_s: FloatArray) -> None:
-        """Sends what becomes of them at consecutive times of the track."""
+        """Sends their changes at consecutive times of the track."""
         until = float(time_s[-1])
         for index, obstacle in self._obstacles:
             start, stop = obstacle.interval_s

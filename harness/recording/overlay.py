@@ -1,4 +1,4 @@
-"""Recordings made of recordings: several in one, with a colour for each; and one with the band of many days.
+"""Recordings made of recordings: an overlay of several, a colour each, and one with the band of many days.
 
 An overlay has the world of the first, tracks and series of all.
 """
@@ -24,10 +24,10 @@ from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import layout_of
 from harness.recording.properties import RUN
 
-SHARED = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
-"""Below PLAN and WORLD: what all runs of a scenario have in common."""
-OWN = (look.FLOWN, look.WHOLE, look.END, "aircraft")
-"""Below PLAN and WORLD: what is drawn of every run."""
+SHARED_ENTITIES = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
+"""Below PLAN and WORLD: entities that all runs of a scenario have in common."""
+RUN_ENTITIES = (look.FLOWN, look.WHOLE, look.END, "aircraft")
+"""Below PLAN and WORLD: entities that are drawn for every run."""
 
 COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "grey")
 """Names of the colours in `blueprint.OVERLAY`, for the summary."""
@@ -35,7 +35,7 @@ COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "g
 BAND_COLOUR = (120, 120, 120)
 
 FLOWN_LINE = "/flown"
-"""Ends the entities of the time series that are drawn of every run."""
+"""Entities of time series that are drawn for every run end so."""
 
 
 def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) -> str:
@@ -69,7 +69,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
 
 
 def _of_other_worlds(names: Sequence[str], worlds: Sequence[str]) -> str:
-    """Says which runs are not of the world that is shown; of a recording that does not name its world it is unknown."""
+    """Names the runs that were flown in another world than the one shown, if recordings tell their worlds."""
     others = [name for name, world in zip(names, worlds, strict=True) if world not in ("", worlds[0])]
     if not others or not worlds[0]:
         return ""
@@ -112,13 +112,13 @@ def send_recording(recording: Path, address: str) -> None:
 
 
 def runs_in(entities: Collection[str]) -> list[str]:
-    """The runs that a recording with these entities holds, as `layout_of` takes them."""
+    """Returns the runs that a recording with these entities holds, as `layout_of` takes them."""
     places = {int(found[1]) for each in entities if (found := re.match(rf"/{look.PLAN}/runs/(\d+)/", each))}
     return [f"runs/{place}/" for place in sorted(places)] or [""]
 
 
 def chunks_of(recording: Path) -> list[rr.chunk.Chunk]:
-    """The content of a recording, an incomplete one too; RunFolderError where it cannot be read."""
+    """Reads the content of a recording, also of an incomplete one; RunFolderError where it cannot be read."""
     try:
         with warnings.catch_warnings():
             # A recording of a killed run has no footer; it is read all the same.
@@ -129,7 +129,7 @@ def chunks_of(recording: Path) -> list[rr.chunk.Chunk]:
 
 
 def properties_of(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]:
-    """The properties of a recording, by their names and those of their values."""
+    """Returns the properties of a recording, by their names and those of their values."""
     return {
         chunk.entity_path.rpartition("/")[2]: {
             name.rpartition(":")[2]: cells[0]
@@ -142,7 +142,7 @@ def properties_of(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]
 
 
 def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
-    """What its views are framed on."""
+    """Returns the area that a recording's views are framed on."""
     kept = properties_of(chunks).get(look.FRAME)
     if kept is None:
         raise RunFolderError(f"{recording} is not a recording of a flight")
@@ -156,14 +156,14 @@ def _is_shared(entity: str) -> bool:
     parts = entity.strip("/").split("/")
     if parts[0] not in (look.PLAN, look.WORLD):
         return False
-    return len(parts) == 1 or parts[1] in SHARED
+    return len(parts) == 1 or parts[1] in SHARED_ENTITIES
 
 
 def _renamed(chunks: Sequence[rr.chunk.Chunk], run: str, place: int, name: str) -> Iterator[rr.chunk.Chunk]:
-    """Tracks, aircraft, series, states and events of one run, below entities of its own."""
+    """Yields tracks, aircraft, series, states and events of one run, below entities of its own."""
     for chunk in chunks:
         top, _, below = chunk.entity_path.strip("/").partition("/")
-        if top in (look.PLAN, look.WORLD) and below.split("/")[0] in OWN:
+        if top in (look.PLAN, look.WORLD) and below.split("/")[0] in RUN_ENTITIES:
             if below != "aircraft/sensing":
                 yield chunk.with_entity_path(f"/{top}/{run}{below}")
         elif top == look.SERIES and below.endswith(FLOWN_LINE) and not chunk.is_static:
@@ -173,7 +173,7 @@ def _renamed(chunks: Sequence[rr.chunk.Chunk], run: str, place: int, name: str) 
 
 
 def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], place: int, name: str) -> None:
-    """The events of one run, in its colour and after its name.
+    """Sends the events of one run, in its colour and after its name.
 
     They have an entity of their own: where the rows of several runs share one, rerun's log takes colours from the
     wrong run.
@@ -221,7 +221,7 @@ def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
 
 
 def _summary(names: Sequence[str], properties: Sequence[Mapping[str, Mapping[str, Any]]]) -> str:
-    """What came out of every run, side by side, as Markdown."""
+    """Returns the results of all runs side by side, as Markdown."""
     colours = [COLOUR_NAMES[place % len(COLOUR_NAMES)] for place in range(len(names))]
     rows = [["", *map(escaped, names)], ["---"] * (1 + len(names)), ["colour", *colours]]
     runs = [each.get(RUN, {}) for each in properties]
@@ -234,7 +234,7 @@ def _summary(names: Sequence[str], properties: Sequence[Mapping[str, Mapping[str
 
 
 def _shown(metric: Metric, run: Mapping[str, Any]) -> str:
-    """A figure among the properties of a run, which have percent in place of shares; empty where it has none."""
+    """Returns a figure from the properties of a run, where shares are in percent; empty where it has none."""
     (value,) = run.get(metric.recorded_as, (None,))
     share = metric.unit == "%" and value is not None
     return escaped(metric.text(value / metric.factor if share else value))

@@ -1,4 +1,4 @@
-"""Plans in a recording: the path, its waypoints and how it came about, as columns with one row a plan."""
+"""Plans in a recording: the path, its waypoints and the planner's working, as columns with one row a plan."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def send_plans(
     chord_error_m: float,
     thin: bool = False,
 ) -> None:
-    """Draws plans, each from the time on at which it takes effect; of a thin recording path and waypoints alone."""
+    """Draws plans, each from when it takes effect; in a thin recording path and waypoints alone."""
     if not plans:
         return
     times = [look.time_column(np.array([each.time_s for each in plans]))]
@@ -44,7 +44,7 @@ def send_plans(
 def _send_pictures(
     rec: rr.RecordingStream, times: list[rr.TimeColumn], pictures: Sequence[PlanPicture | None]
 ) -> None:
-    """Draws how plans came about, nothing where a planner does not show it."""
+    """Draws the planner's working for each plan, or nothing where a planner does not show it."""
     for place, entity in enumerate(("window", "sectors", "candidates")):
         rows = [_strips(picture)[place] if picture else [] for picture in pictures]
         flat = strips_2d([strip for row in rows for strip in row])
@@ -57,7 +57,7 @@ def _send_pictures(
 
 
 def _strips(picture: PlanPicture) -> tuple[list[FloatArray], ...]:
-    """Window, free sectors, and the candidates that were not chosen."""
+    """Returns the lines of the window, the free sectors, and the candidates that were not chosen."""
     here, window_m = picture.guide_m[0], picture.window_m
     window = [circle(here, window_m)] if window_m else []
     return window, [fan(here, edges, window_m) for edges in picture.sectors], list(picture.candidates[1:])

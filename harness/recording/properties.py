@@ -1,4 +1,4 @@
-"""Typed properties of a recording: what rerun's table of runs sorts and filters by."""
+"""Typed properties of a recording, by which rerun's table of runs sorts and filters."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ RUN: Final = "run"
 VARIED: Final = "varied"
 """Name of the properties with the keys that a campaign varied."""
 
-NOT_FAIR: Final = 1.0
+UNTRACKED_SEVERITY: Final = 1.0
 """Severity of a run that reached its goal and was not tracked, or came nearer to an obstacle than was wanted."""
 
 Value = str | float | int | bool
 
 
 def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, Value]:
-    """The figures of a run, each under a name with its unit; one that it does not have is left out.
+    """Returns the figures of a run, each under a name with its unit; one that it does not have is left out.
 
     Navigation errors that were planned for are no fault in its `severity`.
     """
@@ -52,7 +52,7 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
 
 
 def _recorded(metrics: Mapping[str, Any]) -> dict[str, Value | None]:
-    """The figures of the registry that recordings have; shares in percent."""
+    """Returns the figures of the registry that recordings have; shares in percent."""
     return {
         metric.recorded_as: metric.factor * value if metric.unit == "%" and value is not None else value
         for metric in METRICS
@@ -62,14 +62,14 @@ def _recorded(metrics: Mapping[str, Any]) -> dict[str, Value | None]:
 
 
 def _rounded(value: Value) -> Value:
-    """A figure as a table shows it: six significant digits."""
+    """Rounds a number to six significant digits, as a table shows it."""
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> float:
-    """How badly a run went: its outcome before the point, and behind it more the less clearance there was."""
+    """Rates how badly a run went: its outcome before the point, and behind it more the less clearance there was."""
     fair = trackable and (clearance_ratio is None or clearance_ratio >= 1.0)
-    whole = NOT_FAIR if outcome == "reached" and not fair else SEVERITY.get(outcome, 0.0)
+    whole = UNTRACKED_SEVERITY if outcome == "reached" and not fair else SEVERITY.get(outcome, 0.0)
     near = 0.0 if clearance_ratio is None else 1.0 / (1.0 + math.exp(min(clearance_ratio, 50.0)))
     return round(whole + near, 6)
 

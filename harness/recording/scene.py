@@ -1,4 +1,4 @@
-"""What stays the same in a recording: area, standing obstacles, shape of the aircraft, summary, and how all is drawn.
+"""The unchanging part of a recording: area, standing obstacles, shape of the aircraft, summary, and styles.
 
 Frame: local ENU plane, metres.
 """
@@ -21,9 +21,9 @@ from harness.recording.states import AT_LIMIT, FREE, log_colours
 from harness.recording.summary import colours, summary
 
 LEAST_CIRCLE_POINTS, THIN_CIRCLE_POINTS, POINTS_OF_ALL = 12, 24, 400_000
-"""Thousands of circles are drawn with fewer points each, so that their recording fits into memory."""
+"""Points of a circle at the least and in a thin recording, and of all circles together, which must fit into memory."""
 AIRCRAFT_SHARE = 0.022
-"""Wing span of the drawn aircraft as a share of the area: its true size could not be seen."""
+"""Wing span of the drawn aircraft as a share of the area, as its true size could not be seen."""
 
 STYLES: Final[tuple[tuple[str, Any, look.Colour | None, float, float | None], ...]] = (
     (f"{look.PLAN}/{look.SENSED}", rr.Points2D, look.EDGE, 1.25, 12),
@@ -43,10 +43,10 @@ STYLES: Final[tuple[tuple[str, Any, look.Colour | None, float, float | None], ..
     (f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D, None, 1.25, None),
 )
 """Entity, archetype, colour (None: it comes with the data), size in points of the screen, order of drawing."""
-THIN: Final = (f"{look.PLAN}/chosen", f"{look.PLAN}/waypoints")
-"""Those that a thin recording has."""
+THIN_ENTITIES: Final = (f"{look.PLAN}/chosen", f"{look.PLAN}/waypoints")
+"""Entities of `STYLES` that a thin recording has."""
 
-SHAPE = np.array(
+AIRCRAFT_TRIANGLES = np.array(
     [
         [(1.1, 0, 0), (-1.1, 0.10, 0), (-1.1, -0.10, 0)],
         [(0.35, 0, 0.06), (-0.05, 1, 0.06), (-0.30, 0, 0.06)],
@@ -89,9 +89,9 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
 
 
 def log_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
-    """Logs how all entities and time series are drawn that the recording has."""
+    """Logs the styles of all entities and time series that the recording has."""
     for entity, archetype, colour, size, order in STYLES:
-        if entity in THIN or not thin:
+        if entity in THIN_ENTITIES or not thin:
             style = {"colors": colour and [colour], "radii": rr.Radius.ui_points(size)}
             style |= {"draw_order": order} if order else {}
             rec.log(entity, archetype.from_fields(**style), static=True)
@@ -103,8 +103,8 @@ def log_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
 def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
     """Outlines a moving or timed obstacle from the current time on, where it is at its epoch."""
     obstacle = scene.obstacles[index]
-    rec.log(f"{look.PLAN}/moving/{index}", lines_2d(outlines(obstacle.shape), look.MOVING_DIM, 1.5, 10))
-    rec.log(f"{look.WORLD}/moving/{index}", rims(scene, [obstacle], look.MOVING_DIM))
+    rec.log(f"{look.PLAN}/moving/{index}", lines_2d(outlines(obstacle.shape), look.MOVING_OUTLINE, 1.5, 10))
+    rec.log(f"{look.WORLD}/moving/{index}", rims(scene, [obstacle], look.MOVING_OUTLINE))
     log_solids(rec, f"{look.WORLD}/moving/{index}", scene, [obstacle], look.MOVING, static=False)
 
 
@@ -121,7 +121,7 @@ def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
 
 
 def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any] | None) -> None:
-    """Logs the summary: what was asked, what came out (if known), what the colours mean."""
+    """Logs the summary: the task, the results (if known), and the meaning of the colours."""
     rec.log(
         look.SUMMARY, rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN), static=True
     )
@@ -130,7 +130,7 @@ def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any
 def lines_2d(
     polylines: Sequence[FloatArray], colours: Colour | Sequence[Colour], width: float, order: float
 ) -> rr.LineStrips2D:
-    """Polylines (k, 2) in the plan view, `width` in points of the screen."""
+    """Returns polylines (k, 2) for the plan view, `width` in points of the screen."""
     several = colours if polylines and isinstance(colours[0], tuple) else [colours]
     return rr.LineStrips2D(
         strips_2d([points[:, :2] for points in polylines]),
@@ -141,7 +141,7 @@ def lines_2d(
 
 
 def fan(center_m: FloatArray, edges: FloatArray, radius_m: float) -> FloatArray:
-    """Outline of a sector from its right edge anticlockwise to its left edge."""
+    """Returns the outline of a sector from its right edge anticlockwise to its left edge."""
     right = math.atan2(edges[1], edges[0])
     width = (math.atan2(edges[3], edges[2]) - right) % math.tau or math.tau
     angle = right + np.linspace(0.0, width, max(int(width / 0.1), 1) + 1)
@@ -150,7 +150,7 @@ def fan(center_m: FloatArray, edges: FloatArray, radius_m: float) -> FloatArray:
 
 
 def quaternions(heading_deg: FloatArray, pitch_deg: FloatArray, roll_deg: FloatArray) -> FloatArray:
-    """(n, 4) xyzw rotations from body axes (x forward, y left, z up) to ENU.
+    """Returns (n, 4) xyzw rotations from body axes (x forward, y left, z up) to ENU.
 
     Heading is clockwise from north and turns about -z, pitch is nose up and turns about -y, roll is right
     wing down and turns about x: q = q_z(90 deg - heading) q_y(-pitch) q_x(roll) (Diebel, Representing
@@ -208,7 +208,7 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
 
 
 def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
-    """A scale bar and an arrow along the wind, in the lower right and the upper left corner of the plan view."""
+    """Logs a scale bar and an arrow along the wind, in two corners of the plan view."""
     xmin, ymin, xmax, ymax = scene.mission.bounds_m
     margin_m = 0.04 * scene.frame.span_m
     bar_m = scale_bar_m(scene.frame.span_m)
@@ -227,13 +227,13 @@ def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
 
 
 def scale_bar_m(span_m: float) -> float:
-    """Length of a scale bar: the largest of 1, 2, 5, 10, 20 ... m that is at most a quarter of a span."""
+    """Returns the length of a scale bar: the largest of 1, 2, 5, 10, 20 ... m that is at most a quarter of a span."""
     decade = 10.0 ** math.floor(math.log10(0.25 * span_m))
     return decade * max(step for step in (1, 2, 5) if step * decade <= 0.25 * span_m)
 
 
 def _log_labelled(rec: rr.RecordingStream, name: str, line: FloatArray, label: str) -> None:
-    """A line (k, 2) of the plan view that never changes, with a label at its middle."""
+    """Logs a line (k, 2) of the plan view that never changes, with a label at its middle."""
     strips = rr.LineStrips2D(
         [line],
         colors=[look.START_LIGHT],
@@ -246,9 +246,9 @@ def _log_labelled(rec: rr.RecordingStream, name: str, line: FloatArray, label: s
 
 
 def _log_aircraft(rec: rr.RecordingStream, frame: look.Frame) -> None:
-    """The aircraft as a mesh (x forward, y left, z up) in the 3-D view, and as an arrowhead in the plan view."""
+    """Logs the aircraft as a mesh (x forward, y left, z up) in the 3-D view, and as an arrowhead in the plan view."""
     half = 0.5 * AIRCRAFT_SHARE * frame.span_m
-    corners = half * SHAPE.reshape(-1, 3)
+    corners = half * AIRCRAFT_TRIANGLES.reshape(-1, 3)
     mesh = rr.Mesh3D(
         vertex_positions=corners,
         triangle_indices=np.arange(len(corners)).reshape(-1, 3),

@@ -1,4 +1,4 @@
-"""The time series of a recording: curves of the track, the levels they are held against."""
+"""The time series of a recording: curves of the track, and the limits and wanted values beside them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from harness.recording.layout import THIN_SERIES
 
 
 def thin_curves(block: Track) -> dict[str, FloatArray]:
-    """The curves that a thin recording has, by entity below SERIES."""
+    """Returns the curves that a thin recording has, by entity below SERIES."""
     return {
         "cross_track/flown": block.cross_track_m,
         "clearance/flown": np.where(np.isfinite(block.clearance_m), block.clearance_m, np.nan),
@@ -24,7 +24,7 @@ def thin_curves(block: Track) -> dict[str, FloatArray]:
 
 
 def thin_rows(entity: str, curve: FloatArray, every: int) -> IntArray:
-    """The rows of a curve (n,) that a thin recording keeps: every so many, the extreme ones between, and the last.
+    """Returns the rows of a curve (n,) for a thin recording: every `every`-th, extremes between, and the last.
 
     Without the extreme ones a plot would show less than the figures say: a peak is shorter than the rows are apart.
     """
@@ -36,7 +36,7 @@ def thin_rows(entity: str, curve: FloatArray, every: int) -> IntArray:
 
 
 def curves(block: Track, altitude_m: FloatArray) -> dict[str, FloatArray]:
-    """The curves of a whole recording, by entity below SERIES."""
+    """Returns the curves of a whole recording, by entity below SERIES."""
     return {
         **thin_curves(block),
         "bank/pitch": block.pitch_deg,
@@ -64,7 +64,7 @@ def send_levels(rec: rr.RecordingStream, scene: look.Scene, time_s: FloatArray) 
 
 
 def log_series_styles(rec: rr.RecordingStream, scene: look.Scene, thin: bool) -> None:
-    """Logs how the time series are drawn that the recording has: a layout is made by what there is."""
+    """Logs the styles of the time series that the recording has, since a layout is made by them."""
     empty = {*scene.empty_series, *(() if scene.believes else (look.BELIEVED_OFF,))}
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
         plot = entity.partition("/")[0]

@@ -26,25 +26,25 @@ if TYPE_CHECKING:
 
 CIRCLE_POINTS = 72
 MOST_NODES: Final = 160_000
-"""Nodes of the drawn mesh: a recording stays small, and a screen shows no more."""
-SUN: Final = (-0.5, 0.5, 0.7071)
-"""Towards the light: from the north-west and 45 degrees high, as maps are shaded."""
-LOW, HIGH = np.array((58.0, 74.0, 62.0)), np.array((150.0, 140.0, 126.0))
+"""The drawn mesh of the ground has at most this many nodes; a screen shows no more."""
+TO_LIGHT: Final = (-0.5, 0.5, 0.7071)
+"""Vector towards the light: from the north-west and 45 degrees high, as maps are shaded."""
+LOW_COLOUR, HIGH_COLOUR = np.array((58.0, 74.0, 62.0)), np.array((150.0, 140.0, 126.0))
 """Colours of the lowest and the highest ground in full light."""
-SHADE: Final = 0.35
-"""Share of the colour that is left where no light falls."""
+SHADE_SHARE: Final = 0.35
+"""Share of the colour that remains where no light falls."""
 
 Prism: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint32]]
 """Vertices (n, 3), their normals (n, 3) and triangles (k, 3) of indices, in the types that rerun keeps."""
 
 
 def strips_2d(polylines: Sequence[FloatArray]) -> pa.ListArray:
-    """(n,) strips of polylines (k, 2), each of a length of its own."""
+    """Packs polylines (k, 2), each of its own length, as (n,) strips for rerun."""
     return _strips(polylines, 2, Vec2DBatch, rr.components.LineStrip2D)
 
 
 def strips_3d(polylines: Sequence[FloatArray]) -> pa.ListArray:
-    """(n,) strips of polylines (k, 3), each of a length of its own."""
+    """Packs polylines (k, 3), each of its own length, as (n,) strips for rerun."""
     return _strips(polylines, 3, Vec3DBatch, rr.components.LineStrip3D)
 
 
@@ -65,14 +65,14 @@ def circle(
 
 
 def outlines(shape: Circle | Polygon, points: int = CIRCLE_POINTS) -> list[FloatArray]:
-    """Closed rings round a shape, those of holes included; circles with so many points."""
+    """Returns closed rings round a shape and its holes; a circle has `points` corners."""
     if isinstance(shape, Circle):
         return [circle(shape.center_m, shape.radius_m, points)]
     return [np.array([*ring, ring[0]], dtype=np.float64) for ring in shape.rings_m]
 
 
 def drawn_heights(scene: Scene, obstacle: Obstacle) -> tuple[float, float]:
-    """Bottom and top at which an obstacle is drawn, m."""
+    """Returns the heights (m) of bottom and top at which an obstacle is drawn."""
     if obstacle.heights_m is None:
         return scene.base_m, scene.obstacle_top_m
     low, high = obstacle.heights_m
@@ -82,7 +82,7 @@ def drawn_heights(scene: Scene, obstacle: Obstacle) -> tuple[float, float]:
 def rims(
     scene: Scene, obstacles: Sequence[Obstacle], colour: Colour, points: int = CIRCLE_POINTS
 ) -> rr.LineStrips3D:
-    """Outlines at the bottom and at the top of obstacles."""
+    """Draws outlines at the bottom and at the top of obstacles."""
     lines = [
         np.column_stack((ring, np.full(len(ring), height)))
         for obstacle in obstacles
@@ -127,7 +127,7 @@ def _cylinders(circles: Sequence[tuple[Circle, float, float]], colour: Colour) -
 
 
 def _mesh(prisms: Sequence[Prism], colour: Colour) -> rr.Mesh3D:
-    """Prisms as one mesh."""
+    """Joins prisms to one mesh."""
     vertices, normals, faces = zip(*prisms, strict=True)
     firsts = np.cumsum([0, *map(len, vertices[:-1])], dtype=np.uint32)
     return rr.Mesh3D(
@@ -139,7 +139,7 @@ def _mesh(prisms: Sequence[Prism], colour: Colour) -> rr.Mesh3D:
 
 
 def prism(polygon: Polygon, low_m: float, high_m: float) -> Prism:
-    """Vertices, normals and triangles of an upright prism without a floor, with sharp edges; its holes are open."""
+    """Returns vertices, normals and triangles of an upright prism without a floor, with sharp edges and open holes."""
     import shapely
 
     shape = shapely.orient_polygons(shapely.Polygon(polygon.vertices_m, polygon.holes_m))
@@ -168,7 +168,7 @@ def prism(polygon: Polygon, low_m: float, high_m: float) -> Prism:
 
 
 def log_ground(rec: rr.RecordingStream, field: HeightField) -> None:
-    """Logs the ground, every so many nodes of a fine one; where its height is not known there is a hole."""
+    """Logs the ground as a mesh, thinned where it is fine; where its height is not known there is a hole."""
     rows, columns = field.heights_m.shape
     step = max(int(np.ceil(np.sqrt(rows * columns / MOST_NODES))), 1)
     heights = field.heights_m[::step, ::step]
@@ -195,11 +195,11 @@ def shaded(heights: FloatArray, right_m: float, up_m: float) -> NDArray[np.uint8
     known = np.where(np.isfinite(heights), heights, np.nanmin(heights))
     slope_north, slope_east = np.gradient(known, up_m, right_m)
     size = np.sqrt(1.0 + slope_east**2 + slope_north**2)
-    light = np.clip((-SUN[0] * slope_east - SUN[1] * slope_north + SUN[2]) / size, 0.0, 1.0)
+    light = np.clip((-TO_LIGHT[0] * slope_east - TO_LIGHT[1] * slope_north + TO_LIGHT[2]) / size, 0.0, 1.0)
     low, high = float(known.min()), float(known.max())
     share = (known - low) / max(high - low, 1.0)
-    colour = LOW + share[..., None] * (HIGH - LOW)
-    lit = colour * (SHADE + (1.0 - SHADE) * light / SUN[2])[..., None]
+    colour = LOW_COLOUR + share[..., None] * (HIGH_COLOUR - LOW_COLOUR)
+    lit = colour * (SHADE_SHARE + (1.0 - SHADE_SHARE) * light / TO_LIGHT[2])[..., None]
     found: NDArray[np.uint8] = np.clip(lit, 0, 255).astype(np.uint8)
     return found
 

@@ -1,4 +1,4 @@
-"""What a recording tells: lanes of states (planner, bank at its limit, what is tracked), and lines of events."""
+"""Lanes of states in a recording (planner, bank at its limit, what is tracked), and lines of events."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ WAITING = "waiting for a plan"
 HOLDING = "holding"
 AT_LIMIT, FREE = "bank command at its limit", "bank command below its limit"
 TRACKABLE = "trackable"
-CLEAR_AGAIN: Final = 1.05
-"""Over so many times the wanted clearance an aircraft that came nearer is clear again: one event each time."""
+CLEAR_AGAIN_FACTOR: Final = 1.05
+"""An aircraft that came too near is clear again at this many times the wanted clearance."""
 TOLD_DELAY_S: Final = 0.05
-"""A plan that took effect so long after its scan says so."""
+"""The event of a plan tells its delay after the scan if it is at least this."""
 
 
 class States:
-    """Finds the changes of state, block by block."""
+    """Finds the changes of state in the track, block by block."""
 
     def __init__(self, bank_limit_deg: float) -> None:
         self._limit_deg = bank_limit_deg - 0.01
@@ -53,7 +53,7 @@ class States:
         return {WAITING: look.CALM, HOLDING: look.HOLD, **colours}
 
     def changes(self, block: Track) -> dict[str, list[Change]]:
-        """The changes within a block, by lane."""
+        """Returns the changes within a block, by lane."""
         turns_at = np.array([*self._turns_at_m, math.inf])[block.plan_index]
         holding = block.arc_length_m > turns_at
         numbers = np.where(holding, -2, block.plan_index)
@@ -78,12 +78,12 @@ class States:
 
 
 def mode_of(reason: str) -> str:
-    """A plan's reason, an ellipsis for each number: what stays the same while the planner does the same."""
+    """Replaces each number in a plan's reason by an ellipsis; it stays the same while the planner does the same."""
     return re.sub(r"[-+]?\d+(?:[.,]\d+)*", "\N{HORIZONTAL ELLIPSIS}", reason)
 
 
 def tracking_changes(legs: Sequence[Mapping[str, Any]]) -> list[Change]:
-    """The lane of the verdicts, from `trackability` of `metrics.json`."""
+    """Returns the changes in the lane of verdicts, from `trackability` of `metrics.json`."""
     found: list[Change] = []
     for leg in legs:
         state = TRACKABLE if leg["trackable"] else str(leg["cause"])
@@ -111,7 +111,7 @@ def log_colours(rec: rr.RecordingStream, lane: str, states: Mapping[str, look.Co
 
 
 def plan_text(accepted: AcceptedPlan) -> str:
-    """What is told of a plan that takes effect."""
+    """Returns the event line of a plan that takes effect."""
     late = f", {accepted.delay_s:.1f} s after its scan" if accepted.delay_s >= TOLD_DELAY_S else ""
     return f"{accepted.plan.reason} (plan {accepted.plan_index}, {accepted.compute_ms:.1f} ms{late})"
 
@@ -137,14 +137,14 @@ def send_events(
     return float(apart_s[-1])
 
 
-class Nearness:
-    """Tells when the aircraft comes nearer to an obstacle than was wanted, and when it is clear again."""
+class NearMisses:
+    """Finds when the aircraft comes nearer to an obstacle than was wanted, and when it is clear again."""
 
     def __init__(self, wanted_m: float) -> None:
         self._wanted_m, self._least_m = wanted_m, math.inf
 
     def events(self, block: Track) -> list[tuple[float, str]]:
-        """Times and texts for consecutive rows of the track."""
+        """Returns times and texts for consecutive rows of the track."""
         found: list[tuple[float, str]] = []
         if self._least_m == math.inf and not (block.clearance_m < self._wanted_m).any():
             return found
@@ -154,7 +154,7 @@ class Nearness:
                     told = f"nearer to an obstacle than the wanted {self._wanted_m:g} m"
                     found.append((time_s, Caution(told)))
                 self._least_m = min(self._least_m, clearance_m)
-            elif self._least_m < math.inf and clearance_m > CLEAR_AGAIN * self._wanted_m:
+            elif self._least_m < math.inf and clearance_m > CLEAR_AGAIN_FACTOR * self._wanted_m:
                 told = f"clear of the obstacle again, after {self._least_m:.1f} m at the least"
                 found.append((time_s, told))
                 self._least_m = math.inf

@@ -1,4 +1,4 @@
-"""The summary page of a recording, in Markdown: what was asked, what came out, what the colours mean."""
+"""The summary page of a recording, in Markdown: the task, the results, the meaning of the colours."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ LEGEND = """\
 
 The aircraft is drawn larger than it is; obstacles have no top.
 """
-"""A list, for its lines are wrapped; a viewer cuts the cells of a table at the edge of a narrow view."""
+"""Explains the colours as a list, whose lines are wrapped; a narrow view would cut the cells of a table."""
 
 
 def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
-    """The page as Markdown."""
+    """Returns the page as Markdown."""
     mission = scene.mission
     # No heading: it would take three lines of a view that has room for five.
     lines = [escaped(scene.name), ""]
@@ -58,12 +58,12 @@ def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
 
 
 def colours(scene: Scene) -> str:
-    """What the colours of the views mean, as Markdown."""
+    """Returns an explanation of the colours of the views, as Markdown."""
     return LEGEND.format(error=f"{scene.limits.cross_track_threshold_m:.4g}")
 
 
 def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
-    """What came out, name and value: clearance and verdict, then what the viewer's table of runs shows."""
+    """Returns the results by name: clearance and verdict, then those in the viewer's table of runs."""
     causes = dict.fromkeys(leg["cause"] for leg in metrics["trackability"] if not leg["trackable"])
     found = {
         "least clearance": _clearance(scene, metrics),

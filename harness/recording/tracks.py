@@ -21,7 +21,7 @@ SERIES: Final = {
     "airspeed_mps": "airspeed, m/s",
     "height_m": "height over that commanded, m",
 }
-"""Columns that are drawn over time, and what the views are called."""
+"""Columns that are drawn over time, with the titles of their views."""
 
 
 def write_tracks(
@@ -56,7 +56,7 @@ def write_tracks(
 def _send_track(
     rec: rr.RecordingStream, label: str, track: Mapping[str, FloatArray], colour: look.Colour
 ) -> None:
-    """One track: its line, the aircraft on it, its time series."""
+    """Sends one track: its line, the aircraft on it, its time series."""
     position = np.column_stack((track["east_m"], track["north_m"], track["height_m"]))
     times = [look.time_column(track["time_s"])]
     rec.log(f"{look.WORLD}/{label}/track", rr.LineStrips3D([position], colors=[colour]), static=True)

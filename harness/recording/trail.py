@@ -1,4 +1,4 @@
-"""What grows with the flight, in the plan view and in the 3-D view: trails, and what the sensor has shown so far."""
+"""Drawings that grow with the flight, in the plan view and in the 3-D view: trails, and all that was sensed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Trail:
         points_m: FloatArray,
         colours: Callable[[IntArray], Colours],
     ) -> FloatArray:
-        """Sends consecutive points (n, 3), `colours` (k, 3) by first rows of pieces; returns what was drawn, (m, 3)."""
+        """Sends further points (n, 3), `colours` (k, 3) by first rows of pieces; returns the points drawn, (m, 3)."""
         last_row, step = len(points_m) - 1, max(self._rows // 4, 1)
         ends = np.append(np.arange(self._rows - 1, last_row, self._rows), last_row)
         starts = np.append(0, ends[:-1] + 1)
@@ -51,7 +51,7 @@ class Trail:
 
 
 class Sensed:
-    """Gathers places that two scans have shown, one a cell of a square grid: a false return is seen once."""
+    """Gathers places that two scans have shown, one a cell of a square grid, as a false return is seen once."""
 
     def __init__(self, cell_m: float) -> None:
         self._cell_m = cell_m
@@ -59,7 +59,7 @@ class Sensed:
         self._known: set[int] = set()
 
     def new(self, points_m: FloatArray) -> FloatArray:
-        """(k, 2) those places of the next scan, of what it returned (n, 2), that are shown for the second time."""
+        """(k, 2) those of a scan's returns (n, 2) that lie in a cell for the second time."""
         cells = (np.round(points_m / self._cell_m).astype(np.int64) @ (1 << 32, 1)).tolist()
         rows = {cell: row for row, cell in reversed([*enumerate(cells)])}  # the first of each cell
         fresh = (rows.keys() & self._once) - self._known
@@ -70,7 +70,7 @@ class Sensed:
 
 
 def returns_m(scan: RangeScan) -> FloatArray:
-    """(k, 2) places from which something came back."""
+    """(k, 2) places of the returns of a scan."""
     if scan.nearest_m == math.inf:
         return np.zeros((0, 2))
     return scan.returned()[1].view(np.float64).reshape(-1, 2)

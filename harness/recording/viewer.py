@@ -35,18 +35,18 @@ from harness.recording.overlay import send_recording, write_overlay
 from harness.run_files.run_folder import OVERLAY, RECORDING, recording_of
 
 LOCALHOST = "127.0.0.1"
-POLICY = (
+CONTENT_POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
     f"connect-src 'self' blob: data: http://{LOCALHOST}:* ws://{LOCALHOST}:*"
 )
-"""What the page may load: its own parts; and what it may talk to: this machine."""
-PASSED_ON = ("Content-Type", "Content-Encoding", "Cache-Control")
-"""Headers of rerun's server that go with its answers."""
-OUTSIDE = re.compile(rb"<link\b[^>]*https?://[^>]*>|https://[^\"']*\.js\b")
-"""Parts of the page that would load something from elsewhere: fonts and the script of statistics."""
+"""The page may load its own parts only, and talk to this machine only."""
+PASSED_HEADERS = ("Content-Type", "Content-Encoding", "Cache-Control")
+"""Headers of rerun's server that are passed on with its answers."""
+OUTSIDE_PARTS = re.compile(rb"<link\b[^>]*https?://[^>]*>|https://[^\"']*\.js\b")
+"""Matches parts of the page that load something from elsewhere: fonts and the script of statistics."""
 START_TIMEOUT_S = 30.0
-ALONE = ".rrd"
-LOG = "viewer.log"
+ENDING = ".rrd"
+VIEWER_LOG = "viewer.log"
 NO_SCREEN = (
     "there is no screen to open the viewer on (neither DISPLAY nor WAYLAND_DISPLAY is set); `wayproof view --web`, or "
     f"`wayproof fly --live --web`, shows it in a browser; or copy the run's {RECORDING} to a machine with a screen and "
@@ -75,14 +75,14 @@ def open_viewer(
     if len(run_dirs) == 1:
         run_dirs = [_overlay_of(run_dirs[0])]
     for each in run_dirs:
-        if each.suffix.lower() != ALONE:
+        if each.suffix.lower() != ENDING:
             recording_of(each)
         elif not each.is_file():
             raise InputError(f"{each}: no such file")
         elif len(run_dirs) > 1:
             raise InputError(f"{each}: a recording is opened alone; run folders are overlaid")
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
-        recordings = [each if each.suffix.lower() == ALONE else recording_of(each) for each in run_dirs]
+        recordings = [each if each.suffix.lower() == ENDING else recording_of(each) for each in run_dirs]
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
@@ -96,7 +96,7 @@ def open_viewer(
 
 
 def _overlay_of(folder: Path) -> Path:
-    """The overlay in the folder of a comparison; any other path as it is."""
+    """Returns the overlay in the folder of a comparison; any other path as it is."""
     if (folder / RECORDING).exists():
         return folder
     overlays = sorted([*folder.glob(OVERLAY), *folder.glob(f"*/{OVERLAY}")])
@@ -146,13 +146,13 @@ def local_page(port: int, source_port: int) -> Iterator[None]:
             try:
                 with urllib.request.urlopen(f"http://{LOCALHOST}:{source_port}{self.path}") as answer:
                     self.send_response(answer.status)
-                    for name in PASSED_ON:
+                    for name in PASSED_HEADERS:
                         if name in answer.headers:
                             self.send_header(name, answer.headers[name])
-                    self.send_header("Content-Security-Policy", POLICY)
+                    self.send_header("Content-Security-Policy", CONTENT_POLICY)
                     self.send_header("Connection", "close")
                     if answer.headers.get_content_type() == "text/html":
-                        page = OUTSIDE.sub(b"", answer.read())
+                        page = OUTSIDE_PARTS.sub(b"", answer.read())
                         self.send_header("Content-Length", str(len(page)))
                         self.end_headers()
                         self.wfile.write(page)
@@ -186,7 +186,7 @@ def wait_for(viewer: subprocess.Popen[str]) -> None:
 
 
 def run_names(run_dirs: Sequence[Path]) -> list[str]:
-    """Names of runs: as much of the end of each path as tells them apart, and a number where nothing does."""
+    """Names runs by as much of the end of each path as tells them apart, with a number where nothing does."""
     paths = [folder.resolve().parts for folder in run_dirs]
     longest = max(map(len, paths))
     length = next((n for n in range(1, longest) if len({path[-n:] for path in paths}) == len(paths)), 1)
@@ -197,7 +197,7 @@ def run_names(run_dirs: Sequence[Path]) -> list[str]:
 
 
 def _executable() -> str:
-    """The viewer's own program; the wheel's `rerun` command only wraps it and would leave it behind."""
+    """Returns the viewer's own program; the wheel's `rerun` command only wraps it and would leave it behind."""
     spec = find_spec("rerun_cli")
     folder = Path(spec.origin).parent if spec is not None and spec.origin else Path()
     for name in ("rerun", "Rerun.app/Contents/MacOS/Rerun", "rerun.exe"):
@@ -222,7 +222,7 @@ def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iter
     environment = {**os.environ, "XDG_CONFIG_HOME": str(scratch), "RUST_LOG": "error"}
     command = [_executable(), *arguments]
     with (
-        (scratch / LOG).open("w+", encoding="utf-8") as log,
+        (scratch / VIEWER_LOG).open("w+", encoding="utf-8") as log,
         subprocess.Popen(
             command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log, text=True
         ) as viewer,
@@ -238,7 +238,7 @@ def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iter
 
 
 def _why_not(scratch: Path) -> str:
-    lines = (scratch / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    lines = (scratch / VIEWER_LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
     return f"the viewer does not start: {lines[-1] if lines else 'it gave no reason'}"
 
 
@@ -256,13 +256,13 @@ def _terminated_as_interrupted() -> Iterator[None]:
 
 
 def in_notebook() -> bool:
-    """Whether this process answers a notebook: IPython runs in it with a kernel."""
+    """Tells whether this process answers a notebook: IPython runs in it with a kernel."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return getattr(shell, "kernel", None) is not None
 
 
 def viewer_widget(recording: Path, width_px: int, height_px: int) -> Any:
-    """A widget of a notebook that shows a recording; a ViewerError says that rerun's notebook viewer is missing."""
+    """Returns a notebook widget that shows a recording; a ViewerError says that rerun's notebook viewer is missing."""
     import rerun as rr
     from rerun import notebook
 
@@ -277,7 +277,7 @@ def viewer_widget(recording: Path, width_px: int, height_px: int) -> Any:
 
 
 def free_port() -> int:
-    """A port of this machine that nobody listens on."""
+    """Returns a port of this machine that nobody listens on."""
     with socket.socket() as probe:
         probe.bind((LOCALHOST, 0))
         port: int = probe.getsockname()[1]
@@ -285,7 +285,7 @@ def free_port() -> int:
 
 
 def answers(port: int, viewer: subprocess.Popen[str]) -> bool:
-    """Whether a viewer comes to listen on a port."""
+    """Tells whether a viewer comes to listen on a port."""
     until = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < until and viewer.poll() is None:
         with contextlib.suppress(OSError), socket.create_connection((LOCALHOST, port), timeout=1.0):

@@ -1,4 +1,4 @@
-"""A flown flight as columns: from tables, from flight logs, and what is made of them where a column is missing."""
+"""A flown flight as columns, from tables and from flight logs; a missing velocity or height is filled in."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ OPTIONAL: Final = (
     *("ve_mps", "vn_mps", "roll_deg", "airspeed_tas_mps", "airspeed_ias_mps"),
     *("baro_height_m", "lap", "autonomous", "target_index"),
 )
-"""Columns that are read of a table beside time, place and height: SI units and degrees in their names."""
-AIRSPEEDS: Final = ("airspeed_tas_mps", "airspeed_ias_mps")
+"""Columns of a table that are read beside time, place and height, where it has them; their names give the units."""
+AIRSPEED_COLUMNS: Final = ("airspeed_tas_mps", "airspeed_ias_mps")
 TABLES: Final = (".parquet", ".csv")
 
 
@@ -34,7 +34,7 @@ class FlownFlight:
 
     source: Path
     columns: Mapping[str, FloatArray]
-    """(n,) each: `time_s`, `east_m`, `north_m`, `up_m`, `ve_mps`, `vn_mps`, and those of `OPTIONAL` that are there."""
+    """(n,) each: `time_s`, `east_m`, `north_m`, `up_m`, `ve_mps`, `vn_mps`, and any of `OPTIONAL`."""
     notes: tuple[str, ...] = ()  # what was inferred, a sentence each
 
     def __getitem__(self, name: str) -> FloatArray:
@@ -44,17 +44,17 @@ class FlownFlight:
         return name in self.columns
 
     def rows(self, chosen: NDArray[np.intp]) -> FlownFlight:
-        """Some of its rows."""
+        """Returns the flight with the chosen rows only."""
         return replace(self, columns={name: each[chosen] for name, each in self.columns.items()})
 
     @property
     def airspeed_mps(self) -> FloatArray | None:
-        """(n,) true airspeed, or else the indicated one; None where neither is there."""
-        return next((self.columns[name] for name in AIRSPEEDS if name in self.columns), None)
+        """(n,) true airspeed, or else the indicated one; None where the flight has neither."""
+        return next((self.columns[name] for name in AIRSPEED_COLUMNS if name in self.columns), None)
 
 
 def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
-    """Reads a flown flight, or InputError; rows by hand, before the autopilot was on, are left out where it tells them.
+    """Reads a flown flight, or raises InputError; rows flown by hand are left out where a column tells them.
 
     Positions in degrees are put into the plane; None: into one about a table's first.
     """
@@ -82,14 +82,14 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
 
 
 def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
-    """Columns of a table, without the rows that have no place."""
+    """Reads the columns of a table, without the rows that have no place."""
     import pyarrow.csv as csv
     import pyarrow.parquet as parquet
 
     with reading(path):
         table = parquet.read_table(path) if path.suffix.lower() == ".parquet" else csv.read_csv(path)
     table = table.rename_columns([name.strip() for name in table.column_names])
-    place, wanted = _wanted(table.column_names, path)
+    place, wanted = _wanted_columns(table.column_names, path)
     columns = {new: _numbers(table, name, path) for new, name in wanted.items()}
     known = np.isfinite([columns[name] for name in ("time_s", "east_m", "north_m")]).all(axis=0)
     columns = {name: each[known] for name, each in columns.items()}
@@ -101,8 +101,8 @@ def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
     return columns
 
 
-def _wanted(names: Sequence[str], path: Path) -> tuple[tuple[str, str], dict[str, str]]:
-    """The pair of columns of a place, and the columns that are read, by what they are called here."""
+def _wanted_columns(names: Sequence[str], path: Path) -> tuple[tuple[str, str], dict[str, str]]:
+    """Returns the pair of columns that gives the place, and the columns to read by their names in `FlownFlight`."""
     place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
     if "time_s" not in names or place is None:
         missing = next((name for name in ("time_s", *LOCAL[1]) if name not in names), "")

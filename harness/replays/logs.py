@@ -27,9 +27,9 @@ ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")
 FIX_3D: Final = 3
 """`Status` of a receiver with a three-dimensional fix, in DataFlash."""
 DATAFLASH: Final = b"\xa3\x95\x80"
-"""What a DataFlash log begins with: a message that describes formats."""
-LAST_PAGE: Final = 528
-"""Bytes at the end of a DataFlash log that may hold anything: it is written in pages."""
+"""A DataFlash log begins with these bytes, of a message that describes formats."""
+LAST_PAGE_BYTES: Final = 528
+"""A DataFlash log is written in pages: this many bytes at its end may hold anything."""
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
 TRUE_AIRSPEED: Final = "true_airspeed_m_s"
 """Field of the topics `AIRSPEED_TOPICS` of PX4."""
@@ -41,7 +41,7 @@ Series = tuple[FloatArray, dict[str, FloatArray]]
 
 
 def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list[str]]:
-    """Columns of `flown` from a log, in a plane, and notes on it; InputError if it has no track or cannot be read.
+    """Reads the columns of `flown` from a log, in a plane, with notes; InputError if it has no track or is damaged.
 
     One row for each place on earth, in order of time; other series are interpolated there.
     """
@@ -68,7 +68,7 @@ def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list
 
 
 class Command(NamedTuple):
-    """A command of a mission."""
+    """One item of a mission in a log."""
 
     number: int
     command: int  # MAV_CMD
@@ -79,7 +79,7 @@ class Command(NamedTuple):
 
 
 def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
-    """The mission that an ArduPilot log has (CMD), the last of each number, and the parameters (PARM)."""
+    """Returns the mission in an ArduPilot log (CMD, the last of each number), and its parameters (PARM)."""
     commands: dict[int, Command] = {}
     parameters: dict[str, float] = {}
     with reading(path):
@@ -94,7 +94,7 @@ def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Makes one line of all that a library says of a file, which may be damaged, also in machine code."""
+    """Turns whatever a library says of a file, also in machine code, into a one-line InputError."""
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     if path.stat().st_size > MAX_BYTES:
@@ -119,7 +119,7 @@ def reading(path: Path) -> Iterator[None]:
 
 
 def _ulog(path: Path, notes: list[str]) -> Series:
-    """PX4: the estimator's global position, https://docs.px4.io (ULog file format), airspeed and roll where logged."""
+    """Reads PX4's log: global position, https://docs.px4.io (ULog file format), airspeed and roll where logged."""
     from pyulog import ULog
 
     with path.open("rb") as file:
@@ -150,7 +150,7 @@ def _ulog(path: Path, notes: list[str]) -> Series:
 
 
 def _is_whole(path: Path) -> bool:
-    """Whether a ULog is a row of messages up to its end: two bytes of size, one of kind, and so many more."""
+    """Tells whether a ULog is a row of messages up to its end: two bytes of size, one of kind, and the content."""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         place, end = ULOG_HEADER, len(data)
         while place + 3 <= end:
@@ -161,7 +161,7 @@ def _is_whole(path: Path) -> bool:
 
 
 def _dataflash(path: Path, notes: list[str]) -> Series:
-    """ArduPilot: the estimator's position (POS), or else the receiver's (GPS); airspeed (ARSP) and roll (ATT)."""
+    """Reads ArduPilot's log: position of the estimator (POS) or else the receiver (GPS), airspeed and roll."""
     place = ("Lat", "Lng", "Alt")
     keys: dict[str, tuple[str, ...]] = {"POS": place, "GPS": place, "ARSP": ("Airspeed",), "ATT": ("Roll",)}
     found: dict[str, list[tuple[float, ...]]] = {kind: [] for kind in keys}
@@ -175,7 +175,7 @@ def _dataflash(path: Path, notes: list[str]) -> Series:
 
 
 def _messages(path: Path, kinds: tuple[str, ...], notes: list[str]) -> Iterator[Any]:
-    """Messages of a DataFlash log, as pymavlink has them."""
+    """Yields the messages of some kinds in a DataFlash log, as pymavlink has them."""
     from pymavlink.DFReader import DFReader_binary
 
     with path.open("rb") as file:
@@ -189,7 +189,7 @@ def _messages(path: Path, kinds: tuple[str, ...], notes: list[str]) -> Iterator[
         log.data_map.close()
         log.filehandle.close()
     held = sum(len(places) * log.formats[kind].len for kind, places in enumerate(log.offsets) if len(places))
-    if log.data_len - held > LAST_PAGE:
+    if log.data_len - held > LAST_PAGE_BYTES:
         notes.append(DAMAGED)
 
 

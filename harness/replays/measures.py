@@ -1,4 +1,4 @@
-"""What of a flown and a simulated flight is set side by side: laps, outside, bank, height, airspeed, distance."""
+"""Measures that compare a flown with a simulated flight: laps, distance outside, bank, height, airspeed."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 
-FIRST_SETTLED: Final = 2
-"""Laps before this one are not settled: the autopilot has just been switched on."""
-FAR_M: Final = 5.0
-"""A corner counts as reached, where no radius is known, once the aircraft is so much farther away than it was."""
+FIRST_SETTLED_LAP: Final = 2
+"""Laps before this one are not compared, since the autopilot has just been switched on."""
+PASSED_M: Final = 5.0
+"""Without a known radius, a corner counts as reached once the aircraft is this much further away than it was."""
 FIGURES = {
     "outside_p95_m": "outside the corners, p95, m",
     "outside_max_mean_m": "mean of the largest of each lap, m",
@@ -27,13 +27,13 @@ FIGURES = {
     "airspeed_mean_mps": "airspeed, mean, m/s",
     "airspeed_p95_mps": "airspeed, p95, m/s",
 }
-"""Figures of `flown` and `simulated` in `replay.json`, with what people call them."""
+"""Figures of `flown` and `simulated` in `replay.json`, with their names for people."""
 
 
 def legs_of(
     columns: Mapping[str, FloatArray], corners_m: FloatArray, first: int, radius_m: float | None
 ) -> FloatArray:
-    """(n,) how many corners had been reached at each row of a flown flight: by its targets, else by its places.
+    """(n,) number of corners reached at each row of a flown flight, by its targets, else by its places.
 
     `first` is the number of the corner that the first row heads for; one counts as reached from `radius_m`.
     """
@@ -45,7 +45,7 @@ def legs_of(
     for row, place in enumerate(zip(columns["east_m"], columns["north_m"], strict=True)):
         away_m = float(np.hypot(*(corners_m[(first + reached) % len(corners_m)] - place)))
         nearest_m = min(nearest_m, away_m)
-        if away_m <= radius_m if radius_m is not None else nearest_m < min(near_m, away_m - FAR_M):
+        if away_m <= radius_m if radius_m is not None else nearest_m < min(near_m, away_m - PASSED_M):
             reached, nearest_m = reached + 1, np.inf
         found[row] = reached
     return found
@@ -53,7 +53,7 @@ def legs_of(
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of the two flights, as it is measured."""
+    """One of the two flights that are compared."""
 
     columns: Mapping[str, FloatArray]
     """`time_s`, `east_m`, `north_m`, `up_m`, and `roll_deg`, `airspeed_mps` where they are known."""
@@ -75,18 +75,18 @@ class Side:
         return found
 
     @cached_property
-    def whole(self) -> list[int]:
-        """The settled laps of which every corner was flown to."""
+    def whole_laps(self) -> list[int]:
+        """The settled laps in which every corner was flown to."""
         return [
             lap
             for lap in np.unique(self.laps).astype(int).tolist()
-            if lap >= FIRST_SETTLED
+            if lap >= FIRST_SETTLED_LAP
             and np.ptp(self.legs[self.laps == lap]) + 1 >= len(self.corners_m)
             and (self.ended or lap != self.laps[-1])
         ]
 
     def figures(self, chosen: NDArray[np.bool_]) -> dict[str, float]:
-        """What is told of some rows."""
+        """Returns the figures of some rows."""
         columns = {name: each[chosen] for name, each in self.columns.items()}
         told = _spread(self.outside[chosen])
         told["height_error_p95_m"] = _p95(np.abs(columns["up_m"] - self.height_m))
@@ -100,7 +100,7 @@ class Side:
         return told
 
     def lap(self, lap: int) -> dict[str, Any]:
-        """The same of one lap, with its time and how far outside it was after each of its corners."""
+        """Returns the figures of one lap, with its time and how far outside it was after each of its corners."""
         chosen, times = self.laps == lap, self.columns["time_s"]
         rows = np.flatnonzero(chosen)
         end_s = times[rows[-1] + 1] if rows[-1] + 1 < len(times) else 2.0 * times[-1] - times[-2]
@@ -119,11 +119,11 @@ class Side:
 
 
 def compared(flown: Side, simulated: Side) -> dict[str, Any]:
-    """Laps and figures of both; InputError if they have no settled lap in common."""
-    settled = [lap for lap in flown.whole if lap in simulated.whole]
+    """Returns laps and figures of both flights; InputError if they have no settled lap in common."""
+    settled = [lap for lap in flown.whole_laps if lap in simulated.whole_laps]
     if not settled:
-        missing = "the log" if not flown.whole else "the simulated flight"
-        raise InputError(f"{missing} has no whole lap after lap 1; there is nothing to compare")
+        missing = "the log" if not flown.whole_laps else "the simulated flight"
+        raise InputError(f"{missing} has no whole_laps lap after lap 1; there is nothing to compare")
     rows: list[dict[str, Any]] = [
         {"lap": lap, "flown": flown.lap(lap), "simulated": simulated.lap(lap)} for lap in settled
     ]
@@ -146,7 +146,7 @@ def _p95(values: FloatArray) -> float:
 
 
 def rows_of(told: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Name, flown, simulated and difference of each figure."""
+    """Returns name, flown, simulated and difference of each figure, as texts."""
     rows = []
     for name, label in FIGURES.items():
         if name in told["flown"] and name in told["simulated"]:

@@ -17,13 +17,13 @@ from harness.replays.flown import FlownFlight
 from harness.replays.logs import Command, logged_mission
 from harness.run_files.path_files import read_path
 
-CRUISE: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}
+CRUISE_PARAMETERS: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}
 """Parameters of ArduPlane for the cruise airspeed, today's name first, and their units in m/s."""
-BANK: Final = {"ROLL_LIMIT_DEG": 1.0, "LIM_ROLL_CD": 0.01}
+BANK_PARAMETERS: Final = {"ROLL_LIMIT_DEG": 1.0, "LIM_ROLL_CD": 0.01}
 """Parameters of ArduPlane for the bank limit, today's name first, and their units in degrees."""
 TARGET_RADIUS_M: Final = 10.0
 """Acceptance radius of corners that are known from a table's `target_index` alone, which has no radius."""
-CORNERS: Final = "two or more pairs [east, north] of numbers in m"
+CORNERS_WANTED: Final = "two or more pairs [east, north] of numbers in m"
 
 
 class Origin(BaseModel):
@@ -98,8 +98,8 @@ def mission_of_log(path: Path) -> tuple[FlownMission, str]:
     found = FlownMission(
         corners_m=np.array([plane.plane(each.latitude_deg, each.longitude_deg) for each in lap]),
         acceptance_m=radius if radius > 0.0 else None,
-        airspeed_mps=_of(parameters, CRUISE),
-        bank_limit_deg=_of(parameters, BANK),
+        airspeed_mps=_parameter(parameters, CRUISE_PARAMETERS),
+        bank_limit_deg=_parameter(parameters, BANK_PARAMETERS),
         origin=origin,
     )
     told = f"{radius:g} m" if radius > 0.0 else "by the rule of the law"
@@ -134,7 +134,7 @@ def mission_of_targets(flight: FlownFlight) -> tuple[FlownMission, str]:
 
 
 def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
-    """The waypoints from the target of a mission's last jump back to that jump."""
+    """Returns the waypoints from the target of a mission's last jump back to that jump."""
     jump = next((each for each in commands[::-1] if each.command == JUMP and each.first < each.number), None)
     if jump is None:
         raise InputError(f"{path}: its mission is not known; give --mission FILE")
@@ -150,8 +150,8 @@ def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
     return lap
 
 
-def _of(parameters: Mapping[str, float], names: Mapping[str, float]) -> float | None:
-    """The first of some parameters that is there, in its unit."""
+def _parameter(parameters: Mapping[str, float], names: Mapping[str, float]) -> float | None:
+    """Returns the first of the named parameters that is given, in its unit; None where none is."""
     return next((parameters[name] * unit for name, unit in names.items() if name in parameters), None)
 
 
@@ -163,5 +163,5 @@ def _of_json(text: str, source: str) -> FlownMission:
         if first["type"] == "json_invalid":
             raise InputError(f"{source}: is no JSON ({first['msg']})") from error
         value = "is missing" if first["type"] == "missing" else f"is {str(first['input'])[:80]!r}"
-        right = CORNERS if "corners_east_north_m" in first["loc"] else "a number"
+        right = CORNERS_WANTED if "corners_east_north_m" in first["loc"] else "a number"
         raise InputError(f"{source}: {'.'.join(map(str, first['loc']))}: {value}; must be {right}") from error

@@ -1,4 +1,4 @@
-"""A flown log beside the same mission simulated: what differs, as a table, a page and a recording of both."""
+"""A flown log beside the same mission simulated: the differences as a table, a page and a recording of both."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Replay:
 
 
 def default_folder(log: Path) -> Path:
-    """`runs/replay/NAME` for the log NAME.parquet."""
+    """Returns `runs/replay/NAME` for the log NAME.parquet."""
     return Path("runs") / "replay" / log.stem
 
 
@@ -100,7 +100,7 @@ def replay(
 
 
 def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, list[str]]:
-    """The mission, what was flown, and where the mission is from, if it is of the log."""
+    """Returns the mission, the flown flight, and a note on the mission if it is from the log."""
     if not log.is_file():
         raise InputError(f"{log}: no such file")
     if mission is None and log.suffix.lower() in TABLES:
@@ -114,7 +114,7 @@ def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, l
 
 
 def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Asked:
-    """Where it begins, and with which airspeed and height."""
+    """Finds where the simulated flight begins, and its airspeed and height."""
     airspeed, commanded, corners = flight.airspeed_mps, mission.airspeed_mps, mission.corners_m
     if airspeed is None:
         commanded = wind.airspeed_mps
@@ -135,7 +135,7 @@ def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], 
 
 
 def _flown(asked: Asked) -> tuple[Side, int]:
-    """The flown flight as it is measured, and its number of laps."""
+    """Returns the flown flight ready to be measured, and its number of laps."""
     flight, mission = asked.flight, asked.mission
     columns = dict(flight.columns)
     legs = legs_of(columns, mission.corners_m, asked.first, mission.acceptance_m)
@@ -154,7 +154,7 @@ def _flown(asked: Asked) -> tuple[Side, int]:
 
 
 def _laps(legs: FloatArray, asked: Asked) -> FloatArray:
-    """(n,) laps begun after the first: each begins when corner 0 is reached."""
+    """(n,) number of laps begun after the first; each begins when corner 0 is reached."""
     corners = len(asked.mission.corners_m)
     laps: FloatArray = np.floor((legs + (asked.first - 1) % corners) / corners)
     return laps

@@ -26,29 +26,30 @@ from harness.scenario.scenario import Scenario, scenario_of
 from planner.interface import Path as PlannedPath
 
 DEFAULT_LAW: Final = "bearing"
-"""Gain 1.5, and no switch by passing."""
+"""The guidance law of a simulated flight, with gain 1.5 and no switch by passing."""
 LATENCY_S: Final = 0.2
-"""Age of the state that the law works with: what ArduPilot takes of a satellite receiver that it does not know
-(AP_GPS_Backend::get_lag), as a log does not tell which it was."""
-SIGMAS: Final = (
+"""Age of the state that the law works with. A log does not tell the receiver; this is ArduPilot's value for an unknown
+one (AP_GPS_Backend::get_lag)."""
+ZERO_SIGMAS: Final = (
     "position_sigma_m",
     "altitude_sigma_m",
     "heading_sigma_deg",
     "velocity_sigma_mps",
     "airspeed_sigma_mps",
 )
-ABOUT_M: Final = 1000.0
-LOW_M: Final = 50.0
+"""A replay sets these keys of `navigation` to zero and keeps only the latency."""
+AREA_MARGIN_M: Final = 1000.0
+LEAST_ALTITUDE_M: Final = 50.0
 UNKNOWN_ALTITUDE_M: Final = 300.0
-"""A log whose heights are not above the sea is flown here."""
-LONGER: Final = 1.25
-"""The simulated aircraft has this share of the flown time."""
-COLUMNS: Final = ("time_s", "east_m", "north_m", "up_m", "roll_deg", "airspeed_mps")
+"""A log with heights below `LEAST_ALTITUDE_M`, which are not above the sea, is flown at this altitude."""
+TIME_LIMIT_FACTOR: Final = 1.25
+"""The simulated flight may take this many times the flown time, and a minute more."""
+SIMULATED_COLUMNS: Final = ("time_s", "east_m", "north_m", "up_m", "roll_deg", "airspeed_mps")
 
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What is flown anew."""
+    """The flight that is to be flown anew."""
 
     flight: FlownFlight
     mission: FlownMission
@@ -59,7 +60,7 @@ class Asked:
 
 
 class LapsEnd:
-    """Over once all legs are flown, or the time is up. Implements `Termination`."""
+    """Ends a flight once all legs are flown, or the time is up. Implements `Termination`."""
 
     contact_m = math.inf
 
@@ -69,11 +70,11 @@ class LapsEnd:
         """Times of the updates in which a corner was reached."""
 
     def to_go_m(self, state: AircraftState) -> float:
-        """Nothing is known of it."""
+        """Returns NaN, as the distance that is left is not known."""
         return math.nan
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
-        """How the flight ends now; None while it goes on."""
+        """Returns how the flight ends now; None while it goes on."""
         self.switches_s += [self._before_s] * (max(self._law.leg, 0) - len(self.switches_s))
         self._before_s = state.time_s
         if fault is not None:
@@ -86,10 +87,10 @@ class LapsEnd:
 
 
 def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-    """The flight as a scenario, some keys of it replaced; `InputError` if the aircraft cannot fly it."""
+    """Returns the flight as a scenario, some keys of it replaced; `InputError` if the aircraft cannot fly it."""
     flight, mission, origin = asked.flight, asked.mission, asked.mission.origin
     places = np.vstack((np.column_stack((flight["east_m"], flight["north_m"])), mission.corners_m))
-    bounds = (*(places.min(axis=0) - ABOUT_M).tolist(), *(places.max(axis=0) + ABOUT_M).tolist())
+    bounds = (*(places.min(axis=0) - AREA_MARGIN_M).tolist(), *(places.max(axis=0) + AREA_MARGIN_M).tolist())
     start, goal = places[0], mission.corners_m[asked.first]
     far = max(float(np.hypot(*(goal - start))), 2.0)
     altitude_m = asked.height_m + (origin.altitude_m if origin else 0.0)
@@ -104,8 +105,8 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
             "course_deg": math.degrees(math.atan2(flight["ve_mps"][0], flight["vn_mps"][0])) % 360.0,
             "goal_m": goal.tolist() if far > 2.0 else [start[0], start[1] + 10.0],
             "goal_radius_m": min(0.5 * far, 10.0),
-            "altitude_m": altitude_m if altitude_m >= LOW_M else UNKNOWN_ALTITUDE_M,
-            "time_limit_s": LONGER * float(flight["time_s"][-1] - flight["time_s"][0]) + 60.0,
+            "altitude_m": altitude_m if altitude_m >= LEAST_ALTITUDE_M else UNKNOWN_ALTITUDE_M,
+            "time_limit_s": TIME_LIMIT_FACTOR * float(flight["time_s"][-1] - flight["time_s"][0]) + 60.0,
         },
         "aircraft": {
             "model": aircraft,
@@ -113,7 +114,7 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
             "autopilot": {"state_latency_s": 0.0},
         },
         "guidance": {"kind": DEFAULT_LAW, "follow": "waypoints"},
-        "navigation": {"kind": "gnss", **dict.fromkeys(SIGMAS, 0.0), "latency_s": LATENCY_S},
+        "navigation": {"kind": "gnss", **dict.fromkeys(ZERO_SIGMAS, 0.0), "latency_s": LATENCY_S},
         "environment": {"wind": wind},
     }
     if mission.bank_limit_deg is not None:
@@ -131,7 +132,7 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
 
 
 def fly_anew(scenario: Scenario, asked: Asked, laps: int, folder: Path) -> dict[str, FloatArray]:
-    """Flies it into a run folder, so many times round; `COLUMNS` of the track, with the number of the leg in `leg`.
+    """Flies the laps into a run folder; returns `SIMULATED_COLUMNS` of the track, and the number of the leg as `leg`.
 
     From where the log begins through the corners, and half way on: the end of the route is no corner.
 
@@ -161,6 +162,6 @@ def fly_anew(scenario: Scenario, asked: Asked, laps: int, folder: Path) -> dict[
 
     fly_to_folder(scenario, folder, recording=False, make=make, pilot="replay")
     track = load_run(folder).track
-    columns = {name: np.asarray(getattr(track, name), dtype=np.float64) for name in COLUMNS}
+    columns = {name: np.asarray(getattr(track, name), dtype=np.float64) for name in SIMULATED_COLUMNS}
     columns["leg"] = np.searchsorted(ends[0].switches_s, columns["time_s"] + 1e-6).astype(np.float64)
     return columns

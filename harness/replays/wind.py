@@ -1,4 +1,4 @@
-"""The wind of a flown flight: what explains its speed over the ground by its airspeed, without a heading.
+"""The wind of a flown flight, fitted to its speed over the ground and its airspeed, without a heading.
 
 Least squares of | ground velocity - wind | = airspeed (Gauss-Newton). Where no airspeed is known, one for all rows is
 fitted with the wind. The aircraft must turn: in straight flight only the wind along the way shows.
@@ -17,14 +17,14 @@ from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
 
 LEAST_TURN_DEG = 90.0
-"""Courses of a window must span this much."""
+"""A wind is fitted only where the courses span at least this angle."""
 WINDOW_S, WINDOW_EVERY_S = 20.0, 10.0
-"""Winds that change are fitted to windows that long, so often: about half a lap of a small square."""
+"""Winds that change are fitted to windows of this length, at this spacing: about half a lap of a small square."""
 
 
 @dataclass(frozen=True)
 class FittedWind:
-    """A wind, as it blows towards east and north."""
+    """A fitted wind, by the components towards east and north."""
 
     east_mps: float
     north_mps: float
@@ -34,21 +34,21 @@ class FittedWind:
 
     @property
     def speed_mps(self) -> float:
-        """Its speed."""
+        """Speed of the wind."""
         return math.hypot(self.east_mps, self.north_mps)
 
     @property
     def from_deg(self) -> float:
-        """Where it blows from, clockwise from north."""
+        """Direction that the wind blows from, clockwise from north."""
         return math.degrees(math.atan2(-self.east_mps, -self.north_mps)) % 360.0
 
     def told(self) -> dict[str, float]:
-        """For `replay.json`."""
+        """Returns the wind for `replay.json`."""
         return {"speed_mps": self.speed_mps, "from_deg": self.from_deg, "residual_mps": self.residual_mps}
 
 
 def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | None = None) -> FittedWind:
-    """The one wind that explains a flight best, which must turn; `airspeed` (n,) stands in place of the flight's."""
+    """Fits one wind to a flight, which must turn; `airspeed` (n,) stands in place of the flight's."""
     velocity = np.array((flight["ve_mps"], flight["vn_mps"]))
     airspeed = flight.airspeed_mps if airspeed is None else airspeed
     known = np.isfinite(velocity).all(axis=0) & (True if airspeed is None else np.isfinite(airspeed))
@@ -74,7 +74,7 @@ def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | No
 
 
 def fit_windows(flight: FlownFlight, whole: FittedWind) -> list[FittedWind]:
-    """The winds of windows one after the other; none of those in which the aircraft does not turn enough.
+    """Fits winds to windows one after the other, leaving out those in which the aircraft turns too little.
 
     The airspeed of the whole flight's wind stands for one that was not measured.
     """

@@ -1,4 +1,4 @@
-"""A scenario's part of a report: its figures, written as files and kept for the page, its facts and its rows."""
+"""A scenario's chapter of a report: its figures, written as files and kept for the page, its facts and its rows."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ReportedFlight:
 
 
 def entry(scenario: Scenario, run: Run, optimum: Optimum, guidance: str = "") -> ReportedFlight:
-    """A flight that came to an end."""
+    """Returns the report's entry for a flight that came to an end."""
     row = row_of(
         scenario.name,
         GIVEN if "check" in run.metrics else scenario.planner.label,
@@ -53,7 +53,7 @@ def entry(scenario: Scenario, run: Run, optimum: Optimum, guidance: str = "") ->
 
 
 def optimum_of(scenario: Scenario) -> Optimum:
-    """The shortest path of a point that knows the whole world and keeps the wanted clearance."""
+    """Finds the shortest path of a point that knows the whole world and keeps the wanted clearance."""
     world, mission = World.from_scenario(scenario), scenario.mission
     return shortest_path(
         world.obstacles,
@@ -66,7 +66,7 @@ def optimum_of(scenario: Scenario) -> Optimum:
 
 
 def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight], optimum: Optimum) -> Chapter:
-    """Writes the figures of planners side by side; returns the scenario's part of the report."""
+    """Writes the figures of planners side by side; returns the scenario's chapter of the report."""
     from harness.report import figures
     from harness.report.page import Chapter
     from harness.report.planner_figure import planner_figure
@@ -88,7 +88,7 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
 
 
 def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) -> Chapter:
-    """Writes the figures of a single run into its folder; returns its part of the report."""
+    """Writes the figures of a single run into its folder; returns its chapter of the report."""
     from harness.report import figures
     from harness.report.page import Chapter
 
@@ -125,7 +125,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
 
 
 def _enlarged(scene: FigureScene, drawn: DrawnRun) -> str:
-    """What the figure of a planner enlarges, as the end of a sentence."""
+    """Names the enlarged part in the figure of a planner, as the end of a sentence."""
     near = drawn.nearest(scene.clearance_m) is not None
     return "; enlarged: where it came nearest to an obstacle" if near else ""
 
@@ -137,7 +137,7 @@ PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross
 
 
 def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:
-    """The smallest radius that a plan may ask for: as the run has it, for its guidance law may not be here."""
+    """Returns the smallest radius that a plan may ask for, from the run if it tells; its law may be missing here."""
     kept = run.manifest.get("turn_radius_m") if run is not None else None
     if isinstance(kept, int | float) and kept > 0.0:
         return float(kept)
@@ -170,9 +170,9 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
 
 
 def turning_optimum_m(points_m: FloatArray, course_deg: float | None, radius_m: float) -> float | None:
-    """Length of the optimum (k, 2) with the shortest turn and straight from the start's course onto one of its lines.
+    """Estimates the length of the optimum (k, 2) with the shortest turn from the start's course onto one of its lines.
 
-    An estimate: what the bends of the optimum cost is left out. None where there is no optimum or course.
+    What the bends of the optimum cost is left out. None where there is no optimum or course.
     """
     if len(points_m) < 2 or course_deg is None:
         return None
@@ -204,7 +204,7 @@ def _drawn(flight: ReportedFlight) -> DrawnRun | None:
 
 
 def _picture(stem: Path, figure: Any, caption: str) -> Picture:
-    """Writes a figure as SVG and PNG."""
+    """Writes a figure as SVG and PNG, and returns it for the page."""
     from harness.report.figure_style import png, svg
     from harness.report.page import Picture
 

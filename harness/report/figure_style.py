@@ -1,4 +1,4 @@
-"""How all figures look, and how they become files.
+"""The style of all figures, and how they become files.
 
 Drawn without a screen. The same values give the same files: SVG carries no date and its ids no chance.
 """
@@ -40,28 +40,28 @@ BEHIND_TEXT: dict[str, Any] = {"fc": "white", "ec": "none", "alpha": 0.8, "pad":
 """Box behind text that lies on a map."""
 
 WIDTH_IN = 4.8
-"""Narrow, so that the letters stay legible on a phone and in a column of a paper."""
+"""Width of all figures, so narrow that the letters stay legible on a phone and in a column of a paper."""
 
 
 def colour(index: int) -> str:
-    """Of a planner, by its number."""
+    """Returns the colour of a planner by its number."""
     return COLOURS[index % len(COLOURS)]
 
 
 def round_length_m(half_m: float) -> float:
-    """A round length of about a third of a picture."""
+    """Returns a round length of about a third of a picture that spans twice `half_m`."""
     third = 2 * half_m / 3
     size = 10.0 ** math.floor(math.log10(third))
     return float(max(step * size for step in (1, 2, 5) if step * size <= third))
 
 
 def svg(figure: Figure) -> bytes:
-    """A figure as SVG; what of it is a picture of dots has 150 an inch."""
+    """Returns a figure as SVG; dots drawn as pictures have 150 an inch."""
     return _saved(figure, "svg", dpi=150, metadata={"Date": None, "Creator": None})
 
 
 def png(figure: Figure) -> bytes:
-    """A figure as PNG, 200 dots an inch."""
+    """Returns a figure as PNG, 200 dots an inch."""
     return _saved(figure, "png", dpi=200, metadata={"Software": None})
 
 

@@ -28,19 +28,19 @@ if TYPE_CHECKING:
     from harness.run_files.run_tables import PlanRow
     from harness.world.obstacle import Obstacle
 
-SOLID: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}
-CHANGING = SOLID | {"ls": "--"}
-"""Obstacles that stand for the whole flight, and others where they are at first."""
+STANDING_STYLE: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}
+CHANGING_STYLE = STANDING_STYLE | {"ls": "--"}
+"""Style of obstacles that move or stand for a time, drawn where they are at first; STANDING_STYLE is for all others."""
 
-NEAREST: dict[str, Any] = {"marker": "s", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 7, "zorder": 8}
-"""Mark, in the colour of a flight, of where it was nearest to an obstacle, and too near."""
+NEAREST_MARK: dict[str, Any] = {"marker": "s", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 7, "zorder": 8}
+"""Mark of the place where a flight was nearest to an obstacle, and too near, in the flight's colour."""
 
 LEGEND_ROW_IN = 0.19
 TALLEST_MAP_IN = 6.0
 
-DRAWN_ROWS = 1500
-SPARE = 1.35
-"""A curvature plot reaches this much further than the turn limit or, where that is more, the flown curve."""
+MOST_POINTS_DRAWN = 1500
+SPARE_FACTOR = 1.35
+"""A curvature plot reaches up to this many times the turn limit or, where that is more, the flown curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class DrawnRun:
     plans: Sequence[AcceptedPlan | PlanRow]
 
     def nearest(self, clearance_m: float) -> int | None:
-        """The row at which it was nearest to an obstacle, or hit it; None if never below the wanted clearance."""
+        """Returns the row where it was nearest to an obstacle, or hit it; None if never below the wanted clearance."""
         below = self.track.clearance_m < clearance_m
         if not below.any():
             return None
@@ -65,7 +65,7 @@ class DrawnRun:
 
 @dataclass(frozen=True, eq=False)
 class FigureScene:
-    """What all flights of a scenario have in common, the true obstacles among it.
+    """The part of a scenario that all its flights have in common, the true obstacles among it.
 
     `optimum_m` is the clairvoyant shortest path (k, 2), empty where there is none; `turning_optimum_m` its estimated
     length for an aircraft that turns. `wind` has its speed (m/s) and where it blows from (degrees).
@@ -90,7 +90,7 @@ Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
 
 
 def overview(scene: FigureScene, runs: Numbered) -> Figure:
-    """The map with the tracks of all planners."""
+    """Draws the map with the tracks of all planners."""
     marks = legend_marks(scene, [run for _, run in runs])
     with styled(map_height_in(scene) + LEGEND_ROW_IN * math.ceil((2 + len(runs) + len(marks)) / 2)) as figure:
         axes = figure.add_subplot()
@@ -103,7 +103,7 @@ def overview(scene: FigureScene, runs: Numbered) -> Figure:
 
 
 def profiles(scene: FigureScene, runs: Numbered) -> Figure:
-    """Curvature and cross-track error along the way, two strips a planner."""
+    """Draws curvature and cross-track error along the way, two strips a planner."""
     with styled(0.9 + 2.1 * len(runs)) as figure:
         strips = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False)[:, 0]
         for place, (index, run) in enumerate(runs):
@@ -127,18 +127,18 @@ def profiles(scene: FigureScene, runs: Numbered) -> Figure:
 
 
 def map_height_in(scene: FigureScene) -> float:
-    """What a map as wide as a figure needs, title and axis labels included."""
+    """Returns the height of a map as wide as a figure, with title and axis labels."""
     xmin, ymin, xmax, ymax = scene.bounds_m
     return 0.8 + min((WIDTH_IN - 0.6) * (ymax - ymin) / (xmax - xmin), TALLEST_MAP_IN)
 
 
 def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
-    """Obstacles and area, and start, goal, straight line and optimum where wanted; returns the legend's begin."""
+    """Draws obstacles and area, and if `ends` start, goal, straight line and optimum; returns the legend's begin."""
     xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)
     for obstacle in scene.obstacles:
         for grown, style in (
             (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.5, "ls": ":"}),
-            (0.0, SOLID if obstacle.stands_for_ever else CHANGING),
+            (0.0, STANDING_STYLE if obstacle.stands_for_ever else CHANGING_STYLE),
         ):
             drawn = axes.add_artist(outline(obstacle, grown, **style))
             # The limits are set below, and nothing is drawn beyond them: layouts need not measure thousands of these.
@@ -166,7 +166,7 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
 
 
 def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
-    """Ticks, a bar of a round length, and an arrow with the wind's speed that points where it blows to."""
+    """Draws ticks, a bar of a round length, and an arrow with the wind's speed that points where it blows to."""
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(6, min_n_ticks=3))
     bar_m = round_length_m(0.25 * (scene.bounds_m[2] - scene.bounds_m[0]))
@@ -192,7 +192,7 @@ def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
 
 
 def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **style: Any) -> patches.Patch:
-    """An obstacle grown by a distance: where it is at a time, or where it appears."""
+    """Returns an obstacle grown by a distance, where it is at a time, or where it appears."""
     shape = obstacle.shape
     moved = np.array((0.0, 0.0) if at_s is None else obstacle.displacement_m(at_s)) / 1e3
     if isinstance(shape, Circle):
@@ -210,7 +210,7 @@ def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **sty
 
 
 def draw_flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
-    """Draws a track and its places that `legend_marks` tells of; the first planner's lies on top."""
+    """Draws a track with the marks that `legend_marks` explains; the first planner's lies on top."""
     points = thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
     style: dict[str, Any] = {"color": colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
     (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
@@ -219,26 +219,26 @@ def draw_flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes
     nearest = run.nearest(scene.clearance_m)
     if nearest is not None:
         place = run.track.east_m[nearest] / 1e3, run.track.north_m[nearest] / 1e3
-        axes.plot(*place, ls="", **NEAREST | {"mec": colour(index)})
+        axes.plot(*place, ls="", **NEAREST_MARK | {"mec": colour(index)})
     return line
 
 
 def legend_marks(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
-    """What the legend says of marks that are there for some flights only."""
+    """Returns the legend's entries for marks that only some flights have."""
     marks: list[Any] = []
     if not all(obstacle.stands_for_ever for obstacle in scene.obstacles):
-        marks.append(patches.Patch(**CHANGING, label="moves, or stands for a time"))
+        marks.append(patches.Patch(**CHANGING_STYLE, label="moves, or stands for a time"))
     if any(run.outcome != "reached" for run in runs):
         marks.append(
             Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")
         )
     if any(run.nearest(scene.clearance_m) is not None for run in runs):
-        marks.append(Line2D([], [], ls="", label="nearest to an obstacle", **NEAREST))
+        marks.append(Line2D([], [], ls="", label="nearest to an obstacle", **NEAREST_MARK))
     return marks
 
 
 def thinned(points: FloatArray, scene: FigureScene) -> FloatArray:
-    """A track without the points that no one could see on the map."""
+    """Leaves out the points of a track that no one could see on the map."""
     import shapely
 
     xmin, ymin, xmax, ymax = scene.bounds_m
@@ -249,11 +249,11 @@ def thinned(points: FloatArray, scene: FigureScene) -> FloatArray:
 
 
 def _limit_turns(axes: Axes, flown: FloatArray) -> None:
-    """The aircraft's turn limit, and a scale on which the flown curve can be read; corners may leave it."""
+    """Draws the aircraft's turn limit and scales the axis to the flown curve; corners may leave it."""
     for limit in (-1.0, 1.0):
         axes.axhline(limit, color="0.35", lw=0.7, ls="--")
     axes.axhline(0.0, color="0.8", lw=0.6)
-    reach = SPARE * max(1.0, float(np.abs(flown).max(initial=0.0)))
+    reach = SPARE_FACTOR * max(1.0, float(np.abs(flown).max(initial=0.0)))
     axes.set_ylim(-reach, reach)
 
 
@@ -263,18 +263,18 @@ def distance_m(track: Track) -> FloatArray:
 
 
 def _steps(profile: Profile, radius_m: float) -> tuple[FloatArray, FloatArray]:
-    """A curvature profile as a curve: distance along it, km, and curvature times a radius."""
+    """Returns a curvature profile as a curve: distance along it, km, and curvature times a radius."""
     ends = np.cumsum(profile.length_m)
     along = np.column_stack((ends - profile.length_m, ends)).ravel() / 1e3
     return along, radius_m * np.repeat(profile.curvature_1pm, 2)
 
 
 def _extremes(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A curve thinned to its least and greatest value in each of many bins, so that no peak is lost."""
+    """Thins a curve to its least and greatest value in each of many bins, so that no peak is lost."""
     kept = np.isfinite(y)
     x, y = x[kept], y[kept]
-    if len(x) <= DRAWN_ROWS:
+    if len(x) <= MOST_POINTS_DRAWN:
         return x, y
-    bins = np.array_split(np.arange(len(x)), DRAWN_ROWS // 2)
+    bins = np.array_split(np.arange(len(x)), MOST_POINTS_DRAWN // 2)
     chosen = np.unique([part[pick] for part in bins for pick in (y[part].argmin(), y[part].argmax())])
     return x[chosen], y[chosen]

@@ -1,4 +1,4 @@
-"""Reports, of a comparison and of a single run: one HTML file that needs nothing but itself."""
+"""The HTML page of a report, of a comparison or of a single run: one file that needs nothing but itself."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Chapter:
-    """One scenario: what was asked (name and value), a row a planner, and a note where something is missing."""
+    """One scenario: its facts (name and value), a row a planner, and a note where something is missing."""
 
     name: str
     facts: Mapping[str, str]
@@ -45,7 +45,7 @@ def report_html(
     written: str,
     duels: Sequence[Any] = (),
 ) -> str:
-    """The text of `report.html`; `duels` are planners in pairs, as `harness.campaign.paired` has them."""
+    """Returns the text of `report.html`; `duels` are planners in pairs, as `harness.campaign.paired` has them."""
     return rendered(
         "comparison.html",
         duels=duels,
@@ -58,7 +58,7 @@ def report_html(
 
 
 def rendered(template: str, **values: Any) -> str:
-    """A page from one of our templates, with values by the names that it uses."""
+    """Renders one of our templates with values by the names that it uses."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("harness.report"),
         autoescape=True,
@@ -70,5 +70,5 @@ def rendered(template: str, **values: Any) -> str:
 
 
 def _shown(rows: Sequence[Row]) -> list[Metric]:
-    """What a page shows of rows: a digest stands elsewhere."""
+    """Returns the figures that a page shows of rows, without the digest, which stands elsewhere."""
     return [figure for figure in shown_figures(rows) if figure.short != "digest"]

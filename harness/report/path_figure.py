@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from harness.report.figure_style import colour, styled
 from harness.report.figures import LEGEND_ROW_IN, DrawnRun, FigureScene, draw_map, map_height_in, thinned
-from harness.report.planner_figure import CLOSE_UP_IN, close_up
+from harness.report.planner_figure import NEAR_MISS_HEIGHT_IN, close_up
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
     from harness.flight.record import FloatArray
 
 RED, GREEN = "#A8201A", "#009E73"
-GIVEN: dict[str, Any] = {"color": "0.7", "lw": 5.0, "solid_joinstyle": "miter", "zorder": 3.5}
-KEPT: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": GREEN, "mew": 1.4, "ms": 6.5, "zorder": 8}
-CUT: dict[str, Any] = {"marker": "X", "color": RED, "mec": "white", "mew": 0.6, "ms": 9, "zorder": 8}
-TOUCHED, CROSSED = CUT | {"marker": "*", "ms": 13, "zorder": 9}, CUT | {"marker": "^", "zorder": 9}
-FENCES: Mapping[str, dict[str, Any]] = {
+GIVEN_STYLE: dict[str, Any] = {"color": "0.7", "lw": 5.0, "solid_joinstyle": "miter", "zorder": 3.5}
+KEPT_MARK: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": GREEN, "mew": 1.4, "ms": 6.5, "zorder": 8}
+CUT_MARK: dict[str, Any] = {"marker": "X", "color": RED, "mec": "white", "mew": 0.6, "ms": 9, "zorder": 8}
+TOUCHED, CROSSED = CUT_MARK | {"marker": "*", "ms": 13, "zorder": 9}, CUT_MARK | {"marker": "^", "zorder": 9}
+FENCE_STYLES: Mapping[str, dict[str, Any]] = {
     "exclusion": {"ec": RED, "fc": f"{RED}22", "lw": 1.0, "ls": "--"},
     "inclusion": {"ec": GREEN, "fc": "none", "lw": 1.2, "ls": "--"},
 }
-POINT: dict[str, Any] = {"marker": "o", "color": "0.25", "ms": 2.5, "zorder": 6}
-WORST: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": RED, "ms": 9, "zorder": 8}
-WORST_SHOWN = 3.0
-"""The enlargement of the worst place reaches so many times what it is off, or what is allowed, to each side."""
+POINT_MARK: dict[str, Any] = {"marker": "o", "color": "0.25", "ms": 2.5, "zorder": 6}
+WORST_MARK: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": RED, "ms": 9, "zorder": 8}
+WORST_SPANS = 3.0
+"""The enlarged worst place reaches this many times its error, or the error allowed, to each side."""
 
 MOST_POINTS = 300
-"""Most points of a path that are marked; a path with more is a sampled curve, and none is marked."""
+"""Only a path with at most this many points has them marked; one with more is a sampled curve."""
 
-ABOUT = 0.15
+MARGIN_SHARE = 0.15
 """The figure reaches this share of the path's span beyond it."""
 
 
@@ -47,9 +47,9 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     flown = thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
     points = given_m.tolist() if len(given_m) <= MOST_POINTS else []
     every = {
-        "point given": (POINT, points),
-        "corner cut as allowed": (KEPT, _corners(check["corners"], kept=True)),
-        "corner cut too far": (CUT, _corners(check["corners"], kept=False)),
+        "point given": (POINT_MARK, points),
+        "corner cut as allowed": (KEPT_MARK, _corners(check["corners"], kept=True)),
+        "corner cut too far": (CUT_MARK, _corners(check["corners"], kept=False)),
         "contact": (TOUCHED, [(each["east_m"], each["north_m"]) for each in metrics["contacts"]]),
         "fence or bound crossed": (
             CROSSED,
@@ -60,17 +60,17 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     kinds = list(dict.fromkeys(fence["kind"] for fence in check["fences"]))
     lines = math.ceil((2 + len(marks) + len(kinds)) / 2)
     scene = _about(scene, np.concatenate((given_m, flown)))
-    heights_in = [map_height_in(scene), CLOSE_UP_IN]
+    heights_in = [map_height_in(scene), NEAR_MISS_HEIGHT_IN]
     with styled(sum(heights_in) + LEGEND_ROW_IN * (lines + 1)) as figure:
         rows = figure.add_gridspec(2, 1, height_ratios=heights_in)
         axes = figure.add_subplot(rows[0])
         _draw_worst(figure.add_subplot(rows[1]), run, given_m, check["worst"])
         draw_map(axes, scene, ends=False)
-        legend: list[Any] = [*axes.plot(*given_m.T / 1e3, label="as given", **GIVEN)]
+        legend: list[Any] = [*axes.plot(*given_m.T / 1e3, label="as given", **GIVEN_STYLE)]
         legend += axes.plot(*flown.T / 1e3, color=colour(0), lw=1.5, zorder=5, label="flown")
         for fence in check["fences"]:
             _draw_fence(axes, fence)
-        legend += [patches.Patch(**FENCES[kind], label=f"{kind} fence") for kind in kinds]
+        legend += [patches.Patch(**FENCE_STYLES[kind], label=f"{kind} fence") for kind in kinds]
         for name, (style, places) in marks.items():
             axes.plot(*np.array(places).T / 1e3, ls="", **style)
             legend.append(Line2D([], [], ls="", label=name, **{**style, "zorder": 1}))
@@ -80,13 +80,13 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
 
 
 def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[str, Any]) -> None:
-    """The place where the track is furthest off the path in relation to what is allowed there, enlarged."""
+    """Draws the place where the track is furthest off the path in relation to what is allowed there, enlarged."""
     middle = np.array((worst["east_m"], worst["north_m"]))
-    half_m = WORST_SHOWN * max(worst["off_m"], worst["allowed_m"])
-    axes.plot(*given_m.T / 1e3, **GIVEN)
+    half_m = WORST_SPANS * max(worst["off_m"], worst["allowed_m"])
+    axes.plot(*given_m.T / 1e3, **GIVEN_STYLE)
     flown = np.column_stack((run.track.east_m, run.track.north_m))
     close_up(axes, [(flown, colour(0), 1.5, "-")], middle, (2 * half_m, half_m))
-    axes.plot(*middle / 1e3, **WORST)
+    axes.plot(*middle / 1e3, **WORST_MARK)
     axes.set_title(
         f"worst place: {worst['off_m']:.3g} m off at {worst['time_s']:.0f} s, {worst['allowed_m']:.3g} m allowed"
     )
@@ -97,18 +97,18 @@ def _corners(corners: Sequence[Mapping[str, Any]], *, kept: bool) -> list[tuple[
 
 
 def _about(scene: FigureScene, points_m: FloatArray) -> FigureScene:
-    """The scene, its frame drawn close about a path."""
+    """Returns the scene with its frame drawn close about a path."""
     from dataclasses import replace
 
     lowest, highest = points_m.min(axis=0), points_m.max(axis=0)
     middle = (lowest + highest) / 2
     span = highest - lowest
-    half = (0.5 + ABOUT) * np.maximum(span, 0.35 * span.max())
+    half = (0.5 + MARGIN_SHARE) * np.maximum(span, 0.35 * span.max())
     return replace(scene, bounds_m=(*(middle - half).tolist(), *(middle + half).tolist()))
 
 
 def _draw_fence(axes: Axes, fence: Mapping[str, Any]) -> None:
-    style = FENCES[fence["kind"]]
+    style = FENCE_STYLES[fence["kind"]]
     if "center_m" in fence:
         east, north = fence["center_m"]
         axes.add_patch(patches.Circle((east / 1e3, north / 1e3), fence["radius_m"] / 1e3, zorder=3, **style))

@@ -15,8 +15,8 @@ from harness.flight.polylines import polylines
 from harness.report.figure_style import BEHIND_TEXT, colour, round_length_m, styled
 from harness.report.figures import (
     LEGEND_ROW_IN,
-    NEAREST,
-    SOLID,
+    NEAREST_MARK,
+    STANDING_STYLE,
     DrawnRun,
     FigureScene,
     distance_m,
@@ -32,19 +32,20 @@ if TYPE_CHECKING:
 
     from harness.flight.record import FloatArray
 
-CLOSE_UP_IN: Final = 2.3
+NEAR_MISS_HEIGHT_IN: Final = 2.3
+"""Height of the row of the near miss, which holds a picture and a plot."""
 CLOSE_UP_CLEARANCES: Final = 4.0
-"""A picture that enlarges reaches so many wanted clearances to each side."""
-CLEARANCES_SHOWN: Final = 3.0
-"""The plot of the clearance about a near miss reaches so many wanted clearances up."""
+"""An enlarged picture reaches this many wanted clearances to each side."""
+PLOT_CLEARANCES: Final = 3.0
+"""The plot of the clearance about a near miss reaches up to this many wanted clearances."""
 
 PLANNED_DASHES: Any = (0, (4, 2))
 
 
 def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:
-    """One planner's path as in the paper's Figures 2 and 3, and its near miss: where it was nearest to an obstacle."""
+    """Draws one planner's path as in the paper's Figures 2 and 3, and its near miss, nearest to an obstacle."""
     nearest, marks = run.nearest(scene.clearance_m), legend_marks(scene, [run])
-    heights_in = [map_height_in(scene)] + ([] if nearest is None else [CLOSE_UP_IN])
+    heights_in = [map_height_in(scene)] + ([] if nearest is None else [NEAR_MISS_HEIGHT_IN])
     with styled(sum(heights_in) + LEGEND_ROW_IN * math.ceil((4 + len(marks)) / 2)) as figure:
         rows = figure.add_gridspec(len(heights_in), 2, height_ratios=heights_in)
         axes = figure.add_subplot(rows[0, :])
@@ -59,7 +60,7 @@ def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:
 
 
 def _near_miss(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: int) -> None:
-    """Flown and planned path where it was nearest to an obstacle, and the obstacles where they were then."""
+    """Draws flown and planned path where it was nearest to an obstacle, and the obstacles where they were then."""
     track, half_m = run.track, _half_m(scene)
     middle, now_s = np.array((track.east_m[row], track.north_m[row])), track.time_s[row : row + 1]
     for obstacle in scene.obstacles:
@@ -68,7 +69,7 @@ def _near_miss(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: i
             continue
         for grown, style in (
             (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.6, "ls": ":"}),
-            (0.0, SOLID),
+            (0.0, STANDING_STYLE),
         ):
             axes.add_patch(outline(obstacle, grown, float(now_s[0]), **style))
     plan = int(track.plan_index[row])
@@ -80,14 +81,14 @@ def _near_miss(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: i
         middle,
         (half_m, half_m),
     )
-    axes.plot(*middle / 1e3, ls="", **NEAREST | {"mec": colour(index)})
+    axes.plot(*middle / 1e3, ls="", **NEAREST_MARK | {"mec": colour(index)})
     hit = run.outcome == "collision" and row == len(track) - 1
     what = "its collision" if hit else f"nearest: {number(float(track.clearance_m[row]))} m"
     axes.set_title(f"{what}, at {track.time_s[row]:.1f} s")
 
 
 def _clearance(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: int) -> None:
-    """The clearance before and behind the place where it was least."""
+    """Plots the clearance before and behind the place where it was least."""
     track, half_m = run.track, _half_m(scene)
     along_m = distance_m(track) - distance_m(track)[row]
     near = np.abs(along_m) < 2 * half_m
@@ -97,7 +98,7 @@ def _clearance(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: i
     axes.legend(loc="upper center", edgecolor="none", borderpad=0)
     axes.locator_params(axis="x", nbins=4)  # a panel of half a figure has no room for more with four digits
     axes.set_xlabel("along the path, m")
-    most_m = CLEARANCES_SHOWN * scene.clearance_m or half_m
+    most_m = PLOT_CLEARANCES * scene.clearance_m or half_m
     axes.set_ylim(min(0.0, float(track.clearance_m[row])) - 0.1 * most_m, most_m)
     axes.set_title("clearance, m")
 
@@ -112,7 +113,7 @@ def close_up(
     middle_m: FloatArray,
     half_m: tuple[float, float],
 ) -> None:
-    """Lines about a place, with a bar of a round length and no ticks."""
+    """Draws lines about a place, with a bar of a round length and no ticks."""
     for points, ink, width, dashes in lines:
         axes.plot(*points.T / 1e3, color=ink, lw=width, ls=dashes, clip_on=True)
     (east, north), (wide, high) = middle_m / 1e3, np.array(half_m) / 1e3

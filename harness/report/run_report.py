@@ -74,7 +74,7 @@ def _written(run: Run, folder: Path) -> Path:
 
 
 def _exceeded(scenario: Scenario, lost: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """The limits that legs exceeded, beside the distance from the path: figure of `trackability`, label, limit."""
+    """Returns the limits, beside the path's, that legs exceeded: figure of `trackability`, label, limit."""
     limits = scenario.trackability
     given = (
         ("max_altitude_error_m", "altitude error, m", limits.altitude_m),
@@ -89,7 +89,7 @@ def _exceeded(scenario: Scenario, lost: Sequence[Mapping[str, Any]]) -> list[dic
 
 
 def _found_again(arguments: list[str], folder: Path) -> list[str]:
-    """The arguments of a command, with the table that a run came from where it lies now: campaigns are moved."""
+    """Replaces the table that a command names by where it lies now, as campaigns are moved."""
     found = list(arguments)
     for place in [place for place, each in enumerate(arguments[:-1], 1) if each == "--from"]:
         before, now = Path(arguments[place]), folder.resolve().parent.parent / Path(arguments[place]).name
