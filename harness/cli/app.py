@@ -26,7 +26,7 @@ from harness.cli.inputs import list_names, schema, validate
 from harness.cli.options import Command, Group, flag
 from harness.cli.review import export, replay, report, view
 from harness.cli.sweep import sweep
-from harness.cli.terminal import kept_up, results_alone, results_over, say
+from harness.cli.terminal import output_kept_up, results_alone, results_over, say
 from harness.cli.world import world
 from harness.files.errors import RunFolderError, WriteError
 from harness.files.input_file import InputError
@@ -34,11 +34,11 @@ from harness.files.spawning import open_standard_files
 from harness.flight.signals import taken_as_interrupt
 from planner.compiled import own_this_process
 
-INTERRUPTED: Final = 130
+INTERRUPTED_STATUS: Final = 130
 MEMORY_BYTES: Final = 1_200_000_000
-"""Address space with which a flight gets through: with half of it libraries abort."""
-COMPLETION: Final = "_WAYPROOF_COMPLETE"
-"""The variable by which a shell asks for completions, which typer ends with sys.exit."""
+"""A flight needs this much address space; with half of it libraries abort."""
+COMPLETION_VARIABLE: Final = "_WAYPROOF_COMPLETE"
+"""Environment variable by which a shell asks for completions, which typer ends with sys.exit."""
 
 app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
 COMMANDS: Final = (
@@ -86,11 +86,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = _run(words, debug)
     if arguments is None:
         results_over()
-    return 128 + came[0] if came and status == INTERRUPTED else status
+    return 128 + came[0] if came and status == INTERRUPTED_STATUS else status
 
 
 def _warn_of_little_memory() -> None:
-    """Tells of a limit under which libraries abort without a word."""
+    """Warns of a memory limit under which libraries abort without a word."""
     import resource
 
     most, _ = resource.getrlimit(resource.RLIMIT_AS)
@@ -104,12 +104,12 @@ def _warn_of_little_memory() -> None:
 
 def _run(words: Sequence[str], debug: bool) -> int:
     try:
-        with kept_up():
+        with output_kept_up():
             return int(app(list(words) or ["--help"], prog_name="wayproof", standalone_mode=False) or 0)
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return INTERRUPTED_STATUS
     except SystemExit:
-        if COMPLETION in os.environ:
+        if COMPLETION_VARIABLE in os.environ:
             raise
         say("wayproof: code that was loaded, a planner's perhaps, called sys.exit; nothing is done", err=True)
         return FAILED
@@ -120,7 +120,7 @@ def _run(words: Sequence[str], debug: bool) -> int:
 
 
 def _report(error: Exception) -> int:
-    """Says on standard error what went wrong and returns the exit status."""
+    """Prints what went wrong on standard error, and returns the exit status."""
     told, status = f"wayproof: {error}", BAD_INPUT
     if isinstance(error, InputError):
         told = str(error)

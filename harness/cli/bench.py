@@ -13,11 +13,11 @@ from harness.cli.options import AircraftArgument, AircraftOption, Count, Json, T
 from harness.cli.replacing import kind_of
 from harness.cli.terminal import legible, print_table, progress_bar, step_bar
 
-SCENARIO: Final = "A file or shipped name; or the word tracking."
+SCENARIO_HELP: Final = "A file or shipped name; or the word tracking."
 
 
 def bench(
-    scenario: Annotated[str, argument("SCENARIO", SCENARIO, show_default=True)] = "paper_circles",
+    scenario: Annotated[str, argument("SCENARIO", SCENARIO_HELP, show_default=True)] = "paper_circles",
     aircraft: AircraftOption = None,
     seeds: Annotated[Count, option("N", "With tracking: courses in each air. Default: 20.", min=1)] = None,
     guidance: Annotated[Text, option("KIND", "With tracking: the guidance law. Default: preview.")] = None,
@@ -49,7 +49,7 @@ def bench(
 
 
 def _bench_tracking(name: str, seeds: int, as_json: bool, guidance: str) -> int:
-    """The table of tracking errors of an aircraft."""
+    """Prints the table of tracking errors of an aircraft; returns the exit status."""
     from harness.bench.tracking import bench_tracking
     from harness.scenario.kinds import guidance_kinds
 
@@ -69,7 +69,7 @@ def _bench_tracking(name: str, seeds: int, as_json: bool, guidance: str) -> int:
 
 
 def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
-    """Name and value of each row of the table of `bench`."""
+    """Returns name and value of each row of the table of `bench`."""
     planner, same = result["planner_ms"], "x bare JSBSim at the same step rate"
     rows = {
         "closed loop": f"{result['closed_loop_ratio']:.3f} {same}",
@@ -83,7 +83,7 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
 
 
 def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequence[str]]]:
-    """Headings and rows of the table of `bench tracking`; limits are behind the figures."""
+    """Returns headings and rows of the table of `bench tracking`; limits stand behind the figures."""
     figures = ("cross_track_p95_m", "cross_track_max_m", "altitude_p95_m")
     rows: list[Sequence[str]] = []
     for case in result["cases"]:
@@ -97,14 +97,14 @@ def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequen
     return ("air", "cross-track p95", "max m", "altitude p95", "saturated", "limits"), rows
 
 
-AIRSPEEDS: Final = "True airspeed; can be repeated. Default: cruise."
-WINDS: Final = "Wind to track in; can be repeated. Default: 30 % of V."
+AIRSPEEDS_HELP: Final = "True airspeed; can be repeated. Default: cruise."
+WINDS_HELP: Final = "Wind to track in; can be repeated. Default: 30 % of V."
 
 
 def envelope(
     aircraft: AircraftArgument,
-    airspeeds: Annotated[list[float] | None, option("V", AIRSPEEDS, "--airspeed-mps")] = None,
-    winds: Annotated[list[float] | None, option("M/S", WINDS, "--wind")] = None,
+    airspeeds: Annotated[list[float] | None, option("V", AIRSPEEDS_HELP, "--airspeed-mps")] = None,
+    winds: Annotated[list[float] | None, option("M/S", WINDS_HELP, "--wind")] = None,
     as_json: Json = False,
 ) -> int:
     """Flies an aircraft and prints what it can do: speeds, turns, roll-in, the tightest path that it tracks.
@@ -144,7 +144,7 @@ _PATH_COLUMNS: Final = {
 
 
 def _print_card(card: Mapping[str, Any]) -> None:
-    """The tables of `envelope`."""
+    """Prints the tables of `envelope`."""
     low, high = card["airspeed_range_mps"]
     facts = {
         "mass": f"{card['mass_kg']:g} kg",

@@ -1,4 +1,4 @@
-"""What the commands do alike: load a scenario, name a folder, tell of faults and interrupts, print JSON."""
+"""Parts that commands share: load a scenario, name a folder, report faults and interrupts, print JSON."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ FAILED: Final = 1
 """Exit status of a command that ran but whose answer is no, or in which the software failed."""
 BAD_INPUT: Final = 2
 """Exit status of bad input or usage."""
-IN_THE_NAME: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")
-"""Keys that the default folder of a run is called after; of a model that is a folder, by the folder's last name."""
+FOLDER_KEYS: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")
+"""Keys that name the default folder of a run; a model that is a folder stands there by its last name."""
 
 
 def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-    """A scenario by file or shipped name, with keys replaced."""
+    """Loads a scenario by file or shipped name, with keys replaced."""
     from harness.campaign.campaign_file import is_a
     from harness.scenario.scenario import load_scenario
     from harness.scenario.shipped import shipped_campaigns
@@ -43,8 +43,8 @@ def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
         raise
 
 
-def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_THE_NAME) -> str:
-    """What a default folder's name has at its end, so that runs which differ in settings do not replace one another."""
+def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = FOLDER_KEYS) -> str:
+    """Returns an ending for a default folder's name, so that runs with other settings do not replace one another."""
     from hashlib import sha256
 
     from harness.files.strict_yaml import as_spelt
@@ -55,12 +55,12 @@ def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_TH
 
 
 def at_a_time(workers: int | None) -> int:
-    """How many flights are flown at a time: as many as were asked for, or one a processor."""
+    """Returns the number of flights at a time: as many as were asked for, or one a processor."""
     return workers or os.cpu_count() or 1
 
 
 def with_remedy(error: OSError) -> str:
-    """What an error of the system says, and what would help where that is known."""
+    """Returns the text of a system's error, and a remedy where one is known."""
     if error.errno in (errno.EMFILE, errno.ENFILE):
         return f"{error}: raise the limit with `ulimit -n 1024`"
     try:
@@ -72,7 +72,7 @@ def with_remedy(error: OSError) -> str:
 
 @contextmanager
 def interruptible(left: Callable[[], str]) -> Iterator[None]:
-    """Says after Ctrl-C what is left."""
+    """Says after Ctrl-C what is left behind, by the sentence of `left`."""
     try:
         yield
     except KeyboardInterrupt:
@@ -82,7 +82,7 @@ def interruptible(left: Callable[[], str]) -> Iterator[None]:
 
 @contextmanager
 def flying_into(folder: Path, length_m: float, silent: bool) -> Iterator[FlightReport]:
-    """Progress of a flight of about this length into a run folder; after Ctrl-C it is said what became of that."""
+    """Shows progress of a flight of about `length_m` into a run folder; after Ctrl-C says what became of the folder."""
     from harness.run_files.run_folder import MANIFEST, SCHEMA
 
     left = marked_incomplete("run", folder, MANIFEST, SCHEMA)
@@ -91,7 +91,7 @@ def flying_into(folder: Path, length_m: float, silent: bool) -> Iterator[FlightR
 
 
 def marked_incomplete(what: str, folder: Path, index: str, schema: str) -> Callable[[], str]:
-    """What became of a folder that was being written, for `interruptible`."""
+    """Returns a function that says what became of a folder that was being written, for `interruptible`."""
 
     def left() -> str:
         begun = read_index(folder / index, schema)
@@ -104,7 +104,7 @@ def marked_incomplete(what: str, folder: Path, index: str, schema: str) -> Calla
 
 @contextmanager
 def resumable(folder: Path, index: str) -> Iterator[None]:
-    """The same for many flights, which --resume goes on with; a full disk, or a cluster gone, ends with FAILED."""
+    """Says after Ctrl-C that --resume goes on with the flights; a full disk, or a cluster gone, ends with FAILED."""
     done = f"what is done is in {folder}, --resume goes on"
     try:
         with interruptible(lambda: done if (folder / index).exists() else "nothing was written"):
@@ -116,7 +116,7 @@ def resumable(folder: Path, index: str) -> Iterator[None]:
 
 @contextmanager
 def written(out: Path) -> Iterator[None]:
-    """Around writing a file that somebody named; an InputError says that it cannot be written."""
+    """Turns an OSError while a named file is written into an InputError that says so."""
     try:
         yield
     except OSError as error:

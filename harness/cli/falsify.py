@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from harness.falsify.breaking_point import Breaking
     from harness.scenario.scenario import Scenario
 
-RUNS_A_KEY: Final = 40
+RUNS_PER_KEY: Final = 40
 Claim = Literal["reached", "no-contact", "trackable"]
 
 
@@ -32,7 +32,7 @@ def falsify(
     claim: Annotated[
         Claim, option("CLAIM", "What fails to hold: reached, no-contact or trackable.")
     ] = "reached",
-    runs: Annotated[Count, option("N", f"Number of flights. Default: {RUNS_A_KEY} a key.", min=2)] = None,
+    runs: Annotated[Count, option("N", f"Number of flights. Default: {RUNS_PER_KEY} a key.", min=2)] = None,
     tolerance: Annotated[float, option("SHARE", "Precision, as a share of each range.")] = 0.01,
     out: Out = None,
     quiet: Quiet = False,
@@ -77,7 +77,7 @@ def falsify(
             ended.append(done)
             bar(done, of, told)
 
-        most = runs or RUNS_A_KEY * len(ranges)
+        most = runs or RUNS_PER_KEY * len(ranges)
         found = search(
             loaded,
             varied,
@@ -99,7 +99,7 @@ def falsify(
 
 
 def range_of(text: str) -> tuple[str, float, float]:
-    """KEY.PATH=LO:HI as its three parts; a BadParameter says that it is something else, or no range to search."""
+    """Splits KEY.PATH=LO:HI into its three parts; a BadParameter says that it is something else, or no range."""
     key, equals, ends = text.partition("=")
     low, colon, high = ends.partition(":")
     try:
@@ -112,7 +112,7 @@ def range_of(text: str) -> tuple[str, float, float]:
 
 
 def breaking_rows(breaking: Breaking) -> dict[str, str]:
-    """Name and value of each row. Values are printed as they were flown, never rounded."""
+    """Returns name and value of each row. Values are printed as they were flown, never rounded."""
     from harness.falsify.breaking_point import number_text
 
     def told(values: Sequence[float]) -> str:
@@ -146,7 +146,7 @@ def breaking_rows(breaking: Breaking) -> dict[str, str]:
 
 
 def last_line(breaking: Breaking) -> str:
-    """What came of it, in a sentence."""
+    """Returns the result in a sentence."""
     from harness.falsify.breaking_point import number_text
 
     if breaking.found is None:

@@ -8,20 +8,20 @@ from typing import Any, Final
 from harness.cli.terminal import coloured, legible, plain, spread
 from harness.files.wording import counted, tallied
 
-SHOWN: Final = 6
-"""Most corners, legs, contacts and breaches that are listed; the others are counted."""
+MOST_SHOWN: Final = 6
+"""At most this many corners, legs, contacts and breaches are listed; the others are counted."""
 MOST_ITEMS: Final = 12
-"""Most items of a mission that are listed one by one."""
-OF_NOTE: Final = ("not flown", "flown", "not reached")
-"""Treatments of mission items that are listed if there is a reason to tell; items not flown are always listed."""
-OF_HEIGHT_OR_SPEED: Final = (
+"""At most this many items of a mission are listed one by one."""
+TO_LIST: Final = ("not flown", "flown", "not reached")
+"""Items of a mission that were treated so are listed if there is a reason to tell; items not flown always are."""
+HEIGHT_CAUSES: Final = (
     *("climb too steep", "descent too steep", "speed or throttle saturation", "control saturation", "stall"),
 )
-"""Causes at which a leg's errors of altitude and airspeed are told beside its cross-track error."""
+"""At these causes a leg's errors of altitude and airspeed are told beside its cross-track error."""
 
 
 def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """Name and value of each row of the table of a flight."""
+    """Returns name and value of each row of the table of a flight."""
     compute, timing = metrics["compute_ms"], metrics["timing"]
     lengths = [legible(metrics[name]) for name in ("flown_length_m", "planned_length_m")]
     rows = {
@@ -48,7 +48,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
 
 
 def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """Rows on how far the true and the believed position were off the path; one where navigation was perfect.
+    """Returns rows on how far the true and the believed position were off the path; one where navigation was perfect.
 
     The names are those of performance-based navigation (ICAO Doc 9613).
     """
@@ -65,7 +65,7 @@ def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _tracked(metrics: Mapping[str, Any]) -> str:
-    """Whether all legs were tracked, and why some were not; of plans that are judged together, how many they are."""
+    """Tells whether all legs were tracked, and why some were not, and how many plans were judged together."""
     if metrics["trackable"]:
         return "yes"
     legs, plans = metrics["trackability"], metrics["replans"] + 1
@@ -79,7 +79,7 @@ def _tracked(metrics: Mapping[str, Any]) -> str:
 
 
 def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """Name and value of each row of the table of `check`."""
+    """Returns name and value of each row of the table of `check`."""
     legs, check = metrics["trackability"], metrics["check"]
     point = "item" if check["items"] else "waypoint"
     style, (word, _, why) = "bold green" if check["ok"] else "bold red", check["verdict"].partition(":")
@@ -91,11 +91,11 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         "outcome": plain(f"{metrics['outcome']}: {metrics['reason']}"),
         "path": f"{check['points']} points, {lengths}, {counted(len(legs), 'leg')}",
         **_contacts(metrics),
-        **_deviations(metrics),
+        **_deviation_rows(metrics),
         **_counted("legs not trackable", bad),
-        **dict(_leg(leg, point if check["items"] else "") for leg in bad[:SHOWN]),
+        **dict(_leg(leg, point if check["items"] else "") for leg in bad[:MOST_SHOWN]),
         **_counted("corners cut", corners),
-        **{f"  {point} {each['waypoint']}": _corner(each) for each in corners[:SHOWN]},
+        **{f"  {point} {each['waypoint']}": _corner(each) for each in corners[:MOST_SHOWN]},
         **_items(check["items"]),
         **{" " * (at + 1) if at else "notes": plain(note) for at, note in enumerate(check["notes"])},
         "smoothness as given": _smoothness(check["given"]),
@@ -104,17 +104,17 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _counted(title: str, entries: Sequence[Any]) -> dict[str, str]:
-    """A row that counts entries, of which the first few follow."""
-    more = f", the first {SHOWN}:" if len(entries) > SHOWN else ""
+    """Returns a row that counts entries, of which the first few follow."""
+    more = f", the first {MOST_SHOWN}:" if len(entries) > MOST_SHOWN else ""
     return {title: f"{len(entries)}{more}"} if entries else {}
 
 
 def _leg(leg: Mapping[str, Any], point: str) -> tuple[str, str]:
-    """Name and value of the row of a leg that was not tracked."""
+    """Returns name and value of the row of a leg that was not tracked."""
     told = (
         f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {_metres(leg['max_deviation_m'])} off"
     )
-    if leg["cause"] in OF_HEIGHT_OR_SPEED:
+    if leg["cause"] in HEIGHT_CAUSES:
         told += f", {_metres(leg['max_altitude_error_m'])} in altitude"
         if (slow_mps := leg["max_airspeed_error_mps"]) is not None:
             told += f", {slow_mps:.2g} m/s in airspeed"
@@ -129,8 +129,8 @@ def _smoothness(figures: Mapping[str, float]) -> str:
     return f"turns {figures['heading_change_deg']:,.0f} deg, {energy}, {tightest}"
 
 
-def _deviations(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """How far the flight was off the path, where most, and off the altitude."""
+def _deviation_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
+    """Tells the errors from the path given and where most, of the systems, in altitude, and the height above ground."""
     legs, check, worst = metrics["trackability"], metrics["check"], metrics["check"]["worst"]
     tolerance = f"{legs[0]['threshold_m']:.3g} m" if legs else "none"
     other = legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"])
@@ -154,13 +154,13 @@ def _where(place: Mapping[str, float]) -> str:
 
 
 def _contacts(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """What was touched and crossed, and the least distance, where there was anything."""
+    """Lists contacts, breaches and the least clearance, where there are any."""
     least_m, rows = metrics["min_clearance_m"], {}
     if least_m is not None:
         rows["least clearance"] = f"{least_m:,.4g} m"
     for one, many in (("contact", "contacts"), ("breach", "breaches")):
         rows |= _counted(many, metrics[many])
-        for number, each in enumerate(metrics[many][:SHOWN], start=1):
+        for number, each in enumerate(metrics[many][:MOST_SHOWN], start=1):
             time = f"{each['start_s']:.0f} to {each['end_s']:.0f} s"
             place = f"({each['east_m']:.0f}, {each['north_m']:.0f}) m"
             rows[f"  {one} {number}"] = plain(
@@ -170,13 +170,13 @@ def _contacts(metrics: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _items(items: Sequence[Mapping[str, str]]) -> dict[str, str]:
-    """What became of the items of a mission: all are counted, those of note are named."""
+    """Counts the items of a mission by their treatment, and names the noteworthy ones."""
     if not items:
         return {}
     kinds = [item["what"] for item in items]
     tally = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
     told = [
-        item for item in items if item["what"] in OF_NOTE and (item["why"] or item["what"] == "not flown")
+        item for item in items if item["what"] in TO_LIST and (item["why"] or item["what"] == "not flown")
     ]
     rows = {"items": f"{len(items)}: {tally}"}
     for item in told[:MOST_ITEMS]:
@@ -188,7 +188,7 @@ def _items(items: Sequence[Mapping[str, str]]) -> dict[str, str]:
 
 
 def _corner(corner: Mapping[str, Any]) -> str:
-    """How a corner turns and was rounded."""
+    """Tells how a corner turns and how it was rounded."""
     side = "left" if corner["turn_deg"] > 0 else "right"
     allowed, cut_m = f"{corner['allowed_cut_m']:.3g} m allowed", corner["flown_cut_m"]
     if cut_m is None:

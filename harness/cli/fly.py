@@ -24,22 +24,22 @@ if TYPE_CHECKING:
     from harness.watching.watched_flight import Onlookers
 
 FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
-"""Exit status of `fly` by outcome; FAILED for the others."""
-FROM: Final = "A campaign's results.parquet, instead of SCENARIO."
-SPEED: Final = "With --live: simulated seconds a second. Default: as fast as it goes."
+"""Exit status of `fly` by outcome; FAILED for any other."""
+FROM_HELP: Final = "A campaign's results.parquet, instead of SCENARIO."
+SPEED_HELP: Final = "With --live: simulated seconds a second. Default: as fast as it goes."
 
 
 @replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def fly(
     scenario: OptionalScenario = None,
     given: Given = NOTHING,
-    results: Annotated[Path | None, option("FILE", FROM, "--from")] = None,
+    results: Annotated[Path | None, option("FILE", FROM_HELP, "--from")] = None,
     run: Annotated[Count, option("K", "With --from: which run.")] = None,
     out: Out = None,
     no_recording: NoRecording = False,
     view: Annotated[bool, flag("--view", "Open the recording after the flight.")] = False,
     live: Annotated[bool, flag("--live", "Show the flight in the viewer while it is flown.")] = False,
-    speed: Annotated[Number, option("X", SPEED)] = None,
+    speed: Annotated[Number, option("X", SPEED_HELP)] = None,
     web: Annotated[bool, flag("--web", "With --live: show it in a browser, served on 127.0.0.1.")] = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -91,7 +91,7 @@ def _check_usage(views_nothing: bool, live: bool, speed: float | None, web: bool
 def _asked(
     scenario: str | None, results: Path | None, run: int | None, given: list[tuple[str, str]]
 ) -> tuple[Scenario, str | None]:
-    """What to fly, and the digest that a campaign's results have of just that."""
+    """Returns the scenario to fly, and the digest that a campaign's results have for exactly that flight."""
     if (scenario is None) == (results is None):
         raise typer.BadParameter("give either a SCENARIO or --from with --run")
     if results is None or run is None:
@@ -124,7 +124,7 @@ def _fly(
 
 
 def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
-    """The table of a flight, and where its files are."""
+    """Prints the table of a flight, and where its files are."""
     from harness.scenario.conditions import told
     from harness.world.motion_assumptions import outside_assumptions
 
@@ -143,7 +143,7 @@ def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_
 
 @contextmanager
 def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Onlookers, Callable[[], None]]]:
-    """A viewer of our own, open no longer than the block, and what waits until it is closed.
+    """Opens a viewer for the length of the block; gives its onlookers, and a function that waits for its end.
 
     An InputError says that there is no screen for it.
     """

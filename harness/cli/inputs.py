@@ -20,10 +20,10 @@ from harness.files.input_file import InputError
 
 _AIRCRAFT_ROW: Final = "{:13} {:>7} {:>10} {:>6} {:>6} {:6} "
 _WIDTH: Final = 80
-WHAT: Final = "planners, aircraft, guidance, scenarios, worlds, campaigns or metrics."
+WHAT_HELP: Final = "planners, aircraft, guidance, scenarios, worlds, campaigns or metrics."
 
 
-def list_names(what: Annotated[str, argument("WHAT", WHAT)]) -> int:
+def list_names(what: Annotated[str, argument("WHAT", WHAT_HELP)]) -> int:
     """Prints the names that a scenario or a command can use; for planners and guidance laws also their keys.
 
     `list aircraft` first measures, in flight, each aircraft that is new to this machine: about a minute for all. The
@@ -51,7 +51,7 @@ def list_names(what: Annotated[str, argument("WHAT", WHAT)]) -> int:
 
 
 def _files(files: Mapping[str, Path]) -> Iterator[str]:
-    """Shipped files, a row each."""
+    """Returns a row for each shipped file."""
     from harness.scenario.shipped import summary
 
     width = max(map(len, files), default=0)
@@ -59,7 +59,7 @@ def _files(files: Mapping[str, Path]) -> Iterator[str]:
 
 
 def _folded(head: str, text: str) -> str:
-    """A line whose text goes on below its beginning where a terminal is too narrow for it."""
+    """Folds a text under its own beginning where a terminal is too narrow for it."""
     if not sys.stdout.isatty():
         return head + text
     room = max(shutil.get_terminal_size().columns - len(head), 20)
@@ -67,7 +67,7 @@ def _folded(head: str, text: str) -> str:
 
 
 def _metrics() -> Iterator[str]:
-    """Every figure of a flight that people are shown: its name, place in `metrics.json`, unit, and what it means."""
+    """Yields a text for each figure of a flight that people are shown: name, place in `metrics.json`, unit, meaning."""
     from harness.analysis.registry import METRICS
 
     for metric in METRICS:
@@ -83,7 +83,7 @@ def _filled(text: str, begin: str = "") -> str:
 
 
 def _worlds() -> Iterator[str]:
-    """A row for each family of benchmark worlds: how many there are, the first one's name, its source and licence."""
+    """Yields a row for each family of benchmark worlds: how many, the first one's name, its source and licence."""
     from harness.scenario.shipped import shipped_worlds, summary
 
     families: dict[str, list[str]] = {}
@@ -96,7 +96,7 @@ def _worlds() -> Iterator[str]:
 
 
 def _kinds(kinds: Mapping[str, Any]) -> Iterator[str]:
-    """Every planner, or law, with its own keys: default, unit, what it is."""
+    """Yields every planner, or law, with its own keys: default, unit, meaning."""
     for name, kind in kinds.items():
         yield _filled(f"{name}: {kind.summary}")
         for own in fields(kind.config):
@@ -106,14 +106,14 @@ def _kinds(kinds: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _default(value: object) -> str:
-    """A default as it stands in a scenario."""
+    """Formats a default as it stands in a scenario."""
     if value is None:
         return "derived"
     return f"{value:g}" if isinstance(value, float) else str(value).lower()
 
 
 def _aircraft() -> Iterator[str]:
-    """A row for each of the fleet; columns are those of `_AIRCRAFT_ROW`."""
+    """Returns a row for each aircraft of the fleet; columns are those of `_AIRCRAFT_ROW`."""
     from aircraft.airframes import AircraftError, aircraft_names, airframe, is_surveyed
     from aircraft.envelope import performance
     from planner.kernel_cache import seal
@@ -164,7 +164,7 @@ def validate(
 
 
 def _found(file: str) -> tuple[str, tuple[str, ...]]:
-    """What a valid file holds, in a few words, and what of a scenario lies outside the planner's assumptions."""
+    """Returns what a valid file holds, in a few words, and which of the planner's assumptions a scenario breaks."""
     from harness.campaign.campaign_file import is_a
     from harness.files.wording import counted
     from harness.scenario.shipped import campaign_path, shipped_campaigns

@@ -16,7 +16,7 @@ Count: TypeAlias = int | None
 
 
 def _without_types_of_flags(parameters: list[Any]) -> list[Any]:
-    """The parameters of a command; help shows no type for those that take no value."""
+    """Hides the type in the help of parameters that take no value."""
     for each in parameters:
         if getattr(each, "is_flag", False):
             each.metavar = " "
@@ -32,7 +32,7 @@ class Command(TyperCommand):
         self.help = re.sub(r"(?<!\n)\n(?!\n)", " ", apart)
 
     def get_params(self, ctx: Any) -> list[Any]:
-        """Those that help shows."""
+        """Returns the parameters as help shows them."""
         return _without_types_of_flags(super().get_params(ctx))
 
 
@@ -40,32 +40,32 @@ class Group(TyperGroup):
     """The program itself."""
 
     def get_params(self, ctx: Any) -> list[Any]:
-        """Those that help shows."""
+        """Returns the parameters as help shows them."""
         return _without_types_of_flags(super().get_params(ctx))
 
 
 def flag(name: str, text: str) -> Any:
-    """An option without a value."""
+    """Declares an option without a value."""
     return typer.Option(name, help=text)
 
 
 def option(metavar: str, text: str, *names: str, **other: Any) -> Any:
-    """An option with a value; its name is that of the parameter where none is given."""
+    """Declares an option with a value; it is named after the parameter where no name is given."""
     return typer.Option(*names, metavar=metavar, help=text, **other)
 
 
 def argument(metavar: str, text: str, **other: Any) -> Any:
-    """What stands behind a command without a name."""
+    """Declares an argument, which stands behind the command without a name."""
     return typer.Argument(metavar=metavar, help=text, **other)
 
 
-_SCENARIO = argument("SCENARIO", "A file, or a name that `wayproof list scenarios` prints.")
-_NAME = "A name that `wayproof list aircraft` prints, or a folder."
-ScenarioArgument = Annotated[str, _SCENARIO]
-OptionalScenario = Annotated[Text, _SCENARIO]
-AircraftName = Annotated[str, option("NAME", _NAME)]
-AircraftOption = Annotated[Text, option("NAME", _NAME)]
-AircraftArgument = Annotated[str, argument("AIRCRAFT", _NAME)]
+_SCENARIO_ARGUMENT = argument("SCENARIO", "A file, or a name that `wayproof list scenarios` prints.")
+_AIRCRAFT_HELP = "A name that `wayproof list aircraft` prints, or a folder."
+ScenarioArgument = Annotated[str, _SCENARIO_ARGUMENT]
+OptionalScenario = Annotated[Text, _SCENARIO_ARGUMENT]
+AircraftName = Annotated[str, option("NAME", _AIRCRAFT_HELP)]
+AircraftOption = Annotated[Text, option("NAME", _AIRCRAFT_HELP)]
+AircraftArgument = Annotated[str, argument("AIRCRAFT", _AIRCRAFT_HELP)]
 Workers = Annotated[Count, option("N", "Flights at a time. Default: one a processor.", min=1)]
 Out = Annotated[Path | None, option("DIR", "The folder to write. Default: one of its own in runs.")]
 Quiet = Annotated[bool, flag("--quiet", "Print nothing but errors.")]

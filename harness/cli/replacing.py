@@ -1,4 +1,4 @@
-"""The options of commands that replace keys of a scenario, and what they replace."""
+"""The options of commands that replace keys of a scenario, and the replacements that they give."""
 
 from __future__ import annotations
 
@@ -14,45 +14,45 @@ import typer
 from harness.cli.options import AircraftOption, Count, Text, option
 
 Run = TypeVar("Run", bound=Callable[..., int])
-_KIND: Final = "Replaces {}.kind; or FILE.py:NAME, MODULE:NAME."
-_DAY: Final = "Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."
-_ANY: Final = "Replaces any key of a scenario; can be repeated."
+_KIND_HELP: Final = "Replaces {}.kind; or FILE.py:NAME, MODULE:NAME."
+_DAY_HELP: Final = "Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."
+_ANY_HELP: Final = "Replaces any key of a scenario; can be repeated."
 
 REPLACING: Final[dict[str, Any]] = {
-    "planner": Annotated[Text, option("KIND", _KIND.format("planner"))],
+    "planner": Annotated[Text, option("KIND", _KIND_HELP.format("planner"))],
     "aircraft": AircraftOption,
-    "guidance": Annotated[Text, option("KIND", _KIND.format("guidance"))],
-    "conditions": Annotated[Text, option("DAY", _DAY)],
+    "guidance": Annotated[Text, option("KIND", _KIND_HELP.format("guidance"))],
+    "conditions": Annotated[Text, option("DAY", _DAY_HELP)],
     "wind": Annotated[Text, option("SPEED,FROM", "Steady wind: m/s, degrees it blows from.")],
     "turbulence": Annotated[Text, option("INTENSITY", "light, moderate or severe; or milspec:light, ...")],
     "seed": Annotated[Count, option("N", "Replaces seed.")],
-    "settings": Annotated[list[str] | None, option("KEY.PATH=VALUE", _ANY, "--set")],
+    "settings": Annotated[list[str] | None, option("KEY.PATH=VALUE", _ANY_HELP, "--set")],
 }
-"""The options that replace keys of a scenario, by the name of the parameter."""
+"""Options that replace keys of a scenario, by the name of the parameter."""
 
 
 @dataclass(frozen=True)
 class Given:
-    """What the options of `REPLACING` replace in a scenario: key paths, and values as YAML."""
+    """Replacements in a scenario that the options of `REPLACING` give: key paths, and values as YAML."""
 
     options: tuple[tuple[str, str], ...] = ()
     settings: tuple[tuple[str, str], ...] = ()
-    """Those of --set."""
+    """The replacements by --set."""
     planner: str | None = None
     guidance: str | None = None
 
     @property
     def keys(self) -> list[tuple[str, str]]:
-        """All of them, those of --set last."""
+        """All replacements, those by --set last."""
         return [*self.options, *self.settings]
 
     @property
     def sources(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Planners and laws of one's own: a process that flies has to import them too."""
+        """Planners and laws given as FILE.py:NAME or MODULE:NAME, which a process that flies has to import too."""
         return sources(self.planner), sources(self.guidance)
 
     def plus(self, **keys: Any) -> Given:
-        """With further values by key path, its points written as two underscores; None replaces nothing.
+        """Adds values by key path, its points written as two underscores; None replaces nothing.
 
         A BadParameter says that --set gives such a key another value.
         """
@@ -72,7 +72,7 @@ NOTHING: Final = Given()
 
 
 def replacing(*names: str) -> Callable[[Run], Callable[..., int]]:
-    """Gives a command some options of `REPLACING`, which its parameter `given` has what they replace of."""
+    """Adds options of `REPLACING` to a command, whose parameter `given` gets the replacements."""
 
     def made(command: Run) -> Callable[..., int]:
         signature = inspect.signature(command, eval_str=True)
@@ -103,7 +103,7 @@ def given_by(
     seed: int | None = None,
     conditions: str | None = None,
 ) -> Given:
-    """What the texts of options replace; a BadParameter says which cannot be used, or contradicts --set."""
+    """Collects what the options replace; raises BadParameter where a text cannot be used or contradicts --set."""
     from harness.scenario.sections import SHIELDED
 
     is_shielded = planner is not None and planner.endswith(SHIELDED)
@@ -121,7 +121,7 @@ def given_by(
 
 
 def _wind(text: str) -> dict[str, float]:
-    """The key `environment.wind` that --wind SPEED,FROM means."""
+    """Returns the value of `environment.wind` for --wind SPEED,FROM."""
     try:
         speed, direction = (float(part) for part in text.split(","))
     except ValueError:
@@ -130,13 +130,13 @@ def _wind(text: str) -> dict[str, float]:
 
 
 def _turbulence(text: str) -> dict[str, str]:
-    """The key `environment.turbulence` that --turbulence [MODEL:]INTENSITY means."""
+    """Returns the value of `environment.turbulence` for --turbulence [MODEL:]INTENSITY."""
     model, colon, intensity = text.rpartition(":")
     return {"model": model if colon else "tustin", "intensity": intensity}
 
 
 def _setting(text: str) -> tuple[str, str]:
-    """KEY.PATH=VALUE as its two parts."""
+    """Splits KEY.PATH=VALUE into its two parts."""
     name, equals, value = text.partition("=")
     if not equals:
         raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
@@ -144,7 +144,7 @@ def _setting(text: str) -> tuple[str, str]:
 
 
 def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:
-    """The kind that --planner or --guidance means: FILE.py:NAME and MODULE:NAME are imported and known as NAME."""
+    """Returns the kind for --planner or --guidance; imports FILE.py:NAME and MODULE:NAME, then known as NAME."""
     from harness.scenario.kinds import GUIDANCE, PLANNER, registered
     from harness.scenario.sections import SHIELDED
 
@@ -165,7 +165,7 @@ def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:
 
 
 def sources(*names: str | None) -> tuple[str, ...]:
-    """Those of some names that are FILE.py:NAME or MODULE:NAME: a process that flies has to import them too."""
+    """Picks names that are FILE.py:NAME or MODULE:NAME, for flying processes to import; drops the shield's suffix."""
     from harness.scenario.kinds import is_source
     from harness.scenario.sections import SHIELDED
 

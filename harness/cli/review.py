@@ -25,15 +25,15 @@ NO_RECORDINGS: Final = (
     "has no recordings: `recordings: thin` in the campaign's file keeps a small one of every run, `all` a whole one, "
     "`failures` a whole one of those that failed"
 )
-RUN_DIRS: Final = "Run folders (several are overlaid), or a campaign's folder, as a table of runs."
-BY: Final = "Of a campaign: a table by these keys; can be repeated."
-FORMAT: Final = "Of a campaign or comparison: only its table: latex, csv."
-LOG: Final = "A table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...)."
-MISSION: Final = "Its mission: a file of `check`, or a JSON with its corners. Default: that of the log."
+RUN_DIRS_HELP: Final = "Run folders (several are overlaid), or a campaign's folder, as a table of runs."
+BY_HELP: Final = "Of a campaign: a table by these keys; can be repeated."
+FORMAT_HELP: Final = "Of a campaign or comparison: only its table: latex, csv."
+LOG_HELP: Final = "A table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...)."
+MISSION_HELP: Final = "Its mission: a file of `check`, or a JSON with its corners. Default: that of the log."
 
 
 def view(
-    runs: Annotated[list[Path], argument("RUN_DIR...", RUN_DIRS)],
+    runs: Annotated[list[Path], argument("RUN_DIR...", RUN_DIRS_HELP)],
     web: Annotated[bool, flag("--web", "Show them in a browser, served on 127.0.0.1.")] = False,
 ) -> int:
     """Opens recordings in the rerun viewer.
@@ -65,7 +65,7 @@ def _need_folder(run: Path) -> None:
 
 
 def open_viewer(runs: Sequence[Path], web: bool = False, campaign: Path | None = None) -> bool:
-    """Shows recordings, those of a campaign as a table, until the viewer is closed; says why, if it cannot start."""
+    """Shows recordings, a campaign's as a table, until the viewer is closed; says why and returns False if it can't."""
     from harness.recording.viewer import ViewerError, open_viewer
 
     def tell(told: str) -> None:
@@ -91,8 +91,8 @@ def open_viewer(runs: Sequence[Path], web: bool = False, campaign: Path | None =
 
 def report(
     run: Annotated[Path, argument("RUN_DIR", "The folder of a complete run, or of a campaign.")],
-    by: Annotated[list[str] | None, option("KEY[,KEY]", BY)] = None,
-    table: Annotated[Literal["latex", "csv"] | None, option("FORMAT", FORMAT, "--format")] = None,
+    by: Annotated[list[str] | None, option("KEY[,KEY]", BY_HELP)] = None,
+    table: Annotated[Literal["latex", "csv"] | None, option("FORMAT", FORMAT_HELP, "--format")] = None,
     out: Annotated[Path | None, option("FILE", "Of --format: a file in place of standard output.")] = None,
 ) -> int:
     """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
@@ -148,7 +148,7 @@ def _need_run(folder: Path) -> None:
 
 
 def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str, out: Path | None) -> None:
-    """The table of a campaign or a comparison for a paper."""
+    """Prints or writes the table of a campaign or a comparison for a paper."""
     from harness.analysis import rows as compared
     from harness.campaign import cell
     from harness.campaign.results import RESULTS
@@ -171,9 +171,9 @@ def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str,
 
 @replacing("guidance", "settings")
 def replay(
-    log: Annotated[Path, argument("LOG", LOG)],
+    log: Annotated[Path, argument("LOG", LOG_HELP)],
     aircraft: AircraftName,
-    mission: Annotated[Path | None, option("FILE", MISSION)] = None,
+    mission: Annotated[Path | None, option("FILE", MISSION_HELP)] = None,
     given: Given = NOTHING,
     out: Out = None,
     no_recording: NoRecording = False,

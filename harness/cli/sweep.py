@@ -25,25 +25,25 @@ if TYPE_CHECKING:
     from harness.campaign.summary import Summary, Table
     from harness.campaign.workers import Workers as Flyers
 
-SHOWN_WORST: Final = 5
+MOST_FAILURES: Final = 5
 LEGEND: Final = (
     "reached, below the wanted clearance, tracks: 95 % interval; "
     "length over the optimum: median/p95; plan: p99/max"
 )
 
-PLANNERS: Final = "Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME."
-SCHEDULER: Final = "A Dask cluster that flies instead: tls://HOST:8786. It can run code on this machine."
-UNENCRYPTED: Final = "Allow a --scheduler beyond this machine without TLS, in a trusted network."
+PLANNERS_HELP: Final = "Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME."
+SCHEDULER_HELP: Final = "A Dask cluster that flies instead: tls://HOST:8786. It can run code on this machine."
+UNENCRYPTED_HELP: Final = "Allow a --scheduler beyond this machine without TLS, in a trusted network."
 
 
 @replacing("guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def sweep(
     campaign: Annotated[str, argument("CAMPAIGN", "A campaign file, or a shipped one's name.")],
-    planners: Annotated[Text, option("A,B,...", PLANNERS, "--planners", "--planner")] = None,
+    planners: Annotated[Text, option("A,B,...", PLANNERS_HELP, "--planners", "--planner")] = None,
     given: Given = NOTHING,
     workers: Workers = None,
-    scheduler: Annotated[Text, option("ADDRESS", SCHEDULER)] = None,
-    unencrypted: Annotated[bool, flag("--unencrypted", UNENCRYPTED)] = False,
+    scheduler: Annotated[Text, option("ADDRESS", SCHEDULER_HELP)] = None,
+    unencrypted: Annotated[bool, flag("--unencrypted", UNENCRYPTED_HELP)] = False,
     out: Out = None,
     resume: Resume = False,
     quiet: Quiet = False,
@@ -99,7 +99,7 @@ def checked(
     settings: Sequence[tuple[str, str]] = (),
     laws: tuple[str, ...] = (),
 ) -> CampaignRuns:
-    """The runs of a campaign file, every scenario of them made once."""
+    """Returns the runs of a campaign file, after making every scenario of them once."""
     from harness.campaign.campaign_file import is_a, load_campaign
     from harness.campaign.runs import CampaignRuns
 
@@ -119,7 +119,7 @@ def checked(
 def _fly(
     runs: CampaignRuns, path: Path, workers: AbstractContextManager[Flyers], *, resume: bool, silent: bool
 ) -> tuple[dict[str, int], bool]:
-    """Flies what is missing; returns how many runs ended how, and whether all are over."""
+    """Flies the missing runs; returns the number of runs by outcome, and whether all are over."""
     from harness.campaign.flight import Answer
     from harness.campaign.folder import CampaignFolder, fly_missing, told_left
     from harness.campaign.results import INDEX
@@ -145,7 +145,7 @@ def _fly(
 
 
 def print_summary(summary: Summary, all_tables: bool = False) -> None:
-    """Prints the answers on standard output, with `all_tables` every table, not the first alone."""
+    """Prints the answers on standard output, with `all_tables` every table, else the first alone."""
     from harness.campaign.cell import QUESTIONS
 
     _print_counts(summary)
@@ -165,11 +165,11 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
 
 
 def _print_worst(summary: Summary) -> None:
-    """The runs that failed, and how to fly and to see one again."""
+    """Prints the runs that failed, and how to fly and to see one again."""
     from harness.analysis.metric import number
 
     failed = [run for run in summary.worst if run.outcome != "reached"]
-    for run in failed[:SHOWN_WORST]:
+    for run in failed[:MOST_FAILURES]:
         near = "" if run.min_clearance_m is None else f", least clearance {number(run.min_clearance_m)} m"
         print_line(f"{coloured(run.outcome)} run {run.run} ({plain(run.name)}){near}")
     if failed:
@@ -179,7 +179,7 @@ def _print_worst(summary: Summary) -> None:
 
 
 def _print_counts(summary: Summary) -> None:
-    """How many runs there are, how they ended, and what is missing."""
+    """Prints how many runs there are, how they ended, and how many are missing."""
     total, missing = summary.total.runs, summary.missing
     runs = f"{total} of {counted(summary.planned or 0, 'run')}" if missing else counted(total, "run")
     ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
@@ -192,7 +192,7 @@ def _print_counts(summary: Summary) -> None:
 
 
 def _print_duel(duel: Duel) -> None:
-    """Which figures of two planners differ beyond chance, at 5 %."""
+    """Prints which figures of two planners differ beyond chance, at 5 %."""
     first, second = plain(duel.first), plain(duel.second)
     differ = [each for each in duel.figures if each.p is not None and each.p < 0.05]
     figures = "; ".join(f"{plain(each.figure)} {each.difference.text()}" for each in differ)
@@ -210,7 +210,7 @@ def _cells(cell: Cell) -> list[str]:
 
 
 def _lines(table: Table) -> list[Sequence[str]]:
-    """A line a cell; with two keys, the first one's value stands above the lines of the second."""
+    """Returns a line a cell; with two keys, the first one's value stands above the lines of the second."""
     lines: list[Sequence[str]] = []
     for label, cells in zip(table.rows.labels, table.cells, strict=True):
         if table.columns is None:

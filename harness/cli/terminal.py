@@ -1,4 +1,4 @@
-"""What a person sees on a terminal: lines without control characters of others, progress, the one table of results.
+"""Output on a terminal: lines without foreign control characters, progress, the one table of results.
 
 Standard output outlives its reader: what nobody takes any more is lost, and nothing else.
 """
@@ -26,24 +26,24 @@ from rich.text import Text
 from harness.files.wording import printable
 
 FlightReport: TypeAlias = Callable[[float, float, str], None]
-"""Takes simulated time (s), distance to go (m) and what is being done."""
+"""Takes simulated time (s), distance to go (m), and a text on what is being done."""
 StepReport: TypeAlias = Callable[[int, int, str], None]
-"""Takes how many steps are done, of how many, and what is being done."""
+"""Takes the number of steps done, of all steps, and a text on what is being done."""
 LINE_EVERY_S: Final = 10.0
 """Without a terminal, progress is a line on standard error at this interval."""
 MOST_COLUMNS: Final = 80
-"""Tables are never wider."""
-LEAST_NAME: Final = 14
+"""Tables are at most this many letters wide."""
+LEAST_NAME_WIDTH: Final = 14
 """Figures are kept in one line where they leave the first column this width."""
 BREAKS: Final = re.compile(r"(?<=[ _+./:=-])")
-"""Places within a name at which it may go on in the next line."""
+"""Matches places within a name at which it may go on in the next line."""
 OUTCOME_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
-"""Colour of an outcome; all others are bold red."""
+"""Style of an outcome; all others are bold red."""
 
 
 @contextmanager
 def progress_bar(straight_m: float, silent: bool = False) -> Iterator[FlightReport]:
-    """A progress bar of one flight on standard error; a line every ten seconds where that is not a terminal."""
+    """Shows a progress bar of one flight on standard error, or a line every ten seconds where that is no terminal."""
     with _bar(silent) as show:
         begun_s = time.monotonic()
 
@@ -59,7 +59,7 @@ def progress_bar(straight_m: float, silent: bool = False) -> Iterator[FlightRepo
 
 @contextmanager
 def step_bar(silent: bool = False) -> Iterator[StepReport]:
-    """A bar of steps done, with the time left, on standard error; without a terminal, lines likewise."""
+    """Shows a bar of steps done, with the time left, on standard error, or lines where that is no terminal."""
     with _bar(silent, TimeRemainingColumn()) as show:
 
         def report(done: int, of: int, what: str) -> None:
@@ -71,7 +71,7 @@ def step_bar(silent: bool = False) -> Iterator[StepReport]:
 
 @contextmanager
 def _bar(silent: bool, *columns: ProgressColumn) -> Iterator[Callable[[float, float, str, str], None]]:
-    """What shows progress: it takes what is done, the whole, a text beside the bar, and a line for a log."""
+    """Gives a function to show progress, of the part done, the whole, a text beside the bar, and a line for a log."""
     console = Console(stderr=True)
     if silent:
         yield lambda *_: None
@@ -129,15 +129,15 @@ def _add_columns(table: Table, lines: Sequence[Sequence[str]], columns: Sequence
     figures = zip(columns[1:], *(cells[1:] for cells in lines if len(cells) > 1), strict=True)
     widths = [max(Text.from_markup(cell).cell_len for cell in each) for each in figures]
     taken = sum(widths) + len(widths) * (1 if many else 3)
-    fits = taken <= width - LEAST_NAME
+    fits = taken <= width - LEAST_NAME_WIDTH
     table.add_column(printable(columns[0]), overflow="fold")
     for heading in columns[1:]:
         table.add_column(printable(heading), justify="right", overflow="fold", no_wrap=fits)
-    return width - 2 - taken if fits else LEAST_NAME - 4
+    return width - 2 - taken if fits else LEAST_NAME_WIDTH - 4
 
 
 def _broken(name: str, room: int) -> Text:
-    """A name in lines of `room` letters: what is longer goes on below, from behind a space or punctuation on."""
+    """Breaks a name into lines of `room` letters, behind a space or punctuation."""
     shown: list[Text] = []
     for line in Text.from_markup(name).split():
         ends: list[int] = []
@@ -159,34 +159,34 @@ def print_line(text: str, style: str | None = None) -> None:
 
 
 def coloured(outcome: str) -> str:
-    """An outcome in its colour."""
+    """Returns an outcome with the markup of its colour."""
     return f"[{OUTCOME_STYLE.get(outcome, 'bold red')}]{plain(outcome)}[/]"
 
 
 def plain(text: str) -> str:
-    """Text of others with nothing in it that rich takes for markup, or a terminal for a command."""
+    """Escapes foreign text, so that rich finds no markup in it and a terminal no command."""
     return escape(printable(text))
 
 
 def legible(value: float | None) -> str:
-    """A number as a person reads it; a dash where there is none."""
+    """Formats a number for people; a dash where there is none."""
     if value is None or value != value:
         return "-"
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
 def spread(values: Mapping[str, float | None], names: Sequence[str] = ("rms", "p95", "max")) -> str:
-    """Figures of one error, each after its name; their unit, once, comes after them."""
+    """Returns figures of one error, each after its name; their unit, once, comes after them."""
     return " / ".join(f"{name} {legible(values[name])}" for name in names)
 
 
 def say(text: str, *, err: bool = False) -> None:
-    """A line of text, control characters in it spelt out, on standard output or standard error."""
+    """Prints a line on standard output or standard error, with control characters in it spelt out."""
     typer.echo(printable(text), err=err)
 
 
 def results_alone() -> None:
-    """From now on only what this program prints as its result reaches the standard output of the process.
+    """Reserves the standard output of the process for what this program prints as its result.
 
     What code of others writes past Python, from C or a process of its own, goes to standard error, so that it cannot
     get into `--json`. So does what is printed when the interpreter ends, once `results_over` was called.
@@ -209,7 +209,7 @@ def results_alone() -> None:
 
 
 def results_over() -> None:
-    """The result is printed."""
+    """Flushes the result; all that is printed later goes to standard error."""
     if sys.stdout is not None:
         try:
             sys.stdout.flush()
@@ -219,8 +219,8 @@ def results_over() -> None:
 
 
 @contextmanager
-def kept_up() -> Iterator[None]:
-    """A reader that goes away meanwhile (`wayproof fly ... | head -1`) changes neither what is done nor its status."""
+def output_kept_up() -> Iterator[None]:
+    """Lets a reader go away (`wayproof fly ... | head -1`) without changing what is done or the exit status."""
     stream = sys.stdout
     if stream is None:  # closed by whoever started us
         yield
@@ -258,5 +258,5 @@ class _Unread:
 
 
 def to_nowhere(stream: TextIO) -> None:
-    """Has all that is still to be written to a stream lost, so that the interpreter does not try again at its end."""
+    """Loses all that is still to be written to a stream, so that the interpreter does not try again at its end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

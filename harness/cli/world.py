@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 Pair = tuple[float, float]
 
-PLACE: Final = "Latitude,longitude; or x,y in metres for a file without a place on earth."
-NEAR: Final = "Whatever comes this near to the altitude is an obstacle."
-CRS: Final = "Coordinate system of files that name none, such as EPSG:28992."
+PLACE_HELP: Final = "Latitude,longitude; or x,y in metres for a file without a place on earth."
+NEAR_HELP: Final = "Whatever comes this near to the altitude is an obstacle."
+CRS_HELP: Final = "Coordinate system of files that name none, such as EPSG:28992."
 
 
 def world(
@@ -35,13 +35,13 @@ def world(
     altitude_m: Annotated[float, option("H", "Flight altitude above mean sea level.")],
     out: Annotated[Path, option("SCENARIO.yaml", "The scenario to write.")],
     aircraft: AircraftName = "aerosonde",
-    start: Annotated[Text, option("A,B", PLACE)] = None,
+    start: Annotated[Text, option("A,B", PLACE_HELP)] = None,
     goal: Annotated[Text, option("A,B", "Likewise.")] = None,
     clearance_m: Annotated[Number, option("C", "Wanted clearance: planner.clearance_m.")] = None,
-    vertical_clearance_m: Annotated[float, option("V", NEAR)] = 10.0,
+    vertical_clearance_m: Annotated[float, option("V", NEAR_HELP)] = 10.0,
     metres_per_cell: Annotated[Number, option("M", "Side of a cell of an occupancy map.")] = None,
     ground_m: Annotated[Number, option("G", "Flat ground, for heights above ground without terrain.")] = None,
-    crs: Annotated[Text, option("EPSG:N", CRS)] = None,
+    crs: Annotated[Text, option("EPSG:N", CRS_HELP)] = None,
 ) -> int:
     """Makes a scenario from files of terrain, buildings, airspace, fences or an occupancy map.
 
@@ -111,7 +111,7 @@ def _pair(text: str, option: str) -> Pair:
 
 
 def _craft(name: str, clearance_m: float | None) -> Craft:
-    """What the aircraft asks of the area, by the scenario's own defaults."""
+    """Returns the room that the aircraft needs, by the scenario's own defaults."""
     from harness.scenario.performance import performance_of
     from harness.scenario.scenario import scenario_of
     from harness.world_files.siting import Craft
@@ -125,7 +125,7 @@ def _craft(name: str, clearance_m: float | None) -> Craft:
 def _keys(
     name: str, area: Any, obstacles: Sequence[Any], mission: Any, aircraft: str, clearance_m: float | None
 ) -> dict[str, Any]:
-    """The keys of a scenario file."""
+    """Returns the keys of a scenario file."""
     planner = {} if clearance_m is None else {"planner": {"clearance_m": float(clearance_m)}}
     return {
         "schema": "wayproof/scenario/1",
@@ -139,7 +139,7 @@ def _keys(
 
 
 def _file_keys(spec: Any, out: Path) -> dict[str, Any]:
-    """The key `file`, with what differs from its defaults."""
+    """Returns the key `file`, with the values that differ from its defaults."""
     from dataclasses import fields
 
     keys: dict[str, Any] = {"path": os.path.relpath(spec.path.absolute(), out.absolute().parent)}
@@ -151,7 +151,7 @@ def _file_keys(spec: Any, out: Path) -> dict[str, Any]:
 
 
 def _notes(found: Site) -> list[str]:
-    """What was assumed or left out, of all and of each file."""
+    """Returns the notes on what was assumed or left out, of all and of each file."""
     of_files = [f"{each.spec.path.name}: {note}" for each in found.expanded.sources for note in each.notes]
     return [note[:200] for note in (*found.notes, *found.expanded.notes, *of_files)]
 

@@ -1,4 +1,4 @@
-"""Errors of folders and files, and what is told of code of others that raised: the same in every process."""
+"""Errors of folders and files, and texts for errors that foreign code raised: the same in every process."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class WriteError(OSError):
 
     @classmethod
     def of(cls, what: str, folder: object, error: OSError) -> WriteError:
-        """The error about what was being written to a folder when another error came."""
+        """Makes the error for writing `what` to a folder from the system's error."""
         reason = error.strerror or " ".join(str(error).split())
         return cls(f"cannot write {what} in {folder} ({reason}); it is marked incomplete")
 
 
-MOST_LETTERS = 2000
-"""Most characters of a text from other code that stand in a sentence."""
+MOST_CHARACTERS = 2000
+"""A text from other code stands in a sentence with at most this many characters."""
 
 
 class PlannerError(RuntimeError):
@@ -29,33 +29,33 @@ class PlannerError(RuntimeError):
 
 
 def sentence(error: BaseException) -> str:
-    """Its type and what it says, in one line; of a PlannerError what it says alone."""
+    """Returns an error's type and text in one line; of a PlannerError the text alone."""
     try:
-        said = str(error)[:MOST_LETTERS]
+        said = str(error)[:MOST_CHARACTERS]
     except KeyboardInterrupt:
         raise
     except BaseException:  # it may call sys.exit, too
         said = "it cannot be told what"
     if isinstance(error, PlannerError):
         return in_a_line(said)
-    name = type(error).__name__[:MOST_LETTERS]
+    name = type(error).__name__[:MOST_CHARACTERS]
     return in_a_line(f"{name}: {said}" if said else name)
 
 
 def trace(error: BaseException) -> str:
-    """Its traceback; the middle of a very long one is left out."""
+    """Returns an error's traceback; the middle of a very long one is left out."""
     told, half = "".join(traceback.format_exception(error)), 20_000
     if len(told) > 2 * half:
         told = f"{told[:half]}\n... {len(told) - 2 * half:,} characters left out ...\n{told[-half:]}"
-    return _same(told)
+    return _reproducible(told)
 
 
 def in_a_line(text: str) -> str:
-    """Text of others as one line."""
-    return " ".join(_same(text).split())
+    """Returns foreign text as one line."""
+    return " ".join(_reproducible(text).split())
 
 
-def _same(text: str) -> str:
-    """Text without addresses of objects, and without what UTF-8 has no bytes for."""
+def _reproducible(text: str) -> str:
+    """Removes from a text the addresses of objects, and what UTF-8 has no bytes for."""
     writable = text.encode("utf-8", "backslashreplace").decode()
     return re.sub(r"\b0x[0-9a-f]{6,16}\b", "0x...", writable)

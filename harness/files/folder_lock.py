@@ -10,7 +10,7 @@ from harness.files.errors import RunFolderError
 
 
 class FolderLock:
-    """Holds a folder for this process (flock(2) on the folder itself) until it is released; a RunFolderError if held.
+    """Locks a folder for this process (flock(2) on the folder itself) until it is released; a RunFolderError if locked.
 
     With a name, a file of that name in it is held in its place, made where missing: on a network file system (NFS) only
     what is open for writing can be held.
@@ -30,14 +30,14 @@ class FolderLock:
             ) from error
 
     def release(self) -> None:
-        """Lets others write; again it does nothing."""
+        """Lets others write; a second call does nothing."""
         descriptor, self._descriptor = self._descriptor, -1
         if descriptor >= 0:
             os.close(descriptor)
 
 
 def is_held(path: Path) -> bool:
-    """Whether somebody holds a folder, or a file, as `FolderLock` does; it need not be writable, nor exist."""
+    """Tells whether a folder, or a file, is locked as by `FolderLock`; it need not be writable, nor exist."""
     try:
         descriptor = os.open(path, os.O_RDONLY)
     except OSError:

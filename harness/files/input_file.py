@@ -1,4 +1,4 @@
-"""Reads files, and values in them, that somebody gives, without trust: a pipe, a device, huge, no text, no number."""
+"""Reads files that somebody gives, and values in them, without trust: it may be a pipe, huge, or no text."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ class InputError(ValueError):
     """Input that cannot be used. Its text is what a person reads: one line a fault."""
 
 
-_KINDS: Final = {
+_KIND_NAMES: Final = {
     stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
 }  # fmt: skip
 
 
 def read_text(path: Path, max_bytes: int, what: str) -> str:
-    """The text of a regular file, UTF-8; an InputError says why it cannot be read, and `what` the file should be."""
+    """Reads a regular file as UTF-8; an InputError says why it cannot be read, and `what` the file should be."""
     return decoded(read_data(path, max_bytes, what), str(path), what)
 
 
 def read_data(path: Path, max_bytes: int, what: str) -> bytes:
-    """The bytes of a regular file; arguments and faults are those of `read_text`."""
+    """Reads the bytes of a regular file; arguments and faults are those of `read_text`."""
     try:
         with open_regular(path) as file:
             data: bytes = file.read(max_bytes + 1)
@@ -45,7 +45,7 @@ def read_data(path: Path, max_bytes: int, what: str) -> bytes:
 
 
 def decoded(data: bytes, source: str, what: str) -> str:
-    """The text that the bytes of a file are; arguments and faults are those of `read_text`."""
+    """Decodes the bytes of a file as UTF-8; arguments and faults are those of `read_text`."""
     if b"\0" in data:
         raise InputError(f"{source}: is not a text file; must be {what}, as UTF-8")
     try:
@@ -58,18 +58,18 @@ def decoded(data: bytes, source: str, what: str) -> str:
 
 
 def open_regular(path: Path) -> BinaryIO:
-    """Opens a regular file for reading, without waiting for who writes a pipe; an InputError says that it is none."""
+    """Opens a regular file for reading, without waiting on a pipe; an InputError says that it is no such file."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
     if kind != stat.S_IFREG:
         os.close(descriptor)
-        told = f"is {_KINDS.get(kind, 'something else')}, not a file; give the path of a file"
+        told = f"is {_KIND_NAMES.get(kind, 'something else')}, not a file; give the path of a file"
         raise InputError(f"{path}: {told}")
     return os.fdopen(descriptor, "rb")
 
 
 def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any] | None:
-    """A JSON file that one of our folders has, by its key `schema`; None where there is none, or something else."""
+    """Reads the JSON index of one of our folders, which has the key `schema`; None where there is no such index."""
     try:
         index = json.loads(read_text(path, max_bytes, "an index, in JSON"))
     except (ValueError, RecursionError):
@@ -78,7 +78,7 @@ def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict
 
 
 def parsed_json(text: str, source: str, once: bool = True) -> Any:
-    """What a JSON text holds, where `once` no key twice in one place; `source`, or nothing, begins an InputError."""
+    """Parses JSON; where `once`, a key may come only once in a mapping. `source`, or nothing, begins an InputError."""
 
     def fault(sentence: str, line: int | None = None) -> InputError:
         where = source if line is None else f"{source}:{line}" if source else f"line {line}"
@@ -108,7 +108,7 @@ def parsed_json(text: str, source: str, once: bool = True) -> Any:
 
 
 def finite(value: Any, where: str) -> float:
-    """A finite number, from JSON or from text."""
+    """Returns a finite number, from JSON or from text."""
     try:
         number = math.nan if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):
@@ -120,7 +120,7 @@ def finite(value: Any, where: str) -> float:
 
 
 def whole(value: Any, where: str) -> int:
-    """A whole number, from JSON or from text."""
+    """Returns a whole number, from JSON or from text."""
     number = finite(value, where)
     if number != int(number):
         raise InputError(f"{where}: is {number:g}; must be a whole number")
@@ -128,20 +128,20 @@ def whole(value: Any, where: str) -> int:
 
 
 def numbers(value: Any, where: str, form: str, lengths: tuple[int, ...]) -> list[float]:
-    """A list of finite numbers of one of some lengths; `form` says how it should look."""
+    """Returns a list of finite numbers, of one of the `lengths`; `form` tells in an InputError how it should look."""
     if not isinstance(value, list) or len(value) not in lengths:
         raise InputError(f"{where}: must be {form}")
     return [finite(each, f"{where}[{number}]") for number, each in enumerate(value)]
 
 
 def listed(value: Any, where: str, of: str = "") -> list[Any]:
-    """A list; `of` says what it should hold."""
+    """Returns the value if it is a list; `of` tells in an InputError what it should hold."""
     if not isinstance(value, list):
         raise InputError(f"{where}: must be a list{of}")
     return value
 
 
 def shown(text: str) -> str:
-    """A text as a line can show it."""
+    """Shortens a text and escapes it, so that a line can show it."""
     short = text if len(text) <= 80 else f"{text[:77]}..."
     return short if short.isprintable() else ascii(short)

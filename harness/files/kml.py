@@ -14,10 +14,10 @@ from xml.etree import ElementTree
 from harness.files.input_file import InputError, finite, shown
 from harness.files.zip_archive import unpacked
 
-OTHERS: Final = frozenset(
+COUNTED_ELEMENTS: Final = frozenset(
     ["Point", "Model", "NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay", "LinearRing"]
 )
-GIVEN_UP: Final = ("altitudeOffset", "Track", "MultiTrack")
+REFUSED_ELEMENTS: Final = ("altitudeOffset", "Track", "MultiTrack")
 """Elements of Google's extension that are refused by name."""
 COMMA: Final = re.compile(r"\s*,\s*")
 
@@ -40,7 +40,7 @@ class Shape(NamedTuple):
 
 
 class Kml(NamedTuple):
-    """Lines and polygons of a KML file, and how many of what else it has; its name for faults."""
+    """Lines and polygons of a KML file, counts of its other elements, and its name for faults."""
 
     source: str
     lines: list[Shape]
@@ -49,7 +49,7 @@ class Kml(NamedTuple):
 
 
 def read_kml(data: bytes, source: str, most: int) -> Kml:
-    """Reads a KML file, or an archive with one of at most `most` bytes; `source`, or nothing, begins an InputError."""
+    """Reads a KML file, or an archive with one of at most `most` bytes; `source` begins an InputError if not empty."""
     if data.startswith(b"PK"):
         try:
             name, data = unpacked(data, ".kml", most)
@@ -62,13 +62,13 @@ def read_kml(data: bytes, source: str, most: int) -> Kml:
         [shape for mark in marks for shape in _shapes(*mark, source, kind)]
         for kind in ("LineString", "Polygon")
     )
-    others = Counter(kind for each in root.iter() if (kind := name_of(each)) in OTHERS)
+    others = Counter(kind for each in root.iter() if (kind := name_of(each)) in COUNTED_ELEMENTS)
     others["LinearRing"] -= sum(len(each.rings) for each in polygons)
     return Kml(source, lines, polygons, others)
 
 
 def _shapes(number: int, placemark: Element, source: str, kind: str) -> list[Shape]:
-    """Lines or polygons of a Placemark, with the names and values of its ExtendedData."""
+    """Returns the lines or polygons of a Placemark, with the names and values of its ExtendedData."""
     name = shown(text_of(placemark, "name") or f"Placemark {number}")
     where = f"{source}: {name}" if source else name
     kept = {item.get("name", ""): text_of(item, "value") for item in named(placemark, "Data")}
@@ -81,12 +81,12 @@ def _shapes(number: int, placemark: Element, source: str, kind: str) -> list[Sha
 
 
 def _line(line: Element, where: str) -> tuple[tuple[Point, ...], ...]:
-    """Points of a LineString."""
+    """Returns the points of a LineString."""
     return (_points(line, where, "point"),)
 
 
 def _boundary(area: Element, where: str) -> tuple[tuple[Point, ...], ...]:
-    """Corners of the outer ring of a Polygon, then of the inner ones."""
+    """Returns the corners of a Polygon's outer ring, then of its inner ones."""
     rings = [ring for kind in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(area, kind)]
     if not rings:
         raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
@@ -94,7 +94,7 @@ def _boundary(area: Element, where: str) -> tuple[tuple[Point, ...], ...]:
 
 
 def parsed_xml(data: bytes, source: str, root: str) -> Element:
-    """The root of an XML text, which must be of that name and have no entities; `source` begins an InputError."""
+    """Returns the root of an XML text, named `root` and without entities; `source` begins an InputError."""
     where = f"{source}: " if source else ""
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # a few lines of entities unpack to gigabytes
         raise InputError(f"{where}declares a document type or XML entities; remove the declaration")
@@ -108,7 +108,7 @@ def parsed_xml(data: bytes, source: str, root: str) -> Element:
     if name_of(found).lower() != root:
         raise InputError(f"{where}is {shown(name_of(found))}; must be {root.upper()}")
     for each in found.iter():
-        if name_of(each) in GIVEN_UP:
+        if name_of(each) in REFUSED_ELEMENTS:
             raise InputError(
                 f"{where}has gx:{name_of(each)}, which is not read; save it as plain lines and shapes"
             )
@@ -116,22 +116,22 @@ def parsed_xml(data: bytes, source: str, root: str) -> Element:
 
 
 def name_of(element: Element) -> str:
-    """The name of an element without its namespace."""
+    """Returns the name of an element without its namespace."""
     return str(element.tag).rpartition("}")[2]
 
 
 def named(element: Element, name: str) -> Iterator[Element]:
-    """All elements of a name, itself among them."""
+    """Yields all elements of a name, itself among them."""
     return (each for each in element.iter() if name_of(each) == name)
 
 
 def text_of(element: Element, name: str) -> str:
-    """The text of the first element of a name; empty where there is none."""
+    """Returns the text of the first element of a name; empty where there is none."""
     return next(((each.text or "").strip() for each in named(element, name)), "")
 
 
 def _points(element: Element, where: str, what: str) -> tuple[Point, ...]:
-    """Points of a line or a ring; blanks round a comma do not part positions."""
+    """Returns the points of a line or a ring; blanks round a comma do not part positions."""
     points: list[Point] = []
     for number, text in enumerate(COMMA.sub(",", text_of(element, "coordinates")).split()):
         at, cells = f"{where}: {what} {number}", text.split(",")

@@ -16,7 +16,7 @@ _starting = threading.Lock()
 
 @contextmanager
 def without_main() -> Iterator[None]:
-    """Processes begun in the block, by `spawn`, do not import the `__main__` of this one, which might begin others.
+    """Keeps processes begun by `spawn` in the block from importing this one's `__main__`, which might begin others.
 
     An interrupt, which reaches the whole process group, is blocked in them from their first moment on.
     """
@@ -33,7 +33,7 @@ def without_main() -> Iterator[None]:
 
 
 def open_standard_files() -> None:
-    """Opens what is closed of the file descriptors 0 to 2, to nowhere: else another file would get such a number."""
+    """Opens closed file descriptors 0 to 2 to nowhere, since another file would get such a number."""
     for number in range(3):
         try:
             os.fstat(number)

@@ -1,4 +1,4 @@
-"""YAML as this project reads it: a strict subset, every value with its line.
+"""YAML as this project reads it: a strict subset, and a line number for every value.
 
 Plain scalars are resolved by the core schema of YAML 1.2 (https://yaml.org/spec/1.2.2/#103-core-schema): `1e3` is a
 number; `on` and `1_000` are text. Duplicate keys, anchors, aliases, merge keys, tags and a second document are errors.
@@ -19,7 +19,7 @@ from harness.files.input_file import read_text
 
 MAX_BYTES: Final = 32_000_000
 MAX_VALUES: Final = 3_000_000
-"""Enough for 100,000 obstacles with four corners each."""
+"""A file has at most this many values: enough for 100,000 obstacles with four corners each."""
 MAX_DEPTH: Final = 20
 MAX_KEYS: Final = 1000
 MAX_KEY_LENGTH: Final = 100
@@ -38,7 +38,7 @@ _CONSTANTS: Final[dict[str, bool | None]] = {
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
 _INT: Final = re.compile(r"[-+]?[0-9]{1,18}")
-_BASED: Final = re.compile(r"0o[0-7]{1,18}|0x[0-9a-fA-F]{1,15}")
+_OCTAL_OR_HEX: Final = re.compile(r"0o[0-7]{1,18}|0x[0-9a-fA-F]{1,15}")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 _TAB_BEFORE: Final = re.compile(r"[ ?:-]*\t")
@@ -47,13 +47,13 @@ _UNPRINTABLE: Final = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A scalar, a dict of nodes by key, or a tuple of nodes; and the line of its key, or in a list its own."""
+    """A scalar, a dict of nodes by key, or a tuple of nodes, with the line of its key, or in a list its own line."""
 
     value: Scalar | dict[str, Node] | tuple[Node, ...]
     line: int
 
     def plain(self) -> Any:
-        """The value without lines: dicts, tuples and scalars."""
+        """Returns the value without lines: dicts, tuples and scalars."""
         if isinstance(self.value, dict):
             return {key: node.plain() for key, node in self.value.items()}
         if isinstance(self.value, tuple):
@@ -61,23 +61,23 @@ class Node:
         return self.value
 
     def moved(self, line: int) -> Node:
-        """The same value, every part of it from `line`."""
+        """Returns the same value with every part of it at `line`."""
         return node_of(self.plain(), line)
 
     def at(self, loc: Loc) -> Node | None:
-        """The value at `loc`; None where there is none."""
+        """Returns the node at `loc`; None where there is none."""
         node: Node | None = self
         for step in loc:
             node = node.inner(step) if node else None
         return node
 
     def line_of(self, loc: Loc) -> int:
-        """Line of the value at `loc`, or of the innermost one on the way to it that exists."""
+        """Returns the line of the value at `loc`, or of the innermost one on the way to it that exists."""
         inner = self.inner(loc[0]) if loc else None
         return inner.line_of(loc[1:]) if inner else self.line
 
     def inner(self, step: str | int) -> Node | None:
-        """What a mapping has under a key, or a list at an index; None where there is nothing."""
+        """Returns the node that a mapping has under a key, or a list at an index; None where there is none."""
         if isinstance(self.value, dict):
             return self.value.get(str(step)) if isinstance(step, str) else None
         if isinstance(self.value, tuple) and isinstance(step, int) and step < len(self.value):
@@ -86,7 +86,7 @@ class Node:
 
 
 def node_of(plain: Any, line: int) -> Node:
-    """Plain values as a node, every part of it from `line`."""
+    """Makes a node of plain values, every part of it at `line`."""
     if isinstance(plain, dict):
         return Node({key: node_of(value, line) for key, value in plain.items()}, line)
     if isinstance(plain, (list, tuple)):
@@ -95,12 +95,12 @@ def node_of(plain: Any, line: int) -> Node:
 
 
 def key_path(loc: Loc) -> str:
-    """`("obstacles", 2, "circle")` as `obstacles[2].circle`."""
+    """Spells `("obstacles", 2, "circle")` as `obstacles[2].circle`."""
     return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in loc).lstrip(".")
 
 
 def loc_of(path: str, source: str = "") -> Loc:
-    """`obstacles[2].circle` as `("obstacles", 2, "circle")`; `source` begins the InputError on one that is none."""
+    """Reads `obstacles[2].circle` as `("obstacles", 2, "circle")`; `source` begins the InputError for another text."""
     steps = path.replace("[", ".").replace("]", "").split(".")
     if not all(steps) or not all(map(_is_key, steps)) or len(steps) > MAX_DEPTH:
         told = f"{path[:60]!r} is not a key path; write it as sensor.range_m"
@@ -109,12 +109,12 @@ def loc_of(path: str, source: str = "") -> Loc:
 
 
 def as_spelt(path: str) -> str:
-    """A key path as messages and tables spell it: `obstacles.2.circle` as `obstacles[2].circle`."""
+    """Spells a key path as messages and tables do: `obstacles.2.circle` as `obstacles[2].circle`."""
     return key_path(loc_of(path))
 
 
 def fault_line(source: str, line: int, loc: Loc, sentence: str) -> str:
-    """One fault as a person reads it: `file:line: key.path: sentence`."""
+    """Returns a fault as a line for people: `file:line: key.path: sentence`."""
     where = {COMMAND_LINE: "command line", IN_PYTHON: "with_"}.get(line, f"{source}:{line}")
     return ": ".join(part for part in (where, key_path(loc), sentence) if part)
 
@@ -135,12 +135,12 @@ def parse(text: str, source: str) -> Node:
 
 
 def value_of(text: str) -> Scalar:
-    """What a plain (unquoted) scalar stands for."""
+    """Returns the value that a plain (unquoted) scalar stands for."""
     if text in _CONSTANTS:
         return _CONSTANTS[text]
     if _INT.fullmatch(text):
         return int(text)
-    if _BASED.fullmatch(text):
+    if _OCTAL_OR_HEX.fullmatch(text):
         return int(text, 0)
     if _FLOAT.fullmatch(text):
         return float(text)
@@ -169,7 +169,7 @@ class _Composer:
         return InputError(fault_line(self.source, _line(event), loc, sentence))
 
     def next(self, loc: Loc) -> yaml.Event:
-        """The next event; `loc` says where we are in case the text is broken."""
+        """Returns the next event; `loc` tells the place in case the text is broken."""
         try:
             return next(self.events)
         except yaml.MarkedYAMLError as error:
@@ -237,12 +237,12 @@ def _line(event: yaml.Event) -> int:
 
 
 def _is_key(text: str) -> bool:
-    """Whether a key can be shown in a line."""
+    """Tells whether a key can be shown in a line."""
     return len(text) <= MAX_KEY_LENGTH and text.isprintable()
 
 
 def replaced(node: Node, loc: Loc, new: Node, depth: int = 0) -> Node:
-    """A copy of `node` with `new` at `loc` behind `depth` steps; an InputError says that `loc` leads nowhere."""
+    """Returns a copy of `node` with `new` at `loc` behind `depth` steps; InputError where `loc` leads nowhere."""
     if depth == len(loc):
         return new
     step, value, where = loc[depth], node.value, min(new.line, COMMAND_LINE)
@@ -260,7 +260,7 @@ def replaced(node: Node, loc: Loc, new: Node, depth: int = 0) -> Node:
 
 
 def without(node: Node, loc: Loc) -> Node:
-    """A copy of `node` in which a mapping lacks the key at `loc`; the same where it is not there."""
+    """Returns a copy of `node` in which a mapping lacks the key at `loc`; the same where it is not there."""
     step, *rest = loc
     inner = node.inner(step)
     if inner is None or not isinstance(node.value, dict):
@@ -288,7 +288,7 @@ _Dumper.add_representer(tuple, _Dumper.represent_list)
 
 
 def dump(value: Any) -> str:
-    """Plain values as YAML text that `parse` reads back to the same values, floats to the last bit."""
+    """Writes plain values as YAML text that `parse` reads back to the same values, floats to the last bit."""
     text = yaml.dump(
         value, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=110, allow_unicode=True
     )

@@ -1,4 +1,4 @@
-"""Versions of what flies."""
+"""Versions of Python and of the distributions that a flight depends on."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
 FLOWN_WITH: Final = ("wayproof", "jsbsim", "numba", "numpy", "scipy", "shapely")
-"""What a flight's bits depend on, besides Python: with others a campaign is not gone on with."""
+"""Distributions that a flight's bits depend on, besides Python; with others a campaign cannot be resumed."""
 
 
 def versions(distributions: Iterable[str] = FLOWN_WITH) -> dict[str, str | None]:
-    """Versions of Python and of distributions by name; None for one that is not installed."""
+    """Returns the versions of Python and of distributions by name; None for one that is not installed."""
     return {"python": platform.python_version(), **{name: _version(name) for name in distributions}}
 
 

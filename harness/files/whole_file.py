@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 PARTIAL: Final = ".partial"
-"""Ends the name under which a file is written until it is whole."""
+"""A file that is being written has a name with this ending until it is whole."""
 
 
 def replace_text(path: Path, text: str) -> None:
@@ -31,7 +31,7 @@ def replace_bytes(path: Path, content: bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A new file, which takes the place of `path` when the block ends without an error; an OSError names the file."""
+    """Gives a new file, which replaces `path` when the block ends without an error; an OSError names the file."""
     partial = path.with_name(path.name + PARTIAL)
     with _naming(path):
         _check_replaceable(path)
@@ -47,7 +47,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def fresh(path: Path) -> BinaryIO:
-    """A new file in the place of what lies there, a link perhaps, which is not followed; OSErrors as `replacing`."""
+    """Opens a new file in place of one that lies there; a link there is not followed. OSErrors as `replacing`."""
     with _naming(path):
         _check_replaceable(path)
         path.unlink(missing_ok=True)
@@ -56,7 +56,7 @@ def fresh(path: Path) -> BinaryIO:
 
 
 def append_to(path: Path) -> BinaryIO:
-    """A regular file to write behind its end, made where missing; a link is not followed. OSErrors as `replacing`."""
+    """Opens a regular file to append to, made where missing; a link is not followed. OSErrors as `replacing`."""
     with _naming(path):
         if path.is_symlink() or (path.exists() and not path.is_file()):
             raise OSError(errno.EINVAL, "is a link, a pipe or a device, not a file")

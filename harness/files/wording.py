@@ -1,4 +1,4 @@
-"""Numbers in sentences."""
+"""Texts for people: numbers with nouns, tallies, and foreign text made printable."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
-_CONTROLS: Final = re.compile(
+_UNPRINTABLE: Final = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )
-"""Control characters but for tab and end of line, what changes the direction of writing, and halves of characters."""
+"""Matches control characters except tab and end of line, marks of writing direction, and halves of characters."""
 
 
 def counted(number: int, noun: str) -> str:
-    """A number and what it counts, as `1 run` or `2 runs`."""
+    """Returns a number and its noun, as `1 run` or `2 runs`."""
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def tallied(every: Sequence[str], noun: str) -> str:
-    """Texts, each once, with how often it comes if that is more than once: `wind drift (3 legs), roll rate`."""
+    """Returns each text once, with its count if above one: `wind drift (3 legs), roll rate`."""
     times = {text: every.count(text) for text in dict.fromkeys(every)}
     return ", ".join(f"{text} ({count} {noun})" if count > 1 else text for text, count in times.items())
 
 
 def printable(text: str) -> str:
     r"""Text of others as a terminal may show it: a control character is spelt out, as `\x1b`; tabs and lines stay."""
-    return _CONTROLS.sub(lambda found: found.group().encode("unicode_escape").decode(), text)
+    return _UNPRINTABLE.sub(lambda found: found.group().encode("unicode_escape").decode(), text)

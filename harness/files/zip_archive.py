@@ -1,4 +1,4 @@
-"""The one file that is meant in a ZIP archive that may be a bomb, or torn; the texts of faults name no file."""
+"""Finds the one wanted file in a ZIP archive that may be a bomb, or torn; the texts of faults name no file."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from harness.files.wording import counted, printable
 DAMAGES: Final = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, ValueError, IndexError
 )  # fmt: skip
-"""What Python's unpacking raises of damaged archives."""
+"""Errors that Python's unpacking raises for damaged archives."""
 
 
 def unpacked(data: bytes, ending: str, most: int) -> tuple[str, bytes]:
-    """Name, without its folder, and bytes, at most so many, of the file with an ending in an archive."""
+    """Unpacks the one file with an ending, of at most `most` bytes; returns its name without folder and its bytes."""
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
             name = _chosen(archive.namelist(), ending)
@@ -39,7 +39,7 @@ def unpacked(data: bytes, ending: str, most: int) -> tuple[str, bytes]:
 
 
 def member_path(path: Path, ending: str, most: int) -> str:
-    """The path by which GDAL opens the file with an ending in an archive that unpacks to at most so many bytes."""
+    """Returns GDAL's path to the one file with an ending in an archive that unpacks to at most `most` bytes."""
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
@@ -51,7 +51,7 @@ def member_path(path: Path, ending: str, most: int) -> str:
 
 
 def _chosen(names: list[str], ending: str) -> str:
-    """The one file of an archive with an ending."""
+    """Returns the name of the one file in an archive with an ending; InputError if there is not exactly one."""
     own = [name for name in names if not name.lower().startswith("__macosx/")]  # macOS adds forks of files
     held = [each for each in own if each.lower().endswith(ending) and not Path(each).name.startswith("._")]
     if len(held) == 1:

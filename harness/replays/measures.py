@@ -123,7 +123,7 @@ def compared(flown: Side, simulated: Side) -> dict[str, Any]:
     settled = [lap for lap in flown.whole_laps if lap in simulated.whole_laps]
     if not settled:
         missing = "the log" if not flown.whole_laps else "the simulated flight"
-        raise InputError(f"{missing} has no whole_laps lap after lap 1; there is nothing to compare")
+        raise InputError(f"{missing} has no whole lap after lap 1; there is nothing to compare")
     rows: list[dict[str, Any]] = [
         {"lap": lap, "flown": flown.lap(lap), "simulated": simulated.lap(lap)} for lap in settled
     ]

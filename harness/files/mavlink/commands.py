@@ -1,4 +1,4 @@
-"""Commands of MAVLink missions, fences and rally points, and what an aeroplane makes of them.
+"""Commands of MAVLink missions, fences and rally points, and how an aeroplane flies them.
 
 Numbers and parameters: https://mavlink.io/en/messages/common.html#mav_commands, and ardupilotmega.xml for those of
 ArduPilot alone.
@@ -23,9 +23,9 @@ TAKEOFFS: Final = {
 }
 LANDINGS: Final = (LAND, VTOL_LAND)
 AT_AN_ALTITUDE: Final = (WAYPOINT, SPLINE_WAYPOINT, *TAKEOFFS)
-"""Items that always have an altitude of their own."""
+"""Commands of items that always have an altitude of their own."""
 FLOWN: Final = (*AT_AN_ALTITUDE, *LOITERS, RETURN_TO_LAUNCH, *LANDINGS)
-"""Items that are flown to, or about."""
+"""Commands of items that are flown to, or about."""
 NAMES: Final = {
     WAYPOINT: "waypoint", LOITER_UNLIMITED: "loiter without limit", LOITER_TURNS: "loiter turns",
     LOITER_TIME: "loiter time", RETURN_TO_LAUNCH: "return to launch", LAND: "land", TAKEOFF: "takeoff",
@@ -38,12 +38,12 @@ NAMES: Final = {
     206: "camera trigger distance", 207: "enable fence", 208: "parachute", 210: "inverted flight", 211: "gripper",
     214: "camera trigger interval", 2000: "take pictures", 2001: "stop taking pictures", 3000: "VTOL transition",
 }  # fmt: skip
-"""Plain words for the commands of ordinary missions; MAVLink's own name stands for any other."""
+"""Plain words for the commands of ordinary missions; any other is named by its number."""
 WITHOUT_EFFECT: Final = frozenset((
     80, 115, 181, 182, 183, 184, 187, 188, 190, 195, 196, 197, 198, 200, 201, 202, 203, 204, 205, 206, 207, 211, 212,
     214, 215, 216, 220, 223, 530, 531, 532, 534, 600, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 42600, LAND_START,
 ))  # fmt: skip
-"""Cameras, servos, marks and the like: the path of an aeroplane is the same without them."""
+"""Commands for cameras, servos, marks and the like, which do not change the path of an aeroplane."""
 WHY_NOT: Final = {
     42702: "a script of the aircraft flies it",
     36: "an arc of a multicopter: ArduPlane goes on to the next item",
@@ -53,10 +53,10 @@ WHY_NOT: Final = {
 
 RETURN_POINT: Final = 5000
 CORNERS: Final = {5001: True, 5002: False}
-"""Corner of an area to stay inside of, and of one to stay out of; the first parameter counts the corners."""
+"""Commands for a corner of a fence: True to stay inside of, False outside; the first parameter counts the corners."""
 HOME_CIRCLE: Final = 5005
 CIRCLES: Final = {5003: True, 5004: False, HOME_CIRCLE: True}
-"""A circle to stay inside of, and one to stay out of, and one about home; the first parameter is the radius."""
+"""Commands for a circular fence: True to stay inside of, False outside; the first parameter is the radius."""
 RALLY_POINT: Final = 5100
 APART: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
 """Commands of items that are no part of a mission."""
@@ -65,7 +65,7 @@ PX4: Final = 12
 
 
 def name_of(command: int) -> str:
-    """What a command is called in plain words, else by MAVLink where pymavlink is installed, else its number."""
+    """Names a command in plain words, else by its number, to which pymavlink, where installed, adds MAVLink's name."""
     if command in NAMES:
         return NAMES[command]
     try:

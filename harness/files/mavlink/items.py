@@ -21,11 +21,11 @@ SEA, HOME, GROUND = "sea", "home", "ground"
 MISSION: Final = 2
 """MAV_FRAME of commands without a place. ArduPilot takes an altitude in it as above the sea; PX4 refuses it."""
 FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11: GROUND}
-"""MAV_FRAME to what its altitude is above. Autopilots load no item to fly to in any other global frame."""
+"""The datum of the altitude for each MAV_FRAME. Autopilots load no item to fly to in any other global frame."""
 NOWHERE_DEG: Final = 1e-7
-"""A position with less than this in both is none. ArduPilot writes zeros where none is meant."""
+"""A position with less than this in both is no position; ArduPilot writes zeros where none is meant."""
 WPL: Final = "QGC WPL"
-CELLS: Final = 12
+WPL_FIELDS: Final = 12
 COMMENT: Final = "#"
 
 
@@ -71,7 +71,7 @@ class Item:
 def filled(
     params: Sequence[float | None], command: int, frame: int, missing: Callable[[int], str]
 ) -> tuple[float, ...]:
-    """Seven parameters, 0 for None; an InputError says which of a place, or an altitude, is `missing`."""
+    """Returns seven parameters, 0 for None; an InputError names what of a place, or an altitude, is `missing`."""
     latitude, longitude, altitude = params[4:7]
     if command in commands.FLOWN and (latitude is None) != (longitude is None):
         raise InputError(f"{missing(4 if latitude is None else 5)}; a place must have latitude and longitude")
@@ -84,15 +84,15 @@ def filled(
 
 
 def wpl_items(text: str, source: str) -> list[Item]:
-    """The items of a plain-text file, home among them; lines after # are comments. `source` begins an InputError."""
+    """Reads the items of a plain-text file, home among them, without comments (#). `source` begins an InputError."""
     where = f"{source}:" if source else "line "
     rows = [(f"{where}{number}", line.split()) for number, line in enumerate(text.splitlines(), start=1)]
     return [_item(cells, place) for place, cells in rows[1:] if cells and not cells[0].startswith(COMMENT)]
 
 
 def _item(cells: list[str], place: str) -> Item:
-    if len(cells) != CELLS:
-        raise InputError(f"{place}: has {len(cells)} fields; a mission item has {CELLS}")
+    if len(cells) != WPL_FIELDS:
+        raise InputError(f"{place}: has {len(cells)} fields; a mission item has {WPL_FIELDS}")
     number, frame, command = (whole(cells[field], place) for field in (0, 2, 3))
     # What is left to the autopilot is 0, or no number; the first parameter is field 5, counted from 1.
     given = [None if cell.lower() == "nan" else finite(cell, place) for cell in cells[4:11]]
@@ -104,7 +104,7 @@ Place = tuple[float, float]
 Keys = dict[str, Any]
 
 CIRCLE_SIDES: Final = 720
-"""A circle is compared as a polygon of so many sides: one of 10 km is off by 0.1 m."""
+"""A circle is compared as a polygon of this many sides: one of 10 km is off by 0.1 m."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class Fence:
 
     @property
     def places(self) -> tuple[Place, ...]:
-        """All its positions."""
+        """All its corners, or its centre."""
         return (
             tuple(place for ring in self.rings for place in ring) if self.center is None else (self.center,)
         )
@@ -141,12 +141,12 @@ class Fence:
         return shapely.Polygon(self.rings[0], self.rings[1:])
 
     def moved(self, place: Callable[[Place], Place]) -> Fence:
-        """The same fence with every position put elsewhere."""
+        """Returns the fence with every position mapped by `place`."""
         rings = tuple(tuple(map(place, ring)) for ring in self.rings)
         return replace(self, rings=rings, center=place(self.center) if self.center is not None else None)
 
     def plain(self) -> dict[str, Any]:
-        """Its content for `metrics.json`."""
+        """Returns its content for `metrics.json`."""
         shape: dict[str, Any] = {"rings_m": [[list(point) for point in ring] for ring in self.rings]}
         if self.center is not None:
             shape = {"center_m": list(self.center), "radius_m": self.radius_m}
@@ -154,7 +154,7 @@ class Fence:
 
 
 def plan_fences(geofence: Any, source: str) -> tuple[Fence, ...]:
-    """The geoFence of a plan, in degrees; `source` begins an InputError, `path: ` or nothing."""
+    """Returns the fences in a plan's geoFence, in degrees; `source`, as `path: ` or nothing, begins an InputError."""
     if geofence is None:
         return ()
     if not isinstance(geofence, dict):
@@ -194,12 +194,12 @@ def _place(value: Any, where: str) -> Place:
 
 
 def item_fences(items: Sequence[Item], home: Place | None) -> tuple[Fence, ...]:
-    """The fences among some items, in degrees; an InputError says that one is torn, or has no radius or place."""
+    """Returns the fences among items, in degrees; an InputError says that one is torn, or has no radius or place."""
     found: list[Fence] = []
     corners: list[Item] = []
     for item in (each for each in items if each.command in (*CORNERS, *CIRCLES)):
         if corners and item.command != corners[0].command:
-            raise _torn(corners)
+            raise _torn_fence(corners)
         if item.command in CIRCLES:
             found.append(_item_circle(item, home))
             continue
@@ -210,11 +210,11 @@ def item_fences(items: Sequence[Item], home: Place | None) -> tuple[Fence, ...]:
             found.append(Fence(name, CORNERS[item.command], (ring,)))
             corners = []
     if corners:
-        raise _torn(corners)
+        raise _torn_fence(corners)
     return tuple(found)
 
 
-def _torn(corners: Sequence[Item]) -> InputError:
+def _torn_fence(corners: Sequence[Item]) -> InputError:
     begun = f"{corners[0].place}: item {corners[0].number} begins a fence of {corners[0].params[0]:g} corners"
     return InputError(f"{begun}, of which {len(corners)} follow; it may be torn")
 
