@@ -1,4 +1,4 @@
-"""What a given path is flown as: lines and arcs with altitude and airspeed along them, and the flight to its end."""
+"""Plans a given path as lines and arcs with altitude and airspeed along them, and flies it to its end."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from harness.scenario.validation import KeyFault
 from planner.interface import Path, Plan, PlanRequest, PlanStatus
 
 BEND_SHARE = 0.25
-"""Altitudes of a drawn line that are straight to this share of the altitude threshold are one slope."""
+"""Altitudes of a drawn line that are straight within this share of the altitude threshold are one slope."""
 SAME_ALTITUDE_M = 1.0
-"""A path whose altitudes differ by no more is flown at that of its first point."""
+"""A path whose altitudes differ by no more than this is flown at that of its first point."""
 SPARE_BANK_DEG = 5.0
-"""Slower than where altitude is kept at less than cruise's steepest bank by this much a mission is not flown."""
+"""A mission is not flown slower than where altitude is kept at cruise's steepest bank less this."""
 FREE_SHARE = 0.25
-"""Share of the cross-track threshold by which a corner may be passed off only to make its arc wider."""
+"""A corner may be passed off by this share of the cross-track threshold only to make its arc wider."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,25 +50,25 @@ class PathPlan:
     way: FlyBy
     profile: VerticalProfile
     asked_mps: FloatArray
-    """Airspeeds that the path asks for, as those of the profile; the aircraft may not hold them."""
+    """Airspeeds that the path asks for, at the profile's places; the aircraft may not hold them."""
     frame: Airframe
     marks: tuple[tuple[int, float], ...] = ()
     """Number and arc length of every item of a mission; none for a drawn line."""
     bends: tuple[tuple[int, float], ...] = ()
     """Number and arc length of the points of a drawn line at which its slope changes."""
     notes: tuple[str, ...] = ()
-    """What was assumed, a line each."""
+    """Notes on assumptions, a line each."""
     legs: tuple[MissionLeg, ...] = ()
     """The path leg by leg, for a law that flies to its waypoints."""
 
     @cached_property
     def climb_mps(self) -> Callable[[float], tuple[float, float]]:
-        """Fastest climb and descent at an airspeed; flown when it is first asked for."""
+        """Returns the fastest climb and descent at an airspeed; measured in flight when first called."""
         return lru_cache(maxsize=1000)(lambda airspeed_mps: climb_rates(self.frame).at(airspeed_mps))
 
     @cached_property
     def climb_limit_mps(self) -> float | None:
-        """What the altitude loop may ask for; None for a level path, which takes what every flight takes."""
+        """Climb rate that the altitude loop may command; None for a level path, which has that of every flight."""
         if self.profile.level:
             return None
         return max(max(self.climb_mps(speed)) for speed in set(self.profile.airspeed_mps.tolist()))
@@ -81,7 +81,7 @@ def planned(
     ground: Ground | None,
     corner_m: float | None = None,
 ) -> PathPlan:
-    """Makes of a path what is flown.
+    """Plans a path as it is flown.
 
     An InputError says why it cannot be: altitudes above a ground that is not known, a wind too strong for an airspeed.
     """
@@ -121,7 +121,7 @@ def planned(
 
 
 def _above_home(items: Sequence[int]) -> list[str]:
-    """What is assumed of items whose altitudes are above a ground that is not known."""
+    """Returns a note on items whose altitudes are above a ground that is not known."""
     told = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
     said = f"items {told}: above ground, which is taken to be as high as home everywhere"
     return [said] if items else []
@@ -134,7 +134,7 @@ def _planned_line(
     ground: Ground | None,
     corner_m: float | None,
 ) -> PathPlan:
-    """The same of a drawn line."""
+    """Plans a drawn line as it is flown."""
     frame, speed = airframe_of(scenario.aircraft), scenario.aircraft.airspeed_mps
     across_m = scenario.trackability.cross_track_m
     limit_m = across_m if corner_m is None else corner_m
@@ -154,7 +154,7 @@ def _planned_line(
 def _drawn_profile(
     given: PathAsGiven, way: FlyBy, frame: Airframe, speed_mps: float, ground: Ground | None
 ) -> VerticalProfile:
-    """Altitudes along a drawn line that has some."""
+    """Returns the altitudes along a drawn line that has some."""
     altitudes = given.altitudes_m
     if given.above_ground:
         remedy = "give --altitude-m"
@@ -177,7 +177,7 @@ def _drawn_profile(
 
 
 def _bends(profile: VerticalProfile, tolerance_m: float) -> tuple[tuple[int, float], ...]:
-    """The points between which altitudes are straight to a tolerance, both ends left out."""
+    """Returns the points between which altitudes are straight to a tolerance, both ends left out."""
     import shapely
 
     if profile.level:
@@ -189,7 +189,7 @@ def _bends(profile: VerticalProfile, tolerance_m: float) -> tuple[tuple[int, flo
 
 
 def _slowest_turning_mps(frame: Airframe) -> float:
-    """The slowest airspeed at which an aircraft keeps its altitude in the turns of a mission."""
+    """Finds the slowest airspeed that keeps altitude at a bank within `SPARE_BANK_DEG` of the steepest at cruise."""
     low, _ = frame.airspeed_range_mps
     enough = frame.level_bank_deg(frame.cruise_mps) - SPARE_BANK_DEG
     speeds: list[float] = np.linspace(low, max(frame.cruise_mps, low), 50).tolist()
@@ -240,20 +240,20 @@ def fly_along(
 
 
 class GivenPath:
-    """A planner whose first answer is a path, and which keeps to it. Implements `Planner`."""
+    """A planner that answers first with a path, and then keeps to it. Implements `Planner`."""
 
     def __init__(self, waypoints_m: FloatArray, path: Path) -> None:
         self._found = Plan(PlanStatus.FOUND, "the path as given", waypoints_m, path)
         self._kept = Plan(PlanStatus.KEPT, "the path as given")
 
     def plan(self, request: PlanRequest) -> Plan:
-        """The path, or that it is kept."""
+        """Returns the path, or that it is kept."""
         return self._kept if request.flown else self._found
 
 
 @dataclass
 class PathEnd:
-    """A flight along a path: over at its end, or when it takes too long. Implements `Termination`."""
+    """Ends a flight along a path at the end of the path, or when it takes too long. Implements `Termination`."""
 
     where: Callable[[AircraftState], Along | PathPoint]
     length_m: float
@@ -262,11 +262,11 @@ class PathEnd:
     contact_m: float = math.inf
 
     def to_go_m(self, state: AircraftState) -> float:
-        """Length of the path that is left."""
+        """Returns the length of the path that is left."""
         return self.length_m - self.where(state).arc_length_m
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
-        """How the flight ends now; None while it goes on."""
+        """Returns how the flight ends now; None while it goes on."""
         if fault is not None:
             return Ending(Outcome.LOST_CONTROL, fault)
         after, nearest = f"after {state.time_s:.0f} s", self.where(state)

@@ -1,4 +1,4 @@
-"""From a scenario to a flight, and from a flight to a run folder."""
+"""Makes a flight of a scenario, and a run folder of a flight."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ SENSOR_STREAM, TURBULENCE_STREAM, NAVIGATION_STREAM = 1, 2, 3
 def make_loop(
     scenario: Scenario, make_model: Callable[[StartConditions, Atmosphere], FlightModel] | None = None
 ) -> Loop:
-    """All parts of a scenario's flight; an AircraftError says why its aircraft cannot be loaded or trimmed."""
+    """Makes all parts of a scenario's flight; an AircraftError says why its aircraft cannot be loaded or trimmed."""
     mission = mission_of(scenario)
     world = World.from_scenario(scenario)
     start, air = start_conditions(scenario), atmosphere(scenario)
@@ -76,7 +76,7 @@ def make_loop(
 
 
 def atmosphere(scenario: Scenario) -> Atmosphere:
-    """The air of a scenario's flight."""
+    """Returns the air of a scenario's flight."""
     seed = int(_stream(scenario.seed, TURBULENCE_STREAM).generate_state(1)[0]) & 0x7FFFFFFF
     return air_of(scenario, seed)
 
@@ -84,7 +84,7 @@ def atmosphere(scenario: Scenario) -> Atmosphere:
 def jsbsim_aircraft(
     scenario: Scenario, start: StartConditions, air: Atmosphere, climb_limit_mps: float | None = None
 ) -> FlightModel:
-    """The scenario's aircraft, deviations included, trimmed and in the air.
+    """Returns the scenario's aircraft, deviations included, trimmed and in the air.
 
     See `aircraft.jsbsim_model` for the limit of its climb.
     """
@@ -100,7 +100,7 @@ def jsbsim_aircraft(
 
 
 def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
-    """What a scenario's flight is measured against."""
+    """Returns the limits that a scenario's flight is measured against."""
     performance, limits = performance_of(scenario), scenario.trackability
     frame = airframe_of(scenario.aircraft)
     guidance = frame.guidance_limits()
@@ -131,7 +131,7 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
 
 
 def fly_and_measure(scenario: Scenario) -> dict[str, Any]:
-    """Flies a scenario without a run folder, and gives the content of its `metrics.json`."""
+    """Flies a scenario without a run folder, and returns the content of its `metrics.json`."""
     return metrics(fly(make_loop(scenario)), flight_limits(scenario))
 
 
@@ -173,7 +173,7 @@ def fly_to_folder(
             sources = [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
             radius_m = loop.mission.turn_radius_m
             folder = stack.enter_context(RunFolder.create(out, text, told, sources, radius_m))
-            so_far, observers = _SoFar(), [*watching]
+            so_far, observers = _FlownSoFar(), [*watching]
             scene = replace(scene_of(scenario, loop, text, pilot), profile=profile) if recording else None
             log = None if scene is None else _recording(scene, loop, folder, identity, thin)
             if log is not None:
@@ -194,8 +194,8 @@ def fly_to_folder(
     return figures
 
 
-class _SoFar(Observer):
-    """An observer that keeps the events, and what has been flown for a flight that is broken off."""
+class _FlownSoFar(Observer):
+    """An observer that keeps the events, and the rows and plans so far in case the flight is broken off."""
 
     def __init__(self) -> None:
         self._blocks: list[Track] = []
@@ -216,7 +216,7 @@ class _SoFar(Observer):
         self._blocks.append(block)
 
     def leave_in(self, folder: RunFolder) -> None:
-        """Writes what there is into a folder that stays marked incomplete."""
+        """Writes what it keeps into a folder that stays marked incomplete."""
         if self._blocks:
             folder.log_events(self.events)
             folder.leave(Track.joined(self._blocks), self._plans)
@@ -231,7 +231,7 @@ def _recording(scene: Scene, loop: Loop, folder: RunFolder, identity: str | None
 
 
 def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None) -> Scene:
-    """What a recording shows before the flight."""
+    """Returns what a recording shows before the flight."""
     from harness.recording.blueprint import Scene
 
     wind = scenario.environment.wind

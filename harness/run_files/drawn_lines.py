@@ -22,35 +22,35 @@ from harness.files.kml import Point
 from harness.files.wording import counted
 
 LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))
-"""Columns of CSV: a place in the local plane."""
+"""Pairs of CSV columns that hold a place in the local plane."""
 DEGREES: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), ("lat", "lon"))
-"""Columns of a place in degrees."""
+"""Pairs of columns that hold a place in degrees."""
 ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")
-"""Columns of an altitude above mean sea level."""
+"""Columns that hold an altitude above mean sea level."""
 ABOVE_GROUND: Final = "altitude_agl_m"
-"""Column of an altitude above ground."""
-PARTS: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
-"""What a geometry of several parts is made of."""
-COLLECTIONS: Final = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
+"""Column that holds an altitude above ground."""
+SINGLE_TYPE: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
+"""The type of the single parts of a geometry with several."""
+MEMBERS_KEY: Final = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
-"""Values of KML's altitudeMode; with any other the altitude means nothing. The last is the default."""
+"""Values of KML's altitudeMode, the last the default; at any other value, and at that, the altitude means nothing."""
 
 FLYING_MPS: Final = 12.0
-"""Before the first fix and after the last at this ground speed the aircraft rolls, or stands."""
+"""Before the first fix, and after the last, at this ground speed the aircraft rolls, or stands."""
 FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
-"""No glider flies faster than these over the ground, and up or down: a fix that is so far from both its neighbours is
+"""No glider is faster than these over the ground, and up or down: a fix that would need it from both its neighbours is
 an error of the receiver."""
-MOST_BROKEN: Final = 0.05
-"""A file of which a larger share of fixes cannot be read is refused."""
-DATE: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)
-EARTH_M: Final = 6_371_000.0
+MOST_BROKEN_SHARE: Final = 0.05
+"""A file in which more than this share of the fixes cannot be read is refused."""
+DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)
+EARTH_RADIUS_M: Final = 6_371_000.0
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 
 FloatArray = NDArray[np.float64]
 
 
 class PathAsRead(NamedTuple):
-    """A line as its file has it: `where` it stands, for faults, and notes on what else is there.
+    """A line as its file has it: its place `where`, for faults, and notes on what else is in the file.
 
     Points are latitude, longitude (deg; where `local` east, north in metres), and altitude (m) or None, above the sea
     or `above_ground`.
@@ -63,16 +63,16 @@ class PathAsRead(NamedTuple):
     local: bool = False
 
 
-def _beside(others: Mapping[str, int]) -> list[str]:
-    """What is said of what else is in a file."""
+def _notes_on_others(others: Mapping[str, int]) -> list[str]:
+    """Returns notes on what else is in a file, by kind and count."""
     return [
         f"{counted(count, what)} beside the path passed over" for what, count in others.items() if count > 0
     ]
 
 
 def read_csv(text: str, source: str) -> PathAsRead:
-    """The path of a CSV file: a header, and a point a row; blank lines and comments after # are passed over."""
-    (line, header), *filled = _filled(text, source) or [(1, [])]
+    """Reads the path of a CSV file: a header, and a point a row, without blank lines and comments after #."""
+    (line, header), *filled = _filled_rows(text, source) or [(1, [])]
     header = [name.strip().lower() for name in header]
     names = _columns(header, f"{source}:{line}")
     points: list[Point] = []
@@ -87,8 +87,8 @@ def read_csv(text: str, source: str) -> PathAsRead:
     return PathAsRead(source, points, notes, names[2:] == [ABOVE_GROUND], tuple(names[:2]) in LOCAL)
 
 
-def _filled(text: str, source: str) -> list[tuple[int, list[str]]]:
-    """The rows that are neither blank nor a comment, with their lines."""
+def _filled_rows(text: str, source: str) -> list[tuple[int, list[str]]]:
+    """Returns the rows that are neither blank nor a comment, with their line numbers."""
     rows = csv.reader(["" if line.lstrip().startswith("#") else line for line in text.splitlines()])
     try:
         return [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]
@@ -97,7 +97,7 @@ def _filled(text: str, source: str) -> list[tuple[int, list[str]]]:
 
 
 def _columns(header: list[str], where: str) -> list[str]:
-    """The columns of the place, and that of the altitude where there is one."""
+    """Returns the columns of the place, and that of the altitude where there is one."""
     pair = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
     if pair is None:
         raise InputError(
@@ -112,7 +112,7 @@ def _columns(header: list[str], where: str) -> list[str]:
 
 
 def read_geojson(text: str, source: str) -> PathAsRead:
-    """The path of a GeoJSON file: its one LineString."""
+    """Reads the path of a GeoJSON file, its one LineString."""
     shapes = list(_shapes(parsed_json(text, source), source, ""))
     lines = [(key, line) for key, kind, line in shapes if kind == "LineString"]
     if len(lines) != 1:
@@ -125,25 +125,25 @@ def read_geojson(text: str, source: str) -> PathAsRead:
         longitude, latitude, *altitude = (finite(value, at) for value in point)
         points.append((latitude, longitude, altitude[0] if altitude else None))
     others = Counter(kind for _, kind, _ in shapes if kind != "LineString")
-    return PathAsRead(where, points, _beside(others))
+    return PathAsRead(where, points, _notes_on_others(others))
 
 
 def _shapes(node: Any, source: str, key: str) -> Iterator[tuple[str, str, Any]]:
-    """Key, type and coordinates of all geometries of one part of a GeoJSON object."""
+    """Yields key, type and coordinates of all geometries in one part of a GeoJSON object."""
     node = node if isinstance(node, dict) else {}
     kind, before = str(node.get("type") or ""), f"{key}." if key else ""
     if kind == "Feature":
         if node.get("geometry") is not None:  # else it lies nowhere
             yield from _shapes(node["geometry"], source, f"{before}geometry")
-    elif kind in COLLECTIONS:
-        key = f"{before}{COLLECTIONS[kind]}"
-        for number, part in enumerate(listed(node.get(COLLECTIONS[kind]), f"{source}: {key}")):
+    elif kind in MEMBERS_KEY:
+        key = f"{before}{MEMBERS_KEY[kind]}"
+        for number, part in enumerate(listed(node.get(MEMBERS_KEY[kind]), f"{source}: {key}")):
             yield from _shapes(part, source, f"{key}[{number}]")
-    elif kind in PARTS:
+    elif kind in SINGLE_TYPE:
         key = f"{before}coordinates"
         for number, part in enumerate(listed(node.get("coordinates"), f"{source}: {key}")):
-            yield f"{key}[{number}]", PARTS[kind], part
-    elif kind in PARTS.values():
+            yield f"{key}[{number}]", SINGLE_TYPE[kind], part
+    elif kind in SINGLE_TYPE.values():
         yield f"{before}coordinates", kind, node.get("coordinates")
     else:
         told, where = f"the type {shown(kind)}" if kind else "no type", f"{source}: {key}".removesuffix(": ")
@@ -151,7 +151,7 @@ def _shapes(node: Any, source: str, key: str) -> Iterator[tuple[str, str, Any]]:
 
 
 def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
-    """The path of a KML file: its one LineString, with the altitudes that their mode gives a meaning."""
+    """Reads the path of a KML file, its one LineString, with altitudes if their mode gives them a meaning."""
     found = kml.read_kml(data, source, most)
     if len(found.lines) != 1:
         told = f" ({', '.join(line.name for line in found.lines[:4])})" if found.lines else ""
@@ -159,7 +159,7 @@ def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
             f"{found.source}: has {len(found.lines)} lines{told}; must have exactly one, the path"
         )
     (line,) = found.lines
-    points, notes = list(line.rings[0]), _beside({**found.others, "Polygon": len(found.polygons)})
+    points, notes = list(line.rings[0]), _notes_on_others({**found.others, "Polygon": len(found.polygons)})
     if line.mode not in (ABSOLUTE, RELATIVE):
         if any(altitude for *_, altitude in points):
             notes.append(f"altitudes passed over: their altitudeMode is {shown(line.mode or CLAMPED)}")
@@ -168,7 +168,7 @@ def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
 
 
 def read_gpx(text: str, source: str) -> PathAsRead:
-    """The path of a GPX file: its one track, else its one route; waypoints are passed over."""
+    """Reads the path of a GPX file, its one track, else its one route, without waypoints."""
     root = kml.parsed_xml(text.encode(), source, "gpx")
     tracks, routes = list(kml.named(root, "trk")), list(kml.named(root, "rte"))
     lines, kind, tag = (tracks, "track", "trkpt") if tracks else (routes, "route", "rtept")
@@ -183,12 +183,12 @@ def read_gpx(text: str, source: str) -> PathAsRead:
     segments = sum(1 for _ in kml.named(lines[0], "trkseg"))
     notes = [f"{segments} segments of the track joined by straight lines"] if segments > 1 else []
     waypoints = sum(1 for _ in kml.named(root, "wpt"))
-    notes += _beside({"route": len(routes) if tracks else 0, "waypoint": waypoints})
+    notes += _notes_on_others({"route": len(routes) if tracks else 0, "waypoint": waypoints})
     return PathAsRead(f"{source}: {shown(kml.text_of(lines[0], 'name') or tag)}", points, notes)
 
 
 def read_igc(text: str, source: str) -> PathAsRead:
-    """The fixes of a flight from takeoff to landing at GNSS altitudes; where one is missing, at pressure altitudes."""
+    """Reads the fixes of a flight from takeoff to landing at GNSS altitudes; without one, all at pressure altitudes."""
     fixes, broken = _fixes(text, source)
     placed = fixes[np.abs(fixes[:, :2]).max(axis=1) > 1e-9]
     leaps, over = _leaps(placed[:-1], placed[1:]), _leaps(placed[:-2], placed[2:])
@@ -219,15 +219,15 @@ def read_igc(text: str, source: str) -> PathAsRead:
 
 
 def _away_m(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Distances over the ground from fixes to others."""
+    """(k,) distances over the ground (m) between (k, 5) fixes and others."""
     north, east = np.radians((after - before)[:, :2]).T
     east = np.remainder(east + np.pi, 2.0 * np.pi) - np.pi
-    away: FloatArray = EARTH_M * np.hypot(north, east * np.cos(np.radians(after[:, 0])))
+    away: FloatArray = EARTH_RADIUS_M * np.hypot(north, east * np.cos(np.radians(after[:, 0])))
     return away
 
 
 def _leaps(before: FloatArray, after: FloatArray) -> NDArray[np.bool_]:
-    """Whether no glider gets from fixes to others in the time between them."""
+    """(k,) whether a glider cannot get from fixes to others in the time between them."""
     elapsed = after[:, 4] - before[:, 4]
     # An altitude of 0 is none.
     rise = np.where(before[:, 2] * after[:, 2] != 0, after[:, 2] - before[:, 2], 0.0)
@@ -237,7 +237,7 @@ def _leaps(before: FloatArray, after: FloatArray) -> NDArray[np.bool_]:
 
 
 def _fixes(text: str, source: str) -> tuple[FloatArray, int]:
-    """(n, 5) fixes, and how many more cannot be read.
+    """Returns (n, 5) fixes, and the number of records that cannot be read.
 
     A row is latitude, longitude (deg), GNSS altitude (m), 0 without a 3-D fix, pressure altitude or 0, and time (s).
     """
@@ -247,17 +247,17 @@ def _fixes(text: str, source: str) -> tuple[FloatArray, int]:
         raise InputError(f"{source}: {NEEDS_LOGS} ({error.name})") from error
     if not text.lstrip("\ufeff").startswith("A"):
         raise InputError(f"{source}:1: must begin with an A record, the logger's number; is no IGC file")
-    if not DATE.search(text):
+    if not DATE_RECORD.search(text):
         raise InputError(f"{source}: has no date (an HFDTE record); must have one before the first fix")
     try:
         read = Reader(skip_duplicates=True).read(io.StringIO(text))  # of a broken line it keeps the error
     except Exception as error:  # whatever its parser meets
         raise InputError(f"{source}: is not IGC ({type(error).__name__}: {error})") from error
     broken, fixes = read["fix_records"]
-    if len(broken) > MOST_BROKEN * len(fixes):
+    if len(broken) > MOST_BROKEN_SHARE * len(fixes):
         raise InputError(
             f"{source}: has {len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}; must be at "
-            f"most {MOST_BROKEN:.0%}"
+            f"most {MOST_BROKEN_SHARE:.0%}"
         )
     rows: list[tuple[float, ...]] = []
     for fix in fixes:

@@ -1,4 +1,4 @@
-"""A run in the files of other tools; missions: waypoints at the altitude that it held, without takeoff and fences."""
+"""Writes a run for other tools; a mission has waypoints at the altitude that it held, without takeoff and fences."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from harness.scenario.scenario import Scenario, parse_scenario
 from harness.scenario.sections import Origin
 
 FORWARD_M: Final = 0.5
-"""A planned point closer than this to the one before is left out; where a plan takes over, progress restarts."""
+"""A planned point less than this ahead of the one before is left out, as where a new plan takes effect."""
 TOLERANCE_M: Final = 0.25
-"""A point that is left out is nearer than this to the path, seen from above."""
+"""A point is left out only if it is nearer than this to the remaining path, seen from above."""
 DIGITS: Final = 9
-"""Decimal places of degrees in files: a tenth of a millimetre."""
+"""Degrees in files have this many decimal places, a tenth of a millimetre."""
 MISSIONS: Final = ("plan", "waypoints")
 """Formats that an autopilot flies."""
 ABOVE_SEA: Final = 0
@@ -44,7 +44,7 @@ class ExportedPath(NamedTuple):
 
 
 def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
-    """A run in one of `FORMATS`, what was flown or of every plan what was in effect; and what its user should know."""
+    """Writes a run in one of `FORMATS`, its track or the plans in effect; returns it, with notes for its user."""
     path = _path_of(run, what)
     if len(path.degrees) < 2:
         raise RunFolderError(f"the run in {run.folder} has no {what} path: it is too short")
@@ -59,7 +59,7 @@ def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
 
 
 def _path_of(run: Run, what: str) -> ExportedPath:
-    """The path of a run with no more points than it takes."""
+    """Returns the path of a run with no more points than it needs."""
     scenario = parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"), as_flown=True)
     track, altitude_m = run.track, run.track.up_m
     points, rows = np.column_stack((track.east_m, track.north_m)), np.arange(len(track))
@@ -75,7 +75,7 @@ def _path_of(run: Run, what: str) -> ExportedPath:
 
 
 def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
-    """(n, 2) places of the plan in effect, row by row of the track, and the (n,) rows that they go with."""
+    """Returns (n, 2) places on the plan in effect, and the (n,) rows of the track that they belong to."""
     track = run.track
     points = np.full((len(track), 2), np.nan)
     for plan in run.plans:
@@ -99,7 +99,7 @@ def _on_plan(plan: PlanRow, arc_length_m: FloatArray) -> FloatArray:
 
 
 def plan_text(path: ExportedPath) -> str:
-    """A plan of QGroundControl, without fences."""
+    """Returns a plan of QGroundControl, without fences."""
     held = path.scenario.mission.altitude_m
     items = [
         {
@@ -134,7 +134,7 @@ def plan_text(path: ExportedPath) -> str:
 
 
 def waypoints_text(path: ExportedPath) -> str:
-    """The mission plain-text file, https://mavlink.io/en/file_formats; item 0 is home, at the path's start."""
+    """Returns a mission plain-text file, https://mavlink.io/en/file_formats; item 0 is home, at the path's start."""
     degrees, held = path.degrees.tolist(), path.scenario.mission.altitude_m
     places = [(*degrees[0], 0.0), *((*place, held) for place in degrees)]
     rows = [
@@ -145,7 +145,7 @@ def waypoints_text(path: ExportedPath) -> str:
 
 
 def geojson_text(path: ExportedPath) -> str:
-    """A LineString after RFC 7946; across the antimeridian it goes on beyond 180 degrees, not round the earth."""
+    """Returns a LineString after RFC 7946; across the antimeridian it goes on beyond 180 degrees."""
     latitude, longitude = path.degrees.T
     places = np.column_stack((np.unwrap(longitude, period=360.0).round(DIGITS), latitude, path.altitude_m))
     airspeed_mps = path.scenario.aircraft.airspeed_mps
@@ -158,7 +158,7 @@ def geojson_text(path: ExportedPath) -> str:
 
 
 def kml_text(path: ExportedPath) -> str:
-    """A document of KML 2.2 with one line, its altitudes above mean sea level: https://www.ogc.org/standard/kml."""
+    """Returns KML 2.2 with one line, its altitudes above mean sea level: https://www.ogc.org/standard/kml."""
     rows = zip(path.degrees.tolist(), path.altitude_m.tolist(), strict=True)
     root = ElementTree.Element("kml", {"xmlns": "http://www.opengis.net/kml/2.2"})
     placemark = ElementTree.SubElement(ElementTree.SubElement(root, "Document"), "Placemark")
@@ -176,4 +176,4 @@ FORMATS: Final[dict[str, Callable[[ExportedPath], str]]] = {
     "geojson": geojson_text,
     "kml": kml_text,
 }
-"""Writers by the name of the format."""
+"""Functions that write a path, by the name of the format."""

@@ -1,4 +1,4 @@
-"""Fences and areas that come with a path: what the aircraft must stay out of, or stay inside of."""
+"""Fences and areas that come with a path, which the aircraft must stay out of, or stay inside of."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ class Fences:
 
     @property
     def exclusions(self) -> tuple[Fence, ...]:
-        """Those to stay out of."""
+        """Fences to stay out of."""
         return tuple(fence for fence in self.every if not fence.inclusion)
 
     @property
     def inclusions(self) -> tuple[Fence, ...]:
-        """Those to stay inside of."""
+        """Fences to stay inside of."""
         return tuple(fence for fence in self.every if fence.inclusion)
 
     @cached_property
     def allowed(self) -> Geometry | None:
-        """Where the inclusion fences let the aircraft be; None where there is none."""
+        """The area where the inclusion fences let the aircraft be; None without any."""
         import shapely
 
         areas = [fence.area for fence in self.inclusions]
@@ -43,15 +43,15 @@ class Fences:
 
 
 def in_plane(fences: Fences, plane: Callable[[Place], Place], source: str) -> Fences:
-    """Fences in the local plane, their rings without repeated and closing points."""
-    clean = replace(fences, every=tuple(_checked(fence.moved(plane), source) for fence in fences.every))
+    """Returns fences in the local plane, their rings without repeated and closing points."""
+    clean = replace(fences, every=tuple(_clean_fence(fence.moved(plane), source) for fence in fences.every))
     if clean.allowed is not None and clean.allowed.is_empty:
         names = ", ".join(fence.name for fence in clean.inclusions)
         raise InputError(f"{source}: {names}: have no place in common; must have one to stay inside")
     return clean
 
 
-def _checked(fence: Fence, source: str) -> Fence:
+def _clean_fence(fence: Fence, source: str) -> Fence:
     import shapely
 
     # A ring is closed; a corner that comes twice in a row is one.

@@ -1,4 +1,4 @@
-"""A path as somebody gives it, made into what guidance can follow: lines, and an arc at every corner.
+"""Turns a path as somebody gives it into lines and arcs that guidance can follow, with an arc at every corner.
 
 Where the points sample a curve, the arcs are as wide as the points leave room for and give the curve back; where legs
 are long, an arc has the turn radius of the aircraft.
@@ -17,32 +17,32 @@ Row = tuple[float, float, float, float, float, float]
 """A segment, as in `planner.interface.Path`."""
 
 GIVEN: Final = "path as given"
-"""Stands for the planner's name where there was none."""
+"""Stands in place of the planner's name for a flight without a planner."""
 SAME_PLACE_M: Final = 0.01
-"""Points that are not further apart are one."""
+"""Points no further apart than this are one point."""
 SAME_LINE_M: Final = 0.01
-"""A point nearer than this to the line of those about it is taken to lie on it."""
+"""A point nearer than this to the line of its neighbours is taken to lie on it."""
 AT_ONCE: Final = 10_000
-"""Points that are simplified together: GEOS calls itself once more for each that it keeps."""
+"""This many points are simplified together, since GEOS recurses once for each that it keeps."""
 SHORTEST_M: Final = 1e-6
-"""A shorter segment is left out."""
+"""A segment shorter than this is left out."""
 PAST_RAD: Final = np.radians(140.0)
-"""A sharper corner is flown past and back: from there on an aircraft that does so comes nearer to both legs (flown: at
-140 degrees 118 m off against 125 m, at 150 degrees 178 m against 128 m)."""
-FLATTEST: Final = 1e-12
-"""Distance of the flattest corner from its arc, in radii."""
+"""A sharper corner is flown past and back, which keeps nearer to both legs from there on (flown: at 140 degrees 118 m
+off against 125 m, at 150 degrees 178 m against 128 m)."""
+LEAST_CUT: Final = 1e-12
+"""A corner's distance from its arc counts as at least this many radii, so that a straight one divides by no zero."""
 LIMIT_SHARE: Final = 0.9
-"""Share of what a corner may be passed at by which it is cut at most, if the aircraft turns so tightly."""
+"""A corner is cut by at most this share of its limit, if the aircraft turns so tightly."""
 CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
-"""Of a corner's limit only this share is used if the arc is then no tighter than so many least radii: the rest of both
-is left for gusts."""
+"""Only this share of a corner's limit is used if the arc then has at least this many least radii, which leaves the rest
+of both for gusts."""
 WIND_SAMPLES: Final = 9
-"""The ground speed is looked up in so many directions of a turn."""
+"""The ground speed is computed in this many directions of a turn."""
 
 
 @dataclass(frozen=True)
 class Tightest:
-    """How tightly corners are rounded at the most, one value each or (m,) point by point.
+    """The limits of how tightly corners are rounded, one value each or (m,) point by point.
 
     The least radius is that of calm air, the limit how far off a corner may be passed. The wind is over the airspeed,
     east + i north where it blows to.
@@ -53,7 +53,7 @@ class Tightest:
     wind: complex | NDArray[np.complex128] = 0j
 
     def of(self, kept: NDArray[np.int64], count: int) -> Tightest:
-        """Those of some of the points, the ends left out."""
+        """Returns the limits at the kept points, without the ends."""
         return Tightest(*(np.broadcast_to(each, count)[kept][1:-1] for each in vars(self).values()))
 
 
@@ -82,8 +82,8 @@ class CutCorner:
 class FlyBy:
     """A polyline with an arc at every corner.
 
-    Waypoints are (k, 2) those of the points given that are needed, `kept` says which, stations the arc length that
-    belongs to each of `segments`, (n, 6) as in `planner.interface.Path`. Corners are those that are cut by more than
+    Waypoints are the (k, 2) given points that are needed, with the indices `kept`; stations are the arc length that
+    belongs to each, of `segments`, (n, 6) as in `planner.interface.Path`. Corners are those that are cut by more than
     was left free. `given_m` is (m, 3) the polyline with the points where arcs touch it: east, north, and the arc length
     that belongs there; an arc is shared out over what it cuts off.
     """
@@ -96,7 +96,7 @@ class FlyBy:
     given_m: FloatArray
 
     def stations_of(self, points_m: FloatArray) -> FloatArray:
-        """(m,) arc lengths of `segments` that belong to the points given, those that are not needed among them."""
+        """(m,) arc lengths of `segments` that belong to all points given."""
         along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points_m, axis=0).T)))
         stations: FloatArray = np.interp(along, along[self.kept], self.stations_m)
         return stations
@@ -127,7 +127,7 @@ def fly_by(
     ahead = np.diff(place) / length
     turn = np.angle(ahead[1:] / ahead[:-1])
     shape = _shapes(turn)
-    wanted = np.where(shape.past, least, np.maximum(least, free / np.maximum(shape.cut, FLATTEST)))
+    wanted = np.where(shape.past, least, np.maximum(least, free / np.maximum(shape.cut, LEAST_CUT)))
     if tightest is not None:
         wanted = _tightened(wanted, shape, ahead, turn, tightest.of(kept, len(points_m)))
     radius = np.minimum(_fitting(length, least, shape), wanted)
@@ -167,7 +167,7 @@ def fly_by(
 
 
 class _Shapes(NamedTuple):
-    """How corners are rounded, each (k,), lengths in radii of the turn.
+    """The shapes of rounded corners, each (k,), lengths in radii of the turn.
 
     A corner that is flown `past` has a turn by `back_turn` (rad) too far, and back. Turns begin and end so far before
     and after the corner, pass it at `cut`, are off the legs by `furthest`, and belong to it at the length `corner`.
@@ -183,7 +183,7 @@ class _Shapes(NamedTuple):
 
 
 def _shapes(turn: FloatArray) -> _Shapes:
-    """The shapes of corners by their angles.
+    """Returns the shapes of corners by their angles.
 
     A turn that begins one radius before a corner of angle `a` has its centre at (sin a - cos a, sin a + cos a), in
     radii, along the next leg and beside it. The turn back has its centre one radius on the other side of that leg,
@@ -210,7 +210,7 @@ def _shapes(turn: FloatArray) -> _Shapes:
 def _tightened(
     wanted_m: FloatArray, shape: _Shapes, ahead: NDArray[Any], turn: FloatArray, tightest: Tightest
 ) -> FloatArray:
-    """(k,) radii of which none passes its corner too far off, as far as the aircraft turns so tightly in the wind.
+    """(k,) radii that keep every corner within its limit, as far as the aircraft turns so tightly in the wind.
 
     A steady turn at one bank has the radius of calm air times the square of ground speed over airspeed, where that is
     largest along the turn.
@@ -220,7 +220,7 @@ def _tightened(
     seen = np.conj(course) * np.asarray(tightest.wind)[..., None]
     ground_speed = seen.real + np.sqrt(np.maximum(1.0 - seen.imag**2, 0.0))
     least_m = tightest.radius_m * np.square(ground_speed).max(axis=1)
-    limit_m = tightest.limit_m / np.maximum(shape.furthest, FLATTEST)
+    limit_m = tightest.limit_m / np.maximum(shape.furthest, LEAST_CUT)
     careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * least_m)
     most_m = np.minimum(careful_m, LIMIT_SHARE * limit_m)
     tight: FloatArray = np.maximum(np.minimum(wanted_m, most_m), least_m)
@@ -228,7 +228,7 @@ def _tightened(
 
 
 def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float) -> list[Row]:
-    """The turn at a corner: an arc, and where it goes too far another one back."""
+    """Returns the turn at a corner: an arc, and where it goes too far another one back."""
     rows = []
     side = 1.0 if turn > 0.0 else -1.0
     for sign, angle in ((side, abs(turn) + back_turn), (-side, back_turn)):
@@ -242,7 +242,7 @@ def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_tur
 
 
 def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np.int64]:
-    """Indices of the points without which the polyline would be another (Douglas and Peucker, 1973)."""
+    """Returns the indices of the points that the polyline needs to keep its shape (Douglas and Peucker, 1973)."""
     import shapely
 
     # Heights are not looked at: each point carries its number there.
@@ -255,7 +255,7 @@ def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np
 
 
 def _fitting(length_m: FloatArray, radius_m: FloatArray, shape: _Shapes) -> FloatArray:
-    """(k,) the widest radii that (k + 1,) legs leave room for; neighbours share a leg by what (k,) radii need."""
+    """(k,) widest radii that (k + 1,) legs leave room for; neighbours share a leg in proportion to their needs."""
     before = np.append(radius_m * shape.before, 0.0)  # at the end of each leg
     after = np.append(0.0, radius_m * shape.after)  # at its begin
     asked = np.maximum(before + after, SHORTEST_M * SHORTEST_M)

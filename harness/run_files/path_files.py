@@ -1,6 +1,6 @@
 """Reads a path that somebody gives: a drawn line, a recorded track, or a mission.
 
-What is read is put into the local plane; positions in degrees lie in a plane about the first.
+The path is put into the local plane; positions in degrees lie in a plane about the first.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
     ".gpx": read_gpx,
     ".igc": read_igc,
 }
-"""Readers of drawn lines and recorded tracks by the ending of a file's name."""
-KML: Final = (".kml", ".kmz")
+"""Functions that read drawn lines and recorded tracks, by the ending of a file's name."""
+KML_ENDINGS: Final = (".kml", ".kmz")
 MISSIONS: Final[dict[str, Callable[[str, str], Program]]] = {
     ".plan": read_plan,
     ".waypoints": read_waypoints,
     ".txt": read_waypoints,
 }
-"""Readers of missions, likewise."""
+"""Functions that read missions, by the ending of a file's name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class PathAsGiven:
 
     @property
     def fences(self) -> Fences:
-        """Those of the mission, in the plane."""
+        """The fences of the mission, in the plane."""
         return Fences() if self.mission is None else self.mission.fences
 
 
@@ -76,11 +76,11 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
     its format, or holds no path that can be flown.
     """
     source, suffix = str(path), path.suffix.lower()
-    every = (*LINES, *KML, *MISSIONS)
+    every = (*LINES, *KML_ENDINGS, *MISSIONS)
     if suffix not in every:
         raise InputError(f"{path}: is none of {', '.join(every)}; save the path as one of them")
     data = read_data(path, MAX_BYTES, "a path")
-    if suffix in KML:
+    if suffix in KML_ENDINGS:
         return _of_line(read_kml(data, source, MAX_BYTES), source, any_altitude, origin_deg)
     if suffix == ".igc":  # loggers write names in Latin-1
         return _of_line(read_igc(data.decode("latin-1"), source), source, any_altitude, origin_deg)
@@ -134,7 +134,7 @@ def _of_mission(flown: Program, source: str, origin_deg: Place | None) -> PathAs
 
 
 def given_points(points: Any) -> PathAsGiven:
-    """A drawn path from points in the local plane, (n, 2) or with altitudes above the sea (n, 3), in metres."""
+    """Returns a drawn path of points in the local plane, (n, 2) or with altitudes above the sea (n, 3), in metres."""
     try:
         array = np.array(points, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -151,7 +151,7 @@ def given_points(points: Any) -> PathAsGiven:
 def _plane(
     positions: Sequence[Place], names: Sequence[str], origin: Place | None, source: str
 ) -> tuple[Place, Callable[[Place], Place]]:
-    """Latitude and longitude of the origin, and what puts a position into the plane."""
+    """Returns latitude and longitude of the origin, and a function that puts a position into the plane."""
     _check_degrees(names, positions, source)
     latitude, longitude = origin or positions[0]
     if abs(longitude) > 180.0:

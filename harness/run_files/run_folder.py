@@ -40,21 +40,21 @@ METRICS = "metrics.json"
 EVENTS = "events.csv"
 RECORDING = "flight.rrd"
 OVERLAY: Final = "overlay.rrd"
-"""What a comparison writes for each of its scenarios: the recordings of its runs in one."""
+"""File that a comparison writes for each of its scenarios: the recordings of its runs in one."""
 REPORT = "report.html"
 REPORT_FILES = ("report.html", "report.csv", "path.svg", "path.png", "profiles.svg", "profiles.png")
-"""What `wayproof report` adds to a run folder."""
+"""Files that `wayproof report` adds to a run folder."""
 MAX_BYTES = 64_000_000
-"""Largest size of a scenario or JSON file in the folder that is read."""
+"""A scenario in the folder is read up to this size."""
 
 HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)
-"""Files whose SHA-256 the manifest of a complete run has."""
+"""Files whose SHA-256 stands in the manifest of a complete run."""
 
 SCHEMA = "wayproof/run/1"
-DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")
+VERSIONED_DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")
 COMPRESSION = "lz4"
-WHOLE = "plan_index"
-"""The one column whose bytes are not written first bytes first: half the size and half the time."""
+UNSPLIT_COLUMN = "plan_index"
+"""The one column that is not written byte plane by byte plane, which halves size and time of all others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class Run:
 
 
 class RunFolder(AbstractContextManager["RunFolder"]):
-    """A run folder being written, a context manager; left without `finish`, it stays marked incomplete."""
+    """A run folder while it is written, as a context manager; left without `finish`, it stays marked incomplete."""
 
     def __init__(self, path: Path, manifest: dict[str, Any], lock: FolderLock) -> None:
         self.path = path
@@ -98,7 +98,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
             "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
             **({"sources": [dict(each) for each in sources]} if sources else {}),
             **({} if turn_radius_m is None else {"turn_radius_m": turn_radius_m}),
-            "versions": versions(DISTRIBUTIONS),
+            "versions": versions(VERSIONED_DISTRIBUTIONS),
             "platform": {
                 "system": platform.platform(),
                 "machine": platform.machine(),
@@ -110,7 +110,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
             made = [each for each in (path, *path.parents) if not each.exists()]
             lock = _claim(path)
             with ExitStack() as undo:
-                undo.callback(_take_back, path, made)
+                undo.callback(_remove_made, path, made)
                 replace_text(path / MANIFEST, _json(manifest))
                 for name in (METRICS, PLANS, TRACK, EVENTS, SCENARIO, RECORDING, *REPORT_FILES):
                     (path / name).unlink(missing_ok=True)
@@ -123,7 +123,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
 
     @property
     def recording_path(self) -> Path:
-        """Where the recording belongs."""
+        """Path of the recording."""
         return self.path / RECORDING
 
     def finish(self, track: Track, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
@@ -147,11 +147,11 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         replace_text(self.path / EVENTS, text.getvalue())
 
     def leave(self, track: Track, plans: Sequence[AcceptedPlan]) -> None:
-        """Writes track and plans, of a flight that was broken off perhaps: the run stays marked incomplete."""
+        """Writes track and plans, perhaps of a flight that was broken off; the run stays marked incomplete."""
         import pyarrow.parquet as pq
 
         rows = track_table(track)
-        columns = [each for each in rows.column_names if each != WHOLE]
+        columns = [each for each in rows.column_names if each != UNSPLIT_COLUMN]
         split = {"use_dictionary": False, "use_byte_stream_split": columns}
         for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):
             with replacing(self.path / name) as file:
@@ -162,7 +162,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
 
 
 def tables(path: Path) -> tuple[pa.Table, pa.Table]:
-    """Track and plans of a run folder that `load_run` has read without a fault, all their columns."""
+    """Returns all columns of track and plans in a run folder that `load_run` has read without a fault."""
     import pyarrow.parquet as pq
 
     return pq.read_table(path / TRACK), pq.read_table(path / PLANS)
@@ -172,7 +172,7 @@ def load_run(path: Path) -> Run:
     """Reads a complete run back; a RunFolderError says that it is none, incomplete, or misses or has damaged files."""
     manifest = read_index(path / MANIFEST, SCHEMA)
     if manifest is None:
-        _there(path)
+        _check_exists(path)
         raise RunFolderError(f"{path} is not a run folder: it has no {MANIFEST} of a run")
     if manifest.get("complete") is not True:
         left = f"; {TRACK} and {PLANS} have what was flown" if (path / TRACK).exists() else ""
@@ -184,9 +184,9 @@ def load_run(path: Path) -> Run:
 
     try:
         for name in (TRACK, PLANS, METRICS, SCENARIO):
-            _check(path / name, manifest)
+            _check_hash(path / name, manifest)
         if EVENTS in manifest.get("sha256", {}):
-            _check(path / EVENTS, manifest)
+            _check_hash(path / EVENTS, manifest)
         return Run(
             folder=path,
             scenario_yaml=read_text(path / SCENARIO, MAX_BYTES, "a scenario, in YAML"),
@@ -208,38 +208,38 @@ WRONG_CONTENT: Final = (
     MemoryError,
     RecursionError,
 )
-"""What reading values raises that are not what they should be."""
+"""Errors that come up when values are not what they should be."""
 
 
 def damaged(path: Path, error: BaseException) -> RunFolderError:
-    """Says that a run folder's content is not that of a run."""
+    """Returns the error that says that a run folder's content is not that of a run."""
     text = " ".join(str(error).split())[:200]
     reason = text if isinstance(error, OSError | ValueError) else f"{type(error).__name__} {text}"
     return RunFolderError(f"the run in {path} is damaged: {reason}; fly it again")
 
 
-def _there(path: Path) -> None:
-    """Raises RunFolderError if there is nothing."""
+def _check_exists(path: Path) -> None:
+    """Raises RunFolderError if there is no such folder."""
     if not path.exists():
         raise RunFolderError(f"{path}: no such folder; give a run folder")
 
 
 def recording_of(path: Path) -> Path:
-    """The recording in a run folder, whose run may be incomplete."""
+    """Returns the recording in a run folder, whose run may be incomplete."""
     recording = path / RECORDING
     if not recording.is_file():
-        _there(path)
+        _check_exists(path)
         raise RunFolderError(f"{path} has no {RECORDING}: not a run folder, or flown with --no-recording")
     try:
         manifest = read_index(path / MANIFEST, SCHEMA) or {}
         for name in manifest.get("sha256", {}):
-            _check(path / name, manifest)
+            _check_hash(path / name, manifest)
     except (OSError, *WRONG_CONTENT) as error:
         raise damaged(path, error) from error
     return recording
 
 
-def _check(path: Path, manifest: Mapping[str, Any]) -> None:
+def _check_hash(path: Path, manifest: Mapping[str, Any]) -> None:
     """Raises ValueError if a file is not the one that the manifest knows, if it knows one."""
     if not path.is_file():
         raise ValueError(f"{path.name} is missing or not a file")
@@ -262,8 +262,8 @@ def _claim(path: Path) -> FolderLock:
     return lock
 
 
-def _take_back(path: Path, made: Sequence[Path]) -> None:
-    """Removes the manifest of a run that could not begin, in a folder that was made for it, and the folder."""
+def _remove_made(path: Path, made: Sequence[Path]) -> None:
+    """Removes the manifest of a run that could not begin, and the folder, if it was made for the run."""
     if path in made:
         with suppress(OSError):
             (path / MANIFEST).unlink(missing_ok=True)

@@ -49,7 +49,7 @@ class PlanRow:
 
 
 def track_table(track: Track) -> pa.Table:
-    """A track as the table that `track.parquet` holds."""
+    """Returns a track as the table that `track.parquet` holds."""
     import pyarrow as pa
 
     names = (*TRACK_FIELDS, *BELIEVED_FIELDS) if track.has_beliefs else TRACK_FIELDS
@@ -64,14 +64,14 @@ def track_table(track: Track) -> pa.Table:
 
 
 def track_of(table: pa.Table) -> Track:
-    """The track that such a table holds."""
+    """Returns the track in a table of `track.parquet`."""
     names = set(table.column_names)
     needed = [name for name, column in TRACK_COLUMNS.items() if column.left_out is None or name in names]
     return Track(**{name: table[name].to_numpy() for name in needed})
 
 
 def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
-    """The plans of a flight, a row each."""
+    """Returns the plans of a flight as the table that `plans.parquet` holds, a row each."""
     import pyarrow as pa
 
     def get(attribute: str) -> list[Any]:
@@ -95,7 +95,7 @@ def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
 
 
 def plan_rows(table: pa.Table) -> tuple[PlanRow, ...]:
-    """The rows of such a table."""
+    """Returns the rows of a table of `plans.parquet`."""
     rows = []
     for row in table.to_pylist():
         row["waypoints_m"] = np.array(row.pop("waypoints"), dtype=np.float64).reshape(-1, 2)
@@ -106,7 +106,7 @@ def plan_rows(table: pa.Table) -> tuple[PlanRow, ...]:
 
 
 def _numbers(values: ArrayLike, dtype: DTypeLike = np.float64) -> pa.Array:
-    """A column of numbers; not a copy of an array that is contiguous and of this type."""
+    """Returns a column of numbers, without copying an array that is contiguous and of this type."""
     import pyarrow as pa
 
     array: NDArray[Any] = np.ascontiguousarray(values, dtype)
@@ -114,7 +114,7 @@ def _numbers(values: ArrayLike, dtype: DTypeLike = np.float64) -> pa.Array:
 
 
 def _texts(values: Sequence[str]) -> pa.Array:
-    """A column of texts."""
+    """Returns a column of texts."""
     import pyarrow as pa
 
     coded = [value.encode() for value in values]
@@ -123,7 +123,7 @@ def _texts(values: Sequence[str]) -> pa.Array:
 
 
 def _lists(rows: Sequence[FloatArray], width: int) -> pa.Array:
-    """A column of lists of rows: of each entry (n, width) numbers."""
+    """Returns a column of lists of rows, (n, width) numbers for each entry."""
     import pyarrow as pa
 
     flat = np.concatenate([np.zeros((0, width)), *rows]).ravel()

@@ -1,4 +1,4 @@
-"""Ways onto the circle of a loiter and off it, as lines and arcs: rows of `planner.interface.Path`.
+"""Lines and arcs onto the circle of a loiter and off it: rows of `planner.interface.Path`.
 
 The plane is one of complex numbers, east + i north, metres; a direction is a number of size 1.
 """
@@ -17,47 +17,47 @@ from harness.run_files.given_path import SHORTEST_M, FloatArray, Row
 Pose = tuple[complex, complex]
 """A place and a direction."""
 
-NEAR: Final = 1e-9
+ROUNDING: Final = 1e-9
 ON_CIRCLE_M: Final = 0.01
-"""A place no further from a circle lies on it."""
+"""A place no further than this from a circle lies on it."""
 
 
 class Circle(NamedTuple):
-    """A circle that is gone round, `side` +1 to the left (counter-clockwise), -1 to the right."""
+    """A circle that is flown, `side` +1 to the left (counter-clockwise), -1 to the right."""
 
     center: complex
     radius_m: float
     side: int
 
     def joined_from(self, place: complex) -> complex | None:
-        """Where a straight line from a place touches it, so that it goes on round it; None from inside."""
+        """Returns the point where a straight line from a place touches it in flight direction; None from inside."""
         away = abs(place - self.center)
-        if away <= self.radius_m * (1.0 + NEAR):
+        if away <= self.radius_m * (1.0 + ROUNDING):
             return None
         # Seen from the centre, the place and the point of touch are this far apart.
         angle = math.acos(self.radius_m / away)
         return self.center + (self.edge(place) - self.center) * cmath.exp(1j * self.side * angle)
 
     def left_to(self, place: complex) -> complex | None:
-        """Where a line to a place leaves it; None to the inside."""
+        """Returns the point where a straight line to a place leaves it; None to the inside."""
         return self._replace(side=-self.side).joined_from(place)
 
     def edge(self, place: complex) -> complex:
-        """Its point nearest to a place."""
+        """Returns its point nearest to a place."""
         return self.center + self.radius_m * (place - self.center) / abs(place - self.center)
 
     def direction(self, place: complex) -> complex:
-        """Direction of flight at a place of it."""
+        """Returns the direction of flight at a place on it."""
         return (place - self.center) / abs(place - self.center) * 1j * self.side
 
     def has(self, pose: Pose) -> bool:
-        """Whether a pose is on it, and goes round it."""
+        """Tells whether a pose is on it, and flies round it."""
         if abs(abs(pose[0] - self.center) - self.radius_m) > ON_CIRCLE_M:
             return False
         return abs(self.direction(pose[0]) - pose[1]) < 1e-3
 
     def further_m(self, place: complex, target: complex | None, length_m: float) -> float:
-        """How much further round it is than a length from a place, to where the way to a target outside leaves it."""
+        """Returns the way (m) round it from `length_m` after a place on to where it is left for an outside target."""
         leave = None if target is None else self.left_to(target)
         if leave is None:
             return 0.0
@@ -66,14 +66,14 @@ class Circle(NamedTuple):
 
 
 def segment(pose: Pose, bend_1pm: float, length_m: float) -> list[Row]:
-    """A line, or an arc with a bend, positive to the left; none where it is too short to be one."""
+    """Returns a line, or an arc with a bend, positive to the left; nothing where it is too short."""
     begin, ahead = pose
     row = (begin.real, begin.imag, ahead.real, ahead.imag, bend_1pm, length_m)
     return [row] if length_m > SHORTEST_M else []
 
 
 def end_of(row: Row) -> Pose:
-    """Where a segment ends."""
+    """Returns the pose at the end of a segment."""
     east, north, ahead_east, ahead_north = arc_point(row, row[5])
     return complex(east, north), complex(ahead_east, ahead_north)
 
@@ -85,19 +85,19 @@ def sampled(row: Row, pieces: int) -> FloatArray:
 
 
 def onto(pose: Pose, circle: Circle, turn_m: float) -> list[Row]:
-    """The shorter way from a pose onto a circle: straight on as far as it takes, one turn, a line that touches it."""
+    """Returns the shorter way from a pose onto a circle: straight on as needed, one turn, a line that touches it."""
     ways = (_onto(pose, circle, turn_m, turn) for turn in (1, -1))
     return min((way for way in ways if way is not None), key=lambda way: sum(row[5] for row in way))
 
 
 def _onto(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[Row] | None:
-    """`onto` with a turn to one side; the centres of turn and circle must be far enough apart for a common tangent."""
+    """Returns the way with a turn to one side; None if turn and circle have no common tangent."""
     begin, ahead = pose
     # A common tangent of both, outer where they turn alike and inner where not, needs so much between the centres.
     needed = abs(circle.radius_m - turn_m) if turn == circle.side else circle.radius_m + turn_m
     hub = begin + 1j * turn * turn_m * ahead - circle.center
     along = hub.real * ahead.real + hub.imag * ahead.imag
-    reach = needed * (1.0 + NEAR) + SHORTEST_M
+    reach = needed * (1.0 + ROUNDING) + SHORTEST_M
     square = along * along - (abs(hub) ** 2 - reach * reach)
     on = 0.0 if abs(hub) >= reach else -along + math.sqrt(max(square, 0.0))
     start = begin + on * ahead

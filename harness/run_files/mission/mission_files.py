@@ -26,14 +26,14 @@ from harness.run_files.fences import Fences
 from harness.run_files.mission.program import Program, program
 
 LANDING_PATTERNS: Final = {"fwLandingPattern": commands.LAND, "vtolLandingPattern": commands.VTOL_LAND}
-"""Complex items that are written as a place to descend at and a place to land."""
+"""Command to land at for complex items that are written as a place to descend at and a place to land."""
 TRANSECTS: Final = "TransectStyleComplexItem"
-"""The mapping in which a survey has its items."""
+"""Key of the mapping in which a survey has its items."""
 RELATIVE, ABSOLUTE = 3, 0
 """MAV_FRAME of altitudes above home and above the sea."""
 PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')
-"""What stands in every plan of QGroundControl, whatever the name of its file."""
-PLACE: Final = "[latitude, longitude, altitude]"
+"""Matches every plan of QGroundControl, whatever the name of its file."""
+PLACE_FORM: Final = "[latitude, longitude, altitude]"
 Home = Sequence[float | None]
 """Latitude, longitude and altitude of home; None each where the file does not say."""
 
@@ -41,7 +41,7 @@ Home = Sequence[float | None]
 def _mission(
     source: str, items: Sequence[Item], home: Home, fences: Fences, rally: int, notes: list[str]
 ) -> Program:
-    """A mission with what is to be said of items that wait and of rally points."""
+    """Returns a mission with notes on items that wait and on rally points."""
     waiting = [str(each.number) for each in items if each.autocontinue_off and each.command in commands.FLOWN]
     if waiting:
         told = f"{'item' if len(waiting) == 1 else 'items'} {', '.join(waiting)}: autocontinue is off"
@@ -58,7 +58,7 @@ def _place(home: Home) -> tuple[float, float] | None:
 
 
 def read_waypoints(text: str, source: str) -> Program:
-    """The mission of a plain-text file; its first item is home if it is a waypoint.
+    """Reads the mission of a plain-text file; its first item is home if it is a waypoint.
 
     A waypoint above home that has another number than 0 is no home. Items of fences that stand among those of the
     mission are fences; rally points are counted.
@@ -81,7 +81,7 @@ def read_waypoints(text: str, source: str) -> Program:
 
 
 def _home_item(items: list[Item], notes: list[str]) -> Home:
-    """Home, if the first item is; it is taken out of the items."""
+    """Takes the first item out of the items if it is home, and returns home."""
     above = FRAMES.get(items[0].frame, SEA) if items else HOME
     if not items or items[0].command != commands.WAYPOINT or (items[0].number != 0 and above != SEA):
         return None, None, None
@@ -93,7 +93,7 @@ def _home_item(items: list[Item], notes: list[str]) -> Home:
 
 
 def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
-    """Items by their numbers; where one comes twice, or some are left out and there is a jump, counted by lines."""
+    """Returns items by their numbers; where one comes twice, or some are left out and there is a jump, by lines."""
     numbers = [item.number for item in items]
     twice = len(set(numbers)) < len(numbers)
     gaps = bool(numbers) and numbers != list(range(numbers[0], numbers[0] + len(numbers)))
@@ -105,7 +105,7 @@ def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
 
 
 def read_plan(text: str, source: str) -> Program:
-    """The mission of a .plan, with its fences."""
+    """Reads the mission of a .plan, with its fences."""
     plan = parsed_json(text, source)
     if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
         raise InputError(
@@ -126,17 +126,17 @@ def read_plan(text: str, source: str) -> Program:
 
 
 def _home(home: Any, where: str, notes: list[str]) -> Home:
-    """Place and altitude of home; QGroundControl writes null for what it does not know."""
+    """Returns place and altitude of home; QGroundControl writes null for what it does not know."""
     if home is None or home == [None, None, None]:
         return None, None, None
     if isinstance(home, list) and len(home) == 3 and home[2] is None:
         notes.append("its home has no altitude: altitudes above home are counted from the sea")
         home = [*home[:2], 0.0]
-    return numbers(home, where, PLACE, (3,))
+    return numbers(home, where, PLACE_FORM, (3,))
 
 
 def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item]:
-    """The items of a plan, numbered as there unless a number comes twice."""
+    """Returns the items of a plan, numbered as there unless a number comes twice."""
     items: list[Item] = []
     for number, each in enumerate(given):
         items += _items(each, f"{where}[{number}]", len(items) + 1, notes)
@@ -147,7 +147,7 @@ def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item
 
 
 def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
-    """The simple items that an item of a plan stands for; what it is without any goes into the notes."""
+    """Returns the simple items that an item of a plan stands for, or none, with a note."""
     if not isinstance(item, dict):
         raise InputError(f"{where}: must be a mission item")
     if item.get("type", "SimpleItem") in ("SimpleItem", None) and not item.get("complexItemType"):
@@ -181,9 +181,9 @@ def _simple(item: Any, where: str, number: int) -> Item:
 
 
 def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[Item]:
-    """A landing pattern: where it descends in a turn or on the way, and where it lands."""
+    """Returns a landing pattern: where it descends in a turn or on the way, and where it lands."""
     approach, landing = (
-        numbers(item.get(each), f"{where}.{each}", PLACE, (3,))
+        numbers(item.get(each), f"{where}.{each}", PLACE_FORM, (3,))
         for each in ("landingApproachCoordinate", "landCoordinate")
     )
     relative = item.get("altitudesAreRelative", True)

@@ -1,4 +1,4 @@
-"""What a mission makes an aeroplane fly: its items are gone through as an autopilot does, jumps and all.
+"""Turns the items of a mission into steps that an aeroplane flies, as an autopilot does, jumps and all.
 
 ArduPlane's and PX4's fixed-wing missions are the model: https://ardupilot.org/plane/docs/common-mavlink-mission-command-messages-mav_cmd.html,
 https://docs.px4.io/main/en/flight_modes_fw/mission.html.
@@ -17,18 +17,18 @@ from harness.files.wording import counted
 from harness.run_files.fences import Fences
 
 FLOWN, PASSED_OVER, NOT_FLOWN, NOT_REACHED = "flown", "passed over", "not flown", "not reached"
-"""What becomes of an item."""
+"""Treatments of an item."""
 MOST_STEPS: Final = 20_000
-"""A mission whose jumps make it longer is refused."""
+"""A mission that its jumps make longer than this is refused."""
 MOST_TURNS, MOST_LOITER_S, MOST_RADIUS_M, MOST_HEIGHT_M = 1000, 86_400.0, 50_000.0, 50_000.0
-"""Beyond these an item is taken for a mistake."""
+"""An item with a larger figure than these is taken for a mistake."""
 SIDE_ALONE_M: Final = 1.0
-"""A radius of 1 m or less says which way round, and no more: ArduPlane hands back 1 or -1 where it has none."""
+"""A radius of at most this gives the side only: ArduPlane hands back 1 or -1 where it has none."""
 NOT_LOADED: Final = "ArduPilot and QGroundControl load no mission with it"
 BACK_MPS: Final = -2.0
 """A change to this speed, MAVLink says, goes back to that of the vehicle; to -1 changes nothing."""
 AIRSPEED, GROUND_SPEED = 0, 1
-"""Kinds of speed of a change of speed, its first parameter."""
+"""Kinds of speed in a change of speed, its first parameter."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Loiter:
 
 @dataclass(frozen=True)
 class MissionStep:
-    """One thing that is flown, by the number and the name of its item.
+    """One step that is flown, by the number and the name of its item.
 
     The position is latitude and longitude, later east and north; None: where the step before ends. The height, of the
     step before where None, is `above` `sea`, `home` or `ground`. An acceptance of 0 is not given. The airspeed is
@@ -68,8 +68,8 @@ class MissionStep:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What became of an item, by its number and name: `flown`, `passed over`, `not flown` or `not reached`; and why."""
+class ItemFate:
+    """Treatment of an item, by its number and name: `flown`, `passed over`, `not flown` or `not reached`; and why."""
 
     item: int
     name: str
@@ -79,14 +79,14 @@ class Told:
 
 @dataclass(frozen=True)
 class Program:
-    """What a mission makes an aeroplane fly: its steps, and what became of every item, in the order of the file.
+    """A mission as an aeroplane flies it: its steps, and the treatment of every item, in the order of the file.
 
     The altitude of home, which may have no position, is above mean sea level. Fences come with it, and notes on what
     else does.
     """
 
     steps: tuple[MissionStep, ...]
-    items: tuple[Told, ...]
+    items: tuple[ItemFate, ...]
     home_altitude_m: float = 0.0
     has_home: bool = True
     fences: Fences = field(default_factory=Fences)
@@ -101,7 +101,7 @@ class Program:
 def program(
     source: str, items: Sequence[Item], home: tuple[float, float] | None, home_altitude_m: float
 ) -> Program:
-    """Goes through the items of a mission, whose numbers differ; home is latitude and longitude."""
+    """Makes steps of the items of a mission, whose numbers differ; home is latitude and longitude."""
     if not items:
         raise InputError(f"{source}: has no mission items; there is nothing to fly")
     run = _Run(items, home)
@@ -115,7 +115,7 @@ def program(
 
 
 Flown = tuple[MissionStep | None, str]
-"""What an item makes the aircraft fly, and what is said of it; without a step, why it is not flown."""
+"""The step that an item makes, with a remark; or None, with the reason why it is not flown."""
 
 
 class _Run:
@@ -124,7 +124,7 @@ class _Run:
     def __init__(self, items: Sequence[Item], home: tuple[float, float] | None) -> None:
         self.items, self.home = items, home
         self.steps: list[MissionStep] = []
-        self.told: dict[int, Told] = {}
+        self.told: dict[int, ItemFate] = {}
         self.index = {item.number: place for place, item in enumerate(items)}
         self._taken: dict[int, int] = {}  # how often each jump has been taken
         self._airspeed_mps: float | None = None
@@ -132,7 +132,7 @@ class _Run:
         self._over = False
 
     def go(self) -> None:
-        """Goes through it to its end."""
+        """Goes through the mission to its end."""
         at, idle = 0, 0
         while at < len(self.items) and not self._over:
             item, before = self.items[at], len(self.steps)
@@ -147,17 +147,17 @@ class _Run:
             if len(self.steps) > MOST_STEPS:
                 raise InputError(f"{item.place}: jumps make it more than {MOST_STEPS:,} legs; give fewer")
 
-    def not_reached(self, item: Item) -> Told:
-        """What is said of an item that is not reached, and why autopilots may not load a mission for it."""
+    def not_reached(self, item: Item) -> ItemFate:
+        """Returns the treatment of an item that is not reached, and why autopilots may not load a mission for it."""
         doubt = ""
         if item.command == commands.JUMP and item.params[0] not in self.index:
             doubt = f"to item {item.params[0]:g}, which does not exist: {NOT_LOADED}"
         elif item.command in commands.FLOWN and item.position is not None and item.frame not in FRAMES:
             doubt = f"has the frame {item.frame}: autopilots load no mission with it"
-        return Told(item.number, commands.name_of(item.command), NOT_REACHED, doubt)
+        return ItemFate(item.number, commands.name_of(item.command), NOT_REACHED, doubt)
 
     def _jump(self, item: Item, at: int) -> int:
-        """Where it goes on after a jump."""
+        """Returns the place in the items after a jump."""
         wanted, repeats = item.params[0], int(item.params[1])
         if wanted not in self.index:
             first, last = min(self.index), max(self.index)
@@ -227,7 +227,7 @@ class _Run:
         self._over = self._closing or ends
 
     def _step(self, item: Item, **more: Any) -> MissionStep:
-        """A step to where an item says; as with ArduPilot zeros are the present place, a 0 with it that altitude."""
+        """Makes a step to an item's place; as with ArduPilot, zeros mean the present place, then 0 that altitude."""
         height: float | None = _bounded(item, "is at", item.params[6], MOST_HEIGHT_M, "m")
         if item.position is None and height == 0.0:
             height = None
@@ -283,7 +283,7 @@ class _Run:
         return step, "to home at the altitude before; what follows there is not flown"
 
     def _tell(self, item: Item, what: str, why: str = "") -> None:
-        self.told.setdefault(item.number, Told(item.number, commands.name_of(item.command), what, why))
+        self.told.setdefault(item.number, ItemFate(item.number, commands.name_of(item.command), what, why))
 
 
 def _fault(item: Item, sentence: str) -> InputError:
@@ -291,7 +291,7 @@ def _fault(item: Item, sentence: str) -> InputError:
 
 
 def _bounded(item: Item, verb: str, value: float, most: float, unit: str) -> float:
-    """A figure of an item; one that is too large is a fault."""
+    """Returns a figure of an item; one that is too large is a fault."""
     if not abs(value) <= most:
         raise _fault(item, f"{verb} {value:g} {unit}; must be at most {most:g} {unit}")
     return value

@@ -26,8 +26,8 @@ from harness.run_files.mission.vertices import (
     Flying,
     MissionRoute,
     Vertex,
+    above_ground,
     altitude_m,
-    followed,
     legs_of,
     rounded,
     without_steps,
@@ -36,20 +36,20 @@ from harness.run_files.mission.vertices import (
 LANDING_HEIGHT_M: Final = 15.0
 """A landing is flown down to this height above its place; flare and touchdown are not."""
 CLIMB_SHARE: Final = 0.8
-"""A loiter to an altitude is as long as this share of the fastest climb takes."""
+"""A loiter to an altitude takes as long as a climb at this share of the fastest rate."""
 ARC_RAD: Final = math.pi / 2
-"""Longest arc of a circle in one segment."""
+"""A segment on a circle spans at most this angle."""
 SAMPLE_M: Final = 5.0
-"""Points along circles are this close together, where a track is compared with them."""
+"""Points along circles are this close together, for comparison with a track."""
 SAME_DIRECTION: Final = 1e-5
-"""Directions that differ by less, in radians, are no corner."""
+"""Directions that differ by less than this (rad) make no corner."""
 PAST_RADII: Final = 3.0
-"""A turn of more than `PAST_RAD` goes past the next leg and is back on it after no more than so many radii."""
+"""A turn of more than `PAST_RAD` goes past the next leg and is back on it within this many radii."""
 
 
 def mission_route(mission: Program, flying: Flying, source: str) -> MissionRoute:
     """Makes the route of a mission that lies in the plane; `source` names it in faults."""
-    build = _Build(mission, flying)
+    build = _RouteBuilder(mission, flying)
     for number, step in enumerate(mission.steps):
         build.fly(number, step)
     build.flush()
@@ -58,8 +58,8 @@ def mission_route(mission: Program, flying: Flying, source: str) -> MissionRoute
     return build.route()
 
 
-class _Build:
-    """A route while it is made: what is laid already, and the run of waypoints that comes next."""
+class _RouteBuilder:
+    """A route while it is made: the rows made so far, and the run of waypoints that comes next."""
 
     def __init__(self, mission: Program, flying: Flying) -> None:
         self._steps, self._flying, self._home_m = mission.steps, flying, mission.home_altitude_m
@@ -109,7 +109,7 @@ class _Build:
         return self._pose[0] if self._pose else None
 
     def _ground_m(self, place: complex) -> float:
-        """Height of the ground; that of home where it is not known."""
+        """Returns the height of the ground; that of home where it is not known."""
         if self._flying.ground is None:
             return self._home_m
         height = float(self._flying.ground(np.array([place.real]), np.array([place.imag]))[0])
@@ -120,14 +120,14 @@ class _Build:
         self._altitude_m = vertex.altitude_m
 
     def _heading(self) -> complex | None:
-        """Direction at the end of what is there."""
+        """Returns the direction at the end of the route so far."""
         for before, after in zip(self._run[-2::-1], self._run[::-1], strict=False):
             if abs(after.place - before.place) > SAME_PLACE_M:
                 return (after.place - before.place) / abs(after.place - before.place)
         return self._pose[1] if self._pose else None
 
     def _climbing_m(self, altitude: float) -> float:
-        """How far it takes to climb or sink from the present altitude to another; 1 m at the least."""
+        """Returns the way (m) to climb or sink from the present altitude to another; at least 1 m."""
         rise = altitude - self._altitude_m
         up, down = self._flying.climb_mps(self._mps)
         rate = CLIMB_SHARE * (up if rise > 0.0 else down)
@@ -171,13 +171,13 @@ class _Build:
         self._add(Vertex(pose[0], altitude, None))
 
     def _around_m(self, loiter: Loiter, circle: Circle, altitude: float) -> float:
-        """How far a loiter goes round its circle."""
+        """Returns the way (m) of a loiter round its circle."""
         if loiter.turns is not None:
             return loiter.turns * math.tau * circle.radius_m
         return self._climbing_m(altitude) if loiter.time_s is None else loiter.time_s * self._mps
 
     def _target(self, number: int, center: complex) -> complex | None:
-        """What the aircraft turns to as it leaves a circle; None where it goes on round the same centre or straight."""
+        """Returns the place for which a circle is left; None where the next item goes on round it or has no place."""
         after = next(iter(self._steps[number + 1 : number + 2]), None)
         if after is None or after.place is None:
             return None
@@ -185,7 +185,7 @@ class _Build:
         return None if again else after.place
 
     def _join(self, item: int, circle: Circle, turn_m: float, altitude: float) -> Pose:
-        """Gets onto a circle."""
+        """Adds the way onto a circle, and returns the pose there."""
         here, heading = self._here(), self._heading()
         touch = circle.joined_from(here) if here is not None and self._run else None
         if here is not None and touch is not None and self._flying.heads_for_centres:
@@ -205,14 +205,14 @@ class _Build:
         return self._pose
 
     def _turns_to(self, place: complex) -> bool:
-        """Whether a line to a place begins with a turn, as where a circle was just left."""
+        """Tells whether a line to a place begins with a turn, as where a circle was just left."""
         if len(self._run) > 1 or self._pose is None:
             return False
         way = place - self._pose[0]
         return abs(way - abs(way) * self._pose[1]) > SAME_DIRECTION * abs(way)
 
     def _join_from_far(self, item: int, circle: Circle, edge: complex, altitude: float) -> Pose:
-        """Gets onto a circle as autopilots do that head for its centre: there is a corner where they join it."""
+        """Adds the way onto a circle for autopilots that head for its centre, with a corner where they join it."""
         self._add(Vertex(edge, altitude, None, centre=circle.center))
         self.flush()
         self._pose = edge, circle.direction(edge)
@@ -222,7 +222,7 @@ class _Build:
         return self._pose
 
     def _is_near(self, touch: complex, turn_m: float) -> bool:
-        """Whether a corner at the last waypoint has no room before a place that is to be flown to next."""
+        """Tells whether a corner at the last waypoint has no room before the next place."""
         heading, way = self._heading(), touch - self._run[-1].place
         if heading is None or abs(way) <= SAME_PLACE_M:
             return False
@@ -273,13 +273,13 @@ class _Build:
             before = float(stations[max(place - 1, 0)])
             self._speeds.append((before, vertex.asked_mps, vertex.airspeed_mps))
             if place and vertex.agl_m is not None:
-                self._altitudes += followed((run[place - 1], vertex), (before, station), self._ground_m)
+                self._altitudes += above_ground((run[place - 1], vertex), (before, station), self._ground_m)
             self._altitudes.append((station, vertex.altitude_m))
             if vertex.item is not None:
                 self._passed.append((vertex.item, vertex.place, station))
 
     def route(self) -> MissionRoute:
-        """What was made."""
+        """Returns the route made."""
         marks = tuple((item, station) for item, _, station in self._passed if item is not None)
         places = [(place, station) for _, place, station in self._passed if place is not None]
         kept = [b for a, b in pairwise([(math.inf, 0.0), *places]) if abs(b[0] - a[0]) > SAME_PLACE_M]

@@ -1,4 +1,4 @@
-"""Waypoints of a mission one after the other, up to the next circle: what they are flown with, how they are rounded."""
+"""Waypoints of a mission one after the other, up to the next circle: how they are flown and rounded."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from harness.run_files.given_path import SAME_PLACE_M, FloatArray, FlyBy, Tighte
 from harness.run_files.mission.program import MissionStep
 
 Ground = Callable[[FloatArray, FloatArray], FloatArray]
-"""East and north -> height of the ground above mean sea level, NaN where it is not known."""
+"""Maps east and north to the height of the ground above mean sea level, NaN where it is not known."""
 
 CORNER_M: Final = 90.0
-"""How far off a waypoint of a mission may be passed that says nothing itself: ArduPilot Plane's default WP_RADIUS."""
+"""A waypoint without an acceptance radius may be passed this far off: ArduPilot Plane's default WP_RADIUS."""
 FOLLOWED_M: Final = 50.0
-"""The ground is looked up so often along a leg whose altitude is above it."""
+"""Along a leg above ground, the ground is looked up at this spacing."""
 
 
 def corner_limit_m(acceptance_m: float, corner_m: float | None) -> float:
-    """How far off a waypoint may be passed: as is asked for all of them, else as it says itself, else `CORNER_M`."""
+    """Returns how far off a waypoint may be passed: `corner_m` for all, else its own acceptance, else `CORNER_M`."""
     return corner_m if corner_m is not None else acceptance_m or CORNER_M
 
 
 @dataclass(frozen=True)
 class Flying:
-    """What a mission is flown with.
+    """The aircraft's figures that a mission's route depends on.
 
     The airspeed is that before the mission says otherwise, the range what the aircraft holds. Functions of the airspeed
     are the turn radius with bank in hand, the fastest climb and descent, and the least radius, at the bank limit in
@@ -88,7 +88,7 @@ class MissionRoute:
 
 
 def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:
-    """Lines and arcs through some waypoints, not all in one place."""
+    """Returns lines and arcs through waypoints, not all in one place."""
     points = np.array([(vertex.place.real, vertex.place.imag) for vertex in run])
     speeds = [vertex.airspeed_mps for vertex in run]
     wide, least = (
@@ -101,7 +101,7 @@ def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:
 
 
 def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:
-    """The legs between waypoints, by arc lengths; places that only mark where a circle is joined are passed."""
+    """Returns the legs between waypoints, by arc lengths; a place where a circle is joined has no acceptance."""
     pairs = zip(pairwise(run), pairwise(stations_m.tolist()), strict=True)
     return [
         straight((a.place, b.place), along, 0.0 if b.item is None else b.acceptance_m or None, b.centre)
@@ -111,7 +111,7 @@ def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:
 
 
 def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, before_m: float) -> float:
-    """Altitude of a step above mean sea level, by those of home, of the ground below, and of the step before or NaN."""
+    """Returns the altitude of a step above mean sea level, from home, the ground below, and the step before or NaN."""
     if step.height_m is None:
         return before_m if math.isfinite(before_m) else home_altitude_m
     return step.height_m + {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
@@ -120,7 +120,7 @@ def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, befor
 def without_steps(
     points: Sequence[tuple[float, float]], slope: Callable[[], float]
 ) -> list[tuple[float, float]]:
-    """Altitudes along a route, where two at one place are a ramp: the aircraft climbs or sinks on the way on.
+    """Turns two altitudes at one place along a route into a ramp, on which the aircraft climbs or sinks afterwards.
 
     At the end of the route it does so before. A ramp that would be longer than the way to the next altitude goes there.
     Points, as many as before, are arc length, not falling, and altitude (m); the slope is asked for where it is needed.
@@ -142,10 +142,10 @@ def without_steps(
     return ramped
 
 
-def followed(
+def above_ground(
     ends: tuple[Vertex, Vertex], stations_m: tuple[float, float], ground_m: Callable[[complex], float]
 ) -> list[tuple[float, float]]:
-    """Altitudes on the way to a waypoint that is above ground: above it all the way, as ArduPilot flies it."""
+    """Returns altitudes on the way to a waypoint that is above ground: above it all the way, as ArduPilot flies it."""
     (begin, end), (begin_m, end_m) = ends, stations_m
     assert end.agl_m is not None
     begin_agl_m = begin.altitude_m - ground_m(begin.place)
