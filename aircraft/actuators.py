@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 CONTROLS = ("aileron", "elevator", "rudder", "throttle")
-"""The command of each is fcs/<control>-cmd-norm."""
+"""Names of the controls; the command of each is the property fcs/<control>-cmd-norm."""
 THROTTLE_TRAVEL_DEG = 60.0
 """Travel of the servo's arm from idle to full throttle."""
 
@@ -19,7 +19,7 @@ class Actuator:
     deadband_deg: float = 0.0  # about the trim
 
     def of_command(self, travel_deg: float) -> NormActuator:
-        """The same in units of the command, for a surface that moves by so much for a command of 1."""
+        """The same in units of the command, for a surface that moves by `travel_deg` for a command of 1."""
         rate = None if self.rate_limit_degps is None else self.rate_limit_degps / travel_deg
         return NormActuator(self.lag_s, rate, self.deadband_deg / travel_deg)
 
@@ -35,7 +35,7 @@ class NormActuator:
 
 @dataclass(frozen=True)
 class Actuators:
-    """The servos of an aircraft; None: the control does what it is told at once."""
+    """The servos of an aircraft; a control of None follows its command at once."""
 
     aileron: Actuator | None = None
     elevator: Actuator | None = None
@@ -49,6 +49,6 @@ class Actuators:
 
     @property
     def real(self) -> dict[str, Actuator]:
-        """Those that are not ideal, by control."""
+        """The servos that are not ideal, by control."""
         every = {each.name: getattr(self, each.name) for each in fields(self)}
         return {name: servo for name, servo in every.items() if servo not in (None, Actuator())}

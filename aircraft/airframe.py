@@ -15,9 +15,9 @@ from aircraft.interface import GRAVITY_MPS2
 from aircraft.model_files import AircraftError, ModelFiles
 
 PITCH_LIMITS_DEG = (-30.0, 30.0)
-"""Pitch that the autopilot commands at the least and at most: PX4's defaults FW_P_LIM_MIN and FW_P_LIM_MAX."""
-LEAST_SHARE = 0.97
-"""Share of the lowest airspeed of level flight below which the autopilot lets height go for speed."""
+"""Lowest and highest pitch that the autopilot commands: PX4's defaults FW_P_LIM_MIN and FW_P_LIM_MAX."""
+LEAST_AIRSPEED_SHARE = 0.97
+"""Below this share of the lowest airspeed of level flight the autopilot gives up height for speed."""
 FIGURES = (
     "bank_limit_deg",
     "roll_rate_dps",
@@ -27,14 +27,14 @@ FIGURES = (
     "guidance_bandwidth_radps",
     "turn_rate_share",
 )
-"""Attributes of `Airframe` that an entry may replace."""
+"""Attributes of `Airframe` that an entry of airframes.yaml may give, instead of what the survey measures."""
 
 
 @dataclass(frozen=True)
 class AutopilotKeys:
-    """What a scenario says of an aircraft's autopilot, `aircraft.autopilot` and `navigation.latency_s`.
+    """An aircraft's autopilot in a scenario: `aircraft.autopilot` and `navigation.latency_s`.
 
-    None stands for what the survey finds.
+    A key of None is what the survey finds.
     """
 
     bank_limit_deg: float | None = None  # largest bank that guidance may command
@@ -45,7 +45,7 @@ class AutopilotKeys:
     latency_s: float = 0.0  # age of the attitude, airspeed, height and climb that the autopilot works with
 
     def figures(self) -> dict[str, float]:
-        """What replaces figures of `FIGURES` that the survey would find."""
+        """The keys given that replace measured `FIGURES`, by name."""
         named = {
             "bank_limit_deg": self.bank_limit_deg,
             "roll_rate_dps": self.roll_rate_limit_degps,
@@ -54,7 +54,7 @@ class AutopilotKeys:
         return {name: value for name, value in named.items() if value is not None}
 
     def gains(self) -> dict[str, float]:
-        """What replaces derived gains."""
+        """The gains that the keys given replace, by field of `Gains`."""
         rate, time_s = self.roll_rate_limit_degps, self.roll_time_constant_s
         replaced = {} if rate is None else {"roll_rate_limit": math.radians(rate)}
         return replaced if time_s is None else {**replaced, "roll": 1.0 / time_s}
@@ -107,7 +107,7 @@ class Airframe:
 
     @staticmethod
     def of(entry: AirframeEntry, files: ModelFiles, measured: Mapping[str, Any]) -> Airframe:
-        """The airframe of an entry; `measured` holds, by attribute, what the survey found, as JSON keeps it."""
+        """Makes the airframe of an entry; `measured` holds what the survey found, by attribute, as read from JSON."""
         low, high = measured["airspeed_range_mps"]
         given = {
             "airspeed_range_mps": (low, high),
@@ -121,10 +121,10 @@ class Airframe:
     def least_airspeed_mps(self) -> float:
         """Below this true airspeed the autopilot lets height go for speed."""
         given = self.autopilot.least_airspeed_mps
-        return LEAST_SHARE * self.airspeed_range_mps[0] if given is None else given
+        return LEAST_AIRSPEED_SHARE * self.airspeed_range_mps[0] if given is None else given
 
     def guidance_limits(self, airspeed_mps: float | None = None) -> GuidanceLimits:
-        """What a guidance law may ask of it at a true airspeed; default: cruise."""
+        """The limits of a guidance law at a true airspeed; default: cruise."""
         return GuidanceLimits(
             airspeed_mps=self.cruise_mps if airspeed_mps is None else airspeed_mps,
             max_airspeed_mps=self.airspeed_range_mps[1],
@@ -142,7 +142,7 @@ class Airframe:
         return airspeed_mps * airspeed_mps / (lateral_mps2 * self.turn_rate_share)
 
     def level_bank_deg(self, airspeed_mps: float) -> float:
-        """Steepest bank at which an airspeed and the altitude are kept, between the speeds flown linear."""
+        """Steepest bank at which an airspeed and the altitude are kept, interpolated between the speeds flown."""
         (before, bank), *rest = self.level_banks
         for speed, after in rest:
             if airspeed_mps <= speed:

@@ -1,4 +1,4 @@
-"""Airframes by name: what airframes.yaml says of them, and what their models show when they are flown."""
+"""Airframes by name: their entries in airframes.yaml, and the figures that surveys of their models measure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 from aircraft.actuators import Actuator, Actuators, NormActuator
 from aircraft.airframe import DERIVED, Airframe, AirframeEntry, AutopilotKeys
-from aircraft.card_cache import cached, is_kept
+from aircraft.card_cache import cached, is_cached
 from aircraft.model_files import AircraftError as AircraftError
 from aircraft.model_files import ModelFiles, model_files
 
@@ -24,7 +24,7 @@ def aircraft_names() -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def airframe(name: str, actuators: Actuators | None = None, autopilot: AutopilotKeys = DERIVED) -> Airframe:
-    """The airframe of a name or folder, surveyed by flying it unless that has been done before.
+    """The airframe of a name or folder, surveyed by flying it unless the cache has its survey.
 
     The name is of `aircraft_names`, of another aircraft of the JSBSim wheel, or a folder that holds a JSBSim model.
     Servos of None are those of the airframe table, or none.
@@ -43,8 +43,8 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
 
 
 def is_surveyed(name: str) -> bool:
-    """Whether an aircraft's figures are kept, so that `airframe` need not fly it; AircraftError if there is none."""
-    return is_kept(*_as_flown(name, None, DERIVED)[2])
+    """Tells whether the cache has an aircraft's survey, so that `airframe` need not fly; AircraftError: no such one."""
+    return is_cached(*_as_flown(name, None, DERIVED)[2])
 
 
 def _as_flown(
@@ -61,7 +61,7 @@ def _as_flown(
         raise AircraftError(f"{error}; known are: {known}, or a folder with a JSBSim model") from None
     entry = _table().get(name) or AirframeEntry(found.name, f"JSBSim model of {found.model.parent}")
     if real := (entry.actuators if actuators is None else actuators).real:
-        found = replace(found, actuators=_of_commands(found, real))
+        found = replace(found, actuators=_normalised(found, real))
     entry = replace(
         entry,
         figures={**entry.figures, **autopilot.figures()},
@@ -73,11 +73,11 @@ def _as_flown(
     return entry, found, (f"{found.name}-airframe", sha256((found.digest() + known).encode()).hexdigest())
 
 
-def _of_commands(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:
-    """Actuators in units of the command, by how far the surfaces of a model move.
+def _normalised(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:
+    """Turns actuators in degrees into those in units of the command, by how far the surfaces of a model move.
 
     Raises:
-        AircraftError: the model does not show how far, and it must be known.
+        AircraftError: The model does not show how far a surface moves that has a rate limit or deadband.
     """
 
     def measured() -> dict[str, float]:

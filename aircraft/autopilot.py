@@ -19,15 +19,15 @@ from aircraft.interface import FloatArray
 
 GRAVITY_FPS2 = 32.174
 S = 1j * np.logspace(-1.0, 2.5, 4000)
-"""The Laplace variable at the frequencies (rad/s) that loops are looked at."""
-NEEDED_DEG = 45.0
+"""The Laplace variable at the frequencies (rad/s) at which open loops are evaluated."""
+NEEDED_MARGIN_DEG = 45.0
 """The least phase margin that loops keep behind servos; a margin of 45 degrees is what is usually asked of aircraft
 (MIL-F-9490D, 3.1.3.6.1, for modes of less than 1 Hz and up)."""
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 ROLL_ERROR_SHARE = 0.8
-"""Share of the steady roll rate at full aileron that roll errors may ask for."""
+"""Share of the steady roll rate at full aileron that a roll error may ask for."""
 LEAST_AILERON_S = 0.1
-"""Aileron that holds a roll rate of 1 rad/s is taken for no less: 10 rad/s at full aileron."""
+"""Least aileron command per roll rate (s) that is assumed: full aileron then rolls at 10 rad/s."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Derivatives:
 
     @property
     def roll_mode_radps(self) -> float:
-        """Where the roll rate loop puts the roll mode: lambda = max(1.4 |Lp|, 10) 1/s."""
+        """Roll mode with the roll rate loop closed: lambda = max(1.4 |Lp|, 10) 1/s."""
         return max(1.4 * abs(self.lp), 10.0)
 
 
@@ -98,11 +98,11 @@ class Gains:
     throttle_load_forward: float  # throttle against induced drag, per (load factor squared - 1)
 
     def rounded(self, digits: int) -> Gains:
-        """The same to a number of significant digits."""
+        """The same gains, rounded to a number of significant digits."""
         return Gains(**{f.name: float(f"{getattr(self, f.name):.{digits}g}") for f in fields(self)})
 
     def properties(self) -> dict[str, float]:
-        """JSBSim property name to value."""
+        """The value of each gain by the name of its JSBSim property."""
         return {f"wayproof/gain/{f.name.replace('_', '-')}": getattr(self, f.name) for f in fields(self)}
 
 
@@ -149,7 +149,7 @@ def derivatives(
 
 
 def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0, climb_pace: float = 1.0) -> Gains:
-    """Places the loops.
+    """Derives the gains that put each loop in its place relative to the aircraft's modes.
 
     Roll: the roll mode goes to lambda = max(1.4 |Lp|, 10) 1/s and roll to min(4, lambda/4). Yaw: the Dutch
     roll is damped to 0.7; feed-forwards solve rolling and yawing moment for no sideslip. Pitch: the short
@@ -233,23 +233,23 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0, climb_pac
 
 
 def roll_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
-    """The lesser phase margin of the roll rate and the roll loop, behind the aileron's lag, with an old roll."""
+    """Lesser phase margin of the loops of roll rate and roll, behind the aileron's lag, with roll read late."""
     plant = at.lda / (S - at.lp) / (1.0 + lag_s * S)
     inner = (gains.aileron_p + gains.aileron_p_integral / S) * plant
     attitude = gains.roll / S * (gains.aileron_p_forward * plant + inner) / (1.0 + inner)
-    return _least_margin_deg(inner, attitude * _as_known(latency_s))
+    return _least_margin_deg(inner, attitude * _attitude_as_read(latency_s))
 
 
 def pitch_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
-    """The same of the pitch rate loop and of the pitch loop, behind the elevator's lag, with an old pitch."""
+    """Lesser phase margin of the loops of pitch rate and pitch, behind the elevator's lag, with pitch read late."""
     inner, attitude = _pitch_loops(at, gains, lag_s)
-    return _least_margin_deg(inner, attitude * _as_known(latency_s))
+    return _least_margin_deg(inner, attitude * _attitude_as_read(latency_s))
 
 
 def climb_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float) -> float:
-    """The same of the climb and of the altitude loop around the pitch loop, with an old climb and height."""
+    """Lesser phase margin of the loops of climb and altitude around pitch, with climb and altitude read late."""
     _, attitude = _pitch_loops(at, gains, lag_s)
-    path = attitude / (1.0 + attitude * _as_known(latency_s)) / (1.0 - S / at.za)
+    path = attitude / (1.0 + attitude * _attitude_as_read(latency_s)) / (1.0 - S / at.za)
     late = np.exp(-S * latency_s)
     feedback = gains.climb + gains.climb_integral / S
     climb = feedback * path * late
@@ -257,15 +257,15 @@ def climb_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: flo
 
 
 def _pitch_loops(at: Derivatives, gains: Gains, lag_s: float) -> tuple[ComplexArray, ComplexArray]:
-    """The open loops of pitch rate and of pitch, which has a feed-forward of the rate."""
+    """Open loops of pitch rate and of pitch; the latter has a feed-forward of the rate."""
     short_period = S * S - (at.mq + at.za) * S + at.mq * at.za - at.ma
     plant = -at.mde * (S - at.za) / short_period / (1.0 + lag_s * S)
     inner = (gains.elevator_q + gains.elevator_q_integral / S) * plant
     return inner, gains.pitch / S * (gains.elevator_q_forward * plant + inner) / (1.0 + inner)
 
 
-def _as_known(latency_s: float) -> ComplexArray:
-    """An attitude as the autopilot knows it: the angle of then, and what the rate of now makes of it since."""
+def _attitude_as_read(latency_s: float) -> ComplexArray:
+    """Transfer function of an attitude read late: the old angle, carried on to now at the present rate."""
     known: ComplexArray = np.exp(-S * latency_s) + S * latency_s
     return known
 

@@ -1,4 +1,4 @@
-"""What has been measured of a model, kept in the user's cache folder; whatever is wrong there is made anew."""
+"""Keeps measurements of models in the user's cache folder; whatever is wrong there is measured anew."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 MAX_BYTES = 10_000_000
-"""A cache file has a few thousand bytes; of one that has more no more than this is read."""
+"""No more than this is read of a cache file; a sound one has a few thousand bytes."""
 Card = TypeVar("Card")
 
 
@@ -26,13 +26,13 @@ def cache_folder() -> Path:
 def cached(
     title: str, digest: str, measure: Callable[[], dict[str, Any]], read: Callable[[dict[str, Any]], Card]
 ) -> Card:
-    """What is read from the result of a measurement, which comes from the cache if it is there.
+    """Returns what `read` makes of a measurement's result, taken from the cache or else measured now.
 
     Both ways give the same values: JSON keeps every bit of a float. A cache that cannot be read or written, or whose
     numbers are not those that were measured (its SHA-256 tells), costs time and nothing else. The title is for the
     file's name, the digest of all that the result depends on.
     """
-    file = _file(title, digest)
+    file = _cache_file(title, digest)
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         with file.open("rb") as opened:
             kept = json.loads(opened.read(MAX_BYTES))
@@ -45,21 +45,21 @@ def cached(
 
 
 def _sha256(result: dict[str, Any]) -> str:
-    """Of what was measured, so that no number of it is edited unseen."""
+    """SHA-256 of a result, which shows whether a number of it was edited."""
     return hashlib.sha256(json.dumps(result, sort_keys=True).encode()).hexdigest()
 
 
-def is_kept(title: str, digest: str) -> bool:
-    """Whether the cache has something of a measurement, which `cached` then takes if it is sound."""
-    return _file(title, digest).is_file()
+def is_cached(title: str, digest: str) -> bool:
+    """Tells whether the cache has a file for a measurement, which `cached` takes if it is sound."""
+    return _cache_file(title, digest).is_file()
 
 
-def _file(title: str, digest: str) -> Path:
+def _cache_file(title: str, digest: str) -> Path:
     return cache_folder() / f"{title}-{digest[:16]}.json"
 
 
 def _write(file: Path, text: str) -> None:
-    """All or nothing, so that processes which measure at the same time do not disturb each other."""
+    """Writes a file whole or not at all, so that processes that measure at the same time do not disturb each other."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=file.parent) as folder:
         new = Path(folder) / file.name

@@ -17,22 +17,25 @@ from aircraft.model_files import AircraftError
 from aircraft.start import StartConditions
 from aircraft.trials import KEPT_SPEED_SHARE, farthest, flown
 
-STEEPEST = 0.4
-"""Rates beyond this share of the airspeed (24 degrees) are not looked at."""
+STEEPEST_RATE_SHARE = 0.4
+"""No climb or sink rate beyond this share of the airspeed (24 degrees) is tried."""
 SETTLING_S, JUDGED_S = 15.0, 10.0
-"""A rate is flown for both together and judged over the second."""
+"""A trial settles for the first time and is judged over the second."""
 KEPT_RATE_SHARE = 0.05
+"""A rate is held if the mean rate differs from it by at most this share."""
 TOLERANCE = 0.02
-"""A rate is found to this share of the airspeed's steepest."""
+"""A rate is found to this share of the steepest one tried."""
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
-SPEEDS = 5
-FORMAT = 1
-"""Goes up with what is measured and how, so that older figures are made anew."""
+"""A climb must stay below the first throttle command, a descent above the second."""
+SPEEDS_FLOWN = 5
+"""Rates are measured at this many airspeeds, evenly from the lowest to the highest."""
+FIGURES_VERSION = 1
+"""Is raised when the measurement changes, so that figures in the cache are measured anew."""
 
 
 @dataclass(frozen=True)
 class ClimbRates:
-    """What an aircraft can climb and sink by, between the speeds that were flown linear."""
+    """The fastest climb and descent of an aircraft, interpolated linearly between the airspeeds flown."""
 
     airspeeds_mps: tuple[float, ...]  # true, that were flown, rising
     climb_mps: tuple[float, ...]  # the fastest at each, airspeed held and the throttle not quite full
@@ -48,34 +51,34 @@ class ClimbRates:
 
 
 def climb_rates(frame: Airframe) -> ClimbRates:
-    """The rates of an airframe near sea level, wings level, flown unless that has been done before.
+    """Measures the rates of an airframe near sea level, wings level, or takes them from the cache.
 
     Raises:
-        AircraftError: it cannot be flown at one of the speeds.
+        AircraftError: The aircraft cannot be flown at one of the speeds.
     """
 
     def measured() -> dict[str, Any]:
         low, high = frame.airspeed_range_mps
-        speeds = np.linspace(low, high, SPEEDS).round(1).clip(low, high).tolist()
+        speeds = np.linspace(low, high, SPEEDS_FLOWN).round(1).clip(low, high).tolist()
         rates = {"climb_mps": 1.0, "descent_mps": -1.0}
-        flown = {name: [steepest_mps(frame, speed, side) for speed in speeds] for name, side in rates.items()}
+        flown = {name: [fastest_mps(frame, speed, side) for speed in speeds] for name, side in rates.items()}
         return {"airspeeds_mps": speeds, **flown}
 
     def read(result: dict[str, Any]) -> ClimbRates:
         return ClimbRates(**{name: tuple(column) for name, column in result.items()})
 
-    return cached(f"{frame.name}-climb-{FORMAT}", frame.files.digest(), measured, read)
+    return cached(f"{frame.name}-climb-{FIGURES_VERSION}", frame.files.digest(), measured, read)
 
 
-def steepest_mps(frame: Airframe, airspeed_mps: float, side: float) -> float:
-    """The fastest climb (side 1) or descent (side -1) at which an airspeed is held; positive, 0 where none is."""
-    most_mps = STEEPEST * airspeed_mps
-    held = farthest(lambda rate: keeps(frame, airspeed_mps, side * rate), 0.0, most_mps, TOLERANCE * most_mps)
+def fastest_mps(frame: Airframe, airspeed_mps: float, side: float) -> float:
+    """Finds the fastest climb (`side` 1) or descent (-1) at which an airspeed is held: m/s, at least 0."""
+    most_mps = STEEPEST_RATE_SHARE * airspeed_mps
+    held = farthest(lambda rate: holds(frame, airspeed_mps, side * rate), 0.0, most_mps, TOLERANCE * most_mps)
     return round(held, 3)
 
 
-def keeps(frame: Airframe, airspeed_mps: float, rate_mps: float) -> bool:
-    """Whether an aircraft climbs at a rate (sinks where it is negative) and keeps its airspeed."""
+def holds(frame: Airframe, airspeed_mps: float, rate_mps: float) -> bool:
+    """Tells whether an aircraft climbs (sinks where negative) at a rate and keeps its airspeed."""
     altitude = REFERENCE_ALTITUDE_M + max(-rate_mps, 0.0) * (SETTLING_S + JUDGED_S)
     start = StartConditions(0.0, 0.0, altitude, 0.0, airspeed_mps)
     try:

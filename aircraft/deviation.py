@@ -1,4 +1,4 @@
-"""An aircraft that is a little other than its model: what its guidance and autopilot are tuned for is the model.
+"""An aircraft that differs a little from its model; its guidance and autopilot are tuned for the model.
 
 The deviations are put into the XML of a JSBSim model when it is loaded; moments and the trim follow from that.
 """
@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Final
 
 SURFACES: Final = ("elevator", "aileron", "rudder")
-ALPHA: Final = {"aero/alpha-rad", "aero/alpha-deg"}
+ALPHA_PROPERTIES: Final = {"aero/alpha-rad", "aero/alpha-deg"}
 LIFT_AXES: Final = ("LIFT", "NORMAL", "Z")
 DRAG_AXES: Final = ("DRAG", "AXIAL", "X")
-PREFIX: Final = "wayproof/flown/"
-"""Properties of an aircraft's aerodynamics that stand for those of JSBSim, times their factor."""
+FLOWN_PREFIX: Final = "wayproof/flown/"
+"""A property of this prefix is one of JSBSim's times its factor; the aerodynamics read it instead."""
 UNITS_M: Final = {"IN": 0.0254, "FT": 0.3048, "M": 1.0}
 
 
@@ -49,10 +49,10 @@ def deviate(root: ElementTree.Element, deviation: Deviation) -> None:
             _scale_properties(aerodynamics, [aerodynamics], positions, name, 1.0 + getattr(deviation, name))
     lift = [axis for axis in aerodynamics.findall("axis") if axis.get("name") in LIFT_AXES]
     places = [*lift, *_functions_for(aerodynamics, lift)]
-    _scale_properties(aerodynamics, places, ALPHA, "lift slope", 1.0 + deviation.lift_slope)
+    _scale_properties(aerodynamics, places, ALPHA_PROPERTIES, "lift slope", 1.0 + deviation.lift_slope)
     for axis in aerodynamics.findall("axis") if deviation.drag else ():
         for function in axis.findall("function") if axis.get("name") in DRAG_AXES else ():
-            _wrap(function, 1.0 + deviation.drag)
+            _scale_result(function, 1.0 + deviation.drag)
     if deviation.thrust:
         _add_thrust(root, deviation.thrust)
 
@@ -75,7 +75,7 @@ def _change_balance(balance: ElementTree.Element, deviation: Deviation) -> None:
 def _functions_for(
     aerodynamics: ElementTree.Element, axes: list[ElementTree.Element]
 ) -> list[ElementTree.Element]:
-    """Functions outside the axes that these read and no other axis does, drag left out: it follows from the lift."""
+    """Finds the functions that these axes read and no other axis does; drag does not count, for it follows lift."""
     others = [each for each in aerodynamics.findall("axis") if each not in axes]
     others = [each for each in others if each.get("name") not in DRAG_AXES]
     read, elsewhere = ({text for axis in some for text in _texts(axis)} for some in (axes, others))
@@ -83,6 +83,7 @@ def _functions_for(
 
 
 def _texts(element: ElementTree.Element) -> set[str]:
+    """All texts in an element."""
     return {each.text.strip() for each in element.iter() if each.text}
 
 
@@ -93,24 +94,24 @@ def _scale_properties(
     what: str,
     factor: float,
 ) -> None:
-    """Has some elements read properties times a factor, which is computed first of all aerodynamics."""
+    """Has the elements of `places` read properties times a factor; `what` names the effect in an error."""
     if factor == 1.0:
         return
     found = set()
     for each in (each for place in places for each in place.iter()):
         if each.text and each.text.strip() in properties:
             found.add(each.text.strip())
-            each.text = PREFIX + each.text.strip()
+            each.text = FLOWN_PREFIX + each.text.strip()
     if not found:
         raise ValueError(f"its aerodynamics do not show the effect of its {what}")
     for name in sorted(found):
         product = f"<product><property>{name}</property><value>{factor!r}</value></product>"
-        scaled = ElementTree.fromstring(f"<function name='{PREFIX}{name}'>{product}</function>")
+        scaled = ElementTree.fromstring(f"<function name='{FLOWN_PREFIX}{name}'>{product}</function>")
         aerodynamics.insert(0, scaled)
 
 
-def _wrap(function: ElementTree.Element, factor: float) -> None:
-    """Multiplies what a function gives."""
+def _scale_result(function: ElementTree.Element, factor: float) -> None:
+    """Multiplies the value of a function by a factor."""
     product = ElementTree.fromstring(f"<product><value>{factor!r}</value></product>")
     for each in [each for each in function if each.tag != "description"]:
         function.remove(each)
@@ -119,7 +120,7 @@ def _wrap(function: ElementTree.Element, factor: float) -> None:
 
 
 def _add_thrust(root: ElementTree.Element, share: float) -> None:
-    """A force along the body's x axis, a share of all thrust.
+    """Adds a force along the body's x axis, a share of all thrust.
 
     It comes last, when JSBSim has added up the other external forces, an electric motor's thrust among them.
     """

@@ -12,37 +12,37 @@ from aircraft.interface import GRAVITY_MPS2, Performance
 from aircraft.model_files import AircraftError
 
 BANK_RESERVE_DEG = {None: 15.0, "light": 17.0, "moderate": 20.0, "severe": 25.0}
-"""Bank kept back from the limit for corrections: 9 degrees is the least that does not saturate in calm air or
-steady wind, and the rest is margin; moderate turbulence uses up 15 to 20."""
+"""Bank (deg) kept in reserve below the limit for corrections, by turbulence: 9 degrees is the least that does not
+saturate in calm air or steady wind, and the rest is margin; moderate turbulence uses up 15 to 20."""
 
 HOLD_RESERVE_DEG = {None: 5.0, "light": 5.0, "moderate": 10.0, "severe": 15.0}
-"""Bank kept back from the limit (deg) in a full turn that is held in wind. Five Aerosonde flights each in wind of 8 and
+"""Bank (deg) kept in reserve below the limit in a full turn held in wind. Five Aerosonde flights each in wind of 8 and
 12 m/s kept within 0.3 m in light turbulence with 5 degrees, within 0.5 m in moderate turbulence with 10. With 5
 and 7 degrees in moderate turbulence the aircraft was up to 7 m and 3 m off."""
 
 CALM_HOLD_RESERVE_DEG = 10.0
-"""The same in calm air, where all of the turn takes as much bank: with 5 a J3Cub that came into it out of a weave was
-off it by 22 m."""
+"""Bank (deg) kept in reserve in a full turn held in calm air, all of which takes the same bank: with 5 a J3Cub that
+entered it from a weave was off it by 22 m."""
 
 SPACED_RESERVE_DEG = {None: 7.0, "light": 7.0, "moderate": 12.0, "severe": 17.0}
-"""Bank kept back from the limit (deg) in wind, in a turn before and after which the aircraft has a straight to roll on.
+"""Bank (deg) kept in reserve below the limit in wind, in a turn with a straight before and after it to roll on.
 Random courses of the Aerosonde in wind of 8 and 12 m/s were kept within 0.15 m without turbulence, 0.6 m in moderate
 and 0.8 m in severe turbulence; those of J3Cub and c172p in wind of 30 % within 0.5 m. The bank was never cut."""
 
 TRACKING_FACTOR = {None: 1.0, "light": 1.5, "moderate": 3.0, "severe": 6.0}
-"""Cross-track error that is hardly ever exceeded, in units of (turn acceleration) * (roll lag)^2. That is the
-scale of the bump at an arc-line joint; what was flown stays below half of it in calm air, and the factors for
+"""Cross-track error that is hardly ever exceeded, in units of (turn acceleration) * (roll lag)^2, by turbulence. It is
+the scale of the bump at an arc-line joint; what was flown stays below half of it in calm air, and the factors for
 turbulence leave as much. An aircraft that was seen to do worse is taken for what it was seen to do."""
 
 WEAVE_FACTOR = 1.5
 """Cross-track error that is hardly ever exceeded in calm air, in units of the largest on the survey's weave."""
 
 ROLL_IN_LIMIT_S = 1.5
-"""A turn takes no more time than this to roll into: what rolls slowly turns wide, or it would be off the path
-where curvature steps."""
+"""Planned turns take at most this long to roll into: an aircraft that rolls slowly is given wide turns, for it would
+leave the path where curvature steps."""
 
-STRONGEST_SHARE = 0.9
-"""Wind over airspeed; nobody plans in a stronger one."""
+STRONGEST_WIND_SHARE = 0.9
+"""Strongest wind that is planned for, as a share of the airspeed."""
 
 LEAST_BANK_DEG = 5.0
 """An aircraft that can bank less at an airspeed is not planned for there."""
@@ -65,14 +65,14 @@ class LawCard:
     points: tuple[WindPoint, ...]  # in calm air first, then in ever stronger wind
 
     def at(self, wind_share: float) -> tuple[float, float]:
-        """Radius factor and cross-track error (m) in a wind: between what was flown linear.
+        """Radius factor and cross-track error (m) in a wind, interpolated linearly between the winds flown.
 
-        Beyond the strongest wind that was flown the error is taken to double until `STRONGEST_SHARE`.
+        Beyond the strongest wind that was flown the error is taken to double until `STRONGEST_WIND_SHARE`.
         """
         shares = [point.wind_share for point in self.points]
         factor = float(np.interp(wind_share, shares, [point.radius_factor for point in self.points]))
         error_m = float(np.interp(wind_share, shares, [point.error_m for point in self.points]))
-        beyond = max(wind_share - shares[-1], 0.0) / (STRONGEST_SHARE - shares[-1])
+        beyond = max(wind_share - shares[-1], 0.0) / (STRONGEST_WIND_SHARE - shares[-1])
         return factor, error_m * (1.0 + beyond)
 
 

@@ -1,4 +1,4 @@
-"""Makes a JSBSim model with the autopilot, its servos and the age of its state inside, for the time of loading it.
+"""Makes a JSBSim model with the autopilot, its servos and the latency of its state, while it is being loaded.
 
 A command goes through JSBSim's `<actuator>`, which is given what differs from the trim: a deadband lies about the trim.
 """
@@ -18,14 +18,14 @@ from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation, deviate
 
 THROTTLE = "fcs/throttle-cmd-norm"
-ESTIMATED = {
+READ_LATE = {
     "attitude/phi-rad": "velocities/phidot-rad_sec",
     "attitude/theta-rad": "velocities/thetadot-rad_sec",
     "velocities/vtrue-fps": None,
     "velocities/h-dot-fps": None,
     "position/h-sl-ft": None,
 }
-"""What the autopilot reads of the state that its navigation estimates, and the gyro that tells how it changes."""
+"""Properties that the autopilot reads late, each with the rate of a gyro that carries the old value on, or None."""
 LIMITED_SHARE = 0.999
 """A servo that moves by this share of the most it can in a step is at its rate limit."""
 
@@ -77,7 +77,7 @@ def _with_system(
     for control, actuator in actuators:
         _put_servo(system, control, actuator)
     if latency[1]:
-        _age(system, *latency)
+        _delay_readings(system, *latency)
     # A model's own output would leave files where the command was given; its input would listen on the network.
     for port in (*root.findall("output"), *root.findall("input")):
         root.remove(port)
@@ -88,7 +88,7 @@ def _with_system(
 
 
 def _put_servo(system: ElementTree.Element, control: str, actuator: NormActuator) -> None:
-    """Puts a servo behind a command; it counts at `wayproof/<control>-limited` the steps at its rate limit."""
+    """Adds a servo to a control; `wayproof/<control>-limited` counts the steps at its rate limit."""
     name = f"wayproof/{control}-norm"
     channel, component = next(
         (each, part) for each in system.findall("channel") for part in each if part.get("name") == name
@@ -129,13 +129,13 @@ def _put_servo(system: ElementTree.Element, control: str, actuator: NormActuator
     channel[after:after] = made
 
 
-def _age(system: ElementTree.Element, latency_s: float, steps: int) -> None:
-    """Has the autopilot read an older attitude, airspeed, height and climb.
+def _delay_readings(system: ElementTree.Element, latency_s: float, steps: int) -> None:
+    """Has the autopilot read its attitude, airspeed, height and climb rate `latency_s`, so many `steps`, late.
 
-    Gyros are new: the attitude is that of then and what the rate of now makes of it since.
+    Gyros are not late: the old attitude is carried on to now at their present rate.
     """
     channel = ElementTree.Element("channel", name="measured")
-    for name, rate in ESTIMATED.items():
+    for name, rate in READ_LATE.items():
         old = f"wayproof/measured/{name.rpartition('/')[2]}"
         for each in system.iter():
             if each.text and each.text.strip() == name:

@@ -60,16 +60,17 @@ class AircraftState(NamedTuple):
         return math.atan2(self.velocity_east_mps, self.velocity_north_mps) % math.tau
 
 
-NAMES: Final = AircraftState._fields
-FRESH: Final = NAMES.index("load_factor") + 1
-"""From here on a state is that of now; before, from the position on, it is as old as the latency."""
-EAST, NORTH, HEADING = (NAMES.index(name) - 1 for name in ("east_m", "north_m", "heading_rad"))
+FIELDS: Final = AircraftState._fields
+UNDELAYED: Final = FIELDS.index("load_factor") + 1
+"""Fields of a state from this index on are never delayed; those before it are, except the time."""
+EAST_AT, NORTH_AT, HEADING_AT = (FIELDS.index(name) - 1 for name in ("east_m", "north_m", "heading_rad"))
+"""Indices among the fields after the time."""
 
 
-def as_it_was(past: deque[AircraftState], state: AircraftState, latency_s: float) -> AircraftState:
-    """The state some time ago, but for its time; before the first one it moves evenly.
+def delayed_state(past: deque[AircraftState], state: AircraftState, latency_s: float) -> AircraftState:
+    """Returns the state of `latency_s` ago with the time of now; before the first, at that one's constant velocity.
 
-    `past` are states of earlier calls, the oldest first; this one is added, and those that are too old go.
+    `past` holds the states of earlier calls, oldest first: this one is added, and those too old are removed.
     """
     if latency_s == 0.0:
         return state
@@ -82,11 +83,11 @@ def as_it_was(past: deque[AircraftState], state: AircraftState, latency_s: float
     new = past[1] if len(past) > 1 else old
     share = (then_s - old.time_s) / (new.time_s - old.time_s) if then_s > old.time_s else 0.0
     lead_s = min(then_s - old.time_s, 0.0)
-    values = [(1.0 - share) * a + share * b for a, b in zip(old[1:FRESH], new[1:FRESH], strict=True)]
-    values[HEADING] = old.heading_rad + share * math.remainder(new.heading_rad - old.heading_rad, math.tau)
-    values[EAST] += lead_s * old.velocity_east_mps
-    values[NORTH] += lead_s * old.velocity_north_mps
-    return AircraftState(state.time_s, *values, *state[FRESH:])
+    values = [(1.0 - share) * a + share * b for a, b in zip(old[1:UNDELAYED], new[1:UNDELAYED], strict=True)]
+    values[HEADING_AT] = old.heading_rad + share * math.remainder(new.heading_rad - old.heading_rad, math.tau)
+    values[EAST_AT] += lead_s * old.velocity_east_mps
+    values[NORTH_AT] += lead_s * old.velocity_north_mps
+    return AircraftState(state.time_s, *values, *state[UNDELAYED:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,16 +118,16 @@ class Route:
 class Performance:
     """What planning must know of an aircraft at one true airspeed.
 
-    A full turn that is held needs bank in reserve for gusts alone, so its radius is the least; that of turns with a
-    straight to roll on between them lies between the two, in calm air at `turn_radius_m`.
+    A full turn that is held needs bank in reserve for gusts alone, so its radius is the least. The radius of turns with
+    a straight between them to roll on lies between the two, and equals `turn_radius_m` in calm air.
     """
 
     airspeed_mps: float
     turn_radius_m: float  # smallest that a plan may ask for, margins for wind and turbulence included
     roll_in_s: float  # from wings level to 90 % of 30 degrees, or of the bank limit if less, at cruise
     tracking_error_m: float  # cross-track error that the guidance stays within on such a plan
-    hold_radius_m: float
-    spaced_radius_m: float
+    hold_radius_m: float  # smallest of a full circle that is held
+    spaced_radius_m: float  # smallest of turns that a straight to roll on comes before and after
 
 
 class FlightModel(Protocol):
@@ -135,20 +136,15 @@ class FlightModel(Protocol):
     @property
     def step_rate_hz(self) -> int:
         """Integration steps per simulated second."""
-        ...
 
     def state(self) -> AircraftState:
         """The state now."""
-        ...
 
     def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
         """Sets what the inner loops hold until the next call: altitude above mean sea level, true airspeed."""
-        ...
 
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
-        ...
 
     def fault(self) -> str | None:
         """A sentence if control is lost (not finite, at the ground, stalled), else None."""
-        ...

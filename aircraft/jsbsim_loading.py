@@ -20,27 +20,29 @@ from aircraft.start import StartConditions
 
 SLUG_KG = 14.59390
 REFERENCE_ALTITUDE_M = 300.0
+"""Surveys and trials are flown at this altitude above mean sea level."""
 LONGITUDINAL_TRIM, FULL_TRIM = 0, 1
+"""JSBSim's numbers of two modes of trim."""
 RUDDER_NEEDED = "rdot doesn't appear to be trimmable"
-"""What JSBSim says of an aircraft without a rudder: it is trimmed in its plane of symmetry."""
-SURFACES = {
+"""JSBSim's message for an aircraft without a rudder, which is then trimmed in its plane of symmetry."""
+SURFACE_POSITIONS = {
     "aileron": ("fcs/left-aileron-pos-rad", "fcs/right-aileron-pos-rad"),
     "elevator": ("fcs/elevator-pos-rad",),
     "rudder": ("fcs/rudder-pos-rad",),
 }
-"""Properties by which models tell where a surface is, rad."""
+"""Properties of the angle of each surface, rad, by control."""
 MOST_ALPHA_DEG, ALPHA_STEP_DEG = 40.0, 0.5
-"""Angles of attack that are looked at for the most lift."""
-LEAST_DEG = 0.5
-"""A surface that moves by less is not moved by its command."""
-ROTATION = ("rate", "position")
+"""The most lift is sought up to the first angle of attack, in steps of the second."""
+LEAST_TRAVEL_DEG = 0.5
+"""A surface that moves by less than this is taken not to follow its command."""
+ROTATIONAL_STATES = ("rate", "position")
 ADAMS_BASHFORTH_2 = 3
-"""JSBSim's number of the integrator that rotation is given. Its own choice, the rectangle rule, is of first order: with
-60 steps a second the Aerosonde's track on 14 turns is 0.045 m from that with 480, and 0.025 m with this one."""
+"""JSBSim's number of the integrator of both rotational states. Its own choice, the rectangle rule, is of first order:
+with 60 steps a second the Aerosonde's track on 14 turns is 0.045 m from that with 480, and 0.025 m with this one."""
 
 
 class _Silence(jsbsim.FGLogger):
-    """Takes JSBSim's log, keeps its last errors, and says nothing."""
+    """Takes JSBSim's log, keeps its last errors, and prints nothing."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -54,7 +56,7 @@ class _Silence(jsbsim.FGLogger):
 
     def message(self, message: str) -> None:
         """Keeps the message of an error."""
-        if self._is_error and (text := " ".join(message.split())) and text != NO_NEWS:
+        if self._is_error and (text := " ".join(message.split())) and text != HARMLESS_ERROR:
             self.errors.append(text.partition(' in file Path "')[0])
 
     def file_location(self, filename: str, line: int) -> None:
@@ -63,15 +65,15 @@ class _Silence(jsbsim.FGLogger):
 
 ERROR_LEVEL = 4
 """JSBSim's LogLevel::ERROR."""
-NO_NEWS = "No filename given."
+HARMLESS_ERROR = "No filename given."
 """JSBSim logs this as an error of every model."""
 _SILENCE = _Silence()
-"""The only one: JSBSim lets go of the logger of a thread that has ended without Python's lock, and so must not be the
-last to hold it."""
+"""The only logger. It is kept for ever, since JSBSim drops its own reference to it without Python's lock when a thread
+ends."""
 
 
 def node(fdm: Any, path: str) -> Any:
-    """A property that must exist: JSBSim itself would make a new one of a misspelt name."""
+    """The node of a property; AircraftError if there is none: JSBSim would make a new one of a misspelt name."""
     found = fdm.get_property_manager().get_node(path)
     if found is None:
         raise AircraftError(f"the model has no property {path!r}")
@@ -101,15 +103,15 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
         raise AircraftError(f"{files.name}: JSBSim refuses the model{said and f': {said}'}")
     _check_properties(fdm, files)
     fdm.disable_output()
-    for motion in ROTATION:
+    for motion in ROTATIONAL_STATES:
         fdm[f"simulation/integrator/{motion}/rotational"] = ADAMS_BASHFORTH_2
     return fdm
 
 
 def _check_properties(fdm: Any, files: ModelFiles) -> None:
-    """Raises AircraftError if a function of the model reads a property that nothing makes, and makes it.
+    """Raises AircraftError if a function of the model reads a property that does not exist.
 
-    The process would end with the model, whose destructor reads it.
+    The property is made first, for the destructor of the model reads it too and would end the process.
     """
     tags = ("property", "p", "independentVar")
     functions = ElementTree.parse(files.model).getroot().iter("function")
@@ -151,9 +153,9 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
 
 
 def _trim(fdm: Any, mode: int) -> str | None:
-    """What JSBSim says of a model that it cannot start; empty if there is no trim; None if there is.
+    """Trims a model. Returns None, or "" where there is no trim, or JSBSim's message where it cannot be started.
 
-    No exception of JSBSim's leaves this: one that outlives its model ends the process.
+    No exception of JSBSim's leaves this function: one that outlives its model ends the process.
     """
     _SILENCE.errors.clear()
     try:
@@ -168,6 +170,7 @@ def _trim(fdm: Any, mode: int) -> str | None:
 
 
 def _why_not_trimmed(fdm: Any) -> str:
+    """Says why a model has no trim: its thrust, fuel or engines, or JSBSim's own message."""
     engines = fdm.get_propulsion().get_num_engines()
     thrusts = [fdm.get_property_value(f"propulsion/engine[{each}]/thrust-lbs") for each in range(engines)]
     if not all(map(math.isfinite, thrusts)):
@@ -197,7 +200,7 @@ def mass_kg(fdm: Any) -> float:
 
 
 def most_lift_deg(files: ModelFiles, airspeed_mps: float) -> float | None:
-    """Angle of attack at which the lift stops rising, controls as trimmed at a true airspeed (m/s); None: nowhere."""
+    """Angle of attack (deg) at which lift stops rising, controls as trimmed at an airspeed; None: it never does."""
     fdm = trimmed(files, airspeed_mps)
     before_lbf, start_deg = -math.inf, math.degrees(fdm["aero/alpha-rad"])
     for alpha_deg in np.arange(start_deg, MOST_ALPHA_DEG, ALPHA_STEP_DEG):
@@ -229,9 +232,9 @@ def linearised(fdm: Any) -> Derivatives:
 
 
 def surface_travel_deg(files: ModelFiles) -> dict[str, float]:
-    """Degrees that each surface moves for a command of 1, at rest, by control; 0 where the model does not show it."""
+    """Degrees that each surface moves for a command of 1, by control; 0 where the model does not show it."""
     travel = {"throttle": THROTTLE_TRAVEL_DEG}
-    for control, properties in SURFACES.items():
+    for control, properties in SURFACE_POSITIONS.items():
         ends = []
         for command in (-1.0, 1.0):
             fdm = load(files)
@@ -241,5 +244,5 @@ def surface_travel_deg(files: ModelFiles) -> dict[str, float]:
                 fdm.run()
             ends.append([float(fdm[path]) for path in properties])
         moved = max(abs(after - before) for before, after in zip(*ends, strict=True))
-        travel[control] = 0.5 * math.degrees(moved) if math.degrees(moved) >= LEAST_DEG else 0.0
+        travel[control] = 0.5 * math.degrees(moved) if math.degrees(moved) >= LEAST_TRAVEL_DEG else 0.0
     return {control: round(travel[control], 3) for control in CONTROLS}

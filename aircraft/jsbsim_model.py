@@ -37,22 +37,25 @@ STATE_PROPERTIES = (
 """Properties of JSBSim that `AircraftState` is made of, in this order. The names end in the unit: fps is ft/s."""
 COMMAND_PROPERTIES = ("wayproof/roll-cmd-rad", "wayproof/altitude-cmd-ft", "wayproof/airspeed-cmd-fps")
 WIND_PROPERTIES = ("atmosphere/wind-east-fps", "atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
-"""Velocity of the wind, by the direction that it blows towards."""
+"""Velocity of the wind, in the direction that it blows towards."""
 TURBULENCE_TYPE = {"milspec": 3.0, "tustin": 4.0}
 TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}
+"""JSBSim's numbers of turbulence models and of their intensities."""
 GROUND_FT = 2.0 / FOOT_M
-"""Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
+"""An aircraft at or below this altitude counts as at the ground: its centre of gravity is still above that."""
 MAX_ROLL_RAD = math.radians(75.0)
+"""An aircraft that rolls further counts as rolled over."""
 ALPHA_MARGIN_DEG = 3.0
 """Pitch commands stay this far below the angle of attack that counts as stalled."""
-STEEPEST_SINK = 0.3
-"""Sink over airspeed that the autopilot allows where the energy for more height is not there."""
+STEEPEST_SINK_SHARE = 0.3
+"""Where energy is short, the autopilot lets the aircraft sink by at most this share of its airspeed."""
 SETTLING_STEP_S = 1e-9
+"""Duration of the steps that replace what the integrators remember."""
 TERRAIN_BELOW_FT = 10.0 / FOOT_M
 """The flight model's ground is at least so far below the aircraft, so that its wheels do not touch it: contact is
 judged by the true world."""
-INTEGRATOR_MEMORY = 6
-"""Steps that replace every derivative an integrator of JSBSim remembers."""
+INTEGRATOR_MEMORY_STEPS = 6
+"""After this many steps an integrator of JSBSim has replaced every derivative that it remembers."""
 
 
 class JsbsimModel:
@@ -94,7 +97,7 @@ class JsbsimModel:
         self._plane = PatchedPlane(plane, *map(math.radians, plane.geodetic(start.east_m, start.north_m)))
         convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
-        """Of the meridian convergence where the state was last read."""
+        """Cosine and sine of the meridian convergence where the state was last read."""
         self._vertical_gusts: VerticalGusts | None = None
         self._turbulence: DrydenGusts | None = None  # over true ground
         self._windy = atmosphere.wind_mps > 0.0
@@ -212,7 +215,7 @@ class JsbsimModel:
         self._enable(1.0 if on else 0.0)
 
     def _set_up_autopilot(self, climb_limit_mps: float | None) -> None:
-        """Gives the autopilot its gains and the trim that they hold for."""
+        """Gives the autopilot its gains and limits, and the trim at which they hold."""
         fdm, frame = self._fdm, self.airframe
         values = frame.gains.properties()
         if climb_limit_mps is not None:
@@ -227,13 +230,13 @@ class JsbsimModel:
         values["wayproof/limit/most-lift"] = 1.0 + (most_rad - frame.gains.alpha) / frame.gains.alpha_per_load
         values["wayproof/limit/least-airspeed-fps"] = frame.least_airspeed_mps / FOOT_M
         values["wayproof/limit/most-sink-fps"] = max(
-            STEEPEST_SINK * fdm["velocities/vtrue-fps"], values["wayproof/gain/climb-limit-fps"]
+            STEEPEST_SINK_SHARE * fdm["velocities/vtrue-fps"], values["wayproof/gain/climb-limit-fps"]
         )
         for path, value in values.items():
             node(fdm, path).set_double_value(value)
 
     def _move_with_wind(self) -> None:
-        """Gives the trimmed aircraft the velocity of the wind, and then the air: initial conditions reset the wind.
+        """Adds the wind to the velocity of the trimmed aircraft, then sets the wind, which initial conditions reset.
 
         The engine must not be started again: that would put the propeller to the speed of full throttle.
         """
@@ -247,9 +250,9 @@ class JsbsimModel:
         self._apply_wind()
 
     def _settle(self) -> None:
-        """Takes steps of next to no duration: integrators remember derivatives of other air and other commands."""
+        """Takes steps of almost no duration, so that integrators forget the derivatives of other air and commands."""
         self._fdm.set_dt(SETTLING_STEP_S)
-        for _ in range(INTEGRATOR_MEMORY):
+        for _ in range(INTEGRATOR_MEMORY_STEPS):
             self._fdm.run()
         self._fdm.set_dt(1.0 / self.step_rate_hz)
 
@@ -263,7 +266,7 @@ class JsbsimModel:
         return east * self._cosine + north * self._sine, north * self._cosine - east * self._sine
 
     def _apply_wind(self) -> None:
-        """Writes the wind of now: towards true east and north, and down."""
+        """Writes the present wind, with gusts and turbulence, to JSBSim: towards true east and north, and down."""
         write_east, write_north, write_down = self._write_wind
         east_fps, north_fps = self._wind_true()
         down_fps = 0.0
@@ -283,7 +286,7 @@ class JsbsimModel:
             write_down(down_fps)
 
     def _ground_m(self, east_m: float, north_m: float) -> float:
-        """Height of the ground; where it is not known, as it was last."""
+        """Height of the ground (m) at a place; where it is unknown, the last known one."""
         height_m = math.nan if self._ground is None else self._ground(east_m, north_m)
         return self._terrain_ft * FOOT_M if math.isnan(height_m) else height_m
 
@@ -294,7 +297,7 @@ class JsbsimModel:
         self._write_terrain(min(self._terrain_ft, up_ft - TERRAIN_BELOW_FT))
 
     def _start_gusts(self, atmosphere: Atmosphere) -> None:
-        """Starts discrete gusts and turbulence after MIL-F-8785C, over the sea JSBSim's own."""
+        """Starts discrete gusts and turbulence after MIL-F-8785C; over the sea the turbulence is JSBSim's own."""
         self._vertical_gusts = atmosphere.vertical_gusts
         model, intensity = atmosphere.turbulence, atmosphere.intensity
         if model is None or intensity is None:

@@ -1,4 +1,4 @@
-"""Machine code: the arithmetic of what happens at every update, as plain functions of numbers and arrays.
+"""Compiled arithmetic of every update, as plain functions of numbers and arrays.
 
 numba compiles a function at its first call and keeps the result on disk. Importing this module takes half a second, so
 it is imported inside the functions that need it. Fast mathematics is off: the same numbers give the same results.
@@ -47,7 +47,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def for_types_of(function: Any, *arguments: Any) -> Any:
-    """The machine code of a compiled function for arguments of the types of these, to be called many times.
+    """Compiles a function for the types of these arguments and returns the machine code, to be called many times.
 
     numba looks at the types at every call of the function, which takes as long as the arithmetic. The code does not:
     it must get arrays of the same layout.
@@ -69,7 +69,7 @@ def place_in_patch(
 
 @compiled
 def _second_order(terms: FloatArray, up: float, right: float) -> float:
-    """A polynomial from its middle value, two slopes and half of three second derivatives."""
+    """Value of a polynomial of second order: its middle value, two slopes and half of three second derivatives."""
     return float(
         terms[0] + up * (terms[1] + up * terms[3] + right * terms[4]) + right * (terms[2] + right * terms[5])
     )

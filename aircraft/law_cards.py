@@ -1,4 +1,4 @@
-"""How each guidance law tracks with an aircraft, which planning allows for: cards, flown and kept.
+"""Cards of guidance laws: how well each tracks with an aircraft, measured by flying and kept for planning.
 
 A law flies lines and arcs, in calm air and in wind, at ever wider turns until it stays near them: planning then gives
 it turns of that radius, and keeps its error from obstacles. What `preview` does at its defaults is in the survey.
@@ -50,7 +50,7 @@ def law_card(
     acceptance_radius_m: float | None = None,
     before_flying: Callable[[], object] = bool,
 ) -> LawCard | None:
-    """The card of a law with its keys, flown unless that has been done before; `before_flying` is called first then.
+    """The card of a law with its keys, from the cache or else flown; `before_flying` is called before a flight.
 
     None for `preview` at its defaults, which the survey of the aircraft has.
 
@@ -64,9 +64,7 @@ def law_card(
     keys = json.dumps(asdict(resolved), sort_keys=True, default=repr)
 
     def make() -> GuidanceLaw:
-        law = deepcopy(
-            kind.make(resolved, limits)
-        )  # one that was given as an object is flown as it was given
+        law = deepcopy(kind.make(resolved, limits))  # an object that was given stays as it was
         if not waypoints:
             return law
         return waypoint_law(law, kind.kind, resolved, limits, acceptance_radius_m)
@@ -78,18 +76,19 @@ def law_card(
     legs = f"waypoints {acceptance_radius_m!r}" if waypoints else ""
     flies = repr(replace(frame, files=None))  # type: ignore[arg-type]  # the files count by their content
     known = (flies, frame.files, kind, keys, legs, limits.airspeed_mps)
-    if known not in _kept and kind not in BUILT_IN:
-        _kept[known] = _card(flown())  # nothing tells what it depends on
-    if known not in _kept:
+    if known not in _cards and kind not in BUILT_IN:
+        _cards[known] = _card(flown())  # nothing tells what it depends on
+    if known not in _cards:
         file = getsourcefile(kind.make)  # one of another distribution is not in the digest of this package
         source = Path(file).read_text("utf-8") if file else ""
         what = (frame.files.digest(), flies, kind.kind, keys, repr(limits.airspeed_mps), source, legs)
         digest = sha256("\0".join(what).encode()).hexdigest()
-        _kept[known] = cached(f"{frame.name}-{kind.kind}-law", digest, flown, _card)
-    return _kept[known]
+        _cards[known] = cached(f"{frame.name}-{kind.kind}-law", digest, flown, _card)
+    return _cards[known]
 
 
-_kept: dict[tuple[str, ModelFiles, GuidanceKind, str, str, float], LawCard] = {}
+_cards: dict[tuple[str, ModelFiles, GuidanceKind, str, str, float], LawCard] = {}
+"""The cards that this process has measured or read."""
 
 
 def _card(measured: dict[str, Any]) -> LawCard:
@@ -99,7 +98,7 @@ def _card(measured: dict[str, Any]) -> LawCard:
 def _measured(
     frame: Airframe, kind: str, speed_mps: float, make: Callable[[], GuidanceLaw], waypoints: bool
 ) -> dict[str, Any]:
-    """The law's name, and `points`, those of a `WindPoint` in every wind; AircraftError if it does not track."""
+    """Flies a law in every wind; returns the fields of its `LawCard`; AircraftError if it does not track."""
     most = WAYPOINTS_TRACKED_SHARE if waypoints else TRACKED_SHARE
     points: list[dict[str, float]] = []
     factors: tuple[float, ...] = RADIUS_FACTORS[:1] if waypoints else RADIUS_FACTORS
@@ -125,7 +124,7 @@ def _measured(
 def _worst(
     frame: Airframe, speed_mps: float, make: Callable[[], GuidanceLaw], radius_m: float, wind_mps: float
 ) -> tuple[float, float]:
-    """Largest cross-track error (m) on the weave along and against a wind, and the share of the time with bank cut."""
+    """Largest cross-track error (m) on a weave along and against a wind, and share of the time at the bank limit."""
     from aircraft.trials import tracked  # loads JSBSim
 
     route, worst = weave(radius_m), (0.0, 0.0)

@@ -23,11 +23,13 @@ from aircraft.deviation import AS_MODELLED, Deviation
 
 OWN = Path(__file__).parent
 MAX_FILES = 1000
+"""Most files and folders in the folder of a model."""
 MAX_BYTES = 5_000_000
 """Largest size of an XML file."""
 MAX_FOLDER_BYTES = 200_000_000
 """Largest size of all files together; all go into the digest, also those that JSBSim does not read."""
-MAX_ENTITY = 100
+MAX_ENTITY_LETTERS = 100
+"""Longest text that an XML entity may stand for."""
 MAX_DEPTH = 60
 """Deepest nesting of elements; the deepest of JSBSim's own models has 13."""
 
@@ -53,7 +55,7 @@ class ModelFiles:
 
     @property
     def name(self) -> str:
-        """What JSBSim calls it."""
+        """The model's name in JSBSim."""
         return self.model.stem
 
     def digest(self) -> str:
@@ -88,16 +90,16 @@ def model_files(name: str) -> ModelFiles:
             folder = Path(name).expanduser().resolve()
     if folder is None:
         raise AircraftError(f"unknown aircraft {name[:100]!r}")
-    _refuse(folder)
-    found = _with_engines(_main_file(folder), wheel)
+    _check_folder(folder)
+    found = _with_engines(_model_in(folder), wheel)
     for other in (found.engines, found.systems):
         if not other.is_relative_to(wheel) and not other.is_relative_to(folder):
-            _refuse(other)
+            _check_folder(other)
     return found
 
 
-def _refuse(folder: Path) -> None:
-    """Raises AircraftError if a folder holds what must not be loaded. Only regular files are opened."""
+def _check_folder(folder: Path) -> None:
+    """Raises AircraftError if a folder is too large, leads out of itself or holds bad XML; reads only regular files."""
     found = (Path(home, name) for home, inner, names in os.walk(folder) for name in sorted((*inner, *names)))
     size = 0
     for number, path in enumerate(islice(found, MAX_FILES + 1)):
@@ -118,10 +120,10 @@ def _refuse(folder: Path) -> None:
         if path.suffix.lower() == ".xml":
             if path.stat().st_size > MAX_BYTES:
                 raise AircraftError(f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a JSBSim file")
-            _refuse_file(path)
+            _check_xml(path)
 
 
-def _refuse_file(path: Path) -> None:
+def _check_xml(path: Path) -> None:
     """Raises AircraftError if an XML file is deep, refers to other places, or has entities that grow."""
     parser, depth = expat.ParserCreate(), 0
 
@@ -143,7 +145,7 @@ def _refuse_file(path: Path) -> None:
         depth -= 1
 
     def entity(name: str, parameter: bool, value: str | None, *_: object) -> None:
-        if parameter or value is None or "&" in value or len(value) > MAX_ENTITY:
+        if parameter or value is None or "&" in value or len(value) > MAX_ENTITY_LETTERS:
             raise fault(f"declares the entity {name:.40}, which is not a short text of its own; write it out")
 
     parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = begin, end, entity
@@ -164,7 +166,8 @@ def _wheel() -> Path:
     return Path(spec.origin).parent
 
 
-def _main_file(folder: Path) -> Path:
+def _model_in(folder: Path) -> Path:
+    """The file of the one JSBSim model in a folder; AircraftError if there is none, or several."""
     main = folder / f"{folder.name}.xml"
     if main.is_file():
         return main
@@ -176,7 +179,7 @@ def _main_file(folder: Path) -> Path:
 
 
 def _root(path: Path) -> ElementTree.Element:
-    """The root element of a file, of a broken one up to there: whoever loads the model says where it is broken."""
+    """Reads a file's root element, of broken XML up to the fault: loading the model then says where it is."""
     root = ElementTree.Element("broken")
     with suppress(ElementTree.ParseError, OSError, StopIteration):
         elements = ElementTree.iterparse(path, events=("start",))
@@ -187,7 +190,7 @@ def _root(path: Path) -> ElementTree.Element:
 
 
 def _with_engines(main: Path, wheel: Path) -> ModelFiles:
-    """Engines beside the model or in the tree that it is part of go before those of the wheel."""
+    """Finds the engines and systems of a model: those beside it or in its tree, else those of the JSBSim wheel."""
     root, tree = _root(main), main.parent.parent.parent
     named = (*root.iterfind("propulsion/engine"), *root.iterfind("propulsion/engine/thruster"))
     wanted = {file.removesuffix(".xml") for element in named if (file := element.get("file"))}

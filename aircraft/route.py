@@ -1,4 +1,4 @@
-"""Points of a route: where it is, and where it heads, so far along it."""
+"""Points and directions along a route, its length, and a route to try laws on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from aircraft.interface import Route
 SegmentRow = tuple[float, float, float, float, float, float]
 """One row of `Route.segments`."""
 WEAVE_DEG = (60.0, -30.0, 90.0, -60.0, -20.0, 20.0)
-"""Turns of `weave`."""
+"""Angles (deg, positive to the left) of the arcs of `weave`."""
 
 
 def arc_point(row: SegmentRow, along_m: float) -> tuple[float, float, float, float]:
@@ -36,7 +36,7 @@ def route_length(route: Route) -> float:
 
 
 def weave(radius_m: float) -> Route:
-    """Lines of one radius and arcs of some angles, left and right, from (0, 0) northwards."""
+    """A route from (0, 0) northwards: lines as long as the radius, each followed by an arc of `WEAVE_DEG`."""
     point, rows = (0.0, 0.0, 0.0, 1.0), []
     for turn_deg in WEAVE_DEG:
         for curvature, length in ((0.0, radius_m), (1.0 / radius_m, math.radians(turn_deg) * radius_m)):

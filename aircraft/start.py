@@ -25,7 +25,7 @@ class VerticalGusts:
     start_s: float = 0.0  # when the first begins, upwards
 
     def up_mps(self, time_s: float) -> float:
-        """How fast the air rises at a time."""
+        """Speed (m/s) at which the air rises at a time."""
         number, since_s = divmod(time_s - self.start_s, self.every_s)
         if number < 0 or since_s >= self.duration_s:
             return 0.0
@@ -33,8 +33,8 @@ class VerticalGusts:
         return sign * self.speed_mps * (0.5 - 0.5 * math.cos(math.tau * since_s / self.duration_s))
 
 
-DRYDEN_FT = (10.0, 1000.0)
-"""Heights over ground between which its low-altitude model holds; outside the air is that of the nearer end."""
+DRYDEN_HEIGHTS_FT = (10.0, 1000.0)
+"""Heights over ground between which Dryden's low-altitude model holds; outside, the nearer end counts."""
 
 
 class DrydenGusts:
@@ -51,15 +51,15 @@ class DrydenGusts:
         self._second = [0.5 * each for each in self._first]
 
     def sizes(self, height_m: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """1 sigma (m/s) and length (m) of the gusts ahead, to the side and down at a height over ground."""
-        low, high = DRYDEN_FT
+        """Standard deviations (m/s) and scale lengths (m) of the gusts ahead, to the side and down at a height."""
+        low, high = DRYDEN_HEIGHTS_FT
         height_ft = min(max(height_m / FOOT_M, low), high)
         shape = 0.177 + 0.000823 * height_ft
         level_mps, level_m = self._vertical_mps / shape**0.4, FOOT_M * height_ft / shape**1.2
         return (level_mps, level_mps, self._vertical_mps), (level_m, level_m, FOOT_M * height_ft)
 
     def step(self, height_m: float, airspeed_mps: float, seconds: float) -> tuple[float, float, float]:
-        """Gusts ahead, to the right and down (m/s) after so many seconds."""
+        """Moves the turbulence on by `seconds` and returns the gusts ahead, to the right and down (m/s)."""
         sigmas, lengths = self.sizes(height_m)
         found = []
         for axis, noise in enumerate(self._rng.standard_normal(3).tolist()):
@@ -76,14 +76,14 @@ class DrydenGusts:
 
 ROUGHNESS_M = 0.15 * FOOT_M
 """Roughness length of the wind profile: 0.15 ft, MIL-F-8785C section 3.7.3.4 for flight near the ground."""
-PROFILE_M = (3 * FOOT_M, 1000 * FOOT_M)
-"""Heights over ground between which the profile of MIL-F-8785C holds; outside the wind is that of the nearer end."""
+PROFILE_HEIGHTS_M = (3 * FOOT_M, 1000 * FOOT_M)
+"""Heights over ground between which the profile of MIL-F-8785C holds; outside, the nearer end counts."""
 
 
 @functools.lru_cache(maxsize=16)  # a flight asks at every step, and reads its height only now and then
 def profile_share(height_m: float, measured_at_m: float) -> float:
     """Wind speed at a height over ground over that at another: ln(h / z0) / ln(h_measured / z0), MIL-F-8785C."""
-    low, high = PROFILE_M
+    low, high = PROFILE_HEIGHTS_M
     h, reference = (min(max(each, low), high) for each in (height_m, measured_at_m))
     return math.log(h / ROUGHNESS_M) / math.log(reference / ROUGHNESS_M)
 
@@ -100,7 +100,7 @@ class Atmosphere:
     changes: tuple[tuple[float, float, float], ...] = ()
     """(time s, east m/s, north m/s), time rising from above 0: the wind goes over linearly, and stays as the last."""
     measured_at_m: float | None = None
-    """Height over ground at which a wind with the profile of `profile_share` is as told; None: the same everywhere."""
+    """Height over ground at which a wind with the profile of `profile_share` was measured; None: no profile."""
     vertical_gusts: VerticalGusts | None = None
 
     @property
@@ -114,7 +114,7 @@ class Atmosphere:
 
     @property
     def wind_mps(self) -> float:
-        """Largest speed of the wind at any time, at the height that it is told for."""
+        """Largest speed of the wind at any time, at the height that it was measured at."""
         winds = [(self.wind_east_mps, self.wind_north_mps), *(row[1:] for row in self.changes)]
         return max(math.hypot(*wind) for wind in winds)
 
@@ -145,7 +145,7 @@ class StartConditions:
     airspeed_mps: float  # true
 
     def heading_rad(self, atmosphere: Atmosphere) -> float:
-        """Heading that makes the course good in a wind (the wind triangle).
+        """Heading (rad) that makes the course good in a wind (the wind triangle).
 
         Raises:
             ValueError: if the wind across the course is not weaker than the airspeed.

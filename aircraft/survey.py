@@ -15,7 +15,7 @@ import numpy as np
 from aircraft.airframe import FIGURES, Airframe, AirframeEntry
 from aircraft.autopilot import (
     LEAST_AILERON_S,
-    NEEDED_DEG,
+    NEEDED_MARGIN_DEG,
     Derivatives,
     Gains,
     climb_margin_deg,
@@ -30,42 +30,45 @@ from aircraft.model_files import AircraftError, ModelFiles, TrimError
 from aircraft.trials import not_held, roll_in_s, steepest_level_bank_deg, turn_rate_share, weaving_error_m
 
 SLOWEST_MPS, FASTEST_MPS = 8.0, 300.0
-"""Speeds outside of these are not looked at: the air is taken for incompressible enough below."""
-SPEED_STEP = 1.12
-SPEED_DIGITS = 1
-SPEED_TOLERANCE = 0.01
+"""Airspeeds outside of these are not tried: below the second, air counts as incompressible."""
+SPEED_STEP_FACTOR, SPEED_TOLERANCE_SHARE, SPEED_DECIMALS = 1.12, 0.01, 1
+"""Airspeeds are tried in steps of the factor; the slowest and fastest are found to the share and decimals."""
 GAIN_DIGITS = 5
-"""Significant digits of derived gains: fewer than what processors and compilers agree on."""
+"""Significant digits of derived gains: processors and compilers agree on more."""
 BANK_LIMIT_DEG = 45.0
+"""Bank limit of an airframe whose entry gives none."""
 ROLL_COMMAND_SHARE = 0.5
 """Share of the steady roll rate at full aileron that the roll command may ask for."""
 UNSTALLED_DEG = 20.0
-"""Angle of attack that counts as stalled of a model whose lift never stops rising."""
+"""Angle of attack that counts as stalled where the lift of a model never stops rising."""
 BANDWIDTH_SHARE = 0.36
 """Bandwidth of the cross-track correction over that of roll: more and the two begin to work against each other."""
 ROLL_LIMITED_S = 0.1
-"""Flying time; a cross-track error of that much flight is corrected without reaching the limit of roll rate.
-Correcting an error e at bandwidth w takes a change of g * roll of w^3 e; beyond the limit it becomes unstable."""
+"""A cross-track error as long as this time of flight is corrected without reaching the limit of roll rate. Correcting
+an error e at bandwidth w takes a change of g * roll of w^3 e; beyond the limit the correction becomes unstable."""
 DELAY_MARGIN_S = 0.5
 """Further delay that the cross-track loop of `preview` bears where the latency of the state is known."""
-REVERSALS = (30.0, -30.0, 15.0, 0.0)
+REVERSAL_BANKS_DEG = (30.0, -30.0, 15.0, 0.0)
+"""Banks that an aircraft must hold at cruise, one after the other."""
 WELL_TRACKED_S = 0.01
-"""Flying time; a cross-track error of that much flight is what a good autopilot stays within."""
+"""An autopilot tracks a weave well if its cross-track error is at most the distance flown in this time."""
 PACES = (1.0, 0.7, 0.5, 0.35)
+"""Paces are shares of the feedback of `aircraft.autopilot.gains`; the survey tries them in this order."""
 LAST_PACE = 0.25
-"""For an aircraft that is held at no other."""
+"""Pace for an aircraft that no other pace holds."""
 CLIMB_PACES = (*PACES, LAST_PACE, 0.18, 0.12)
+"""Paces of the climb and altitude loops on a late state, tried in this order."""
 LEAST_TURN_SHARE = 0.5
 """An aircraft that turns at less than this share of a coordinated turn's rate is not flown by its bank."""
 
 
 def survey(entry: AirframeEntry, files: ModelFiles) -> dict[str, Any]:
-    """Everything measured of `Airframe`, by attribute; AircraftError if it cannot be loaded, trimmed or held."""
+    """Measures the attributes of an `Airframe`, by name; AircraftError if it cannot be loaded, trimmed or held."""
     cruise = entry.cruise_mps or middle_of_trims(files)
     frame = _held_at_cruise(entry, files, cruise)
-    low, high = _edge(frame, 1.0 / SPEED_STEP), _edge(frame, SPEED_STEP)
+    low, high = _last_held_mps(frame, 1.0 / SPEED_STEP_FACTOR), _last_held_mps(frame, SPEED_STEP_FACTOR)
     frame = replace(frame, airspeed_range_mps=(low, high))
-    speeds = sorted({*np.linspace(low, high, 5).round(SPEED_DIGITS).tolist(), cruise})
+    speeds = sorted({*np.linspace(low, high, 5).round(SPEED_DECIMALS).tolist(), cruise})
     return {
         "mass_kg": float(f"{frame.mass_kg:.4g}"),
         "airspeed_range_mps": [low, high],
@@ -79,14 +82,14 @@ def survey(entry: AirframeEntry, files: ModelFiles) -> dict[str, Any]:
 
 
 def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> Airframe:
-    """The airframe as far as its cruise tells, its loops as fast as they can be to track a weave well, else the best.
+    """Derives the airframe from its cruise alone, with the fastest loops that track a weave well, else the best ones.
 
-    AircraftError: it has no trim there, none that gains can be derived for, or is not held at any pace.
+    Raises AircraftError if it has no trim at cruise, no gains can be derived there, or it is held at no pace.
     """
     best, reason = None, ""
     try:
         at = linearised(trimmed(files, cruise))
-        pitch_paces = _pitch_paces(at, _lag_s(files, "elevator"), files.latency_s)
+        pitch_paces = _pitch_paces(at, _servo_lag_s(files, "elevator"), files.latency_s)
         for pace in (*PACES, LAST_PACE):
             if pace == LAST_PACE and best is not None:
                 break
@@ -111,14 +114,14 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
 def _at_pace(
     entry: AirframeEntry, files: ModelFiles, cruise: float, at: Derivatives, *paces: float
 ) -> Airframe | str:
-    """The airframe with loops of a pace in roll, pitch and climb, or why it is not held with them."""
+    """Returns the airframe with the loops at these paces in roll, pitch and climb, or says why they do not hold it."""
     placed = replace(gains(at, *paces).rounded(GAIN_DIGITS), **entry.gains)
-    late = _lag_s(files, "aileron"), files.latency_s
+    late = _servo_lag_s(files, "aileron"), files.latency_s
     margin_deg = roll_margin_deg(at, placed, *late)
-    if any(late) and margin_deg < NEEDED_DEG:
-        return _too_slow("aileron", sum(late), "roll", margin_deg)
+    if any(late) and margin_deg < NEEDED_MARGIN_DEG:
+        return _too_slow_text("aileron", sum(late), "roll", margin_deg)
     frame = _provisional(entry, files, cruise, at, placed, paces[0])
-    if reason := not_held(frame, cruise, REVERSALS):
+    if reason := not_held(frame, cruise, REVERSAL_BANKS_DEG):
         return reason
     if "turn_rate_share" not in entry.figures:
         share = turn_rate_share(frame, cruise)
@@ -131,44 +134,46 @@ def _at_pace(
     return replace(frame, weave_error_m=error_m)
 
 
-def _lag_s(files: ModelFiles, control: str) -> float:
+def _servo_lag_s(files: ModelFiles, control: str) -> float:
+    """Time constant of the servo of a control; 0 without a servo."""
     servos = dict(files.actuators)
     return servos[control].lag_s if control in servos else 0.0
 
 
 def _pitch_paces(at: Derivatives, lag_s: float, latency_s: float) -> tuple[float, float]:
-    """The fastest paces in pitch (ValueError if none), and in climb and altitude, that keep a margin, else the last."""
+    """The fastest paces with enough phase margin: in pitch (ValueError if none), and in climb (the slowest if none)."""
     late = lag_s or latency_s
     for pace in PACES if late else PACES[:1]:
         margin_deg = pitch_margin_deg(at, gains(at, 1.0, pace), lag_s, latency_s)
-        if not late or margin_deg >= NEEDED_DEG:
+        if not late or margin_deg >= NEEDED_MARGIN_DEG:
             break
     else:
-        raise ValueError(_too_slow("elevator", lag_s + latency_s, "pitch", margin_deg))
+        raise ValueError(_too_slow_text("elevator", lag_s + latency_s, "pitch", margin_deg))
     for climb_pace in CLIMB_PACES if latency_s else PACES[:1]:
-        if climb_margin_deg(at, gains(at, 1.0, pace, climb_pace), lag_s, latency_s) >= NEEDED_DEG:
+        if climb_margin_deg(at, gains(at, 1.0, pace, climb_pace), lag_s, latency_s) >= NEEDED_MARGIN_DEG:
             break
     return pace, climb_pace
 
 
-def _too_slow(control: str, lag_s: float, loop: str, margin_deg: float) -> str:
+def _too_slow_text(control: str, lag_s: float, loop: str, margin_deg: float) -> str:
+    """Says that even the slowest loop has too little phase margin behind a lag."""
     return (
         f"behind a lag of the {control} of {lag_s:g} s the slowest {loop} loop has a phase margin of {margin_deg:.0f} "
-        f"degrees; it must have {NEEDED_DEG:g}"
+        f"degrees; it must have {NEEDED_MARGIN_DEG:g}"
     )
 
 
 def _provisional(
     entry: AirframeEntry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains, pace: float
 ) -> Airframe:
-    """The airframe before its limits are known."""
+    """Makes the airframe that trials are flown with before its limits are measured."""
     full_aileron_dps = math.degrees(1.0 / max(abs(placed.aileron_p_forward), LEAST_AILERON_S))
     roll_rate_dps = ROLL_COMMAND_SHARE * full_aileron_dps
     if any((servo.rate_limit_1ps or math.inf) < placed.roll for _, servo in files.actuators):
         roll_rate_dps *= pace  # a servo that takes longer to its stop than roll does cannot follow
     roll_rate_dps = float(math.floor(roll_rate_dps))
     slow = (GRAVITY_MPS2 * math.radians(roll_rate_dps) / (ROLL_LIMITED_S * cruise)) ** (1.0 / 3.0)
-    roll_delay_s = round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _lag_s(files, "aileron"), 2)
+    roll_delay_s = round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _servo_lag_s(files, "aileron"), 2)
     roll_delay_s = round(roll_delay_s + files.latency_s, 3)
     slow = min(slow, bandwidth_of_delay_margin(DELAY_MARGIN_S, roll_delay_s))
     figures = {
@@ -194,7 +199,7 @@ def _provisional(
 
 
 def middle_of_trims(files: ModelFiles) -> float:
-    """The (geometric) middle of the longest run of speeds at which a model can be trimmed, m/s; AircraftError: none."""
+    """Geometric middle (m/s) of the longest range of speeds at which a model trims; AircraftError if there is none."""
     runs: list[list[float]] = [[]]
     reasons: Counter[str] = Counter()
     speed = SLOWEST_MPS
@@ -205,27 +210,27 @@ def middle_of_trims(files: ModelFiles) -> float:
         except TrimError as error:
             runs.append([])
             reasons[str(error).partition("level: ")[2]] += 1
-        speed *= SPEED_STEP
+        speed *= SPEED_STEP_FACTOR
     longest = max(runs, key=len)
     if not longest:
         raise AircraftError(
             f"{files.name} cannot be trimmed for level flight at any speed from {SLOWEST_MPS:g} to "
             f"{FASTEST_MPS:g} m/s: {reasons.most_common(1)[0][0]}"
         )
-    return round(math.sqrt(longest[0] * longest[-1]), SPEED_DIGITS)
+    return round(math.sqrt(longest[0] * longest[-1]), SPEED_DECIMALS)
 
 
-def _edge(frame: Airframe, factor: float) -> float:
-    """The last speed that is held on the way from cruise by a factor, to 1 % and 0.1 m/s.
+def _last_held_mps(frame: Airframe, factor: float) -> float:
+    """The slowest or fastest speed that is held, sought from cruise in steps of a factor, to 1 % and 0.1 m/s.
 
     Every speed that counts as held has been flown: near the stall some trims fail between others that do not.
     """
     good = bad = frame.cruise_mps
     while bad == good and SLOWEST_MPS < good < FASTEST_MPS:
-        bad = round(min(max(good * factor, SLOWEST_MPS), FASTEST_MPS), SPEED_DIGITS)
+        bad = round(min(max(good * factor, SLOWEST_MPS), FASTEST_MPS), SPEED_DECIMALS)
         good = bad if not_held(frame, bad) is None else good
-    while abs(good - bad) > max(SPEED_TOLERANCE * good, 10.0**-SPEED_DIGITS):
-        middle = round(0.5 * (good + bad), SPEED_DIGITS)
+    while abs(good - bad) > max(SPEED_TOLERANCE_SHARE * good, 10.0**-SPEED_DECIMALS):
+        middle = round(0.5 * (good + bad), SPEED_DECIMALS)
         if middle in (good, bad):  # a step apart: floats tell 8.3 - 8.2 from 0.1
             break
         good, bad = (middle, bad) if not_held(frame, middle) is None else (good, middle)

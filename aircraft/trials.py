@@ -16,25 +16,29 @@ from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import RouteProgress, measures_itself
-from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState, Route, as_it_was
+from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState, Route, delayed_state
 from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import AircraftError
 from aircraft.route import weave
 from aircraft.start import Atmosphere, StartConditions
 
-DOUBLET = (10.0, -10.0, 0.0)
-RESTED_SHARE = 0.7
-LEG_S = 10.0
-TURN_S = 20.0
+DOUBLET_DEG = (10.0, -10.0, 0.0)
+"""Banks that an aircraft must hold, one after the other, for a speed to count as held."""
+HELD_BANK_S, SETTLED_SHARE = 10.0, 0.7
+"""Each of these banks is flown for this time, and must have settled after this share of it."""
+TRIAL_TURN_S = 20.0
+"""A turn is flown for this long before it is judged; a roll into one must end within it."""
 TURN_SHARE_TOLERANCE = 0.03
 """A steady turn whose rate is this close to that of a coordinated one counts as one: feedback makes up for the rest."""
 BANK_STEP_DEG = 1.0
+"""The steepest bank in level flight is found to this."""
 ROLL_IN_DEG = 30.0
-KEPT_SPEED_SHARE = 0.03
-KEPT_ALTITUDE_M = 2.0
-KEPT_ROLL_DEG = 1.5
+"""Turn rate and time to roll in are measured at this bank, or at the bank limit if that is less."""
+KEPT_SPEED_SHARE, KEPT_ALTITUDE_M, KEPT_ROLL_DEG = 0.03, 2.0, 1.5
+"""A steady turn is kept if airspeed, altitude and roll are off by no more than these."""
 UPDATE_STEPS = STEP_RATE_HZ // UPDATE_RATE_HZ
+"""Steps of the flight model between two updates of guidance."""
 
 
 def in_flight(
@@ -44,13 +48,13 @@ def in_flight(
     start: tuple[float, float] = (0.0, 0.0),
     course_rad: float = 0.0,
 ) -> JsbsimModel:
-    """An aircraft in level flight, by default northwards from (0, 0)."""
+    """Starts an aircraft in level flight, by default northwards from (0, 0) in calm air."""
     begins = StartConditions(*start, REFERENCE_ALTITUDE_M, course_rad, speed)
     return JsbsimModel(frame, begins, LocalPlane(45.0, 0.0), atmosphere)
 
 
-def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET) -> str | None:
-    """Why the autopilot does not keep a speed through banks, one after the other; None if it does.
+def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET_DEG) -> str | None:
+    """Says why the autopilot does not hold a speed through banks, one after the other; None if it does.
 
     Bank must have come to rest in the last seconds of each.
     """
@@ -58,12 +62,12 @@ def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET
         model = in_flight(frame, speed)
         for bank_deg in banks_deg:
             model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
-            states = flown(model, LEG_S)
-            for state in states[round(RESTED_SHARE * len(states)) + 1 :]:
+            states = flown(model, HELD_BANK_S)
+            for state in states[round(SETTLED_SHARE * len(states)) + 1 :]:
                 off_deg = math.degrees(state.roll_rad) - bank_deg
                 if abs(off_deg) > KEPT_ROLL_DEG:
                     return f"bank off by {off_deg:.1f} deg"
-            if drift := departure(states[-1], bank_deg, speed):
+            if drift := turn_fault(states[-1], bank_deg, speed):
                 return drift
     except AircraftError as error:
         return str(error)
@@ -71,7 +75,7 @@ def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET
 
 
 def flown(model: JsbsimModel, seconds: float) -> list[AircraftState]:
-    """The states of all updates of so long a flight under the last command; AircraftError says how control is lost."""
+    """Flies on under the last command and returns the state at every update; AircraftError says how control is lost."""
     states = []
     for _ in range(round(seconds * model.step_rate_hz / UPDATE_STEPS)):
         model.advance(UPDATE_STEPS)
@@ -111,7 +115,7 @@ def tracked(
     atmosphere: Atmosphere | None = None,
     most_s: float = math.inf,
 ) -> Tracked:
-    """Flies a law along a route from its start, in so much time at most.
+    """Flies a law along a route from its start, for at most `most_s`.
 
     Raises:
         AircraftError: the aircraft cannot start in this air.
@@ -124,7 +128,7 @@ def tracked(
     cross, altitude, cut, lost = list[float](), list[float](), 0, None
     past: deque[AircraftState] = deque()
     while lost is None:
-        state = as_it_was(past, model.state(), frame.files.latency_s)
+        state = delayed_state(past, model.state(), frame.files.latency_s)
         output = law.update(state)
         lost = model.fault() or ("it takes too long" if state.time_s > most_s else None)
         if lost or output.past_end:
@@ -146,8 +150,8 @@ def tracked(
     return Tracked(cross, altitude, cut / max(len(cross), 1), after)
 
 
-def departure(state: AircraftState, bank_deg: float, speed: float) -> str | None:
-    """What of a steady turn at a bank is not kept; None if all is."""
+def turn_fault(state: AircraftState, bank_deg: float, speed: float) -> str | None:
+    """Says what a steady turn does not keep: its bank, airspeed or altitude; None if it keeps all."""
     off_deg = math.degrees(state.roll_rad) - bank_deg
     if abs(off_deg) > KEPT_ROLL_DEG:
         return f"bank off by {off_deg:.1f} deg"
@@ -168,7 +172,7 @@ def turn_rate_share(frame: Airframe, speed: float) -> float:
     for bank_deg in (min(ROLL_IN_DEG, frame.bank_limit_deg), -min(ROLL_IN_DEG, frame.bank_limit_deg)):
         model = in_flight(frame, speed)
         model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
-        model.advance(round(TURN_S * model.step_rate_hz))
+        model.advance(round(TRIAL_TURN_S * model.step_rate_hz))
         before = model.state()
         model.advance(model.step_rate_hz)
         after = model.state()
@@ -180,7 +184,7 @@ def turn_rate_share(frame: Airframe, speed: float) -> float:
 
 
 def roll_in_s(frame: Airframe, speed: float) -> float:
-    """Time from wings level to 90 % of 30 degrees, or of the bank limit if that is less, the command a step; to 0.01 s.
+    """Time from wings level to 90 % of 30 degrees, or of the bank limit if less, after a step command; to 0.01 s.
 
     Raises:
         AircraftError: it does not get there.
@@ -190,7 +194,7 @@ def roll_in_s(frame: Airframe, speed: float) -> float:
     model.command(bank, REFERENCE_ALTITUDE_M, speed)
     while model.state().roll_rad < 0.9 * bank:
         model.advance(1)
-        if model.state().time_s > TURN_S:
+        if model.state().time_s > TRIAL_TURN_S:
             raise AircraftError(f"{frame.name} cannot be held: it does not roll to {ROLL_IN_DEG:g} degrees")
     return round(model.state().time_s, 2)
 
@@ -202,7 +206,7 @@ def steepest_level_bank_deg(frame: Airframe, speed: float) -> float:
         try:
             model = in_flight(frame, speed)
             model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
-            return departure(flown(model, TURN_S)[-1], bank_deg, speed) is None
+            return turn_fault(flown(model, TRIAL_TURN_S)[-1], bank_deg, speed) is None
         except AircraftError:
             return False
 

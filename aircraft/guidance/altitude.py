@@ -1,4 +1,4 @@
-"""Guidance up and down: a profile of altitude and airspeed along a route, and what is commanded to fly it."""
+"""Vertical guidance: a profile of altitude and airspeed along a route, and the commands that fly it."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import AircraftState, FloatArray
 
 LEAD_S = 1.0
-"""The slope is taken from so far ahead: what the climb takes to follow its command."""
-CLIMBS_FROM = (0.95, 0.88)
-"""Shares of the commanded airspeed: from the first on the fastest climb is commanded, below the second none:
-in a turn the engine has less left over for a climb than wings level."""
+"""The slope of the profile is read this flying time ahead, which the climb takes to follow its command."""
+CLIMB_AIRSPEED_SHARES = (0.95, 0.88)
+"""At the first share of the commanded airspeed the fastest climb may be commanded, at the second none: in a turn the
+engine has less power left for a climb."""
 SPEED_CHANGE_PER_S = 0.02
 """A commanded airspeed changes by no more than this share of itself a second."""
 
@@ -49,20 +49,20 @@ class VerticalProfile:
         return np.concatenate(([0.0], slope, [0.0]))
 
     def airspeeds(self, arc_length_m: FloatArray) -> FloatArray:
-        """(n,) airspeeds asked for at places along the route."""
+        """(n,) airspeeds of the profile at places along the route."""
         at = np.searchsorted(self.speed_from_m, arc_length_m, side="right") - 1
         speeds: FloatArray = self.airspeed_mps[np.maximum(at, 0)]
         return speeds
 
 
 def flat(altitude_m: float, airspeed_mps: float) -> VerticalProfile:
-    """One altitude and one airspeed."""
+    """A profile of one altitude and one airspeed."""
     nought = np.zeros(1)
     return VerticalProfile(nought, nought + altitude_m, nought, nought + airspeed_mps)
 
 
 def slewed(airspeeds_mps: FloatArray, time_s: FloatArray, before_mps: float) -> FloatArray:
-    """(n,) airspeeds as they are commanded, row by row, where those are asked for."""
+    """Limits the rate of change of (n,) airspeeds asked for at (n,) times, from a commanded `before_mps` on."""
     if (airspeeds_mps == before_mps).all():
         return airspeeds_mps
     commanded = np.empty(len(airspeeds_mps))
@@ -79,7 +79,7 @@ Vertical = Callable[[AircraftState, float], tuple[float, float]]
 
 
 class AltitudeGuidance:
-    """Commands altitude and airspeed so that the inner loops fly a profile, by the believed state.
+    """Commands altitude and airspeed so that the inner loops fly a profile; works on the believed state.
 
     The inner loop climbs at its gain times the altitude error. The command is put where that gives the climb of the
     profile, plus what takes the present error back, within what the aircraft can climb and sink at its airspeed. A
@@ -103,7 +103,7 @@ class AltitudeGuidance:
         self._airspeed_mps += min(max(wanted - self._airspeed_mps, -change), change)
         altitude, slope = float(self._profile.altitudes(here)), float(self._profile.slopes(ahead))
         up, down = self._limits(self._airspeed_mps)
-        most, none = CLIMBS_FROM
+        most, none = CLIMB_AIRSPEED_SHARES
         up *= min(max((state.airspeed_mps / self._airspeed_mps - none) / (most - none), 0.0), 1.0)
         climb = self._gain * (altitude - state.up_m) + slope * state.groundspeed_mps
         climb = min(max(climb, -down), up)

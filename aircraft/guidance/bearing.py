@@ -23,7 +23,7 @@ from aircraft.guidance.route_law import RouteLaw
 from aircraft.interface import GRAVITY_MPS2, AircraftState, Route
 
 SLOW_MPS = 1.0
-"""Ground speeds below this count as this for the look-ahead, so that the point stays ahead."""
+"""Least ground speed in the look-ahead, so that the point stays ahead."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class BearingLaw(RouteLaw):
         self._point = east_m, north_m
 
     def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
-        """What the law asks for."""
+        """Roll (rad) towards the point; no airspeed."""
         speed = max(state.groundspeed_mps, SLOW_MPS)
         east, north = self._point or self.progress.ahead(2.0 * speed * speed / (self._gain * GRAVITY_MPS2))
         to_east, to_north = east - state.east_m, north - state.north_m

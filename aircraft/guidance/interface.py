@@ -56,8 +56,6 @@ class GuidanceLaw(Protocol):
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         """Takes a new route, whose nearest point is looked for from an arc length on; roll goes on from where it is."""
-        ...
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Decides the roll command for the next update interval; RuntimeError if there is no route yet."""
-        ...

@@ -26,8 +26,8 @@ ONE_OVER_PI = 0.3183099
 """1/pi to the digits that the autopilot uses."""
 TWO_PI = 6.2832
 """2 pi to the digits that the autopilot uses for the circle law."""
-QUARTER_TURN = 1.5708
-"""Largest Nu on a leg, rad, likewise."""
+QUARTER_TURN_RAD = 1.5708
+"""Largest Nu on a leg, rad: pi/2 to the digits that the autopilot uses."""
 HALF_RIGHT_SINE = 0.7071
 """Sine of the steepest angle to a leg; and the cosine, behind a leg's beginning, from which on the law aims there."""
 SLOW_MPS = 0.1
@@ -35,24 +35,25 @@ SLOW_MPS = 0.1
 MIN_CIRCLE_SPEED_MPS = 1.0
 """Least ground speed on a circle."""
 NEAR_CENTRE_M = 0.1
-"""Nearer to the centre of a circle than this the way to it is not defined."""
+"""Nearer to the centre of a circle than this the direction to it is undefined."""
 SHORT_LEG_M = 1e-6
 """A shorter leg has no direction."""
 PAST_LEG_S = 3.0
-"""This much flying time beyond a leg's end the law aims at the end."""
+"""From this flying time beyond a leg's end on the law aims back at the end."""
 INTEGRATOR_RANGE_RAD = math.radians(5.0)
-"""The integrator works below this Nu1."""
+"""The integrator grows only while Nu1, the angle to intercept the leg, is below this."""
 INTEGRATOR_LIMIT_RAD = 0.1
+"""Largest value of the integrator."""
 MAX_UPDATE_S = 0.1
-"""The integrator takes a longer time since the last call for this one."""
+"""The integrator counts no more time than this since the last call."""
 FAR_M = 1e4
 """A leg without an end goes on this far beyond the aircraft."""
 STALE_S = 1.0
-"""After a longer time since the last call on a leg the integrator begins at 0."""
+"""The integrator begins again at 0 if the last call on a leg is longer ago than this."""
 INDECISION_RAD = 0.9 * math.pi
-"""Beyond this Nu the target is behind, and the last direction to turn in is kept."""
+"""Beyond this Nu the target is behind; then the last direction of turn is kept, so that it does not alternate."""
 INDECISION_CD = 12000
-"""That holds where the nose is more than this off the target, hundredths of a degree."""
+"""The direction of turn is kept only if the nose is more than this off the target, hundredths of a degree."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class L1Motion(NamedTuple):
 
 
 class L1Memory(NamedTuple):
-    """What the law keeps from one call to the next."""
+    """State of the law between two calls."""
 
     last_nu_rad: float = 0.0
     integrator_rad: float = 0.0
@@ -100,7 +101,7 @@ class L1Circle(NamedTuple):
 
 
 def right_of(a: complex, b: complex) -> float:
-    """How far b leads to the right of a, times the length of a."""
+    """Cross product of two vectors: positive if b points to the right of a."""
     return a.imag * b.real - a.real * b.imag
 
 
@@ -131,7 +132,7 @@ def follow_leg(
             integrator = min(max(integrator, -INTEGRATOR_LIMIT_RAD), INTEGRATOR_LIMIT_RAD)
         nu = intercept + integrator + aim_at(ahead, velocity)
     nu = decided(nu, memory.last_nu_rad, bearing_cd(to), at.yaw_cd)
-    used = min(max(nu, -QUARTER_TURN), QUARTER_TURN)
+    used = min(max(nu, -QUARTER_TURN_RAD), QUARTER_TURN_RAD)
     acceleration = 4.0 * has.damping * has.damping * speed * speed / distance * math.sin(used)
     return acceleration, L1Memory(nu, integrator, gain)
 
@@ -163,9 +164,7 @@ def follow_circle(at: L1Motion, circle: L1Circle, memory: L1Memory, has: L1Confi
         # Away from the centre and the wrong way round: never turn away from the circle.
         correction = max(correction, 0.0)
     bend_m = max(0.5 * radius, radius + error)
-    centripetal = (
-        around * around / bend_m if bend_m > 0.0 else 0.0
-    )  # at a centre without a circle: straight on
+    centripetal = around * around / bend_m if bend_m > 0.0 else 0.0  # 0: no circle, straight on
     hold = circle.direction * (correction + centripetal)
     approaching = error > 0.0 and circle.direction * capture < circle.direction * hold
     return capture if approaching else hold, L1Memory(nu, memory.integrator_rad, memory.last_gain)
@@ -193,7 +192,7 @@ def leg_direction(at: L1Motion, begin: complex, end: complex) -> complex:
 
 
 def aim_at(to: complex, velocity: complex) -> float:
-    """Nu towards a direction, rad."""
+    """Nu, the angle from the velocity to a direction, rad, positive to the right."""
     return math.atan2(right_of(velocity, to), dot(velocity, to))
 
 
@@ -221,7 +220,7 @@ class L1Law(RouteLaw):
         self._has, self._memory, self._leg_time_s = config, L1Memory(), -math.inf
 
     def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
-        """What the law asks for."""
+        """Roll (rad) of L1 on the nearest line or arc; no airspeed."""
         yaw = (state.heading_rad + math.pi) % math.tau - math.pi
         velocity = complex(state.velocity_east_mps, state.velocity_north_mps)
         at = L1Motion(

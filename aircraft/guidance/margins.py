@@ -17,20 +17,20 @@ from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLimits
 from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind
 from aircraft.interface import GRAVITY_MPS2, AircraftState, Route
 
-LINE_M = 1e5
-OFFSET_M, TURN_RAD = 0.01, 1e-4
+LINE_M, OFFSET_M, OFF_COURSE_RAD = 1e5, 0.01, 1e-4
+"""A law is made linear half way along a line of this length, by offsets of place and of course."""
 FREQUENCIES_RADPS = np.logspace(-2.5, 2.0, 20_000)
 
 
 class LawMargins(NamedTuple):
-    """How far a law is from swinging on a straight line in calm air."""
+    """Margins of a law against oscillation on a straight line in calm air."""
 
     gain: float  # the loop may be stronger by this factor
     delay_s: float  # the state may be older by this
 
 
 def law_margins(kind: GuidanceKind, limits: GuidanceLimits) -> LawMargins:
-    """Margins of a law at its defaults."""
+    """Computes the margins of a law whose keys are at their defaults."""
     speed = limits.airspeed_mps
 
     def roll_rad(off_m: float, course_rad: float) -> float:
@@ -44,7 +44,7 @@ def law_margins(kind: GuidanceKind, limits: GuidanceLimits) -> LawMargins:
         return output.roll_command_rad
 
     per_m = (roll_rad(OFFSET_M, 0.0) - roll_rad(-OFFSET_M, 0.0)) / (2.0 * OFFSET_M)
-    per_rad = (roll_rad(0.0, TURN_RAD) - roll_rad(0.0, -TURN_RAD)) / (2.0 * TURN_RAD)
+    per_rad = (roll_rad(0.0, OFF_COURSE_RAD) - roll_rad(0.0, -OFF_COURSE_RAD)) / (2.0 * OFF_COURSE_RAD)
     s = 1j * FREQUENCIES_RADPS
     lag_s = 0.0 if kind.kind == DEFAULT_KIND else limits.roll_lag_s
     roll = np.exp(-s * (limits.roll_delay_s + 0.5 / UPDATE_RATE_HZ)) / (1.0 + lag_s * s)

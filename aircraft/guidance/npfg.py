@@ -26,8 +26,8 @@ FEASIBILITY_BUFFER_MPS = 1.5
 SLOW_MPS = 1.0
 """Below this ground speed the track error bound no longer shrinks in proportion to speed."""
 TRACK_KEEPING_SHARE = 0.5
-"""Share of the track error bound from which on track keeping asks for its full ground speed."""
-SMALL = 1e-6
+"""From this share of the track error bound track keeping asks for its full ground speed, and for less below."""
+NEGLIGIBLE = 1e-6
 """Time constants, speeds (m/s) and rates (rad/s) below this count as zero."""
 LEAST_DAMPING = 0.5
 """Below this damping the lower bound of the period for curved paths does not apply."""
@@ -103,12 +103,12 @@ def dot(a: complex, b: complex) -> float:
 
 
 def cross(a: complex, b: complex) -> float:
-    """How far b leads to the left of a, times the length of a."""
+    """Cross product of two vectors: positive if b points to the left of a."""
     return a.real * b.imag - a.imag * b.real
 
 
 def npfg(at: NpfgInput, has: NpfgConfig, nominal_mps: float, largest_mps: float) -> tuple[float, float]:
-    """Lateral acceleration (m/s^2) and true airspeed (m/s) of a law without memory, by nominal and largest airspeed."""
+    """Lateral acceleration (m/s^2) and true airspeed (m/s) that NPFG asks for, by nominal and largest airspeed."""
     air = at.velocity - at.wind
     error = cross(at.place - at.path, at.tangent)
     on_track = feasibility(abs(air), at.wind, at.tangent)
@@ -152,23 +152,23 @@ def look_ahead_angle(share: float) -> float:
 def adapted_period(
     at: NpfgInput, has: NpfgConfig, distance_m: float, airspeed_mps: float, on_track: float
 ) -> float:
-    """The period between what roll can follow and what a curved path in wind needs, s."""
+    """The period (s), lengthened to what roll can follow and shortened to what a curved path in wind needs."""
     roll_s, wind_mps = has.roll_time_constant_s or 0.0, abs(at.wind)
-    if not has.lower_period_bound or roll_s <= SMALL:
+    if not has.lower_period_bound or roll_s <= NEGLIGIBLE:
         return has.period_s
-    beaten = wind_mps > airspeed_mps or airspeed_mps < SMALL
+    beaten = wind_mps > airspeed_mps or airspeed_mps < NEGLIGIBLE
     rate = 2.0 * abs(at.right_curvature_1pm) * airspeed_mps
     rate *= 1.0 if beaten else 1.0 - math.sqrt(1.0 - wind_mps / airspeed_mps)
     straight = math.pi * roll_s / has.damping
     curved = straight
-    if rate >= SMALL and has.damping >= LEAST_DAMPING:
+    if rate >= NEGLIGIBLE and has.damping >= LEAST_DAMPING:
         curved = on_track * 4.0 * math.pi * roll_s * has.damping + (1.0 - on_track) * straight
     safety = has.period_safety_factor
     bound = track_error_bound(abs(at.velocity), safety * straight * has.damping)
     near = math.sin(look_ahead_angle(min(distance_m / bound, 1.0))) ** 2
     lower = near * safety * curved + (1.0 - near) * safety * straight
     period = max(has.period_s, lower)
-    if has.upper_period_bound and rate > SMALL and on_track > 0.0:
+    if has.upper_period_bound and rate > NEGLIGIBLE and on_track > 0.0:
         upper = 4.0 * math.pi * has.damping / (rate * on_track)
         if period > upper:
             period = near * max(lower, upper) + (1.0 - near) * period
@@ -176,7 +176,7 @@ def adapted_period(
 
 
 def min_ground_speed(has: NpfgConfig, share: float, feasible: float) -> float:
-    """The least ground speed along the bearing, m/s: the one of the aircraft, or what track keeping asks for."""
+    """Least ground speed along the bearing, m/s: the key's, or what track keeping asks for if more."""
     least = 0.0
     if has.wind_regulation and has.min_ground_speed_on:
         least = has.min_ground_speed_mps
@@ -229,7 +229,7 @@ def curvature_feedforward(at: NpfgInput, airspeed_mps: float, error_m: float) ->
     along, across = dot(at.wind, at.tangent), cross(at.tangent, at.wind)
     ahead = math.sqrt(max(airspeed_mps * airspeed_mps - across * across, 0.0))
     speed = max(dot(at.velocity, at.tangent), 0.0)
-    return airspeed_mps * (1.0 + along / max(ahead, SMALL)) * curvature * speed
+    return airspeed_mps * (1.0 + along / max(ahead, NEGLIGIBLE)) * curvature * speed
 
 
 def turning(gain_1ps: float, air: complex, wanted: complex) -> float:
@@ -248,7 +248,7 @@ class NpfgLaw(RouteLaw):
         self._has, self._speeds_mps = config, (limits.airspeed_mps, limits.max_airspeed_mps)
 
     def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
-        """What the law asks for."""
+        """Roll (rad) and true airspeed (m/s) of `npfg`, without limits."""
         velocity = complex(state.velocity_east_mps, state.velocity_north_mps)
         nose = complex(math.sin(state.heading_rad), math.cos(state.heading_rad))
         at = NpfgInput(

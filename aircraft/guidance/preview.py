@@ -95,7 +95,7 @@ class PreviewLaw:
 def bandwidth_of_delay_margin(
     margin_s: float, delay_s: float, damping: float = PreviewConfig.damping
 ) -> float:
-    """The bandwidth (rad/s) with which the correction bears a further delay.
+    """Bandwidth (rad/s) at which the cross-track correction has a delay margin of `margin_s`.
 
     The open loop of the cross-track error is (2 zeta omega s + omega^2) / s^2, roll made up for by the lead of the
     command. Its gain is 1 at omega_c = omega sqrt(2 zeta^2 + sqrt(4 zeta^4 + 1)), its phase margin there is

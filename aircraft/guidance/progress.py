@@ -1,4 +1,4 @@
-"""Where an aircraft is on its route: nearest point, cross-track error, curvature there. For any law."""
+"""Progress along a route, for any law: nearest point, cross-track error, curvature there."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class RouteProgress:
         self._segments: list[tuple[float, ...]] = [tuple(row) for row in self.rows.tolist()]
 
     def restart(self, arc_length_m: float) -> None:
-        """Looks for the nearest point from there on (m from the route's start), as if the route was new."""
+        """Looks for the next nearest point from an arc length on, as on a new route."""
         self._row, self._along_m = place_on_rows(self.rows, arc_length_m)
 
     @property
@@ -45,7 +45,7 @@ class RouteProgress:
         return self._segments[self._row]
 
     def ahead(self, along_m: float) -> tuple[float, float]:
-        """East and north (m) of the point of the route so far beyond the last nearest one."""
+        """East and north (m) of the point of the route `along_m` beyond the last nearest one."""
         row, along_m = self._row, self._along_m + along_m
         while along_m > self._segments[row][5] and row < len(self._segments) - 1:
             along_m, row = along_m - self._segments[row][5], row + 1
@@ -71,12 +71,12 @@ class RouteProgress:
 
 
 def measures_itself(law: object) -> bool:
-    """Whether a law tells its cross-track error by `RouteProgress`: those of this package do, others may not."""
+    """Tells whether a law is known to measure its cross-track error by `RouteProgress`, as this package's laws do."""
     return type(law).__module__.startswith("aircraft.guidance.")
 
 
 def route_rows(route: Route) -> FloatArray:
-    """(n, 9) the segments of a route as kernels take them; one without a loiter goes on straight for ever.
+    """The (n, 9) rows of a route for the kernels; without a loiter an endless straight is added.
 
     Columns are those of `Route.segments`, then the arc lengths at which the segment begins and ends (m; the last is
     infinite) and by how much the route has turned before it (rad, positive to the left).

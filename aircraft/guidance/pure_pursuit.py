@@ -18,11 +18,11 @@ from aircraft.guidance.route_law import RouteLaw
 from aircraft.guidance.vector_field import LEAST_CRAB_COSINE, SLOW_MPS
 from aircraft.interface import GRAVITY_MPS2, AircraftState
 
-LOOK_AHEAD = 2.0 * math.sqrt(2.0)
+LOOK_AHEAD_FACTOR = 2.0 * math.sqrt(2.0)
 """Look-ahead time times the aircraft's guidance bandwidth. On a line the law is an oscillator of the natural frequency
 sqrt(2) / time and the damping 0.7: with this it is half as fast as the bandwidth."""
-GOAL_STEPS, GOAL_REACH = 16, 2.0
-"""Most steps towards the goal point; it is at most so many look-ahead distances along the route away."""
+GOAL_STEPS, GOAL_REACH_FACTOR = 16, 2.0
+"""The goal point is sought in at most this many steps, up to this many look-ahead distances along the route."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,12 @@ class PurePursuitConfig:
 
     def resolved(self, limits: GuidanceLimits) -> PurePursuitConfig:
         """The config with every default filled in."""
-        ahead = LOOK_AHEAD / limits.bandwidth_radps if self.look_ahead_s is None else self.look_ahead_s
+        ahead = LOOK_AHEAD_FACTOR / limits.bandwidth_radps if self.look_ahead_s is None else self.look_ahead_s
         return replace(self, look_ahead_s=ahead)
 
 
 def look_ahead_distance(velocity_east_mps: float, velocity_north_mps: float, has: PurePursuitConfig) -> float:
-    """How far ahead the goal point is sought, m."""
+    """Look-ahead distance at a ground velocity, m."""
     speed = math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps)
     return max(speed * (has.look_ahead_s or 0.0), has.min_look_ahead_m)
 
@@ -80,18 +80,18 @@ class PurePursuitLaw(RouteLaw):
         self._has = config
 
     def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
-        """What the law asks for."""
+        """Roll (rad) of pure pursuit; no airspeed."""
         velocity = state.velocity_east_mps, state.velocity_north_mps
         ahead_m = look_ahead_distance(*velocity, self._has)
-        goal = self._goal(state.east_m, state.north_m, ahead_m)
+        goal = self._to_goal(state.east_m, state.north_m, ahead_m)
         return pure_pursuit(*goal, *velocity, state.heading_rad, ahead_m)[1], math.nan
 
-    def _goal(self, east_m: float, north_m: float, ahead_m: float) -> tuple[float, float]:
-        """The way to the goal point (m). To go on by what is missing of the distance never oversteps it."""
+    def _to_goal(self, east_m: float, north_m: float, ahead_m: float) -> tuple[float, float]:
+        """Vector (m) to the goal point. A step along the route by the distance still missing cannot overshoot it."""
         gone, east, north = 0.0, *self.progress.ahead(0.0)
         for _ in range(GOAL_STEPS):
             missing = ahead_m - math.hypot(east - east_m, north - north_m)
-            if missing <= 1e-3 * ahead_m or gone > GOAL_REACH * ahead_m:
+            if missing <= 1e-3 * ahead_m or gone > GOAL_REACH_FACTOR * ahead_m:
                 break
             gone += missing
             east, north = self.progress.ahead(gone)

@@ -28,9 +28,9 @@ separation of five at least)."""
 FIELD_SHARE = 3.5
 """The field converges no faster than with this time constant, in units of that of course hold."""
 LEAST_CRAB_COSINE = 0.2
-"""Least cosine of the angle between course and heading with which bank is worked out."""
+"""Least cosine of the angle between course and heading that bank is computed with."""
 SLOW_MPS = 1.0
-"""Ground speeds below this count as this."""
+"""Least ground speed that course and bank are computed with."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def line_course(
 def orbit_course(
     out_east_m: float, out_north_m: float, radius_m: float, direction: float, gain: float
 ) -> float:
-    """Course of the field of an orbit (eq. 10.13), rad, by the way out from its centre; direction +1 clockwise."""
+    """Course of the field of an orbit (eq. 10.13), rad, at an offset from its centre; direction +1 is clockwise."""
     inwards = math.atan(gain * (math.hypot(out_east_m, out_north_m) - radius_m) / radius_m)
     return math.atan2(out_east_m, out_north_m) + direction * (0.5 * math.pi + inwards)
 
@@ -102,11 +102,11 @@ class VectorFieldLaw(RouteLaw):
         self._integral_rad = 0.0
 
     def wanted(self, state: AircraftState, place: PathPoint) -> tuple[float, float]:
-        """What the law asks for."""
+        """Roll (rad) that holds the course of the field; no airspeed."""
         if place.curvature_1pm == 0.0:
             tangent = place.tangent_east, place.tangent_north
             course_rad = line_course(place.cross_track_m, *tangent, self._approach_rad, self._gain_1pm)
-            return self._held(state, course_rad, 0.0), math.nan
+            return self._course_hold_rad(state, course_rad, 0.0), math.nan
         radius, direction = abs(1.0 / place.curvature_1pm), -math.copysign(1.0, place.curvature_1pm)
         # By default the slope, at the orbit, of the field of a line.
         gain = self._orbit_gain or 2.0 / math.pi * self._approach_rad * self._gain_1pm * radius
@@ -115,10 +115,10 @@ class VectorFieldLaw(RouteLaw):
         # The bank that holds the orbit at this ground speed and crab angle (chapter 9).
         speed2 = state.velocity_east_mps**2 + state.velocity_north_mps**2
         forward = direction * math.atan(speed2 / (GRAVITY_MPS2 * radius * crab_cosine(state)))
-        return self._held(state, orbit_course(*out, radius, direction, gain), forward), math.nan
+        return self._course_hold_rad(state, orbit_course(*out, radius, direction, gain), forward), math.nan
 
-    def _held(self, state: AircraftState, course_rad: float, forward_rad: float) -> float:
-        """Course hold (chapter 6): PI with the feedforward; the integrator stands still while the command is cut."""
+    def _course_hold_rad(self, state: AircraftState, course_rad: float, forward_rad: float) -> float:
+        """Roll of course hold (chapter 6): PI and the feedforward; the integrator stops while the bank limit cuts."""
         east, north = state.velocity_east_mps, state.velocity_north_mps
         to_east, to_north = math.sin(course_rad), math.cos(course_rad)
         off = math.atan2(north * to_east - east * to_north, east * to_east + north * to_north)

@@ -25,20 +25,19 @@ from aircraft.interface import GRAVITY_MPS2, AircraftState, FloatArray, Route
 from aircraft.route import SegmentRow, arc_point, route_length
 
 WP_RADIUS_M = 90.0
-"""ArduPilot's WP_RADIUS: the most that `l1` accepts a waypoint from."""
+"""ArduPilot's WP_RADIUS: `l1` accepts a waypoint from at most this distance."""
 MAX_SWITCH_M = 500.0
-"""PX4 asks npfg for its switch distance with this as the most."""
-CORNER_RAD = math.radians(90.0)
-"""An arc that turns by more is rounded by several corners."""
-LEAST_TURN_RAD = math.radians(0.5)
-LEAST_LEG_M = 1.0
-"""Waypoints are no closer to each other, and legs bend by no less at one that is no end."""
-BANK_KEPT_RAD = math.radians(15.0)
-"""Bank kept back where a law has no rule of its own: it turns at each waypoint as the fillet of a plan would."""
+"""`npfg` switches to the next leg at most this far from a waypoint, as PX4 limits it."""
+MAX_CORNER_RAD = math.radians(90.0)
+"""An arc that turns by more than this is replaced by several corners."""
+LEAST_TURN_RAD, LEAST_LEG_M = math.radians(0.5), 1.0
+"""Legs turn by at least this angle at a waypoint between them, and waypoints are at least this far apart."""
+ACCEPTANCE_BANK_MARGIN_RAD = math.radians(15.0)
+"""A law without a rule of its own accepts a waypoint where a fillet at the bank limit less this would begin."""
 L1_CAPTURE_RADII = 3.0
-"""ArduPlane follows the line to the centre of a loiter down to so many radii from it."""
+"""ArduPlane follows the line to the centre of a loiter until it is this many radii from it."""
 FAR_M = 1e5
-"""Beyond the last waypoint a law that flies to points heads for one so far on."""
+"""After the last waypoint a law that flies to points heads for one this far straight on."""
 HEADING_FOR_CENTRES: Final = ("l1", "npfg")
 """Laws whose autopilots head for the centre of a loiter; all others join its circle along a tangent."""
 
@@ -50,12 +49,8 @@ class MissionLeg:
     route: Route  # what the law follows
     stations_m: tuple[float, float]  # arc lengths at its ends on the route that the mission was made into
     end_m: tuple[float, float] | None = None  # the waypoint that it leads to; None: it is flown to its end
-    acceptance_m: float | None = (
-        0.0  # the waypoint is reached from here; None: by the law's rule; 0: when passed
-    )
-    captured_radius_m: float = (
-        0.0  # of the circle about the waypoint that is joined from far; 0: there is none
-    )
+    acceptance_m: float | None = 0.0  # reached from this distance; None: by the law's rule; 0: when passed
+    captured_radius_m: float = 0.0  # of the circle about the waypoint that is joined from far; 0: none
     centre_m: tuple[float, float] | None = None  # of a circle that the leg goes round
     swept_rad: float = 0.0  # how far round, from where the route begins
 
@@ -72,7 +67,7 @@ def straight(
     acceptance_m: float | None,
     centre: complex | None = None,
 ) -> MissionLeg:
-    """A leg from one place to another, east + i north."""
+    """A leg from one place to another (east + i north, m), or, with a `centre`, towards that of a circle to join."""
     start, end = ends
     goal = end if centre is None else centre
     length_m = abs(goal - start)
@@ -88,7 +83,6 @@ class PointLaw(Protocol):
 
     def fly_to(self, east_m: float, north_m: float) -> None:
         """Heads for one point (m) until the next call of this or of `follow`."""
-        ...
 
 
 Acceptance = Callable[[float, float], float]
@@ -96,7 +90,7 @@ Acceptance = Callable[[float, float], float]
 
 
 def mission_waypoints(route: Route) -> FloatArray:
-    """(k, 2) the waypoints of a route: its start, its corners and those that its arcs round, its end; k is at least 2.
+    """The (k, 2) waypoints of a route, k at least 2: its start, its corners and those that its arcs round, its end.
 
     Of a route that closes with a loiter the end is where the circle begins.
     """
@@ -123,9 +117,9 @@ def mission_waypoints(route: Route) -> FloatArray:
 
 
 def _corners(row: SegmentRow) -> list[tuple[float, float]]:
-    """The corners that an arc rounds, each of 90 degrees at the most; none of a line."""
+    """The corners that an arc rounds, each of at most 90 degrees; a line has none."""
     turn, found = abs(row[4] * row[5]), []
-    parts = max(1, math.ceil(turn / CORNER_RAD - 1e-9)) if turn >= LEAST_TURN_RAD else 0
+    parts = max(1, math.ceil(turn / MAX_CORNER_RAD - 1e-9)) if turn >= LEAST_TURN_RAD else 0
     for part in range(parts):
         east, north, along_east, along_north = arc_point(row, part * row[5] / parts)
         ahead = math.tan(0.5 * turn / parts) / abs(row[4])
@@ -162,7 +156,7 @@ class WaypointLaw:
         self._leg = -1
 
     def flying(self, legs: Sequence[MissionLeg]) -> WaypointLaw:
-        """The same law on the legs of a mission."""
+        """Returns the same law for the legs of a mission."""
         return WaypointLaw(self.law, self._kind, self._acceptance_m, self._by_passing, legs)
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
@@ -170,7 +164,7 @@ class WaypointLaw:
         self._progress, self._leg = RouteProgress(route, arc_length_m), -1
         self._legs = self._mission or legs_between_waypoints(route)
         self._last = len(self._legs) - (1 if self._mission else 2)
-        self._begin_next()
+        self._begin_next_leg()
 
     @property
     def leg(self) -> int:
@@ -182,7 +176,7 @@ class WaypointLaw:
         if self._progress is None:
             raise RuntimeError("follow() a route before update()")
         while self._leg < len(self._legs) - 1 and self._is_over(state):
-            self._begin_next()
+            self._begin_next_leg()
         decided, place = self.law.update(state), self.along(state)
         return decided._replace(
             cross_track_m=place.cross_track_m, arc_length_m=place.arc_length_m, past_end=place.past_end
@@ -213,7 +207,8 @@ class WaypointLaw:
         beside = self._progress.nearest(state.east_m, state.north_m)
         return Along(beside.cross_track_m, station_m, past_end and self._leg == len(self._legs) - 1)
 
-    def _begin_next(self) -> None:
+    def _begin_next_leg(self) -> None:
+        """Gives the law the route, or the point, of the next leg."""
         self._leg += 1
         leg = self._legs[self._leg]
         self.law.follow(leg.route, 0.0)
@@ -224,7 +219,7 @@ class WaypointLaw:
         self._bearing_rad: float | None = None
 
     def _is_over(self, state: AircraftState) -> bool:
-        """Whether the leg's end counts as reached: near enough, passed, or gone round."""
+        """Tells whether the leg is over: its waypoint is accepted or passed, or its circle flown round."""
         leg = self._legs[self._leg]
         if leg.centre_m is not None:
             return self._gone_round_rad(leg, state) >= leg.swept_rad
@@ -244,7 +239,7 @@ class WaypointLaw:
         return away_m <= self._acceptance_m(state.groundspeed_mps, self._turn_rad)
 
     def _capture_m(self, radius_m: float, ground_speed_mps: float) -> float:
-        """How far from the centre of a circle it begins to be joined."""
+        """Distance from the centre of a circle at which the aircraft begins to join it."""
         if self._kind == "l1":
             return L1_CAPTURE_RADII * radius_m
         return radius_m + self._acceptance_m(ground_speed_mps, 0.5 * math.pi)
@@ -295,12 +290,12 @@ def by_passing(config: Any) -> bool:
 
 
 def acceptance(kind: str, config: Any, limits: GuidanceLimits, radius_m: float | None = None) -> Acceptance:
-    """From where a law's autopilot counts a waypoint as reached.
+    """The rule for the distance from which a law's autopilot counts a waypoint as reached.
 
     `l1`: its look-ahead distance, no more than `WP_RADIUS_M`, less for a turn of less than 90 degrees in proportion
     (ArduPilot). `npfg`: its switch distance (PX4), a share of the track error bound. Any other: where a fillet of the
-    turn would begin, R tan(turn / 2), at the bank limit less `BANK_KEPT_RAD`. A law that does not switch by passing
-    would circle a point inside its turn for ever: the turn radius at the bank limit.
+    turn would begin, R tan(turn / 2), at the bank limit less `ACCEPTANCE_BANK_MARGIN_RAD`. A law that does not switch
+    by passing would circle a point inside its turn for ever: the turn radius at the bank limit.
     """
     if radius_m is not None:
         return lambda ground_speed_mps, turn_rad: radius_m
@@ -315,7 +310,7 @@ def acceptance(kind: str, config: Any, limits: GuidanceLimits, radius_m: float |
     if not by_passing(config):
         least_per_speed2 = 1.0 / (GRAVITY_MPS2 * math.tan(limits.bank_limit_rad))
         return lambda ground_speed_mps, turn_rad: ground_speed_mps * ground_speed_mps * least_per_speed2
-    per_speed2 = 1.0 / (GRAVITY_MPS2 * math.tan(max(limits.bank_limit_rad - BANK_KEPT_RAD, 0.1)))
+    per_speed2 = 1.0 / (GRAVITY_MPS2 * math.tan(max(limits.bank_limit_rad - ACCEPTANCE_BANK_MARGIN_RAD, 0.1)))
     return lambda ground_speed_mps, turn_rad: (
-        ground_speed_mps * ground_speed_mps * per_speed2 * math.tan(0.5 * min(turn_rad, CORNER_RAD))
+        ground_speed_mps * ground_speed_mps * per_speed2 * math.tan(0.5 * min(turn_rad, MAX_CORNER_RAD))
     )

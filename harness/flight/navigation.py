@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from aircraft.interface import AircraftState, as_it_was
+from aircraft.interface import AircraftState, delayed_state
 from harness.scenario.navigation import Navigation
 from harness.world.range_sensor import child_stream
 
@@ -117,7 +117,7 @@ class Navigator(StateEstimator):
         """Returns the believed state for a true one; `ValueError` if time goes back."""
         if self._perfect:
             return state
-        state = as_it_was(self._past, state, self._navigation.latency_s)
+        state = delayed_state(self._past, state, self._navigation.latency_s)
         if state.time_s < self._time_s:
             raise ValueError(f"time goes back from {self._time_s:g} s to {state.time_s:g} s")
         if state.time_s != self._time_s:

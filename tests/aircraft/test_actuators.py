@@ -10,7 +10,7 @@ import pytest
 
 from aircraft.actuators import Actuator, Actuators
 from aircraft.airframes import AircraftError, airframe
-from aircraft.autopilot import NEEDED_DEG, gains, pitch_margin_deg, roll_margin_deg
+from aircraft.autopilot import NEEDED_MARGIN_DEG, gains, pitch_margin_deg, roll_margin_deg
 from aircraft.deviation import Deviation
 from aircraft.frames import LocalPlane
 from aircraft.jsbsim_loading import linearised, surface_travel_deg, trimmed
@@ -95,8 +95,8 @@ def test_figures_are_flown_anew_with_servos_and_the_cache_tells_them_apart() -> 
 def test_gains_keep_a_phase_margin_behind_a_lag() -> None:
     at = linearised(trimmed(model_files("aerosonde"), 25.0))
     real = airframe("aerosonde", Actuators.alike(SERVO))
-    assert roll_margin_deg(at, real.gains, SERVO.lag_s) > NEEDED_DEG
-    assert pitch_margin_deg(at, real.gains, SERVO.lag_s) > NEEDED_DEG
+    assert roll_margin_deg(at, real.gains, SERVO.lag_s) > NEEDED_MARGIN_DEG
+    assert pitch_margin_deg(at, real.gains, SERVO.lag_s) > NEEDED_MARGIN_DEG
     for lag_s in (0.02, 0.1, 0.2):
         assert roll_margin_deg(at, gains(at), lag_s) < roll_margin_deg(at, gains(at), 0.5 * lag_s)
         assert roll_margin_deg(at, gains(at, 0.5), lag_s) > roll_margin_deg(at, gains(at), lag_s)

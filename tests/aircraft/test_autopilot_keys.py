@@ -11,7 +11,7 @@ import pytest
 from aircraft.airframe import AutopilotKeys
 from aircraft.airframes import airframe
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw, bandwidth_of_delay_margin
-from aircraft.interface import AircraftState, FloatArray, as_it_was
+from aircraft.interface import AircraftState, FloatArray, delayed_state
 from aircraft.route import weave
 from aircraft.trials import in_flight
 
@@ -76,7 +76,7 @@ def test_preview_tracks_turns_on_an_old_state(name: str, latency_s: float) -> No
     past: deque[AircraftState] = deque()
     worst = 0.0
     while True:
-        output = law.update(as_it_was(past, model.state(), latency_s))
+        output = law.update(delayed_state(past, model.state(), latency_s))
         if output.past_end:
             break
         worst = max(worst, abs(output.cross_track_m))

@@ -1,4 +1,4 @@
-"""How fast aircraft climb and sink, and the guidance that keeps within it."""
+"""How fast aircraft climb and sink, and the guidance that holds within it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from aircraft.airframes import airframe
-from aircraft.climb import ClimbRates, climb_rates, keeps
+from aircraft.climb import ClimbRates, climb_rates, holds
 from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat, slewed
 from aircraft.interface import AircraftState
 
@@ -21,10 +21,10 @@ def test_a_rate_that_is_promised_is_flown_and_a_faster_one_is_not() -> None:
     climb, descent = rates.at(25.0)
     assert 4.0 < climb < 8.0
     assert 5.0 < descent < 10.0
-    assert keeps(frame, 25.0, 0.95 * climb)
-    assert not keeps(frame, 25.0, 1.2 * climb)
-    assert keeps(frame, 25.0, -0.95 * descent)
-    assert not keeps(frame, 25.0, -1.2 * descent)
+    assert holds(frame, 25.0, 0.95 * climb)
+    assert not holds(frame, 25.0, 1.2 * climb)
+    assert holds(frame, 25.0, -0.95 * descent)
+    assert not holds(frame, 25.0, -1.2 * descent)
     assert rates.at(rates.airspeeds_mps[-1])[0] < 1.0, "at the fastest there is no throttle left"
 
 
@@ -32,7 +32,7 @@ def test_rates_are_kept_and_made_anew_where_the_cache_is_spoilt(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr("aircraft.climb.steepest_mps", lambda frame, speed, side: 3.0 + side)
+    monkeypatch.setattr("aircraft.climb.fastest_mps", lambda frame, speed, side: 3.0 + side)
     frame = airframe("aerosonde")
     rates = climb_rates(frame)
     assert (rates.climb_mps[0], rates.descent_mps[0]) == (4.0, 2.0)

@@ -24,7 +24,7 @@ AEROSONDE = airframe("aerosonde")
 
 @pytest.fixture(autouse=True)
 def _own_cache(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(law_cards, "_kept", {})
+    monkeypatch.setattr(law_cards, "_cards", {})
 
 
 @pytest.fixture
@@ -114,10 +114,10 @@ def test_a_card_is_kept_and_one_of_wrong_content_is_made_anew(
     kind = guidance_kinds()["pure_pursuit"]
     card = law_cards.law_card(AEROSONDE, kind, kind.config())
     (file,) = (tmp_path / "wayproof").glob("*law*.json")
-    monkeypatch.setattr(law_cards, "_kept", {})
+    monkeypatch.setattr(law_cards, "_cards", {})
     with monkeypatch.context() as patched:
         patched.setattr(law_cards, "weave", None)  # nothing is flown
         assert law_cards.law_card(AEROSONDE, kind, kind.config()) == card
     file.write_text(file.read_text().replace('"error_m": ', '"error_m": -'))
-    monkeypatch.setattr(law_cards, "_kept", {})
+    monkeypatch.setattr(law_cards, "_cards", {})
     assert law_cards.law_card(AEROSONDE, kind, kind.config()) == card

@@ -10,7 +10,7 @@ import pytest
 from aircraft.airframes import airframe
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.margins import law_margins
-from aircraft.interface import AircraftState, Route, as_it_was
+from aircraft.interface import AircraftState, Route, delayed_state
 from aircraft.start import StartConditions
 from harness.scenario.kinds import guidance_kinds
 from tests.point_mass import PointMass
@@ -26,7 +26,7 @@ def swing(kind: str, latency_s: float) -> float:
     past: deque[AircraftState] = deque()
     off = []
     for _ in range(600):
-        state = as_it_was(past, model.state(), latency_s)
+        state = delayed_state(past, model.state(), latency_s)
         off.append(abs(model.state().east_m))
         model.command(law.update(state).roll_command_rad, 300.0, 25.0)
         model.advance(model.step_rate_hz // 10)

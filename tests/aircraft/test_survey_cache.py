@@ -20,7 +20,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _forget() -> None:
     airframes.airframe.cache_clear()
-    law_cards._kept.clear()
+    law_cards._cards.clear()
 
 
 def _digest(**changes: object) -> str:
