@@ -103,11 +103,11 @@ class AnytimeSearch:
     def _courses(self, found: list[_Found]) -> Iterator[Course]:
         """Courses along routes, the shorter first, from where a plan would begin now."""
         for each in sorted(found, key=lambda each: each.route.path.length_m):
-            start, _ = self._now()
+            start, flown = self._now()
             route: FlyableRoute | None = each.route
             if start is not each.start:
                 nodes = (start.pose[:2], *each.route.nodes)
-                route = self._local.fitted(start, each.attempt, nodes, each.points_m)
+                route = self._local.fitted(start, each.attempt, nodes, each.points_m, turning=flown is None)
             if route is not None:
                 yield self._course(route, each.known, each.shortest)
 

@@ -19,7 +19,7 @@ from planner.rolling_window.multi_step_search import Candidate, search_candidate
 from planner.rolling_window.pose_search import search_poses
 from planner.rolling_window.route_optimisation import FlyableRoute, optimise
 from planner.rolling_window.window import Window
-from planner.shield.committed_plan import Start
+from planner.shield.committed_plan import BROKEN_SHARE, Start
 from planner.shield.escape import Room
 
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
@@ -47,6 +47,9 @@ the share `RETRACE` of what leads back along where the aircraft has been."""
 
 TRAIL_CLEARANCES = 4.0
 """Places within so many clearances of the flown trail count as where the aircraft has been."""
+
+LEAVES = 8
+"""A turn is left at one of so many places of it: from some no curve fits the way on."""
 
 AROUND = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1))
 """A square and those around it, by columns and rows."""
@@ -170,16 +173,16 @@ class LocalPlanning:
                 reluctance_m = self._reluctance_m(candidate, course)
                 if candidate.cost_m + reluctance_m >= least_m:
                     continue
-                route = self.fitted(start, attempt, candidate.nodes, points)
+                route = self.fitted(start, attempt, candidate.nodes, points, turning=course is None)
                 if route is not None:
                     fitted.append((route.path.length_m + reluctance_m, route))
                 yield
         fitted.sort(key=lambda each: each[0])
-        start, _ = now()
+        start, course = now()
         if start is begun:
             return fitted[0][1] if fitted else None
         ways = ((start.pose[:2], *route.nodes) for _, route in fitted)
-        routes = (self.fitted(start, attempt, way, points) for way in ways)
+        routes = (self.fitted(start, attempt, way, points, turning=course is None) for way in ways)
         return next((route for route in routes if route is not None), None)
 
     def _reluctance_m(self, candidate: Candidate, course: Course | None) -> float:
@@ -193,12 +196,35 @@ class LocalPlanning:
         return switching + RETRACE * self.trail.retraced_m(candidate.nodes)
 
     def fitted(
-        self, start: Start, attempt: Attempt, nodes: Sequence[Point], points: FloatArray
+        self,
+        start: Start,
+        attempt: Attempt,
+        nodes: Sequence[Point],
+        points: FloatArray,
+        turning: bool = False,
     ) -> FlyableRoute | None:
-        """The curve along track points found among (m, 2) points, from where a plan would begin now; None: none is."""
+        """The curve along track points found among (m, 2) points, from where a plan would begin now; None: none is.
+
+        Who is `turning` may fly the turn on and leave it later: the shortest of these, with what is flown before.
+        """
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         terrain = self._terrain(start, attempt, points)
-        return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
+        in_turn = self.room.terrain(BROKEN_SHARE * self._mission.clearance_m)
+        best: FlyableRoute | None = None
+        for each in start.later(LEAVES if turning else 1):
+            pose, before = each.pose, each.prefix[len(start.prefix) :]
+            least_m = sum(segment[5] for segment in before) + math.dist(pose[:2], nodes[-1])
+            if best is not None and least_m >= best.path.length_m:
+                break
+            if before and not in_turn.admits(Path(np.array(before))):
+                break  # something has come near to the turn
+            route = optimise(pose, start.curvature, (pose[:2], *nodes[1:]), self.limits, cut, terrain)
+            if route is None:
+                continue
+            path = Path(np.array([*before, *route.path.segments.tolist()]))
+            if best is None or path.length_m < best.path.length_m:
+                best = FlyableRoute(route.nodes, path)
+        return best
 
     def tight_route(self, now: Now) -> Generator[None, None, FlyableRoute | None]:
         """A way found by search over poses, where none through the free sectors can be flown.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -63,6 +64,13 @@ class Start:
     pose: Pose
     curvature: float = 0.0
     prefix: list[Segment] = field(default_factory=list)
+
+    def later(self, count: int) -> Iterator[Start]:
+        """This start, and on a turn others further round it: so many in all, evenly spaced."""
+        yield self
+        for i in range(1, count if self.curvature else 1):
+            arc: Segment = (*self.pose, self.curvature, math.tau * i / count / abs(self.curvature))
+            yield replace(self, pose=along(arc, arc[5]), prefix=[*self.prefix, arc])
 
 
 def start_of(

@@ -12,7 +12,7 @@ import pytest
 
 from planner import contract
 from planner.geometry.course import Course
-from planner.geometry.curves import Pose
+from planner.geometry.curves import Pose, places_along
 from planner.interface import FloatArray, MapView
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
@@ -158,3 +158,22 @@ def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_
     for course in courses:
         assert course.nodes[-1] == MISSION.goal_m
         assert course.path.length_m < 1.06 * shortest
+
+
+def test_a_turn_is_flown_on_to_where_a_curve_fits_the_way_out(known: Known) -> None:
+    """A ring about the turn, open where the tangent north leaves it: no wider arc fits in it."""
+    turn_m, wide_m = 0.8 * MISSION.turn_radius_m, MISSION.turn_radius_m
+    outer_m = turn_m + MISSION.clearance_m + 10.0
+    bearing = np.linspace(0.0, math.tau, 400)
+    ring = np.column_stack((outer_m * np.cos(bearing), turn_m + outer_m * np.sin(bearing)))
+    open_ = (np.abs(ring[:, 0] - turn_m) < 1.3 * MISSION.clearance_m) & (ring[:, 1] > turn_m)
+    local, _ = planning(known(ring[~open_]))
+    attempt = local.attempts()[1]
+    start = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0), 1.0 / turn_m)
+    nodes, points = [(0.0, 0.0), (turn_m, turn_m + 8.0 * wide_m)], local.points_m
+    assert local.fitted(start, attempt, nodes, points) is None
+    route = local.fitted(start, attempt, nodes, points, turning=True)
+    assert route is not None
+    assert route.path.segments[0].tolist()[:5] == [0.0, 0.0, 1.0, 0.0, 1.0 / turn_m]
+    away = places_along(route.path, route.path.length_m, 2000)[:, None] - ring[~open_]
+    assert np.hypot(away[..., 0], away[..., 1]).min() > MISSION.clearance_m
