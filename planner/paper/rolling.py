@@ -5,6 +5,7 @@ What the paper does not say is done in the plainest way:
 * The window rolls when a step S_0 of the plan is flown, or when something sensed since cuts the plan.
 * A plan begins on the path in effect, a second ahead, at the end of an arc. The first track point w_s1 lies half a
   step straight ahead of there, so that the corner there can be rounded as any other.
+* Where the shortest candidate is longer than the plan in effect by more than S_0, that is flown on, to its last step.
 * Where no candidate is found, the plan in effect is flown on; where that ends or is cut, the aircraft circles and
   searches again after every scan. Nothing leads it out of a trap.
 """
@@ -17,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from planner.geometry.clearance import first_breach
-from planner.geometry.curves import Pose, Segment, along, between, place_on
+from planner.geometry.curves import Pose, Segment, along, between, end_of, place_on
 from planner.geometry.joining import LEAD_S, branch_off, stuck
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.paper.config import ImprovedBugConfig
@@ -48,12 +49,23 @@ class ImprovedBug:
                 return Plan(PlanStatus.KEPT, "the first step of the plan is being flown")
         start, before = self._start(request, cut)
         routes = self.local_planning(window, start)
-        if routes:
-            return self._found(request, window, routes, before)
-        left_m = 0.0 if path is None or path.loiter or cut else path.length_m - at_m
-        if left_m > self._config.resolved_step_m:
+        plan = self._found(request, window, routes, before) if routes else None
+        flown_on = None if path is None or path.loiter or cut else self._flown_on(path, at_m, plan)
+        return (
+            flown_on or plan or stuck("no candidate in the window", request, self._mission, window.points_m)
+        )
+
+    def _flown_on(self, path: Path, at_m: float, plan: Plan | None) -> Plan | None:
+        """The plan in effect, where that found is longer by more than S_0 or none is; None in its last step."""
+        step_m, goal = self._config.resolved_step_m, self._mission.goal_m
+        if path.length_m - at_m <= step_m:
+            return None
+        if plan is None or plan.path is None:
             return Plan(PlanStatus.NO_PATH, "no candidate in the window; the plan in effect is flown on")
-        return stuck("no candidate in the window", request, self._mission, window.points_m)
+        old_m, new_m = (each.length_m + math.dist(end_of(each)[:2], goal) for each in (path, plan.path))
+        if new_m > old_m - at_m + step_m:
+            return Plan(PlanStatus.NO_BETTER, "every candidate is longer than the plan in effect")
+        return None
 
     def planning_window(self, request: PlanRequest) -> Window:
         """Section 3.3: U_1 about the aircraft, with the sensed edge points that are not too far to matter in it."""

@@ -10,7 +10,7 @@ import pytest
 
 from planner.contract import MISSION, GivenMap, circle_outline
 from planner.geometry.curves import pose_at, sample
-from planner.interface import Mission, PlanRequest, PlanStatus
+from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.paper.config import ImprovedBugConfig
 from planner.paper.rolling import ImprovedBug
 
@@ -67,6 +67,29 @@ def test_a_new_plan_goes_on_from_the_one_in_effect_without_a_kink() -> None:
     np.testing.assert_allclose(again.path.segments[0, :4], pose_at(plan.path, 800.0), atol=1e-9)
     joints = np.array([pose_at(again.path, s) for s in np.cumsum(again.path.segments[:-1, 5])])
     np.testing.assert_allclose(joints, again.path.segments[1:, :4], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("half_m", "end_m", "status"),
+    [
+        (
+            2000.0,
+            15_000.0,
+            PlanStatus.NO_BETTER,
+        ),  # round its end: 3,125 + 7,343 m, 1,268 m more; S_0 is 750 m
+        (1000.0, 15_000.0, PlanStatus.FOUND),  # 2,515 + 7,105 m, 420 m more
+        (2000.0, 10_500.0, PlanStatus.FOUND),  # the last step of the plan in effect
+    ],
+)
+def test_a_plan_is_flown_on_where_what_is_found_is_longer_by_more_than_a_step(
+    half_m: float, end_m: float, status: PlanStatus
+) -> None:
+    """The plan in effect leads through a gap in a wall with 210 m on each side; candidates keep 220 m."""
+    above = np.arange(210.0, half_m, 50.0)
+    wall = np.array([(12_000.0, 7000.0 + y) for y in (*above, *-above)])
+    flown = Plan(PlanStatus.FOUND, "", path=Path.through(np.array([HERE, (end_m, 7000.0)])))
+    asked = ask(800.0, (9800.0, 7000.0), flown=flown, seen=GivenMap(wall))
+    assert planner().plan(asked).status is status
 
 
 def test_where_it_is_caught_it_holds_and_says_so() -> None:
