@@ -43,9 +43,9 @@ class GrownObstacles:
         self._united = -1  # how many of the points the discs are those of
         self._discs: Any = None
         self._shapes: Any = None
-        self._cores: Any = None
+        self.cores: Any = None
         self._border = 0  # the obstacle that is the border of the area and what touches it
-        self._rings: list[Any] = []
+        self.rings: list[Any] = []
         self._owners: IntArray = np.zeros(0, dtype=np.intp)  # which obstacle each ring belongs to
 
     def take_in(self, seen: MapView) -> tuple[FloatArray, bool]:
@@ -78,8 +78,8 @@ class GrownObstacles:
         self._united = len(self._points_m)
         parts = shapely.simplify(shapely.get_parts(self._discs), SIMPLER * self._margin_m)
         self._shapes = shapely.orient_polygons(parts)
-        self._cores = shapely.buffer(self._shapes, -GRAZED_M, join_style="mitre")
-        shapely.prepare(self._cores)
+        self.cores = shapely.buffer(self._shapes, -GRAZED_M, join_style="mitre")
+        shapely.prepare(self.cores)
         self._border = int(np.argmin(shapely.bounds(self._shapes)[:, 0]))
         owned = []
         for i, shape in enumerate(self._shapes):
@@ -88,7 +88,7 @@ class GrownObstacles:
             owned += [
                 (i, hole) for hole in shape.interiors if shapely.Polygon(hole).area > self.keep_m**2 / 4.0
             ]
-        self._rings = [ring for _, ring in owned]
+        self.rings = [ring for _, ring in owned]
         self._owners = np.array([i for i, _ in owned], dtype=np.intp)
 
     def _hole(self) -> Any:
@@ -117,8 +117,8 @@ class GrownObstacles:
         """
         self._unite()
         line = shapely.linestrings([a, b])
-        met = np.flatnonzero(shapely.intersects(self._cores, line))
-        inside, which = shapely.get_parts(shapely.intersection(self._cores[met], line), return_index=True)
+        met = np.flatnonzero(shapely.intersects(self.cores, line))
+        inside, which = shapely.get_parts(shapely.intersection(self.cores[met], line), return_index=True)
         begins = shapely.distance(inside, shapely.Point(a))
         entered = (begins > 1e-6) | (shapely.length(inside) > 0.5 * self.keep_m)
         if not entered.any():
@@ -130,8 +130,8 @@ class GrownObstacles:
         """The obstacles that lines from a place to corners enter first."""
         lines = shapely.linestrings(np.array([(place, corner) for corner in corners]).reshape(-1, 2, 2))
         self._unite()
-        met = shapely.intersects(self._cores[:, None], lines)
-        inside = shapely.intersects_xy(self._cores, *place).any()
+        met = shapely.intersects(self.cores[:, None], lines)
+        inside = shapely.intersects_xy(self.cores, *place).any()
         alone = (met.sum(axis=0) == 1) & ~inside
         doubtful = {self.first_hit(place, corners[i])[1] for i in np.flatnonzero(~alone).tolist()}
         return doubtful | set(np.flatnonzero(met[:, alone].any(axis=1)).tolist())
@@ -156,7 +156,7 @@ class GrownObstacles:
     def _nearest(self, place: Point) -> tuple[int, float]:
         """The ring next to a place, and how far it is."""
         self._unite()
-        away = shapely.distance(self._rings, shapely.Point(place))
+        away = shapely.distance(self.rings, shapely.Point(place))
         return int(np.argmin(away)), float(away.min())
 
     def boundary(self, place: Point, side: float, length_m: float) -> FloatArray:
@@ -165,7 +165,7 @@ class GrownObstacles:
         Side 1 has the obstacle on the left, -1 on the right.
         """
         nearest, off = self._nearest(place)
-        ring = self._rings[nearest]
+        ring = self.rings[nearest]
         corners, at = shapely.get_coordinates(ring), ring.project(shapely.Point(place))
         if side < 0.0:
             corners, at = corners[::-1], ring.length - at
@@ -186,7 +186,7 @@ class GrownObstacles:
         """Where lines from a place touch some obstacles within reach: at corners."""
         self._unite()
         found: list[Tangent] = []
-        for own, ring in zip(self._owners.tolist(), self._rings, strict=True):
+        for own, ring in zip(self._owners.tolist(), self.rings, strict=True):
             if own not in parts:
                 continue
             corners = shapely.get_coordinates(ring)[:-1]
@@ -197,10 +197,10 @@ class GrownObstacles:
             touched = (sides[0] * sides[1] >= 0.0) & (_cross(before, after) < 0.0)
             chosen = np.flatnonzero(touched & (away < reach_m) & (away > 1e-6))
             lines = shapely.linestrings(np.stack(np.broadcast_arrays(place, corners[chosen]), axis=1))
-            hidden = shapely.intersects(self._cores[:, None], lines).any(axis=0)
+            hidden = shapely.intersects(self.cores[:, None], lines).any(axis=0)
             beyond = corners[chosen] + DENT_SHARE * self.keep_m * to[chosen] / away[chosen, None]
             rays = shapely.linestrings(np.stack((corners[chosen], beyond), axis=1))
-            dents = shapely.intersects(self._cores[own], rays) & (own != self._border)
+            dents = shapely.intersects(self.cores[own], rays) & (own != self._border)
             for i, out, dent in zip(chosen.tolist(), hidden.tolist(), dents.tolist(), strict=True):
                 side = math.copysign(1.0, float(sides[:, i].sum()))
                 found.append(Tangent((float(corners[i, 0]), float(corners[i, 1])), side, not out, dent))
@@ -209,7 +209,7 @@ class GrownObstacles:
     def encloses_nothing(self, outline: FloatArray) -> bool:
         """Whether no obstacle lies within a closed outline, but for a little beside it."""
         shape = shapely.Polygon(outline).buffer(-TOUCH_SHARE * self.keep_m) if len(outline) > 2 else None
-        return shape is None or not shapely.intersects(self._cores, shape).any()
+        return shape is None or not shapely.intersects(self.cores, shape).any()
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -8,7 +8,6 @@ its length over the optimum in shared worlds.
 
 from __future__ import annotations
 
-import heapq
 import json
 import math
 import sys
@@ -19,6 +18,8 @@ from typing import Any, Final
 
 import numpy as np
 import shapely
+from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
 
 from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import length_of, piece
@@ -34,8 +35,6 @@ LOOKS: Final = 40
 """It looks this many times in a sensing range."""
 HIDDEN_M: Final = 0.5
 """An edge point is seen unless the line to it goes this deep through an obstacle."""
-ON_RIM_M: Final = 0.01
-"""A place so near to an outline is on it."""
 FURTHEST: Final = 30.0
 """It gives up after so many times the optimum."""
 
@@ -67,33 +66,44 @@ class Seen(GivenMap):
 
 
 def shortest(known: GrownObstacles, start: Point, goal: Point) -> list[Point]:
-    """The shortest way through what is known, by A* over tangents; none where none leads there."""
-    every = set(range(10_000))  # of the obstacles, however many there are
-    best: dict[Point, float] = {start: 0.0}
-    before: dict[Point, Point] = {}
-    queue, done = [(math.dist(start, goal), start)], set[Point]()
-    while queue:
-        _, place = heapq.heappop(queue)
-        if place == goal:
-            way = [goal]
-            while way[-1] != start:
-                way.append(before[way[-1]])
-            return way[::-1]
-        if place in done:
-            continue
-        done.add(place)
-        onward = [each.place for each in known.tangents(place, every, math.inf) if each.seen]
-        if math.isinf(known.first_hit(place, goal)[0]):
-            onward.append(goal)
-        if known.off_m(place) < ON_RIM_M:  # between two small dents no corner is in sight
-            rims = (known.boundary(place, side, known.keep_m) for side in (1.0, -1.0))
-            onward += [(float(rim[1, 0]), float(rim[1, 1])) for rim in rims]
-        for there in onward:
-            way_m = best[place] + math.dist(place, there)
-            if way_m < best.get(there, math.inf):
-                best[there], before[there] = way_m, place
-                heapq.heappush(queue, (way_m + math.dist(there, goal), there))
-    return []
+    """The shortest way through what is known, by Dijkstra on the visibility graph; none where none leads there.
+
+    The graph has the convex corners of the outlines, and of the lines between two of them those that pass both.
+    """
+    rings = [shapely.get_coordinates(each)[:-1] for each in known.rings]
+    corners, before, after = (
+        np.concatenate([np.roll(each, turn, axis=0) for each in rings]) for turn in (0, 1, -1)
+    )
+    convex = cross(before - corners, after - corners) < 0.0
+    solid, here = shapely.multipolygons(known.cores), shapely.Point(start)
+    shapely.prepare(solid)
+    if solid.intersects(here):  # an outline has grown over it by a hair
+        here = shapely.shortest_line(shapely.MultiLineString(known.rings), here)
+    begin = shapely.get_coordinates(here)[:1]
+    ends = np.concatenate((begin, [goal]))
+    places = np.concatenate((ends, corners[convex]))
+    sides = [
+        cross(places[:, None] - places, np.concatenate((0.0 * ends, (each - corners)[convex])))
+        for each in (before, after)
+    ]
+    passes = sides[0] * sides[1] >= 0.0  # the line from one place, a row, at another
+    passes[0] = True  # rounding must not take the edge along an outline that it is on
+    i, j = np.nonzero(np.triu(passes & passes.T, 1))
+    clear = ~shapely.intersects(solid, shapely.linestrings(np.stack((places[i], places[j]), axis=1)))
+    i, j = i[clear], j[clear]
+    graph = sparse.coo_matrix((np.hypot(*(places[i] - places[j]).T), (i, j)), shape=passes.shape)
+    left_m, onward = dijkstra(graph.tocsr(), directed=False, indices=[1], return_predecessors=True)
+    if math.isinf(left_m[0, 0]):
+        return []
+    way, at = [start], 0
+    while at >= 0:
+        way.append((float(places[at, 0]), float(places[at, 1])))
+        at = int(onward[0, at])
+    return way
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def walked_m(obstacles: list[Any], mission: Mission, start: Point, most_m: float) -> float:
@@ -108,10 +118,7 @@ def walked_m(obstacles: list[Any], mission: Mission, start: Point, most_m: float
             known.take_in(seen)
             if any(math.isfinite(known.first_hit(a, b)[0]) for a, b in pairwise(way)):
                 way = shortest(known, place, mission.goal_m)
-                if not way:  # an outline has grown over it by a hair
-                    rim = known.boundary(place, 1.0, 0.0)[0]
-                    way = [place, *shortest(known, (float(rim[0]), float(rim[1])), mission.goal_m)]
-                if len(way) < 2:
+                if not way:
                     return math.inf
         left_m = min(step_m, math.dist(place, mission.goal_m) - 0.99 * mission.goal_radius_m)
         flown = piece(np.array(way), 0.0, left_m)
