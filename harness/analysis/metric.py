@@ -14,6 +14,8 @@ Claim: TypeAlias = Literal["reached", "no-contact", "trackable", "as-given"]
 CLAIMS: Final[tuple[Claim, ...]] = get_args(Claim)
 UNKNOWN_AFTER: Final = ("collision", "lost_control", "planner_failed", "error")
 """Outcomes after which nobody can say that nothing is touched: `no-contact` does not hold."""
+LEAST_MARGIN: Final = 1e-9
+"""A claim that holds has at least this margin, whatever its figure says."""
 ERROR: Final = "error"
 """Outcome of a flight whose software failed before its end; the other outcomes are those of `metrics.json`."""
 SEVERITY: Final[Mapping[str, float]] = {
@@ -127,3 +129,22 @@ def holds(claim: Claim, metrics: Mapping[str, Any]) -> bool:
     if claim == "trackable":
         return metrics["outcome"] == "reached" and bool(metrics["trackable"])
     return bool(metrics.get("check", {}).get("ok"))
+
+
+def margin(claim: Claim, metrics: Mapping[str, Any]) -> float | None:
+    """How far a flight was from where a claim fails, by the content of its `metrics.json`; 0 where it does not hold.
+
+    `no-contact`: the least distance to an obstacle (m). `trackable`, `as-given`: what is left of the limit that was
+    used most, as a share of it. None: the claim has no such figure, or there is no obstacle.
+    """
+    if not holds(claim, metrics):
+        return 0.0
+    if claim in ("reached", "no-contact"):
+        left = metrics["min_clearance_m"] if claim == "no-contact" else None
+    else:
+        pairs = [(leg["max_cross_track_m"], leg["threshold_m"]) for leg in metrics["trackability"]]
+        if told := metrics.get("check"):
+            pairs = [(corner["most_off_m"], corner["allowed_cut_m"]) for corner in told["corners"]]
+            pairs += [(told["limit_used"][name], 1.0) for name in ("off_path", "altitude")]
+        left = 1.0 - max((off / allowed for off, allowed in pairs if off and allowed), default=0.0)
+    return None if left is None else max(left, LEAST_MARGIN)

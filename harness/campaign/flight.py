@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from harness.analysis.metric import ERROR, Claim, holds
+from harness.analysis.metric import ERROR, Claim, holds, margin
 from harness.campaign.results import metric_cells, time_cells
 from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence, trace
 from harness.flight.record import Outcome
@@ -87,6 +87,7 @@ def fly_job(job: Job) -> Answer | None:
             return None
         row = {"outcome": ERROR, "reason": sentence(error), "error": trace(error)}
         return Answer(job.run, row, {})
+    cells["margin"] = margin(job.claim, metrics)
     return Answer(job.run, cells, time_cells(metrics), holds(job.claim, metrics))
 
 

@@ -24,6 +24,7 @@ from harness.campaign.results import LAW_KEY, RESULTS, RUN, RUNS, fly_again, rea
 from harness.campaign.sampling import takes_whole_numbers
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError, Loc, Node, Scalar, fault_line, key_path, loc_of, node_of
+from harness.run_files.run_folder import SCENARIO
 from harness.scenario.generators import generated
 from harness.scenario.scenario import Scenario, overridden, packed, scenario_from, unpacked, with_key
 from harness.scenario.validation import KeyFaults, in_lines
@@ -243,11 +244,15 @@ class CampaignRuns:
             axis.append(changes or [self._change((section, first), (listed, index))])
         return axis or [[]]
 
+    def _shares(self, case: int) -> list[float]:
+        """Returns the number in [0, 1) by which each key is drawn."""
+        rng = np.random.default_rng(self._stream(case, DRAW_STREAM))
+        return [*map(float, rng.random(len(self.campaign.random)))]
+
     def _drawn(self, case: int) -> list[_Change]:
         """Returns the changes drawn for a case, each key by a number in [0, 1) of its stream."""
-        shares = np.random.default_rng(self._stream(case, DRAW_STREAM)).random(len(self.campaign.random))
         changes = []
-        for (name, each), share in zip(self.campaign.random.items(), shares.tolist(), strict=True):
+        for (name, each), share in zip(self.campaign.random.items(), self._shares(case), strict=True):
             origin: Loc = ("random", name)
             if each.choice:
                 changes.append(self._change(loc_of(name), (*origin, "choice", each.chosen(share))))
@@ -295,11 +300,18 @@ def flown_run(
     There is no digest where the row is missing, or `overrides` change what is flown.
     """
     table, about = read_table(results)
+    digests = dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True))
+    if about.get("rare"):
+        kept = results.parent / RUNS / str(run) / SCENARIO
+        if not kept.is_file():
+            raise InputError(f"{results}: run {run} of a subset simulation was not kept: there is no {kept}")
+        from harness.scenario.scenario import load_scenario
+
+        return load_scenario(kept, overrides), None if overrides else digests.get(run)
     runs = CampaignRuns(CampaignFile.from_plain(about, str(results)))
     if not 0 <= run < len(runs):
         raise InputError(f"{results}: has no run {run}; must be 0 to {len(runs) - 1}")
     asked = runs.scenario(run, overrides)
-    digests = dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True))
     with suppress(InputError):  # a planner that is not here: another one was given
         if not overrides or packed(runs.scenario(run)) == packed(asked):
             return asked, digests.get(run)

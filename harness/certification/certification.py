@@ -7,11 +7,12 @@ same for any number of workers.
 from __future__ import annotations
 
 import json
+import math
 import shlex
 import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,9 +25,10 @@ from harness.campaign.cell import grouped
 from harness.campaign.flight import Answer
 from harness.campaign.folder import CampaignFolder, fly_missing, told_left
 from harness.campaign.results import RUNS
-from harness.campaign.workers import Workers
+from harness.campaign.workers import Workers, fly_jobs
 from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
 from harness.certification.days import Days, PathDays
+from harness.certification.rare import FloatArray, IntArray, Rare, subset_simulation
 from harness.files.input_file import InputError
 from harness.files.versions import versions
 from harness.files.whole_file import replace_text
@@ -36,7 +38,10 @@ CERTIFICATE: Final = "certificate.json"
 SCHEMA: Final = "wayproof/certificate/1"
 SECTIONS: Final = ("environment", "navigation", "uncertainty", "sensor", "aircraft")
 """Sections of a scenario whose numbers may differ between days without being varied by name: conditions draw them."""
-MOST_RUNS: Final = 1000
+MOST_RUNS: Final = (1000, 10_000)
+"""Days to fly at most if nothing is said: by counting, and by subset simulation."""
+KEPT: Final = 20
+"""This many of the days that fail in a subset simulation keep a run folder: thousands may fail."""
 CONFIDENCE: Final = 0.95
 
 
@@ -94,6 +99,8 @@ class Certificate:
     failing_runs: tuple[int, ...]
     command: str
     versions: Mapping[str, str | None]
+    rare: Rare | None = None
+    """The result of a subset simulation; the days were then drawn near failure, and `held` is no frequency."""
 
     def plain(self) -> dict[str, Any]:
         """The content of `certificate.json`."""
@@ -149,7 +156,7 @@ def certify(
 
     A RunFolderError: it holds something else, or days without `resume`; an OSError: disk or workers give out.
     """
-    tally = Tally(terms)
+    tally, rare = Tally(replace(terms, probability=None) if days.rare else terms), None
     with CampaignFolder(out, days, resume=resume) as folder:
         for run, over in folder.over.items():
             tally.add(run, over.held)
@@ -159,20 +166,53 @@ def certify(
             if progress is not None:
                 progress(tally)
 
-        left = fly_missing(days, folder, workers, count, lambda: tally.decided)
-        if left and not tally.decided:
-            raise OSError(told_left(left))
+        def fly(numbers: range | None = None) -> None:
+            left = fly_missing(days, folder, workers, count, lambda: tally.decided, numbers)
+            if left and not tally.decided:
+                raise OSError(told_left(left))
+
+        if days.rare:
+            rare = _simulated(days, folder, fly, terms.confidence)
+        else:
+            fly()
         folder.write_tables(tally.runs)
         certificate = _certificate(days, folder, tally, terms)
+        if rare is not None:
+            certificate = replace(certificate, rare=rare, **_rarely(rare, terms.probability))
         if days.band and not (out / BAND).exists():
             kept = (out / RUNS / str(run) for run in range(tally.runs))
             write_band(out, [each for each in kept if (each / TRACK).is_file()])
-        for each in (out / RUNS).glob("*"):  # of days that were flown ahead of the day that decided
-            if each.name.isdecimal() and int(each.name) not in certificate.failing_runs:
-                shutil.rmtree(each, ignore_errors=True)
+        _keep(days, out, certificate.failing_runs, workers)
         content = json.dumps(certificate.plain(), indent=2, allow_nan=False) + "\n"
         replace_text(out / CERTIFICATE, content)
     return certificate
+
+
+def _simulated(days: Days, folder: CampaignFolder, fly: Callable[[range], None], confidence: float) -> Rare:
+    def margins(normals: FloatArray, seeds: IntArray) -> FloatArray:
+        fly(numbers := days.give(normals, seeds))
+        cells = [folder.over[run].row.get("margin", 0.0) for run in numbers]
+        return np.array([math.inf if cell is None else cell for cell in cells])
+
+    return subset_simulation(margins, days.normals, len(days), days.campaign.seed, confidence)
+
+
+def _keep(days: Days, out: Path, failing: Sequence[int], workers: Workers) -> None:
+    """Keeps the run folders of failing days; after a subset simulation some of them are flown again for that."""
+    if days.rare:
+        missing = (run for run in failing[:KEPT] if not (out / RUNS / str(run)).exists())
+        fly_jobs((replace(days.job(run, out), recordings="all") for run in missing), workers, lambda *_: None)
+    for each in (out / RUNS).glob("*"):  # of days that were flown ahead of the day that decided
+        if each.name.isdecimal() and int(each.name) not in failing:
+            shutil.rmtree(each, ignore_errors=True)
+
+
+def _rarely(rare: Rare, claimed: float | None) -> dict[str, Any]:
+    """The verdict, bounds and method of a subset simulation, which is looked at once, at its end."""
+    low, high = 1.0 - rare.failure_upper, 1.0 - rare.failure_lower
+    said = "undecided" if claimed is None or claimed <= high else "refuted"
+    said = "shown" if claimed is not None and claimed <= low else said
+    return {"verdict": said, "method": rare.method, "probability_lower": low, "probability_upper": high}
 
 
 def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms) -> Certificate:
@@ -181,7 +221,7 @@ def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms)
     first = days.scenario(0)
     flew = [each for each in over if each[0] not in days.grounded]
     quantities: dict[str, list[Any]] = {}
-    if failing:
+    if failing and not days.rare:
         quantities = differing([days.scenario(run).model_dump(by_alias=True) for run, _ in flew])
         quantities |= {key: [each.row[key] for _, each in flew] for key in days.varied}
     return Certificate(

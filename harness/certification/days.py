@@ -11,17 +11,23 @@ from contextlib import suppress
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any, Final
+
+import numpy as np
 
 from harness.analysis.metric import Claim
 from harness.campaign.campaign_file import Base, CampaignFile, absolute_paths, is_a, validated
 from harness.campaign.flight import Job
-from harness.campaign.runs import CampaignRuns
+from harness.campaign.results import IntArray
+from harness.campaign.runs import SEED_STREAM, CampaignRuns
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, node_of
+from harness.flight.record import FloatArray
 from harness.run.path_check import PathCheck, origin_of
 from harness.run.path_check import asked as path_check
 from harness.run_files.path_files import read_path
+from harness.scenario.keys import NORMALS
 from harness.scenario.scenario import Scenario, overridden
 from harness.scenario.sections import UncertaintySpec
 from harness.scenario.shipped import scenario_path, shipped_scenarios
@@ -30,6 +36,9 @@ DEFAULT_AIRCRAFT: Final = "aerosonde"
 DEFAULT_SEED: Final = 1
 AS_MEANT: Final = ("uncertainty", json.dumps(dict.fromkeys(UncertaintySpec.model_fields, 0.0)))
 FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
+
+LEAST_RARE, CHECKED = 500, 50
+"""Fewest days of a subset simulation, whose independent runs then begin with 15; how many are made to be checked."""
 
 Settings = Sequence[tuple[str, str]]
 Vary = Mapping[str, Mapping[str, Any]]
@@ -48,11 +57,17 @@ class Days(CampaignRuns):
         most: int,
         sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
         band: bool = False,
+        rare: bool = False,
     ) -> None:
         """Makes at most so many days of a scenario, or raises InputError; nothing is flown.
 
-        `vary`: what is drawn, as `random` of a campaign file; `band`: whether `band.json` is made of all days' tracks.
+        `vary`: what is drawn, as `random` of a campaign file; `band`: whether `band.json` is made of all days' tracks;
+        `rare`: whether the days are not drawn as they come, but given one after another (`give`).
         """
+        if rare and claim == "reached":
+            raise InputError("wayproof: --rare needs a margin: --claim no-contact, trackable or as-given")
+        if rare and most < LEAST_RARE:
+            raise InputError(f"wayproof: --rare needs at least --runs {LEAST_RARE}; 10,000 do for 1e-4")
         plain = {
             "schema": "wayproof/campaign/1",
             "name": base.name,
@@ -60,14 +75,47 @@ class Days(CampaignRuns):
             "scenarios": [base.file],
             "random": {key: dict(each) for key, each in vary.items()},
             "draws": most,
-            "recordings": "all" if band else "failures",
+            "recordings": "all" if band else "none" if rare else "failures",
             "optimum": False,
         }
         root, source = node_of(plain, COMMAND_LINE), "command line"
         super().__init__(CampaignFile(validated(root, source), source, root, (base,)), *sources)
-        self.claim, self.vary, self.band = claim, vary, band
+        self.claim, self.vary, self.band, self.rare = claim, vary, band, rare
+        self._given: list[tuple[list[float], int]] = []
+        self._fixed = base.root.at(("normals",)) is not None  # a scenario may say itself what its days draw
+        self.normals = len(vary) + sum(NORMALS)  # of a day that is given: by `vary`, then by the scenario
         self.grounded: dict[int, str] = {}  # why the aircraft that a day draws cannot fly, by its number
-        self.can_grow = not band  # the tracks of earlier days are gone
+        self.can_grow = not (band or rare)  # the tracks of earlier days are gone; other days would follow
+
+    def give(self, normals: FloatArray, seeds: IntArray) -> range:
+        """Appends days by their standard normal numbers (n, d) and seeds (n,); returns their numbers."""
+        begin = len(self._given)
+        self._given += zip(normals.tolist(), seeds.tolist(), strict=True)
+        return range(begin, len(self._given))
+
+    def check(self, progress: Callable[[int], None] | None = None) -> None:
+        """Makes every scenario once, or some where days are given, or raises InputError."""
+        if not self.rare:
+            return super().check(progress)
+        rng = np.random.default_rng(self.campaign.seed)
+        normals, seeds = rng.standard_normal((CHECKED, self.normals)), rng.integers(0, 2**53, CHECKED)
+        for number in self.give(normals, seeds):
+            self.scenario(number)
+        self._given.clear()
+        self.grounded.clear()
+
+    def _shares(self, case: int) -> list[float]:
+        if not self.rare:
+            return super()._shares(case)
+        return [NormalDist().cdf(each) for each in self._given[case][0][: len(self.vary)]]
+
+    def _seed(self, case: int, stream: int = SEED_STREAM) -> int:
+        return self._given[case][1] if self.rare else super()._seed(case, stream)
+
+    def _normals(self, number: int) -> list[tuple[str, str]]:
+        if not self.rare or self._fixed:
+            return []
+        return [("normals", json.dumps(self._given[number][0][len(self.vary) :]))]
 
     def scenario(self, number: int, overrides: Settings = ()) -> Scenario:
         """The scenario of day `number`; with its aircraft as it is meant to be where the one drawn cannot fly level."""
@@ -82,7 +130,7 @@ class Days(CampaignRuns):
             return found
 
     def _drawn_scenario(self, number: int, overrides: Settings) -> Scenario:
-        return super().scenario(number, overrides)
+        return super().scenario(number, [*self._normals(number), *overrides])
 
     def job(self, number: int, folder: Path) -> Job:
         """Day `number` as it is handed to who flies it."""
@@ -90,7 +138,7 @@ class Days(CampaignRuns):
 
     def plain(self) -> dict[str, Any]:
         """All that says what is flown, and what is claimed."""
-        return {**super().plain(), "claim": self.claim}
+        return {**super().plain(), "claim": self.claim, **({"rare": True} if self.rare else {})}
 
 
 class PathDays(Days):
@@ -125,11 +173,12 @@ class PathDays(Days):
             seed=scenario.seed,
             **terms,
         )
+        self._fixed = scenario.normals is not None
 
     def _settings(self, number: int) -> list[tuple[str, str]]:
         """The keys that day `number` replaces, and their values as YAML."""
         day = self.cells(number)
-        return [(key, json.dumps(day[key])) for key in ("seed", *self.varied)]
+        return [*((key, json.dumps(day[key])) for key in ("seed", *self.varied)), *self._normals(number)]
 
     def _drawn_scenario(self, number: int, overrides: Settings) -> Scenario:
         try:

@@ -13,7 +13,7 @@ import typer
 
 from harness.analysis.metric import Claim
 from harness.cli.command_line import FAILED, at_a_time, print_json, resumable, told_apart
-from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, option
+from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say, step_bar
 
@@ -29,6 +29,7 @@ STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold
 
 CLAIM: Final = "reached (default), no-contact, trackable; as-given (default of a path)."
 PROBABILITY: Final = "Claim that it holds on this share of the days; stops once that is decided."
+RARE: Final = "Subset simulation, for failures on less than one day in 1,000; not of reached."
 VARY: Final = "LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."
 
 
@@ -39,7 +40,8 @@ def certify(
     claim: Annotated[Claim | None, option("CLAIM", CLAIM)] = None,
     probability: Annotated[Number, option("P", PROBABILITY)] = None,
     confidence: Annotated[float, option("C", "Of each bound.")] = 0.95,
-    runs: Annotated[Count, option("N", "Days to fly, at most. Default: 1000.", min=1)] = None,
+    rare: Annotated[bool, flag("--rare", RARE)] = False,
+    runs: Annotated[Count, option("N", "Days at most. Default: 1000, --rare 10000.", min=1)] = None,
     vary: Annotated[list[str] | None, option("KEY=DRAW", VARY)] = None,
     world: Annotated[Text, option("WORLD", "Of a path: obstacles, bounds, air.", "--scenario")] = None,
     workers: Workers = None,
@@ -52,7 +54,8 @@ def certify(
 
     Every day has its own seed and its own draw of what varies. Without --probability all N days are flown, and the
     bounds are those of Clopper and Pearson. With it the flights end as soon as the claim is shown or refuted; the
-    bounds then hold at every look.
+    bounds then hold at every look. With --rare the days are drawn ever nearer to failure, and the claim is looked at
+    once, at the end.
 
     For example: wayproof certify aerosonde_forest --vary environment.wind.speed_mps=0:8 --probability 0.9
 
@@ -70,11 +73,11 @@ def certify(
     if is_path(subject) and not any(key == "aircraft.model" for key, _ in given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
     place = None if world is None else scenario_path(world)
-    most = runs or MOST_RUNS
-    days = days_of(subject, given.keys, drawn, claim, place, most=most, sources=given.sources)
+    most = runs or MOST_RUNS[rare]
+    days = days_of(subject, given.keys, drawn, claim, place, most=most, sources=given.sources, rare=rare)
     days.check()
     apart = told_apart([*given.keys, *((key, str(each)) for key, each in drawn.items())], named=())
-    folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{apart}"
+    folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{'-rare' * rare}{apart}"
     found = _fly(days, folder, workers, terms, resume=resume, silent=quiet)
     if as_json:
         print_json(found.plain())
@@ -154,6 +157,12 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
         f"{share(certificate.probability_upper, up=True)} (each bound at confidence {sure})",
         "bounds": certificate.method,
     }
+    if (rare := certificate.rare) is not None:
+        rows["held"] += ", drawn near failure"
+        rows["failure"] = (
+            f"{rare.failure_probability:.2g}; at least {rare.failure_lower:.2g}, at most {rare.failure_upper:.2g}"
+        )
+        rows["levels"] = ", ".join(f"{each:.3g}" for each in rare.levels) or "none: failures are not rare"
     claimed = certificate.probability
     asked = "" if claimed is None else f": holds on at least {claimed:.6g} of the days"
     rows["verdict"] = f"[{STYLE[certificate.verdict]}]{certificate.verdict}[/]{asked}"

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: this length, and this share of its span."""
 OF_THE_WORLD: Final = (
-    *("seed", "area", "obstacles", "ground", "sources", "environment", "conditions", "uncertainty"),
+    *("seed", "area", "obstacles", "ground", "sources"),
+    *("environment", "conditions", "uncertainty", "normals"),
 )
 """Sections that a check takes from a scenario that it flies a path in; mission, aircraft and sensor are its own."""
 KEYS_OF_THE_WORLD: Final = (

@@ -6,13 +6,14 @@ A day fills in what a scenario leaves out. The sources of all figures stand in `
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from aircraft.start import profile_share
 from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
-from harness.scenario.keys import ScenarioKeys
+from harness.scenario.keys import NORMALS, ScenarioKeys
 from harness.scenario.navigation import Navigation
 from harness.scenario.sections import MOST_SHARE, MOST_SHIFT_M, ActuatorsSpec, DeviationSpec, UncertaintySpec
 
@@ -98,15 +99,15 @@ def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
     """The scenario, airspeed known, with navigation, air and deviations of its day, as far as it leaves them out."""
     day = DAYS.get(keys.conditions)
     if day is not None:
-        air = _air(keys, day, _stream(keys.seed, CONDITIONS_STREAM))
+        air = _air(keys, day, _stream(keys, CONDITIONS_STREAM))
         keys = keys.updated(environment=air, navigation=_navigation(keys, day))
     uncertainty = _uncertainty(keys.uncertainty, day, frame.mass_kg)
-    deviation = _deviation(keys.aircraft.deviation, uncertainty, _stream(keys.seed, DEVIATION_STREAM))
+    deviation = _deviation(keys.aircraft.deviation, uncertainty, _stream(keys, DEVIATION_STREAM))
     aircraft = keys.aircraft.model_copy(update={"deviation": deviation})
     return keys.updated(aircraft=aircraft, uncertainty=uncertainty)
 
 
-def _air(keys: ScenarioKeys, day: Day, rng: np.random.Generator) -> Environment:
+def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
     """The air: what is drawn is drawn whether or not the file has it, so that one key changes nothing else."""
     airspeed_mps, every_s = keys.aircraft.airspeed_mps, day.vertical_gust_every_s
     most_mps = day.most_wind * airspeed_mps / profile_share(keys.mission.altitude_m, WIND_FROM_M)
@@ -152,7 +153,7 @@ def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float)
 
 
 def _deviation(
-    given: DeviationSpec | None, uncertainty: UncertaintySpec | None, rng: np.random.Generator
+    given: DeviationSpec | None, uncertainty: UncertaintySpec | None, rng: _Draws
 ) -> DeviationSpec | None:
     """What is drawn for one flight where the scenario names nothing itself."""
     names = list(DeviationSpec.model_fields)
@@ -165,11 +166,34 @@ def _deviation(
     return (given or DeviationSpec()).filled(**values)
 
 
-def _stream(seed: int, number: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
+class _Given:
+    """Draws as numpy's generator does, but from given standard normal numbers, one after another."""
+
+    def __init__(self, normals: Sequence[float]) -> None:
+        self._left = iter(normals)
+        self._above = (0.5 * math.erfc(each / math.sqrt(2.0)) for each in self._left)
+
+    def uniform(self, low: float, high: float) -> float:
+        return high - (high - low) * next(self._above)
+
+    def rayleigh(self, scale: float) -> float:
+        return scale * math.sqrt(-2.0 * math.log(next(self._above)))
+
+    def standard_normal(self, shape: int | tuple[int, int]) -> np.ndarray[Any, Any]:
+        return np.fromiter(self._left, np.float64, int(np.prod(shape))).reshape(shape)
 
 
-def _clipped(rng: np.random.Generator, shape: int | tuple[int, int]) -> list[Any]:
+_Draws: TypeAlias = np.random.Generator | _Given
+
+
+def _stream(keys: ScenarioKeys, number: int) -> _Draws:
+    if keys.normals is not None:
+        air = NORMALS[0]
+        return _Given(keys.normals[:air] if number == CONDITIONS_STREAM else keys.normals[air:])
+    return np.random.default_rng(np.random.SeedSequence(keys.seed, spawn_key=(number,)))
+
+
+def _clipped(rng: _Draws, shape: int | tuple[int, int]) -> list[Any]:
     drawn: list[Any] = rng.standard_normal(shape).clip(-MOST_SIGMAS, MOST_SIGMAS).tolist()
     return drawn
 

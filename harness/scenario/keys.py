@@ -25,6 +25,9 @@ from harness.scenario.sections import (
 )
 from harness.scenario.validation import NAME_PATTERN, KeyFault
 
+NORMALS: Final = (51, 8)
+"""Standard normal numbers that a day's air is drawn from, and the deviations of its aircraft."""
+
 
 class TrackabilitySpec(Section):
     """What a leg of the flight may be off before it counts as not trackable."""
@@ -96,6 +99,11 @@ class ScenarioKeys(Section):
     """What kind of day fills what is left out of navigation, aircraft.actuators, environment and uncertainty."""
     uncertainty: UncertaintySpec | None = None
     """By how much the flown aircraft differs from its model, 1 sigma. Default: that of the conditions."""
+    normals: Annotated[
+        tuple[Annotated[float, Field(ge=-9, le=9)], ...] | None,
+        *(Strict(False), Field(min_length=sum(NORMALS), max_length=sum(NORMALS))),
+    ] = None
+    """Standard normal numbers from which conditions and uncertainty are drawn in place of the seed. Default: none."""
     simulation: Simulation = Simulation()
     """How finely it is integrated."""
     environment: Environment = Environment()

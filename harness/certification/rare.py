@@ -1,0 +1,160 @@
+"""Small failure probabilities by subset simulation: days are drawn nearer and nearer to failure.
+
+Subset simulation (Au and Beck, Probabilistic Engineering Mechanics 16, 2001, doi:10.1016/S0266-8920(01)00019-4) writes
+a small probability as a product of larger ones: that the margin is below a first level, below a second one if it is
+below the first, and so on down to 0. A pilot run picks the levels. Independent runs keep them, and multiply the days
+below each by Markov chains (generalized splitting: Botev and Kroese, Statistics and Computing 22, 2012). A move is
+reversible with respect to the law of the days and rejected above the level. With fixed levels the estimate of each run
+is therefore unbiased, however slowly its chains mix (Del Moral, Doucet and Jasra, J. R. Statist. Soc. B 68, 2006).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.certification.bounds import clopper_pearson, lognormal_bounds
+
+RUNS: Final = 8
+"""Independent runs; the bounds come from how much they differ."""
+CHAIN: Final = 5
+"""Days of a chain, with that which it begins at: a level is the quantile 1 / CHAIN of the pilot's margins."""
+PILOT_LEAST, PILOT_SHARE, PILOT_MOST = 50, 0.02, 0.25
+"""The pilot has at least so many days at a level, else this share of all, and ends with this share of them."""
+ACCEPTED, ADAPTED = 0.42, 0.7
+"""The pilot adapts the length of the moves until this share stays below the level, and how fast it does so."""
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+Evaluate: TypeAlias = Callable[[FloatArray, IntArray], FloatArray]
+"""Margins (n,) of days, above 0 where the claim holds, from their standard normal numbers (n, d) and seeds (n,)."""
+
+
+@dataclass(frozen=True)
+class Rare:
+    """The probability that a day fails: an unbiased estimate, and bounds of it, each by itself at some confidence.
+
+    `levels`: of the margin, falling. `plain_runs`: days drawn as they come, of which so many failed. `estimates`: of
+    each independent run, 0 where it met no failure. `method`: how the bounds were derived.
+    """
+
+    failure_probability: float
+    failure_lower: float
+    failure_upper: float
+    levels: tuple[float, ...]
+    estimates: tuple[float, ...]
+    plain_runs: int
+    plain_failures: int
+    method: str
+
+
+class _Days(NamedTuple):
+    """Days by their standard normal numbers (n, d), seeds, margins, and the independent run that they belong to."""
+
+    normals: FloatArray
+    seeds: IntArray
+    margins: FloatArray
+    run: IntArray
+
+    def at(self, rows: IntArray) -> _Days:
+        return _Days(self.normals[rows], self.seeds[rows], self.margins[rows], self.run[rows])
+
+
+def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, confidence: float) -> Rare:
+    """Estimates how often the margin of a day is not above 0, with at most `most` evaluations.
+
+    A day consists of so many standard normal numbers, and the seed of all that it draws at random in flight. `seed` is
+    that of the simulation: which days are evaluated, and in which order, depends on it and on the margins alone.
+    """
+    sampler = _Sampler(evaluate, np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,))))
+    levels, lengths, plain, used = sampler.pilot(normals, most)
+    number = (most - used) * CHAIN // (RUNS * (CHAIN + (CHAIN - 1) * len(levels))) // CHAIN * CHAIN
+    days, weights = sampler.first(number, normals, RUNS), np.full(RUNS, 1.0 / number)
+    plain = np.append(plain, days.margins)
+    failed, count = int((plain <= 0.0).sum()), len(plain)
+    for level, length in zip(levels, lengths, strict=True):
+        kept, share = sampler.thinned(days.at(np.flatnonzero(days.margins <= level)), number // CHAIN)
+        days, weights = sampler.multiplied(kept, level, length)[0], weights * share / CHAIN
+    estimates = np.bincount(days.run[days.margins <= 0.0], minlength=RUNS) * weights
+    mean = float(estimates.mean()) if levels else failed / count
+    if levels and estimates.all():
+        low, high = lognormal_bounds(estimates, confidence)
+        method = f"subset simulation, {RUNS} independent runs with fixed levels, their estimates taken as lognormal"
+    else:
+        low, high = clopper_pearson(failed, count, confidence)
+        why = "a run of the subset simulation met none" if levels else "they are not rare"
+        method = f"Clopper-Pearson, failures of the {count} days drawn as they come: {why}"
+    told = tuple(levels), tuple(estimates.tolist()), count, failed
+    return Rare(mean, min(low, mean), max(high, mean), *told, method)
+
+
+@dataclass(frozen=True)
+class _Sampler:
+    """Draws days and moves them."""
+
+    evaluate: Evaluate
+    rng: np.random.Generator
+
+    def first(self, number: int, normals: int, runs: int = 1) -> _Days:
+        """So many days of every run, as they come."""
+        drawn = self.rng.standard_normal((number * runs, normals))
+        seeds = self.rng.integers(0, 2**53, len(drawn))
+        return _Days(drawn, seeds, self.evaluate(drawn, seeds), np.repeat(np.arange(runs), number))
+
+    def pilot(self, normals: int, most: int) -> tuple[list[float], list[float], FloatArray, int]:
+        """Levels, the length of the moves at each, the margins of days drawn as they come, and all days used."""
+        days = self.first(max(PILOT_LEAST, int(PILOT_SHARE * most)), normals)
+        plain, kept, length = days.margins, len(days.run) // CHAIN, 0.5
+        used, levels, lengths = len(plain), [np.inf], [length]
+        while used + kept * (CHAIN - 1) <= PILOT_MOST * most:
+            nearest = np.argsort(days.margins, kind="stable")[:kept]
+            level = float(days.margins[nearest[-1]])
+            if not 0.0 < level < levels[-1]:
+                break
+            days, length = self.multiplied(days.at(nearest), level, length, ADAPTED)
+            used += kept * (CHAIN - 1)
+            levels.append(level)
+            lengths.append(length)
+        known = slice(1, None if len(levels) > 2 else 1)  # with one level, counting is as good
+        return levels[known], lengths[known], plain, used
+
+    def thinned(self, days: _Days, most: int) -> tuple[_Days, FloatArray]:
+        """At most so many days of each run, and how many days one of them stands for then.
+
+        They lie at equal steps in the order of their margins, each as likely as the others (systematic sampling).
+        """
+        count = np.bincount(days.run, minlength=RUNS)
+        step = np.maximum(count / most, 1.0)
+        rows, begin = (
+            np.lexsort((days.margins, days.run)),
+            step * self.rng.random(RUNS) - np.cumsum(count) + count,
+        )
+        place, each = np.arange(len(rows)) + np.repeat(begin, count), np.repeat(step, count)
+        return days.at(rows[np.floor(place / each) < np.floor((place + 1.0) / each)]), step
+
+    def multiplied(
+        self, days: _Days, level: float, length: float, adapted: float = 0.0
+    ) -> tuple[_Days, float]:
+        """The chains that begin at days below a level, and the length of the next move.
+
+        A move takes the normal numbers a part of the way to new ones (preconditioned Crank-Nicolson: Cotter, Roberts,
+        Stuart and White, Statistical Science 28, 2013), and draws the seed anew in one of two cases.
+        """
+        rng, chain = self.rng, [days]
+        for _ in range(CHAIN - 1) if len(days.run) else ():
+            there = np.sqrt(1.0 - length**2) * days.normals + length * rng.standard_normal(days.normals.shape)
+            new = rng.integers(0, 2**53, len(days.seeds))
+            seeds = np.where(rng.random(len(new)) < 0.5, new, days.seeds)
+            moved = days._replace(normals=there, seeds=seeds, margins=self.evaluate(there, seeds))
+            below = moved.margins <= level
+            both = zip(moved, days, strict=True)
+            days = _Days(
+                *(np.where(below if new.ndim == 1 else below[:, None], new, old) for new, old in both)
+            )
+            length = min(1.0, length * float(np.exp(adapted * (below.mean() - ACCEPTED))))
+            chain.append(days)
+        return _Days(*map(np.concatenate, zip(*chain, strict=True))), length

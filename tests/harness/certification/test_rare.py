@@ -1,0 +1,132 @@
+"""Subset simulation: planted systems of known failure probability, and the days of a path by `certify --rare`."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from scipy import stats
+
+import harness.certification.days
+import harness.certification.rare
+from harness.certification.rare import Evaluate, subset_simulation
+from harness.cli.app import main
+
+SIZE = 4
+ALONG = np.array([0.1, -0.7, 0.5, 0.5])
+
+
+def planted(system: str, p: float) -> Evaluate:
+    """Margins of days that fail with this probability: distribution functions of scipy give the place of failure."""
+    away, both_sides, far = stats.norm.isf(p), stats.norm.isf(p / 2), stats.chi(SIZE).isf(p)
+
+    def of_seed(seeds: Any) -> Any:
+        """A standard normal number."""
+        mixed = seeds.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+        mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+        return stats.norm.ppf(((mixed >> np.uint64(11)) + 0.5) / 2.0**53)
+
+    systems: dict[str, Evaluate] = {
+        "one direction": lambda x, _: away - x @ ALONG,
+        "two directions": lambda x, _: both_sides - np.abs(x @ ALONG),
+        "all directions": lambda x, _: far - np.linalg.norm(x, axis=1),
+        "seed in part": lambda x, seeds: (
+            away - math.sqrt(0.7) * (x @ ALONG) - math.sqrt(0.3) * of_seed(seeds)
+        ),
+        "seed alone": lambda _, seeds: away - of_seed(seeds),
+    }
+    return systems[system]
+
+
+def check(system: str, p: float, most: int, times: int) -> tuple[float, float]:
+    """Holds estimates against the truth; returns how many days each took on average, and their variance."""
+    counts: list[int] = []
+    margins = planted(system, p)
+
+    def counted(normals: Any, seeds: Any) -> Any:
+        counts.append(len(seeds))
+        return margins(normals, seeds)
+
+    found = [subset_simulation(counted, SIZE, most, seed, 0.95) for seed in range(times)]
+    estimates = np.array([each.failure_probability for each in found])
+    assert sum(counts) <= most * times
+    assert abs(estimates.mean() - p) < 4.0 * estimates.std() / math.sqrt(times)
+    assert (
+        np.mean([each.failure_lower <= p for each in found]) >= 0.86
+    )  # 0.95 less three standard errors of 60
+    assert np.mean([each.failure_upper >= p for each in found]) >= (0.86 if times < 400 else 0.93)
+    return sum(counts) / times, float(estimates.var())
+
+
+SYSTEMS = ("one direction", "two directions", "all directions", "seed in part", "seed alone")
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_estimates_are_unbiased_and_their_bounds_cover(system: str) -> None:
+    check(system, 5e-3, 3000, 60)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("p", [1e-1, 1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_upper_bounds_cover_in_400_repetitions_and_rare_failures_need_fewer_days(
+    system: str, p: float
+) -> None:
+    days, variance = check(system, p, 10_000, 400)
+    if p == 1e-4 and system == "one direction":
+        assert p * (1.0 - p) / variance >= 20.0 * days  # what plain sampling takes for that standard error
+
+
+def test_where_no_day_fails_the_bound_is_that_of_counting_and_says_how_near_it_came() -> None:
+    found = subset_simulation(lambda x, _: 1.0 + np.exp(x[:, 0]), SIZE, 3000, 1, 0.95)
+    assert (found.failure_probability, found.failure_lower) == (0.0, 0.0)
+    assert found.failure_upper == pytest.approx(1.0 - 0.05 ** (1.0 / found.plain_runs), rel=1e-9)
+    assert 1.0 < found.levels[-1] < found.levels[0] < 2.0
+    endless = subset_simulation(lambda x, _: np.full(len(x), np.inf), SIZE, 3000, 1, 0.95)
+    assert endless.levels == ()
+    assert endless.plain_runs > 2900
+
+
+@pytest.mark.flights
+def test_days_of_a_path_are_the_same_for_any_number_of_workers_and_after_an_interruption(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(harness.certification.days, "LEAST_RARE", 100)
+    monkeypatch.setattr(harness.certification.rare, "PILOT_LEAST", 20)
+    monkeypatch.setattr(harness.certification.rare, "PILOT_MOST", 0.3)
+    (tmp_path / "path.csv").write_text("east_m,north_m\n0,0\n300,0\n")
+    limits = {"trackability.cross_track_m": 2.9, "trackability.altitude_m": 30.0}
+    words = ["certify", str(tmp_path / "path.csv"), "--aircraft", "aerosonde", "--conditions", "typical"]
+    words += [word for key, value in limits.items() for word in ("--set", f"{key}={value}")]
+    words += ["--vary", "environment.wind.from_deg=0:360", "--rare", "--runs", "220", "--probability", "0.5"]
+
+    def certify(name: str, *more: str) -> dict[str, Any]:
+        assert main([*words, *more, "--out", str(tmp_path / name)]) == 0
+        return {**json.loads((tmp_path / name / "certificate.json").read_text()), "command": ""}
+
+    one, two = certify("one", "--workers", "1"), certify("two", "--workers", "2")
+    assert one == two
+    lines = (tmp_path / "two" / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    (tmp_path / "two" / "journal.jsonl").write_bytes(b"".join(lines[:60]))
+    assert certify("two", "--resume") == one
+    tables = [(tmp_path / name / "results.parquet").read_bytes() for name in ("one", "two")]
+    assert tables[0] == tables[1]
+    rows, found = pq.read_table(tmp_path / "one" / "results.parquet").to_pylist(), one["rare"]
+    assert one["runs"] == len(rows) <= 220
+    assert len({(row["seed"], row["environment.wind.from_deg"]) for row in rows}) == len(rows)
+    assert len(found["levels"]) >= 2
+    assert one["probability_upper"] == pytest.approx(1.0 - found["failure_lower"])
+    for line in (tmp_path / "one" / "journal.jsonl").read_text().splitlines():
+        row = json.loads(line)["row"]
+        used = (row["deviation_from_given_m.max"] / 2.9, row["altitude_error_m.max"] / 30.0)
+        assert row["margin"] == pytest.approx(max(1.0 - max(used), 0.0), abs=1e-8)
+    kept = one["failing_runs"][0]
+    report = (tmp_path / "one" / "runs" / str(kept) / "metrics.json").read_text()
+    assert json.loads(report)["digest"] == rows[kept]["digest"]
+    assert main(["fly", "--from", str(tmp_path / "one" / "results.parquet"), "--run", "0"]) == 2
+    assert "was not kept" in capsys.readouterr().err
