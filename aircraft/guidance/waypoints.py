@@ -175,7 +175,7 @@ class WaypointLaw:
         """Decides the roll command for the next update interval."""
         if self._progress is None:
             raise RuntimeError("follow() a route before update()")
-        while self._leg < len(self._legs) - 1 and self._is_over(state):
+        while self._is_over(state) and self._leg < len(self._legs) - 1:  # a last circle is counted too
             self._begin_next_leg()
         decided, place = self.law.update(state), self.along(state)
         return decided._replace(
