@@ -2,8 +2,8 @@
 
 A row each planner and wind, in Markdown; then every planner in pairs with `rolling_window` in the same world and wind.
 With `planner/MEASURED.md` behind it, the tables are put there. Only worlds that every planner has flown count, so that
-a campaign which is still being flown compares like with like. The campaign's page has the rest; `wayproof report FOLDER
---format latex` and `csv` have its own table.
+a campaign which is still being flown compares like with like; of a flight in several folders the last one counts. The
+campaign's page has the rest; `wayproof report FOLDER --format latex` and `csv` have its own table.
 """
 
 from __future__ import annotations
@@ -49,6 +49,7 @@ def load(folders: Sequence[Path]) -> pd.DataFrame:
         ]
     )
     rows["case"] = rows.world + rows[WIND].astype(str)
+    rows = rows.drop_duplicates(["case", "planner"], keep="last")
     planners = rows.groupby("case").planner.nunique()
     rows = rows[rows.case.map(planners) == rows.planner.nunique()].copy()
     rows["reached"] = rows.outcome == "reached"
