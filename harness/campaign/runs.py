@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from harness.analysis.metric import Claim
-from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
+from harness.campaign.campaign_file import MAX_RUNS, Base, CampaignFile
 from harness.campaign.flight import Job
 from harness.campaign.results import LAW_KEY, RESULTS, RUN, RUNS, fly_again, read_table
 from harness.campaign.sampling import takes_whole_numbers
@@ -27,6 +27,7 @@ from harness.files.strict_yaml import InputError, Loc, Node, Scalar, fault_line,
 from harness.run_files.run_folder import SCENARIO
 from harness.scenario.generators import generated
 from harness.scenario.scenario import Scenario, overridden, packed, scenario_from, unpacked, with_key
+from harness.scenario.sections import PlannerSpec
 from harness.scenario.validation import KeyFaults, in_lines
 
 SEED_STREAM, WORLD_STREAM, DRAW_STREAM = range(3)
@@ -81,7 +82,7 @@ class CampaignRuns:
         self._entries = [self._entry_axis(*each) for each in (KIND, MODEL)]
         self._pairs = [len(axis) for axis in self._entries]
         self._sizes = [len(bases), len(campaign.worlds) or 1, *(len(axis) for axis in self._grid)]
-        own = [(base.text(KIND, "rolling_window"), base.text(MODEL, "aerosonde")) for base in bases]
+        own = [(_planner_of(base), base.text(MODEL, "aerosonde")) for base in bases]
         planners_of, models_of = map(list, zip(*own, strict=True))
         self.planners = [each.label for each in campaign.planners] or planners_of
         self.aircraft = [each.model for each in campaign.aircraft] or models_of
@@ -281,6 +282,12 @@ class CampaignRuns:
 
     def _line(self, origin: Loc, sentence: str) -> str:
         return fault_line(self.file.source, self.file.root.line_of(origin), origin, sentence)
+
+
+def _planner_of(base: Base) -> str:
+    """Returns the label of a scenario's own planner."""
+    kind, shield = base.text(KIND, "rolling_window"), base.text(("planner", "shield"), "")
+    return PlannerSpec.model_construct(kind=kind, shield=shield).label
 
 
 def _chosen_changes(axes: Sequence[_Axis], indices: Sequence[int]) -> list[_Change]:

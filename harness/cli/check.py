@@ -13,7 +13,7 @@ import typer
 from harness.cli.command_line import FAILED, flying_into, print_json, told_apart
 from harness.cli.flight_rows import verdict_rows
 from harness.cli.options import AircraftName, Count, Json, NoRecording, Number, Out, Quiet, argument, option
-from harness.cli.replacing import NOTHING, Given, replacing
+from harness.cli.replacing import NOTHING, Given, replacing, sources
 from harness.cli.terminal import plain, print_table, say
 
 if TYPE_CHECKING:
@@ -99,9 +99,13 @@ def check(
     if days is not None:
         from harness.certification.days import PathDays
         from harness.cli.certify import fly_path_days
+        from harness.scenario.kinds import own_words
 
         content = f"{path.read_bytes().hex()} {differs} {replaced} {world and world.read_text()}"
-        again = ["wayproof", "check", str(path), "--aircraft", aircraft]
+        again = ["wayproof", "check", str(path), "--aircraft", aircraft, *own_words(None, given.guidance)]
+        again += [word for name, value in differs for word in (f"--{name.replace('_', '-')}", value)]
+        own = ("aircraft.model", *(["guidance.kind"] if sources(given.guidance) else []))
+        again += [word for key, value in replaced if key not in own for word in ("--set", f"{key}={value}")]
         drawn = PathDays(on_day, content, again, {}, claim="as-given", most=days, band=True)
         fly_path_days(drawn, folder, silent=quiet or as_json)
     return 0 if metrics["check"]["ok"] else FAILED

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AliasPath, BaseModel, ConfigDict, Field, FiniteFloat, PlainValidator, ValidationError
 
 from aircraft.frames import LocalPlane
-from harness.files.input_file import MAX_JSON_BYTES, InputError, read_text
+from harness.files.input_file import MAX_JSON_BYTES, InputError, parsed_json, read_text, shown
 from harness.files.mavlink.commands import FLOWN, JUMP, WAYPOINT, name_of
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
@@ -156,12 +156,15 @@ def _parameter(parameters: Mapping[str, float], names: Mapping[str, float]) -> f
 
 
 def _of_json(text: str, source: str) -> FlownMission:
+    content = parsed_json(text, source)
+    if isinstance(content, dict) and not isinstance(frame := content.get("frame"), dict | None):
+        raise InputError(f"{source}: frame: is {shown(repr(frame))}; must be a mapping")
     try:
-        return FlownMission.model_validate_json(text, by_name=False)
+        return FlownMission.model_validate(content, by_name=False)
     except ValidationError as error:
         first: Any = error.errors()[0]
-        if first["type"] == "json_invalid":
-            raise InputError(f"{source}: is no JSON ({first['msg']})") from error
-        value = "is missing" if first["type"] == "missing" else f"is {str(first['input'])[:80]!r}"
-        right = CORNERS_WANTED if "corners_east_north_m" in first["loc"] else "a number"
-        raise InputError(f"{source}: {'.'.join(map(str, first['loc']))}: {value}; must be {right}") from error
+        value = "is missing" if first["type"] == "missing" else f"is {shown(repr(first['input']))}"
+        right = "a mapping" if first["type"].startswith("model") else "a number"
+        right = CORNERS_WANTED if "corners_east_north_m" in first["loc"] else right
+        where = ".".join(map(str, first["loc"])) or "the file"
+        raise InputError(f"{source}: {where}: {value}; must be {right}") from error

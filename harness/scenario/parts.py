@@ -189,7 +189,8 @@ def _named(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKin
     """The kind that a section names."""
     if spec.kind in kinds:
         return kinds[spec.kind]
-    told = f"is {spec.kind[:40]!r}; must be one of {', '.join(kinds)}"
+    known = ", ".join(kind for kind in kinds if not is_source(kind))
+    told = f"is {spec.kind[:40]!r}; must be one of {known}"
     if is_source(spec.kind):
         name = spec.kind[:80]
         told = f"is {name!r}, which no file may name: code is only run for --{section} {name}, or in Python"

@@ -219,6 +219,22 @@ def test_worlds_need_no_scenario(place: Path) -> None:
     assert (runs.scenario(0).planner.kind, runs.scenario(0).aircraft.model) == ("rolling_window", "aerosonde")
 
 
+@pytest.mark.parametrize(
+    ("planner", "label"),
+    [
+        ("{kind: bug2, shield: loiter}", "bug2+shield"),
+        ("{kind: bug2+shield}", "bug2+shield"),
+        ("{kind: bug2}", "bug2"),
+    ],
+)
+def test_the_planner_of_a_scenario_is_named_with_its_shield(place: Path, planner: str, label: str) -> None:
+    own = SCENARIO.format(name="own").replace("{kind: rolling_window, clearance_m: 40}", planner)
+    (place / "own.yaml").write_text(own)
+    runs = runs_of(place, "schema: wayproof/campaign/1\nname: c\nseed: 1\nscenarios: [own.yaml]\n")
+    assert runs.cells(0)["planner"] == label
+    assert runs.scenario(0).planner.label == label
+
+
 def test_scenarios_are_files_folders_and_shipped_names(place: Path) -> None:
     (place / "more" / "._a.yaml").write_bytes(b"\x00\x05\x16\x07")
     (place / "more" / ".#b.yaml").symlink_to("somebody@somewhere.1234")
@@ -324,8 +340,8 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
         ("airspeed_mps: 50}", "airspeed_mps: 500}", "aircraft[1].airspeed_mps: "),
         (
             "draws: 3",
-            "worlds: [{circles: {}, forest: {}}]",
-            "worlds[0].circles: unknown key; known here: label, ",
+            "worlds: [{circles: {}}]",
+            "worlds[0].circles: is no generator; write forest with trunks: [1, 1] in its place",
         ),
         ("draws: 3", "worlds: [{}]", "worlds[0].forest: is missing"),
         ("draws: 3", "worlds: [{forest: {}}, {forest: {}}]", "worlds[1]: is called forest as another"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -329,3 +330,28 @@ def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
     assert {"/plan/band", "/world/band", "/plan/whole_track"} <= drawn
     assert main(["report", str(tmp_path / "run")]) == 0
     assert "where 95 % of 3 days fly" in (tmp_path / "run" / "report.html").read_text()
+
+
+@pytest.mark.flights
+def test_a_failing_day_is_flown_again_by_the_command_of_its_manifest(tmp_path: Path) -> None:
+    path = tmp_path / "line.csv"
+    path.write_text("x_m,y_m\n0,0\n1500,0\n")
+    run = [
+        "check",
+        str(path),
+        "--aircraft",
+        "aerosonde",
+        "--conditions",
+        "typical",
+        "--altitude-m",
+        "700",
+        "--seed",
+        "9",
+    ]
+    run += ["--tolerance-m", "0.01", "--set", "aircraft.autopilot.bank_limit_deg=40", "--quiet"]
+    assert main([*run, "--days", "1", "--out", str(tmp_path / "run")]) == 1
+    (day,) = (tmp_path / "run" / "days" / "runs").iterdir()
+    (command,) = json.loads((day / "manifest.json").read_text())["command"]
+    assert main([*shlex.split(command)[1:], "--no-recording", "--out", str(tmp_path / "again")]) == 1
+    again, flown_day = load_run(tmp_path / "again"), load_run(day)
+    assert again.metrics["digest"] == flown_day.metrics["digest"]

@@ -201,6 +201,7 @@ def test_a_log_of_positions_alone_shows_the_same_wind_and_laps(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("change", "told"),
     [
+        ({"mission": {"corners_east_north_m": SQUARE}, "frame": "ENU"}, "frame: is 'ENU'; must be a mapping"),
         ({"mission": {}, "corners_m": SQUARE}, "mission.corners_east_north_m: is missing"),
         ({"mission": {"corners_east_north_m": [[0, 0], [1]]}}, "must be two or more pairs"),
         ({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": "45"}}, "bank_limit_deg: is '45'"),
