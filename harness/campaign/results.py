@@ -168,6 +168,7 @@ class Runs:
         about = json.loads((results.schema.metadata or {}).get(b"wayproof", b"{}"))
         self.campaign: Mapping[str, Any] = about.get("campaign", {})
         self.planned: int | None = about.get("runs")
+        self.rare: bool = about.get("rare", False)  # drawn near failure by a subset simulation
         self._count = results.num_rows
         self._columns: dict[str, list[Any]] = {
             name: [None if value != value else value for value in results[name].to_pylist()]

@@ -20,6 +20,7 @@ from harness.cli.terminal import plain, print_table, say, step_bar
 if TYPE_CHECKING:
     from harness.certification.certification import Certificate, Tally, Terms
     from harness.certification.days import Days
+    from harness.certification.rare import Rare
 
 SHOWN: Final = 5
 """Ways to fail, and quantities that explain failures, that are printed; the file has all."""
@@ -157,12 +158,8 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
         f"{share(certificate.probability_upper, up=True)} (each bound at confidence {sure})",
         "bounds": certificate.method,
     }
-    if (rare := certificate.rare) is not None:
-        rows["held"] += ", drawn near failure"
-        rows["failure"] = (
-            f"{rare.failure_probability:.2g}; at least {rare.failure_lower:.2g}, at most {rare.failure_upper:.2g}"
-        )
-        rows["levels"] = ", ".join(f"{each:.3g}" for each in rare.levels) or "none: failures are not rare"
+    if certificate.rare is not None:
+        rows |= _rare_rows(certificate.rare, rows["held"])
     claimed = certificate.probability
     asked = "" if claimed is None else f": holds on at least {claimed:.6g} of the days"
     rows["verdict"] = f"[{STYLE[certificate.verdict]}]{certificate.verdict}[/]{asked}"
@@ -177,6 +174,13 @@ def certificate_rows(certificate: Certificate) -> dict[str, str]:
         worst = f"most at {plain(quantity.worst)}: {quantity.failed} of {quantity.runs}"
         rows[plain(quantity.key)] = f"explains {100 * quantity.share:.0f} % of the failures; {worst}"
     return rows
+
+
+def _rare_rows(rare: Rare, held: str) -> dict[str, str]:
+    bounds = f"at least {rare.failure_lower:.2g}, at most {rare.failure_upper:.2g}"
+    levels = ", ".join(f"{each:.3g}" for each in rare.levels)
+    told = {"failure": f"probability {rare.failure_probability:.2g}, {bounds}"}
+    return told | ({"held": f"{held}, drawn near failure", "levels": f"{levels} (margin)"} if levels else {})
 
 
 def share(value: float, up: bool = False) -> str:
