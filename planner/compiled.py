@@ -35,7 +35,7 @@ BOOLS_OUT, COUNTS_OUT, FLOATS_OUT, PLACES_OUT = "boolean[::1]", "intp[::1]", "fl
 """Arrays that a function changes."""
 
 STARTS_BYTES = 2500
-"""A second process starts in about the time in which so much byte code is compiled."""
+"""Starting a second process takes about as long as compiling this many bytes of byte code."""
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -64,6 +64,7 @@ class Compiled(Generic[P, R]):
         return self._code(*args)
 
     def _compile_first(self, *args: Any) -> R:
+        """The first call: compiles the function with all others that wait, then calls it."""
         compile_all()
         if self.rare:
             with _compiling:
@@ -96,7 +97,7 @@ _compiling = threading.RLock()
 
 
 def compiled(*arguments: str, rare: bool = False) -> Callable[[Callable[P, R]], Compiled[P, R]]:
-    """Has a function compiled for arguments of these types."""
+    """Decorates a function that is compiled later, for arguments of these types."""
 
     def compile_later(function: Callable[P, R]) -> Compiled[P, R]:
         made = Compiled(function, arguments, rare)
@@ -112,7 +113,7 @@ def _functions(module: str = "") -> list[Compiled[..., Any]]:
 
 
 def compile_all(rare: bool = False) -> None:
-    """Compiles all functions imported so far that are not yet nor are rare: some seconds the first time, then tenths.
+    """Compiles all functions imported so far but the rare ones: some seconds the first time, then tenths of one.
 
     The first time is told by one line on standard error, where that is a terminal. Where there are two processors, a
     second process compiles half of them meanwhile. With `rare` those are compiled as well.
@@ -166,7 +167,7 @@ class _SecondProcess:
         atexit.register(self._end)
 
     def wait(self) -> None:
-        """Waits for its end."""
+        """Waits until the process ends."""
         try:
             self._process.wait()
         finally:
@@ -212,7 +213,7 @@ def _compile(functions: Sequence[Compiled[..., Any]]) -> None:
 
 
 def _share(functions: Sequence[Compiled[..., Any]], busy_bytes: int) -> frozenset[str]:
-    """The modules that a second process compiles, so that both end at the same time."""
+    """Chooses the modules that a second process compiles, so that both processes end at about the same time."""
     # Functions of one module call each other, so that a module stays whole.
     sizes: Counter[str] = Counter()
     for each in functions:
@@ -238,6 +239,6 @@ def own_this_process() -> None:
 
 
 def _tell(line: str) -> None:
-    """Tells a person who waits; a script is not told."""
+    """Writes a line to standard error where that is a terminal."""
     if sys.stderr is not None and sys.stderr.isatty():
         sys.stderr.write(f"{line}\n")

@@ -1,4 +1,4 @@
-"""What every planner must be, as tests that its author can run.
+"""The requirements on every planner, as tests that its author can run.
 
     from planner.contract import PlannerContract
 
@@ -53,10 +53,12 @@ MISSION = Mission(
 )
 START: Point = (1000.0, 1000.0)
 AHEAD: Point = (math.sqrt(0.5), math.sqrt(0.5))
+"""Unit vector of the course at `START`."""
 CIRCLES: tuple[Disc, ...] = ((7000.0, 5000.0, 1500.0), (12_000.0, 8200.0, 900.0), (15_500.0, 9000.0, 800.0))
 
 ASKED_EVERY_S = 0.5
 AMONG_CIRCLES_S, IN_THE_OPEN_S = 300.0, 1500.0
+"""Longest flights of the tests, among `CIRCLES` and in an empty world."""
 SPACING_M = 50.0
 """Distance between neighbouring edge points."""
 
@@ -84,7 +86,7 @@ class GivenMap:
 
 
 class InRange(GivenMap):
-    """A seen world in which everything within range of a place of the flight has been seen."""
+    """The map of a flight among circles: edges that came within range of a place that was flown through."""
 
     def __init__(self, circles: Sequence[Disc], range_m: float) -> None:
         super().__init__(np.zeros((0, 2)))
@@ -157,6 +159,7 @@ def make(kind: PlannerKind, mission: Mission) -> Planner:
 
 @cache
 def _among_circles(kind: PlannerKind, mission: Mission) -> ContractFlight:
+    """A flight among `CIRCLES`, made once for a kind."""
     return ContractFlight(kind, mission, CIRCLES, AMONG_CIRCLES_S)
 
 
@@ -172,7 +175,7 @@ def arrays_in(value: Any) -> list[FloatArray]:
 
 
 def bits(plan: Plan) -> tuple[object, ...]:
-    """All that a plan says, to be compared bit for bit."""
+    """Status, reason and the bytes of all arrays of a plan, to be compared bit for bit."""
     return (plan.status, plan.reason, *((a.shape, a.tobytes()) for a in arrays_in(plan)))
 
 

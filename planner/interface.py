@@ -1,4 +1,4 @@
-"""What goes into a planner and what comes out.
+"""The request to a planner, its answer, and the map that it may know.
 
 Frame: local ENU plane, x = east, y = north, metres. Directions are unit vectors, never angles.
 Curvature is positive for a left (counter-clockwise) turn.
@@ -21,24 +21,26 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 ComplexArray = NDArray[np.complex128]
 
-OFF_PATH = 4.0
-"""The aircraft has left a path when it is this many times the tracking error away from it."""
-NOT_UNIT = 1e-6
-"""A tangent is a unit vector if its length differs from 1 by less than this."""
-MOST_DRAWN = 1_000_000
-"""An array of a picture has no more rows."""
+OFF_PATH_ERRORS = 4.0
+"""An aircraft further from a path than this many tracking errors has left it."""
+UNIT_TOLERANCE = 1e-6
+"""A tangent counts as a unit vector if its length differs from 1 by less than this."""
+MOST_ROWS = 1_000_000
+"""Most rows of an array in a picture."""
 
 
 def _frozen(array: FloatArray) -> FloatArray:
+    """A read-only copy of an array."""
     copy = np.array(array, dtype=np.float64)
     copy.setflags(write=False)
     return copy
 
 
 def _drawn(name: str, points: FloatArray, columns: int) -> FloatArray:
+    """A read-only copy of an array of a picture; ValueError if it is not finite and of shape (n, `columns`)."""
     kept = _frozen(points)
-    if kept.ndim != 2 or kept.shape[1] != columns or len(kept) > MOST_DRAWN or not np.isfinite(kept).all():
-        must = f"finite, of shape (n, {columns}), n at most {MOST_DRAWN:,}"
+    if kept.ndim != 2 or kept.shape[1] != columns or len(kept) > MOST_ROWS or not np.isfinite(kept).all():
+        must = f"finite, of shape (n, {columns}), n at most {MOST_ROWS:,}"
         raise ValueError(f"{name} of a picture has the shape {kept.shape}; it must be {must}")
     return kept
 
@@ -91,11 +93,11 @@ class MapView(Protocol):
 
     @property
     def moving(self) -> tuple[MovingEdges, ...]:
-        """Obstacles known to move; their edge points are not among those of `edges_since`."""
+        """The obstacles known to move; `edges_since` leaves out their edge points."""
 
     @property
     def last_contradiction_s(self) -> float:
-        """Simulated time of the latest edge in space that had been seen to be free; -inf: there was none."""
+        """Simulated time when an edge last appeared in space that had been seen to be free; -inf: never."""
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after `revision`, oldest first; all of them after -1."""
@@ -109,7 +111,7 @@ class MapView(Protocol):
 
 @dataclass(frozen=True)
 class Mission:
-    """What stays the same for a whole flight."""
+    """What a planner is told once for a whole flight: goal, area, aircraft and sensor."""
 
     goal_m: tuple[float, float]
     """(east, north) of the goal."""
@@ -156,7 +158,7 @@ class Mission:
     @property
     def off_path_m(self) -> float:
         """If the aircraft is further than this from the path in effect, a new path begins at the aircraft itself."""
-        return max(1.0, OFF_PATH * self.tracking_error_m)
+        return max(1.0, OFF_PATH_ERRORS * self.tracking_error_m)
 
     @property
     def ground_speed_mps(self) -> float:
@@ -293,7 +295,7 @@ class Plan:
         object.__setattr__(self, "waypoints_m", _frozen(self.waypoints_m))
         if self.path is not None:
             lengths = np.hypot(*self.path.segments[:, 2:4].T)
-            for i in np.flatnonzero(~(np.abs(lengths - 1.0) < NOT_UNIT)).tolist():
+            for i in np.flatnonzero(~(np.abs(lengths - 1.0) < UNIT_TOLERANCE)).tolist():
                 told = f"begins with a tangent of length {lengths[i]:.9g}; tangents are unit vectors"
                 raise ValueError(f"segment {i} of a plan's path {told}")
 

@@ -1,4 +1,4 @@
-"""Compiled code on disk, each file with its SHA-256: damaged code would end the process, or be flown with."""
+"""Checks compiled code on disk by a SHA-256: damaged code would end the process, or be flown with."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 SEAL_BYTES = 32
-"""Length of the SHA-256 behind the content of a file, which unpickling does not read."""
+"""Length of the SHA-256 at the end of a file, which unpickling does not read."""
 FRAME = b"\x80\x05\x95"
-"""How an index begins: numba's version as a pickle of one frame, whose length follows in eight bytes."""
+"""First bytes of an index: numba's version, a pickle of one frame, whose length follows in eight bytes."""
 
 
 @functools.cache
 def seal() -> None:
-    """Has numba write a SHA-256 behind what it keeps, and compile anew where that is another."""
+    """Has numba append a SHA-256 to each file of compiled code, and compile again where it does not match."""
     _put_off_linear_algebra()
     from numba.core.caching import IndexDataCacheFile as File
 
@@ -42,7 +42,7 @@ def seal() -> None:
 
 
 def _put_off_linear_algebra() -> None:
-    """Has numba import `scipy.linalg`, a seventh of a second, when code asks for it, not to see whether it is there."""
+    """Has numba import `scipy.linalg`, which takes a seventh of a second, only when compiled code uses it."""
     linalg: Any = import_module("numba.np.linalg")
     ensure = linalg.ensure_blas
     linalg.ensure_blas = lambda: None  # which `arraymath` calls once, when it is imported
@@ -54,19 +54,19 @@ def _put_off_linear_algebra() -> None:
 
 
 def _is_whole(path: Path, is_index: bool = False) -> bool:
-    """Whether a file is as it was written; where it is not, that is told."""
+    """Tells whether a file matches its SHA-256; if not, says so on standard error."""
     data = path.read_bytes()
     begin = 0
     if is_index:
         begin = len(FRAME) + 8 + int.from_bytes(data[3:11], "little") if data.startswith(FRAME) else len(data)
     whole = sha256(data[begin:-SEAL_BYTES]).digest() == data[begin:][-SEAL_BYTES:]
     if not whole:
-        _tell(str(path.parent))
+        _tell_damaged(str(path.parent))
     return whole
 
 
 @functools.cache
-def _tell(folder: str) -> None:
-    sys.stderr.write(
-        f"wayproof: compiled code in {folder} is damaged, or of an older version: compiled anew\n"
-    )
+def _tell_damaged(folder: str) -> None:
+    """Says once for a folder that its compiled code is damaged."""
+    told = f"compiled code in {folder} is damaged, or of an older version: compiled anew"
+    sys.stderr.write(f"wayproof: {told}\n")

@@ -1,4 +1,4 @@
-"""What a planner remembers of the flight so far: edge points, gathered into obstacles."""
+"""A planner's memory of a flight: the edge points seen so far, gathered into obstacles."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from planner.interface import FloatArray, IntArray, MapView
 from planner.kernels.buckets import cells_of, joined
 
-FIRST_MOVING = -1000
-"""Label of the first obstacle that moves; the next ones have the numbers below it."""
-MOVED = 0.3
-"""An outline that has moved less than this share of a cell is left where it was."""
-NOTHING = np.zeros((0, 2))
+FIRST_MOVING_LABEL = -1000
+"""Label of the first moving obstacle; further ones have the numbers below it."""
+MOVED_SHARE = 0.3
+"""A moving outline is brought up to date once it has moved by this share of a cell."""
+NO_POINTS = np.zeros((0, 2))
 
 
 class ObstacleMemory:
@@ -27,26 +27,26 @@ class ObstacleMemory:
     def __init__(self, clearance_m: float) -> None:
         self.cell_m = clearance_m / math.sqrt(2.0)
         self.cleared = 0
-        """How many edge points have been cleared so far; the others have moved up in their order by no more."""
+        """Number of edge points cleared so far; no other has moved up by more places in their order."""
         self.ever_cleared = False
         """Whether an edge point that had been seen was cleared again: the sensor errs, or something has gone."""
         self._outlines: Sequence[FloatArray] = ()
         self._revision = -1
-        self._forget()
+        self._drop_all()
 
-    def _forget(self) -> None:
-        self._points, self._genuine = NOTHING, np.zeros(0, dtype=np.bool_)
+    def _drop_all(self) -> None:
+        self._points, self._genuine = NO_POINTS, np.zeros(0, dtype=np.bool_)
         self._labels: IntArray | None = None
         self._with_moving: FloatArray | None = None
 
     @property
     def known(self) -> int:
-        """How many of the points stand still: the first ones, in the order in which they came in."""
+        """Number of points that stand still: they come first, in the order in which they came in."""
         return len(self._points)
 
     @property
     def points_m(self) -> FloatArray:
-        """(m, 2) edge points, those of what moves last; what comes in later does not change what was given."""
+        """(m, 2) edge points, those of moving obstacles last; later calls do not change this array."""
         if self._with_moving is None:
             moving = self._outlines
             self._with_moving = np.concatenate((self._points, *moving)) if moving else self._points
@@ -54,59 +54,60 @@ class ObstacleMemory:
 
     @property
     def labels(self) -> IntArray:
-        """(m,) the obstacle that each point belongs to; each that moves is one."""
+        """(m,) label of the obstacle that each point belongs to; each moving obstacle has its own."""
         if self._labels is None:
             self._labels = obstacles_of(self._points, self.cell_m)
-        numbers = [np.full(len(outline), FIRST_MOVING - i) for i, outline in enumerate(self._outlines)]
+        numbers = [np.full(len(outline), FIRST_MOVING_LABEL - i) for i, outline in enumerate(self._outlines)]
         return np.concatenate((self._labels, *numbers)) if numbers else self._labels
 
     @property
     def standing_m(self) -> FloatArray:
-        """(`known`, 2) the points of what stands still, refused places among them."""
+        """(`known`, 2) points that stand still, refused places among them."""
         return self._points
 
     @property
     def met_m(self) -> FloatArray:
-        """(k, 2) the others: what moves, where it is met."""
+        """(k, 2) points of moving obstacles, where they will be met."""
         return self.points_m[self.known :]
 
     @property
     def genuine_m(self) -> FloatArray:
-        """(k, 2) those points that were seen to stand still, not refused."""
+        """(k, 2) points seen to stand still, without refused places."""
         return self._points if self._genuine.all() else self._points[self._genuine]
 
     @property
     def refused_m(self) -> FloatArray:
-        """(k, 2) those points that were refused."""
+        """(k, 2) refused places."""
         return self._points[~self._genuine]
 
     def refuse(self, place: tuple[float, float]) -> None:
-        """Remembers a place as if there were an edge: it is not to be gone to again."""
+        """Remembers a place as an edge point, so that no path leads there again."""
         self._add(np.array([place]), genuine=False)
 
     def forgive(self) -> None:
-        """Forgets what was refused."""
+        """Forgets the refused places."""
         if not self._genuine.all():
-            self._keep_only(self.genuine_m, NOTHING)
+            self._keep_only(self.genuine_m, NO_POINTS)
 
     def take_in(self, seen: MapView, met: Sequence[FloatArray] | None = None) -> FloatArray:
-        """Remembers what has come in since the last call, and returns it: (k, 2). Lets go of what was taken back."""
-        fresh = NOTHING if seen.revision == self._revision else self._take_in(seen)
+        """Takes in and returns the (k, 2) edge points new since the last call; forgets those that the map removed."""
+        fresh = NO_POINTS if seen.revision == self._revision else self._take_in(seen)
         outlines = [each.points_m for each in seen.moving] if met is None else met
-        if not (outlines or self._outlines) or self._alike(outlines):
+        if not (outlines or self._outlines) or self._unmoved(outlines):
             return fresh
         self._outlines, self._with_moving = tuple(outlines), None
         return np.concatenate((fresh, *outlines))
 
-    def _alike(self, outlines: Sequence[FloatArray]) -> bool:
-        """Whether what moves is where it was, but for a little."""
+    def _unmoved(self, outlines: Sequence[FloatArray]) -> bool:
+        """Tells whether moving outlines are still where they were, to `MOVED_SHARE` of a cell."""
         return len(outlines) == len(self._outlines) and all(
-            np.abs(edge(new, axis=0) - edge(old, axis=0)).max() < MOVED * self.cell_m
+            np.abs(edge(new, axis=0) - edge(old, axis=0)).max() < MOVED_SHARE * self.cell_m
             for new, old in zip(outlines, self._outlines, strict=True)
             for edge in (np.min, np.max)
         )
 
     def _take_in(self, seen: MapView) -> FloatArray:
+        """Takes in the edge points of the map that stand still."""
         fresh = seen.edges_since(self._revision)
         if seen.last_removal_revision > self._revision >= 0:
             self.ever_cleared, known = True, seen.edges_since(-1)
@@ -117,9 +118,9 @@ class ObstacleMemory:
         return fresh
 
     def _keep_only(self, genuine_m: FloatArray, refused_m: FloatArray) -> None:
-        """Begins anew with what is left; what was refused comes first, so that nothing else moves up."""
+        """Begins anew with the points left; refused places come first, so that no other moves up in the order."""
         self.cleared += self.known - len(genuine_m) - len(refused_m)
-        self._forget()
+        self._drop_all()
         self._add(refused_m, genuine=False)
         self._add(genuine_m, genuine=True)
 

@@ -37,5 +37,5 @@ class NearestEdge:
 
 
 def distance_to_edges(seen: MapView, points_m: FloatArray) -> FloatArray:
-    """The same for a map that is asked once: its method `distance_m`."""
+    """(k,) distances to the nearest edge point, +inf where there is none; serves a map as its `distance_m`."""
     return NearestEdge(seen).distance_m(points_m)

@@ -1,4 +1,4 @@
-"""What a planner's answer must be before anything is flown by it.
+"""Checks a planner's answer before it is flown.
 
 An answer comes from code of others. It is read once, attribute by attribute; what is flown, judged and recorded is a
 copy of what was read. A path is refused, with the number of the segment and the figure, if it does not begin at the
@@ -14,22 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from planner.interface import NOT_UNIT, FloatArray, Mission, Path, Plan, PlanPicture, PlanStatus
+from planner.interface import UNIT_TOLERANCE, FloatArray, Mission, Path, Plan, PlanPicture, PlanStatus
 
 MOST_REASON_LETTERS = 2000
 """A reason is one sentence, no longer than this."""
 MOST_SEGMENTS = 100_000
-"""A path has no more segments, and a plan no more waypoints. A sampled curve of 100 km at 1 m has as many."""
+"""Most segments of a path and most waypoints of a plan: as many as a curve of 100 km sampled at 1 m has."""
 LONGEST_M, MOST_TURNING_RAD = 1e7, 1e5
-"""A path is no longer: five times across the largest area; and turns no more: 16,000 full turns."""
+"""Greatest length of a path, five times across the largest area, and most that it may turn: 16,000 full turns."""
 FURTHEST_M = 1e8
-"""No waypoint lies further east, west, north or south of the origin."""
+"""Largest coordinate of a waypoint, east, west, north or south of the origin."""
 START_S = 1.0
-"""A path may begin so much flying time ahead of the aircraft or behind it; see `start_tolerance_m`."""
+"""A path may begin this much flying time ahead of the aircraft or behind it; see `start_tolerance_m`."""
 JOIN_M = 0.1
-"""A segment begins no further than this from where the one before ends; a loiter ends so near to its beginning."""
+"""Largest gap between two segments, and between the end of a loiter and its beginning."""
 FULL_TURN_RAD = 1e-3
-"""A loiter turns by a full turn, give or take this."""
+"""A loiter may differ from a full turn by this."""
 
 
 class WrongAnswerError(ValueError):
@@ -49,7 +49,7 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
         BaseException: whatever an attribute of the answer, or the making of its picture, raises.
     """
     if not issubclass(type(answer), Plan):
-        raise WrongAnswerError(f"the planner answered with {_type(answer)}; an answer must be a Plan")
+        raise WrongAnswerError(f"the planner answered with {_type_text(answer)}; an answer must be a Plan")
     assert isinstance(answer, Plan)
     status, reason, wants_more_time = answer.status, answer.reason, answer.wants_more_time
     for told, value, fits, must in (
@@ -58,7 +58,7 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
         ("wants_more_time", wants_more_time, isinstance(wants_more_time, bool | np.bool_), "True or False"),
     ):
         if not fits:
-            raise WrongAnswerError(f"the planner's plan has {_type(value)} as {told}; it must be {must}")
+            raise WrongAnswerError(f"the planner's plan has {_type_text(value)} as {told}; it must be {must}")
     letters = str.__len__(reason)
     if letters > MOST_REASON_LETTERS:
         told = f"the planner's plan has a reason of {letters:,} characters"
@@ -73,28 +73,28 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
     return Plan(status, str.__str__(reason), waypoints_m, path, picture, wants_more_time=more)
 
 
-def _type(value: object) -> str:
-    """What a value is, told without asking the value."""
+def _type_text(value: object) -> str:
+    """Names the type of a value in an error, without calling any code of the value."""
     return "None" if value is None else f"an object of type {type(value).__name__[:100]}"
 
 
-def _shape(value: Any) -> str:
-    return str(value.shape) if isinstance(value, np.ndarray) else _type(value)
+def _shape_text(value: Any) -> str:
+    return str(value.shape) if isinstance(value, np.ndarray) else _type_text(value)
 
 
 def _is_table(value: Any, columns: int) -> bool:
     return issubclass(type(value), np.ndarray) and value.ndim == 2 and value.shape[1] == columns
 
 
-def _refused(what: str) -> WrongAnswerError:
+def _path_error(what: str) -> WrongAnswerError:
     return WrongAnswerError(f"the planner gave a path that cannot be flown: {what}")
 
 
 def _waypoints(waypoints_m: Any) -> FloatArray:
-    """The waypoints, if they are (n, 2) finite numbers."""
+    """Returns the waypoints as an array; WrongAnswerError unless they are (n, 2) finite numbers."""
     told = "the planner gave"
     if not _is_table(waypoints_m, 2):
-        shape = "shape " * isinstance(waypoints_m, np.ndarray) + _shape(waypoints_m)
+        shape = "shape " * isinstance(waypoints_m, np.ndarray) + _shape_text(waypoints_m)
         raise WrongAnswerError(f"{told} waypoints with {shape}; they must be an array of shape (n, 2)")
     count = len(waypoints_m)
     if count > MOST_SEGMENTS:
@@ -107,18 +107,18 @@ def _waypoints(waypoints_m: Any) -> FloatArray:
 
 
 def _path(path: Any, position_m: tuple[float, float], start_m: float) -> Path:
-    """A copy of a path, if it can be flown and begins no further than `start_m` from the aircraft."""
+    """Returns a copy of a path; WrongAnswerError if it cannot be flown, or begins further than `start_m` away."""
     if path is None:
-        raise _refused("it is none")
+        raise _path_error("it is none")
     if not issubclass(type(path), Path):
-        raise _refused(f"it is {_type(path)}; it must be a Path")
+        raise _path_error(f"it is {_type_text(path)}; it must be a Path")
     rows, loiter = path.segments, path.loiter
     if not _is_table(rows, 6) or not len(rows):
-        raise _refused(f"its segments must have shape (n, 6), n > 0; got {_shape(rows)}")
+        raise _path_error(f"its segments must have shape (n, 6), n > 0; got {_shape_text(rows)}")
     if not isinstance(loiter, bool | np.bool_):
-        raise _refused(f"it has {_type(loiter)} as its loiter; it must be True or False")
+        raise _path_error(f"it has {_type_text(loiter)} as its loiter; it must be True or False")
     if len(rows) > MOST_SEGMENTS:
-        raise _refused(f"it has {len(rows):,} segments; it must have at most {MOST_SEGMENTS:,}")
+        raise _path_error(f"it has {len(rows):,} segments; it must have at most {MOST_SEGMENTS:,}")
     rows = np.asarray(rows, dtype=np.float64)
     _check_segments(rows, position_m, start_m)
     if loiter:
@@ -127,21 +127,21 @@ def _path(path: Any, position_m: tuple[float, float], start_m: float) -> Path:
 
 
 def _require(fits: Any, told: str, *values: FloatArray) -> None:
-    """Refuses the path where something does not fit: told of the first segment `i` for which it does not."""
+    """Raises WrongAnswerError for the first segment `i` where `fits` is false; `told` is formatted with its values."""
     bad = np.flatnonzero(~fits)
     if len(bad):
         i = int(bad[0])
-        raise _refused(told.format(*(value[i] for value in values), i=i, following=i + 1))
+        raise _path_error(told.format(*(value[i] for value in values), i=i, following=i + 1))
 
 
 def _check_segments(rows: FloatArray, position_m: tuple[float, float], start_m: float) -> None:
-    """Each segment can be flown, all are not too much, and they are joined from the aircraft on."""
+    """Raises WrongAnswerError unless all segments can be flown, join, begin at the aircraft and are not too long."""
     tangent, length = np.hypot(rows[:, 2], rows[:, 3]), rows[:, 5]
     each = "segment {i} is not finite: {:g}, {:g}, {:g}, {:g}, {:g}, {:g}"
     _require(np.isfinite(rows).all(axis=1), each, *rows.T)
     _require(length > 0.0, "segment {i} is {:g} m long; it must be longer than 0 m", length)
     each = "segment {i} begins with a tangent of length {:.9g}; it must be a unit vector"
-    _require(np.abs(tangent - 1.0) < NOT_UNIT, each, tangent)
+    _require(np.abs(tangent - 1.0) < UNIT_TOLERANCE, each, tangent)
     with np.errstate(over="ignore"):
         way, turning = np.cumsum(length), np.cumsum(np.abs(rows[:, 4] * length))
     most = f"m long up to the end of segment {{i}}; it must be at most {LONGEST_M:g} m long"
@@ -157,13 +157,13 @@ def _check_segments(rows: FloatArray, position_m: tuple[float, float], start_m: 
 
 
 def _check_loiter(rows: FloatArray) -> None:
-    """The last segment is a full circle."""
+    """Raises WrongAnswerError unless the last segment is a full circle."""
     last = len(rows) - 1
     turn = abs(float(rows[-1, 4] * rows[-1, 5]))
     gap = math.dist(_ends(rows[-1:])[0].tolist(), rows[-1, :2].tolist())
     if not (abs(turn - math.tau) <= FULL_TURN_RAD and gap <= JOIN_M):
         told = f"turns by {math.degrees(turn):.6g} deg and ends {gap:.3g} m from where it begins"
-        raise _refused(f"segment {last}, its loiter, {told}; it must be a full circle")
+        raise _path_error(f"segment {last}, its loiter, {told}; it must be a full circle")
 
 
 def _ends(rows: FloatArray) -> FloatArray:
@@ -181,7 +181,6 @@ def _picture(make: Callable[[], PlanPicture] | None) -> Callable[[], PlanPicture
         return None
     made = make()
     if type(made) is not PlanPicture:
-        raise WrongAnswerError(
-            f"the planner's picture of its plan is {_type(made)}; it must be a PlanPicture"
-        )
+        told = f"the planner's picture of its plan is {_type_text(made)}"
+        raise WrongAnswerError(f"{told}; it must be a PlanPicture")
     return lambda: made

@@ -7,8 +7,8 @@ import math
 from planner.interface import MapView
 
 SETTLED_S = 600.0
-"""No goal is called unreachable within so many seconds after something last moved or appeared: what closes the way
-may go again."""
+"""No goal is called unreachable for this long after something last moved or appeared: what closes the way may go
+again."""
 
 
 class WorldStability:
@@ -16,10 +16,10 @@ class WorldStability:
 
     def __init__(self) -> None:
         self.changed_s = -math.inf
-        """When that was; -inf for never."""
+        """Simulated time (s) when something last moved or appeared; -inf for never."""
 
     @property
-    def ever(self) -> bool:
+    def ever_changed(self) -> bool:
         """Whether anything has moved or appeared so far."""
         return math.isfinite(self.changed_s)
 
@@ -31,5 +31,5 @@ class WorldStability:
         return newer
 
     def settled(self, time_s: float) -> bool:
-        """Whether nothing has moved or appeared for so long that what closes the way is taken to stay."""
+        """Tells whether nothing has moved or appeared for `SETTLED_S`, so that what closes the way is taken to stay."""
         return time_s - self.changed_s > SETTLED_S

@@ -30,7 +30,7 @@ from harness.scenario.performance import (
 )
 from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec, Point
 from harness.scenario.validation import KeyFault
-from planner.geometry.clearance import TOLERATED_SHARE
+from planner.geometry.clearance import MARGIN_SHARE
 
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe
@@ -83,7 +83,7 @@ def resolve(
     navigation = keys.navigation.filled(margin_m=margin_m)
     weight_lb = airframe_of(aircraft).mass_kg / POUND_KG
     limits = keys.trackability.filled(
-        cross_track_m=TOLERATED_SHARE * keys.planner.clearance_m if keys.planner.clearance_m else TOLERANCE_M,
+        cross_track_m=MARGIN_SHARE * keys.planner.clearance_m if keys.planner.clearance_m else TOLERANCE_M,
         altitude_m=TOLERANCE_M,
         airspeed_mps=0.1 * aircraft.airspeed_mps,
         load_factor=min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0)),

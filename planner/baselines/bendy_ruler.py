@@ -20,17 +20,18 @@ import math
 
 import numpy as np
 
-from planner.baselines.steering import Steerer, ahead, off
+from planner.baselines.steering import Steerer, ahead, turn_rad
 from planner.geometry.curves import Point, Pose
 from planner.interface import FloatArray, Mission
 from planner.keys import MarginConfig
 
-BEARING_STEP = math.radians(5.0)
-SECOND_BEARINGS = (0.0, math.radians(45.0), -math.radians(45.0))
-"""Offsets from the bearing of the goal of the second line."""
+BEARING_STEP_RAD = math.radians(5.0)
+"""Angle between neighbouring bearings that are probed."""
+SECOND_OFFSETS_RAD = (0.0, math.radians(45.0), -math.radians(45.0))
+"""Bearings of the second line, from the bearing of the goal."""
 LOOKAHEAD_RADII = 8.0
 """OA_BR_LOOKAHEAD, in turn radii: length of a probed line, at most the sensor range."""
-CONT_RATIO, CONT_ANGLE = 1.5, math.radians(75.0)
+CONT_RATIO, CONT_ANGLE_RAD = 1.5, math.radians(75.0)
 """OA_BR_CONT_RATIO and OA_BR_CONT_ANGLE, ArduPilot's defaults."""
 
 
@@ -40,7 +41,7 @@ class BendyRuler(Steerer):
     def __init__(self, config: MarginConfig, mission: Mission) -> None:
         lookahead_m = min(LOOKAHEAD_RADII * mission.turn_radius_m, mission.sensor_range_m)
         self._margin_m = mission.clearance_m + config.margin(mission)
-        super().__init__(mission, lookahead_m, 2.0 * lookahead_m + self._margin_m, BEARING_STEP)
+        super().__init__(mission, lookahead_m, 2.0 * lookahead_m + self._margin_m, BEARING_STEP_RAD)
 
     def direction(self, pose: Pose, points_m: FloatArray) -> float:
         """The bearing that steps 1 to 4 of the method choose; without a clear one, that with the largest margin."""
@@ -48,9 +49,9 @@ class BendyRuler(Steerer):
         to_goal = math.atan2(goal[1] - here[1], goal[0] - here[0])
         first_m = min(self.look_m, math.dist(here, goal))
         widest, best = -math.inf, to_goal
-        for number in range(round(math.tau / BEARING_STEP)):
+        for number in range(round(math.tau / BEARING_STEP_RAD)):
             side = 1.0 if number % 2 else -1.0
-            bearing = to_goal + side * BEARING_STEP * ((number + 1) // 2)
+            bearing = to_goal + side * BEARING_STEP_RAD * ((number + 1) // 2)
             end = ahead(here, bearing, first_m)
             margin = self._margin_along(here, end, points_m)
             if margin > widest:
@@ -66,7 +67,7 @@ class BendyRuler(Steerer):
         if left_m < 1.0:
             return True
         to_goal = math.atan2(goal[1] - end[1], goal[0] - end[0])
-        ends = (ahead(end, to_goal + offset, min(self.look_m, left_m)) for offset in SECOND_BEARINGS)
+        ends = (ahead(end, to_goal + offset, min(self.look_m, left_m)) for offset in SECOND_OFFSETS_RAD)
         return any(self._margin_along(end, onward, points_m) > self._margin_m for onward in ends)
 
     def _resisting(
@@ -74,7 +75,7 @@ class BendyRuler(Steerer):
     ) -> float:
         """Step 3: the last bearing where the new one is far off it and not that much better."""
         last = self.chosen
-        if last is None or abs(off(bearing, last)) <= CONT_ANGLE:
+        if last is None or abs(turn_rad(bearing, last)) <= CONT_ANGLE_RAD:
             return bearing
         along_last = self._margin_along(here, ahead(here, last, first_m), points_m)
         keeps = along_last > self._margin_m and margin_m < CONT_RATIO * along_last

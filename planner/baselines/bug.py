@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.baselines.polyline import Mark, beside, length_of, mark_at, piece, stations
-from planner.baselines.walk import LEFT, Enclosed, Straight, Walker, WalkLeg, place_at_end
+from planner.baselines.walk import ON_RIGHT, Enclosed, Straight, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
 from planner.keys import MarginConfig
@@ -29,7 +29,7 @@ PROGRESS_SHARE = 0.05
 """A leave point is nearer to the goal than the hit point by more than this share of the kept distance."""
 
 LOST_SHARE = 1.5
-"""Q not met again after this share of a round: the obstacle is not what it was, and is gone round anew."""
+"""If Q is not met again within this share of a round, the obstacle has changed, and is gone round anew."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Circling:
 
 @dataclass(frozen=True)
 class Returning:
-    """Bug1, on the way back to Q, passed in that sense: side of the obstacle, length of all of it, how far followed."""
+    """Bug1, on the way back to Q: side of the obstacle, length (m) of its whole boundary and of the part followed."""
 
     q: Mark
     side: float
@@ -67,7 +67,7 @@ class Bug1(Walker[BugState]):
         return Straight()
 
     def after(self, state: BugState, flown: FloatArray) -> BugState:
-        """Counts what has been followed and remembers Q."""
+        """The state after a part of a leg: counts the length followed and remembers Q."""
         if isinstance(state, Circling):
             return self._circled(state, flown)
         if isinstance(state, Returning):
@@ -75,7 +75,7 @@ class Bug1(Walker[BugState]):
         return state
 
     def follows(self, place: Point, state: BugState) -> tuple[Point, ...]:
-        """The boundary here, and where the way round or back ends."""
+        """The place beside the boundary, and the place where the way round or back ends."""
         if isinstance(state, Circling | Returning):
             return place, (state.hit if isinstance(state, Circling) else state.q).place
         return ()
@@ -89,7 +89,7 @@ class Bug1(Walker[BugState]):
         return "straight to the goal"
 
     def walk(self, place: Point, state: BugState) -> Iterator[WalkLeg[BugState]]:
-        """Straight on, round and back in turn."""
+        """Yields legs straight on, round an obstacle and back to Q, as they follow one another."""
         left = self.horizon_m
         while left > 0.0:
             if isinstance(state, Enclosed):
@@ -101,9 +101,9 @@ class Bug1(Walker[BugState]):
                 if not met:
                     return
                 place = place_at_end(line, place)
-                state = self._met(place)
+                state = self._begin_circling(place)
                 continue
-            way = self.known.boundary(place, state.side if isinstance(state, Returning) else LEFT, left)
+            way = self.known.boundary(place, state.side if isinstance(state, Returning) else ON_RIGHT, left)
             stop, leaves = self._stops(state, way)
             flown = piece(way, 0.0, stop)
             yield WalkLeg(state, flown)
@@ -111,10 +111,11 @@ class Bug1(Walker[BugState]):
                 return
             left -= stop
             place = place_at_end(flown, place)
-            state = Straight() if leaves else self._onward(place, state, flown)
+            state = Straight() if leaves else self._after_boundary(place, state, flown)
 
-    def _met(self, place: Point) -> Circling:
-        hit = mark_at(self.known.boundary(place, LEFT, self.keep_m), 0.0)
+    def _begin_circling(self, place: Point) -> Circling:
+        """The state at a hit point."""
+        hit = mark_at(self.known.boundary(place, ON_RIGHT, self.keep_m), 0.0)
         return Circling(hit, hit, math.dist(place, self.goal))
 
     def _stops(self, state: Circling | Returning, way: FloatArray) -> tuple[float, bool]:
@@ -123,18 +124,18 @@ class Bug1(Walker[BugState]):
             return self.passes(way, state.hit, self.keep_m - state.walked_m), False
         return self.passes(way, state.q, 0.0), False
 
-    def _onward(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
-        """The state after the boundary has been followed to where it stops."""
+    def _after_boundary(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
+        """The state at the end of a boundary: on the way back to Q, or there on to the goal, or enclosed."""
         if isinstance(state, Circling):
             return self._returning(self._circled(state, flown))
         if state.walked_m > LOST_SHARE * state.round_m:
-            return self._met(place)
+            return self._begin_circling(place)
         if self.known.leads_inside(place, self.goal):
             return Enclosed(f"{self.enclosed()}: gone round, and the way from its nearest point leads inside")
         return Straight()
 
     def _circled(self, state: Circling, flown: FloatArray) -> Circling:
-        """The state further round."""
+        """The state of circling after a further part of the boundary."""
         walked = state.walked_m + length_of(flown)
         if len(flown) < 2:
             return state
@@ -146,9 +147,9 @@ class Bug1(Walker[BugState]):
         return Circling(state.hit, q, float(away[i]), state.walked_m + float(at[i]), walked)
 
     def _returning(self, state: Circling) -> Returning:
-        """The shorter way back to Q."""
+        """The state on the shorter way back to Q."""
         onward = state.q_at_m <= 0.5 * state.walked_m
-        q, side = (state.q, LEFT) if onward else (state.q.reversed(), -LEFT)
+        q, side = (state.q, ON_RIGHT) if onward else (state.q.reversed(), -ON_RIGHT)
         return Returning(q, side, state.walked_m)
 
 
@@ -168,7 +169,8 @@ class Bug2(Bug1):
         closed, leave = super()._stops(state, way)[0], self._leaves(way, state)
         return min(closed, leave), leave <= closed
 
-    def _onward(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
+    def _after_boundary(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
+        """Ends the walk: back at the hit point without a leave point, the goal is enclosed."""
         return Enclosed(f"{self.enclosed()}: back at the hit point without a leave point")
 
     def _leaves(self, way: FloatArray, state: Circling | Returning) -> float:

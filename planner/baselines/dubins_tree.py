@@ -24,11 +24,11 @@ from planner.geometry.terrain import Terrain
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.keys import MarginConfig, key
 
-SHARES = (1.0, 0.125)
+MARGIN_SHARES = (1.0, 0.125)
 """Shares of the margin that a tree keeps, tried in this order."""
 
-HOLDING_S = 5.0
-"""In a turn to hold in a tree is grown this often."""
+HOLD_REGROW_S = 5.0
+"""In a holding turn a new tree is grown this often."""
 
 
 @dataclass(frozen=True)
@@ -62,17 +62,17 @@ class DubinsTree(Replanner):
 
     def plan(self, request: PlanRequest) -> Plan:
         """As seldom in a turn that a shield holds as in one of its own."""
-        if request.committed and not request.flown and request.time_s - self._planned_s < HOLDING_S:
+        if request.committed and not request.flown and request.time_s - self._planned_s < HOLD_REGROW_S:
             return Plan(PlanStatus.NO_PATH, "no new tree is due")
         return super().plan(request)
 
     def due(self, path: Path, left_m: float, age_s: float) -> bool:
-        """A way is flown to its end; from a turn to hold in another way is looked for."""
-        return age_s >= HOLDING_S if path.loiter else left_m <= 0.0
+        """Tells whether to plan anew: at the end of a way, and from time to time in a holding turn."""
+        return age_s >= HOLD_REGROW_S if path.loiter else left_m <= 0.0
 
     def replanned(self, request: PlanRequest, start: Start) -> Plan:
         """A way to the goal, straight there where that is free, else by a tree."""
-        for share in SHARES:
+        for share in MARGIN_SHARES:
             terrain = self._terrain(start.pose, self.mission.clearance_m + share * self._margin_m)
             found = self.grown(start.pose, terrain)
             if found is None:
@@ -98,7 +98,7 @@ class DubinsTree(Replanner):
         """The goal as a node: straight from the start where that is free, else of a tree; None where none is found."""
         goal, reach_m = self.mission.goal_m, self.mission.sensor_range_m
         nodes = [Node(start, (), 0.0)]
-        best = self._onward(nodes[0], goal, terrain)
+        best = self._branch(nodes[0], goal, terrain)
         if best is not None:
             return best
         ends, bounds = np.array([start[:2], goal]), np.array(self.mission.bounds_m).reshape(2, 2)
@@ -109,19 +109,18 @@ class DubinsTree(Replanner):
             if math.dist(start[:2], aim) + math.dist(aim, goal) >= best_m:
                 continue
             nearest = min(nodes, key=lambda node: math.dist(node.pose[:2], aim))
-            new = self._onward(nearest, aim, terrain, 0.5 * reach_m)
+            new = self._branch(nearest, aim, terrain, 0.5 * reach_m)
             if new is None:
                 continue
             nodes.append(new)
-            there = self._onward(new, goal, terrain)
+            there = self._branch(new, goal, terrain)
             if there is not None:
-                best = min(
-                    self._shortened(nodes[0], there, terrain), best or there, key=lambda node: node.length_m
-                )
+                shorter = self._shortened(nodes[0], there, terrain)
+                best = min(shorter, best or there, key=lambda node: node.length_m)
         return best
 
-    def _onward(self, node: Node, place: Point, terrain: Terrain, most_m: float = math.inf) -> Node | None:
-        """The node at the end of a branch towards a place, at most so long; None where it is not free."""
+    def _branch(self, node: Node, place: Point, terrain: Terrain, most_m: float = math.inf) -> Node | None:
+        """The node at the end of a branch towards a place, at most `most_m` long; None where the branch is not free."""
         way = turn_onto(node.pose, place, self.mission.turn_radius_m)
         if way and math.isfinite(most_m):
             way = between(Path(np.array(way)), 0.0, most_m)
@@ -131,11 +130,11 @@ class DubinsTree(Replanner):
         return Node(along(way[-1], way[-1][5]), (*node.ways, way), length_m)
 
     def _shortened(self, root: Node, found: Node, terrain: Terrain) -> Node:
-        """A way on which each branch leads on to the furthest place that one leads to."""
+        """Shortens a way: each branch leads to the furthest place that a branch from there can reach."""
         places, node, passed = found.places, root, 0
         while passed < len(places):
             for k in range(len(places), passed, -1):
-                onward = self._onward(node, places[k - 1], terrain)
+                onward = self._branch(node, places[k - 1], terrain)
                 if onward is not None:
                     node, passed = onward, k
                     break

@@ -1,4 +1,4 @@
-"""The known obstacles grown by the distance to be kept: what a BUG follows.
+"""Known obstacles grown by the distance to be kept; a BUG follows their boundaries.
 
 Every edge point is the centre of a disc that must not be entered, and so is all that lies outside of the area. shapely
 unites them. Their outline is simplified by less than the margin: neighbouring discs leave no dents between them.
@@ -17,7 +17,7 @@ from planner.geometry.curves import Point
 from planner.interface import FloatArray, IntArray, MapView, Mission
 from planner.memory import ObstacleMemory
 
-SIMPLER = 0.2
+SIMPLIFY_SHARE = 0.2
 """The outline is simplified by this share of the margin."""
 GRAZED_M, TOUCH_SHARE = 0.01, 0.05
 """A line that goes less deep into an obstacle passes it; one that enters within this share of the kept distance from
@@ -25,7 +25,7 @@ where it begins on a boundary leads inside."""
 QUARTER_CORNERS = 12
 """Corners of a quarter of a disc."""
 DENT_SHARE = 4.0
-"""A line that touches an obstacle and meets it again within so many kept distances leads into a dent."""
+"""A line that touches an obstacle and meets it again within this many kept distances leads into a dent."""
 CELL_SHARE = 0.35
 """Points in one square of this share of the kept distance are grown as one, with what lies between them."""
 
@@ -49,7 +49,7 @@ class GrownObstacles:
         self._owners: IntArray = np.zeros(0, dtype=np.intp)  # which obstacle each ring belongs to
 
     def take_in(self, seen: MapView) -> tuple[FloatArray, bool]:
-        """Remembers what has come in.
+        """Takes in the edge points of a map.
 
         Returns the (k, 2) new edge points, and whether some were taken back: then everything may be different.
         """
@@ -68,15 +68,15 @@ class GrownObstacles:
         return self._memory.ever_cleared
 
     def _unite(self) -> None:
-        """Brings the obstacles up to date: only where a walk is asked for."""
+        """Brings shapes and boundaries up to date with the edge points."""
         if self._united == len(self._points_m):
             return
         if self._united < 0:
             reach = 10.0 * self.keep_m * np.array((-1.0, -1.0, 1.0, 1.0))
-            self._united, self._discs = 0, shapely.box(*(self._mission.bounds_m + reach)) - self._hole()
+            self._united, self._discs = 0, shapely.box(*(self._mission.bounds_m + reach)) - self._free_area()
         self._discs = shapely.union(self._discs, self._grown(self._points_m[self._united :]))
         self._united = len(self._points_m)
-        parts = shapely.simplify(shapely.get_parts(self._discs), SIMPLER * self._margin_m)
+        parts = shapely.simplify(shapely.get_parts(self._discs), SIMPLIFY_SHARE * self._margin_m)
         self._shapes = shapely.orient_polygons(parts)
         self.cores = shapely.buffer(self._shapes, -GRAZED_M, join_style="mitre")
         shapely.prepare(self.cores)
@@ -91,8 +91,8 @@ class GrownObstacles:
         self.rings = [ring for _, ring in owned]
         self._owners = np.array([i for i, _ in owned], dtype=np.intp)
 
-    def _hole(self) -> Any:
-        """The area but for its border."""
+    def _free_area(self) -> Any:
+        """The area without the margin kept from its border."""
         goal, bounds = np.array(self._mission.goal_m), np.array(self._mission.bounds_m)
         inset = max(0.0, min(self._margin_m, float(np.abs(goal - bounds.reshape(2, 2)).min()) - 1e-3))
         return shapely.box(*(bounds + inset * np.array((1.0, 1.0, -1.0, -1.0))))
@@ -108,7 +108,7 @@ class GrownObstacles:
         least = np.full(len(hulls), self.keep_m)
         np.minimum.at(least, cells.ravel(), radii)
         discs = shapely.buffer(hulls, least, quad_segs=QUARTER_CORNERS)
-        return shapely.simplify(shapely.union_all(discs), SIMPLER * self._margin_m)
+        return shapely.simplify(shapely.union_all(discs), SIMPLIFY_SHARE * self._margin_m)
 
     def first_hit(self, a: Point, b: Point) -> tuple[float, int]:
         """Where the line from a to b first enters an obstacle: distance (m) and obstacle; infinite and -1 for never.
@@ -145,22 +145,22 @@ class GrownObstacles:
         return self.first_hit(place, target)[0] > math.dist(place, target) - TOUCH_SHARE * self.keep_m
 
     def part_at(self, place: Point) -> int:
-        """The obstacle next to a place; the border of the area is one."""
+        """Index of the obstacle nearest to a place; the border of the area is one of them."""
         ring, _ = self._nearest(place)
         return int(self._owners[ring])
 
     def off_m(self, place: Point) -> float:
-        """How far a place is from the next boundary."""
+        """Distance of a place from the nearest boundary."""
         return self._nearest(place)[1]
 
     def _nearest(self, place: Point) -> tuple[int, float]:
-        """The ring next to a place, and how far it is."""
+        """Index of the ring nearest to a place, and its distance (m)."""
         self._unite()
         away = shapely.distance(self.rings, shapely.Point(place))
         return int(np.argmin(away)), float(away.min())
 
     def boundary(self, place: Point, side: float, length_m: float) -> FloatArray:
-        """(n, 2) at most so much of the boundary next to a place, from there on and at most once round.
+        """(n, 2) corners of the boundary nearest to a place, for `length_m` from there on, at most once round.
 
         Side 1 has the obstacle on the left, -1 on the right.
         """
@@ -173,17 +173,17 @@ class GrownObstacles:
         return piece(np.concatenate((corners, corners[1:])), at, at + min(length_m, ring.length))
 
     def nearest_to_goal_m(self, place: Point) -> float:
-        """How near to the goal the obstacle beside a place comes, as far as it is known; the border is none."""
+        """Least distance (m) from the goal of the known obstacles beside a place; the border does not count."""
         self._unite()
         beside_m, here = TOUCH_SHARE * self.keep_m + self._margin_m, shapely.Point(place)
         # What the border joins are obstacles of their own.
-        joined = shapely.get_parts(self._shapes[self._border] & self._hole())
+        joined = shapely.get_parts(self._shapes[self._border] & self._free_area())
         parts = np.concatenate((np.delete(self._shapes, self._border), joined))
         beside = parts[shapely.distance(parts, here) < beside_m]
         return float(shapely.distance(beside, shapely.Point(self._mission.goal_m)).min(initial=math.inf))
 
     def tangents(self, place: Point, parts: set[int], reach_m: float) -> list[Tangent]:
-        """Where lines from a place touch some obstacles within reach: at corners."""
+        """The corners within reach at which lines from a place touch the obstacles of indices `parts`."""
         self._unite()
         found: list[Tangent] = []
         for own, ring in zip(self._owners.tolist(), self.rings, strict=True):
@@ -207,10 +207,11 @@ class GrownObstacles:
         return found
 
     def encloses_nothing(self, outline: FloatArray) -> bool:
-        """Whether no obstacle lies within a closed outline, but for a little beside it."""
+        """Tells whether no obstacle lies within a closed outline, a narrow strip along it left out."""
         shape = shapely.Polygon(outline).buffer(-TOUCH_SHARE * self.keep_m) if len(outline) > 2 else None
         return shape is None or not shapely.intersects(self.cores, shape).any()
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(n,) cross products of (n, 2) vectors."""
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

@@ -39,9 +39,9 @@ TURN_COST = 0.05
 LAMBDA_STEPS = 0.3
 """Temperature lambda, in steps."""
 ROUNDS = 3
-"""The weighted mean is taken so many times."""
-DRAWN = 24
-"""So many of the rollouts are drawn in a recording."""
+"""Number of rounds: the weighted mean is taken once in each."""
+ROLLOUTS_DRAWN = 24
+"""Most rollouts in the picture of a plan."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Mppi(Replanner):
             return self.stuck("the best rollout is blocked", request)
         here = request.position_m
         waypoints = np.array([here, *(row[:2] for row in rows), along(rows[-1], rows[-1][5])[:2]])
-        drawn = tuple(np.array([here, *each]) for each in rollouts[:DRAWN])
+        drawn = tuple(np.array([here, *each]) for each in rollouts[:ROLLOUTS_DRAWN])
         picture = partial(PlanPicture, np.array([here, mission.goal_m]), candidates=drawn)
         return Plan(PlanStatus.FOUND, f"mean of {self._config.samples} rollouts", waypoints, found, picture)
 

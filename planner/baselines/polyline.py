@@ -1,4 +1,4 @@
-"""Ways of a point: polylines, (n, 2) east and north in metres, by arc length."""
+"""Ways of a point: polylines of (n, 2) places, east and north in metres, measured by arc length."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from planner.geometry.curves import Point
 from planner.interface import FloatArray
 
 NOWHERE: FloatArray = np.zeros((0, 2))
+"""A way without a place."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def length_of(way: FloatArray) -> float:
 
 
 def piece(way: FloatArray, from_m: float, to_m: float) -> FloatArray:
-    """The part between two arc lengths; both are put on the way."""
+    """The part of a way between two arc lengths, both clamped to its ends."""
     if not len(way):
         return way
     at = stations(way)
@@ -57,7 +58,7 @@ def piece(way: FloatArray, from_m: float, to_m: float) -> FloatArray:
 
 
 def mark_at(way: FloatArray, arc_length_m: float) -> Mark:
-    """The place at an arc length, and the direction there."""
+    """The place of a way at an arc length, and its direction there."""
     at = stations(way)
     i = int(np.clip(np.searchsorted(at, arc_length_m, side="right") - 1, 0, max(len(way) - 2, 0)))
     edge = way[min(i + 1, len(way) - 1)] - way[i]

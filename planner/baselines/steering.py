@@ -79,7 +79,7 @@ class Steerer(Replanner):
         """The direction to fly, rad counter-clockwise from east, among (m, 2) edge points; None if none is free."""
 
     def picture(self, request: PlanRequest) -> PlanPicture:
-        """The guide vector and the length of the path."""
+        """The picture of a plan: guide vector and length of the path."""
         return PlanPicture(np.array([request.position_m, self.mission.goal_m]), self.look_m)
 
     def replanned(self, request: PlanRequest, start: Start) -> Plan:
@@ -90,7 +90,7 @@ class Steerer(Replanner):
         if self.chosen is None:
             return self.stuck("no direction is free", request)
         look_m = min(self.look_m, math.dist(start.pose[:2], self.mission.goal_m))
-        same = last is not None and abs(off(self.chosen, last)) < 0.5 * self._step_rad
+        same = last is not None and abs(turn_rad(self.chosen, last)) < 0.5 * self._step_rad
         if same and not start.cut and start.left_m > 0.5 * look_m:
             self.chosen = last
             return Plan(PlanStatus.KEPT, "the direction is still the best one")
@@ -115,12 +115,12 @@ class Steerer(Replanner):
 
 
 def ahead(place: Point, bearing: float, distance_m: float) -> Point:
-    """The place in a direction, rad counter-clockwise from east."""
+    """The place at a distance in a direction, rad counter-clockwise from east."""
     return place[0] + distance_m * math.cos(bearing), place[1] + distance_m * math.sin(bearing)
 
 
-def off(a: ArrayLike, b: ArrayLike) -> FloatArray:
-    """The turn from direction b to direction a, in [-pi, pi)."""
+def turn_rad(a: ArrayLike, b: ArrayLike) -> FloatArray:
+    """Angle from direction b to direction a, rad in [-pi, pi)."""
     return np.asarray((np.subtract(a, b) + math.pi) % math.tau - math.pi, dtype=np.float64)
 
 

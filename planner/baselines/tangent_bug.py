@@ -24,19 +24,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.baselines.polyline import NOWHERE, Mark, Tangent, length_of, mark_at, piece
-from planner.baselines.walk import LEFT, Enclosed, Walker, WalkLeg, place_at_end
+from planner.baselines.walk import ON_RIGHT, Enclosed, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission
 from planner.keys import MarginConfig
 
 PROGRESS_SHARE = 0.05
-"""What is to be nearer to the goal is nearer by this share of the kept distance."""
-LOOKS = 40.0
-"""The graph is looked at anew this many times in a sensing range, and when the way is blocked."""
-SHORTER = 0.005
+"""A place counts as nearer to the goal only by at least this share of the kept distance."""
+LOOKS_PER_RANGE = 40.0
+"""The local tangent graph is made anew this many times per sensing range flown, and when the way is blocked."""
+SHORTER_SHARE = 0.005
 """A way to the goal is dropped only for one that is shorter by this share."""
-SHORTCUTS = 16
-"""So many places of a boundary are tried for a straight way to it."""
+SHORTCUT_TRIES = 16
+"""A straight way to a boundary is tried to this many of its places."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class TangentBug(Walker[TangentBugState]):
         return replace(state, anchor=place, walked_m=walked, followed_m=followed)
 
     def follows(self, place: Point, state: TangentBugState) -> tuple[Point, ...]:
-        """The boundary where it is followed on, and where that began."""
+        """The place where the boundary is followed on, and the place where following began."""
         return (state.anchor, state.hit.place) if isinstance(state, BoundaryFollowing) else ()
 
     def says(self, state: TangentBugState) -> str:
@@ -105,8 +105,8 @@ class TangentBug(Walker[TangentBugState]):
         return "motion to the goal"
 
     def look_again_m(self) -> float:
-        """The graph is looked at several times in a sensing range."""
-        return self.mission.sensor_range_m / LOOKS
+        """Length (m) after which the local tangent graph is made anew."""
+        return self.mission.sensor_range_m / LOOKS_PER_RANGE
 
     def prefers(self, new: tuple[WalkLeg[TangentBugState], ...], left_m: float) -> bool:
         """A change of behaviour, a straight way to the boundary, or a shorter or a free way to the goal."""
@@ -114,12 +114,12 @@ class TangentBug(Walker[TangentBugState]):
         if isinstance(state, BoundaryFollowing):
             return not state.on_boundary and length_of(new[0].way) > self.look_again_m()
         was_caught = any(isinstance(leg.state, BoundaryFollowing) for leg in self.legs)
-        shorter = sum(length_of(leg.way) for leg in new) < (1.0 - SHORTER) * left_m
+        shorter = sum(length_of(leg.way) for leg in new) < (1.0 - SHORTER_SHARE) * left_m
         return was_caught or shorter or math.isfinite(self.breach_m)
 
     def walk(self, place: Point, state: TangentBugState) -> Iterator[WalkLeg[TangentBugState]]:
-        """Steps 1 and 2 in turn."""
-        if isinstance(state, BoundaryFollowing) and (node := self._leave(place, state)) is not None:
+        """Yields the legs of steps 1 and 2, as they follow one another."""
+        if isinstance(state, BoundaryFollowing) and (node := self._leave_node(place, state)) is not None:
             way, _ = self.straight(place, node.at.place)
             state = Toward(state.followed_m)
             yield WalkLeg(state, way)
@@ -172,7 +172,7 @@ class TangentBug(Walker[TangentBugState]):
         return min(nearer, key=lambda node: (node.at.dent, node.way_m), default=None)
 
     def _slide(self, place: Point, node: TangentNode) -> FloatArray:
-        """To a node and along the obstacle while that leads nearer to the goal and the goal is behind it."""
+        """The way to a node, then along the obstacle while that leads nearer to the goal and hides it."""
         way, met = self.straight(place, node.at.place)
         if met and length_of(way) < math.dist(place, node.at.place) - self._progress_m:
             return way
@@ -192,23 +192,23 @@ class TangentBug(Walker[TangentBugState]):
         d_followed is of this boundary alone: else a round of it would prove nothing.
         """
         nodes = [node for node in self._nodes(place) if node.at.side]
-        side = min(nodes, key=lambda node: node.way_m).at.side if nodes else LEFT
+        side = min(nodes, key=lambda node: node.way_m).at.side if nodes else ON_RIGHT
         first = mark_at(self.known.boundary(hit, side, self.keep_m), 0.0)
         on_boundary = math.dist(place, hit) < self._progress_m
         return BoundaryFollowing(first, side, hit, 0.0, on_boundary, self._nearest_m(hit))
 
     def _nearest_m(self, anchor: Point) -> float:
-        """How near to the goal the boundary at a place comes, as far as it has been sensed."""
+        """Least distance (m) from the goal of the sensed boundary at a place."""
         return min(self.known.nearest_to_goal_m(anchor), math.dist(anchor, self.goal))
 
-    def _leave(self, place: Point, state: BoundaryFollowing) -> TangentNode | None:
+    def _leave_node(self, place: Point, state: BoundaryFollowing) -> TangentNode | None:
         """The node to leave the boundary for: d_reach < d_followed."""
         limit = state.followed_m - self._progress_m
         nearer = [node for node in self._nodes(place, state.anchor) if node.to_goal_m < limit]
         return min(nearer, key=lambda node: node.way_m, default=None)
 
     def _follow(self, place: Point, state: BoundaryFollowing) -> Iterator[WalkLeg[TangentBugState]]:
-        """Along the boundary, the first part of it cut short where its next places are in sight."""
+        """Yields legs along the boundary; its first part is cut short by a straight line to a place in sight."""
         way = self.known.boundary(state.anchor, state.side, self.horizon_m)
         closed = self.passes(way, state.hit, self.keep_m - state.walked_m)
         skip_m = self._in_sight(place, state, piece(way, 0.0, closed))
@@ -228,7 +228,7 @@ class TangentBug(Walker[TangentBugState]):
         """The furthest arc length of a boundary in sight with nothing between it and the straight way there."""
         whole = length_of(way)
         least_m = 2.0 * self.look_again_m() if state.on_boundary else 0.0
-        for share in (np.arange(SHORTCUTS, 0, -1) / SHORTCUTS).tolist():
+        for share in (np.arange(SHORTCUT_TRIES, 0, -1) / SHORTCUT_TRIES).tolist():
             ahead = piece(way, 0.0, share * whole)
             onto = place_at_end(ahead, place)
             shorter = math.dist(place, onto) < share * whole - self._progress_m

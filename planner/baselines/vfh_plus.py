@@ -21,7 +21,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.baselines.steering import Steerer, off
+from planner.baselines.steering import Steerer, turn_rad
 from planner.geometry.curves import Pose
 from planner.interface import BoolArray, FloatArray, Mission, PlanPicture, PlanRequest
 from planner.keys import MarginConfig
@@ -75,7 +75,7 @@ class VfhPlus(Steerer):
         half = np.arcsin(np.minimum(self._keep_m / np.maximum(distance, 1e-9), 1.0))
         # The paper's a - b d^2 with unit certainty, 1 here and 0 at the rim.
         magnitude = 1.0 - np.square(distance / self.look_m)
-        aside = np.abs(off(self._bearings[:, None], np.arctan2(dy, dx)))
+        aside = np.abs(turn_rad(self._bearings[:, None], np.arctan2(dy, dx)))
         primary = (magnitude * (aside <= half)).sum(axis=1)
         between = np.where(primary < FREE_BELOW, False, self._blocked)
         self._blocked = np.where(primary > BLOCKED_ABOVE, True, between)
@@ -92,14 +92,14 @@ class VfhPlus(Steerer):
     def _mask(self, pose: Pose, near: FloatArray, blocked: BoolArray) -> BoolArray:
         """Which sectors are blocked or lie behind an obstacle that a turn there would touch."""
         course = math.atan2(pose.tangent_north, pose.tangent_east)
-        relative = off(self._bearings, course)
+        relative = turn_rad(self._bearings, course)
         masked = blocked.copy()
         for side in (1.0, -1.0):  # left, right
             radius = self.mission.turn_radius_m
             x = pose.east_m - side * radius * pose.tangent_north
             y = pose.north_m + side * radius * pose.tangent_east
             touching = np.hypot(near[:, 0] - x, near[:, 1] - y) < radius + self._keep_m
-            bearing = side * off(np.arctan2(near[:, 1] - pose.north_m, near[:, 0] - pose.east_m), course)
+            bearing = side * turn_rad(np.arctan2(near[:, 1] - pose.north_m, near[:, 0] - pose.east_m), course)
             ahead = bearing[touching & (bearing >= 0.0)]
             limit = float(ahead.min()) if len(ahead) else math.pi
             masked |= side * relative > limit
@@ -113,12 +113,12 @@ class VfhPlus(Steerer):
 
         def cost(bearing: float) -> float:
             terms = ((GOAL_WEIGHT, goal), (COURSE_WEIGHT, course), (CHOICE_WEIGHT, last))
-            return float(sum(weight * abs(off(bearing, other)) for weight, other in terms))
+            return float(sum(weight * abs(turn_rad(bearing, other)) for weight, other in terms))
 
         return min(self._candidates(masked, goal), key=cost, default=None)
 
     def _candidates(self, masked: BoolArray, goal: float) -> list[float]:
-        """The directions worth choosing from."""
+        """Step 4: the candidate directions (rad) of the free openings."""
         if not masked.any():
             return [goal]
         count, width = len(masked), WIDTH_RAD

@@ -1,4 +1,4 @@
-"""What the planners of the BUG family share: the walk of a point that can turn on the spot.
+"""Base class of the BUG family: plans the walk of a point that can turn on the spot.
 
 A walk is what the algorithm would do from here on if nothing but what has been seen were there: straight lines and
 stretches of boundary, each with the state of the algorithm on it. Where a new edge point comes too near to it, it is
@@ -25,13 +25,13 @@ from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, Plan
 from planner.keys import MarginConfig
 from planner.world_stability import WorldStability
 
-LEFT = -1.0
-"""A point that meets an obstacle turns left, so that the obstacle comes to be on its right: that side."""
+ON_RIGHT = -1.0
+"""Side of the obstacle (1: left, -1: right): a point that meets an obstacle turns left and has it on its right."""
 
 BREACH_SHARE = 0.25
 """A new edge point counts when it comes nearer than the kept distance by this share of the margin."""
 
-SAME_PLACE = 0.5
+SAME_PLACE_SHARE = 0.5
 """Places on a boundary passed in one sense and nearer than this share of the kept distance are the same: no two
 stretches that run the same way can be that near to each other."""
 
@@ -87,18 +87,18 @@ class Walker(ABC, Generic[WalkState]):
 
     @abstractmethod
     def walk(self, place: Point, state: WalkState) -> Iterator[WalkLeg[WalkState]]:
-        """What the algorithm does from a place on, in what is known, leg by leg to the goal or the sensing range."""
+        """Yields the legs that the algorithm walks among known obstacles, to the goal or the sensing range."""
 
     @abstractmethod
     def follows(self, place: Point, state: WalkState) -> tuple[Point, ...]:
-        """Where the boundary lies that is followed in a state at a place, and a mark on it; none where none is."""
+        """Two places of the boundary followed in a state: one beside `place`, and a mark; empty if none is followed."""
 
     @abstractmethod
     def says(self, state: WalkState) -> str:
-        """What the algorithm does in a state, a sentence for the event log."""
+        """Describes what the algorithm does in a state, for the event log."""
 
     def look_again_m(self) -> float:
-        """After how much of a walk the algorithm looks round although it can go on (m)."""
+        """Length of a walk (m) after which the algorithm looks for a better one although it can go on."""
         return math.inf
 
     def prefers(self, new: tuple[WalkLeg[WalkState], ...], left_m: float) -> bool:
@@ -122,7 +122,7 @@ class Walker(ABC, Generic[WalkState]):
         """The answer while the walk is flown."""
         at_m, end = request.arc_length_m, self.legs[-1].state
         self._flown_m, left_m = at_m, path.length_m - at_m
-        if isinstance(end, Enclosed) and left_m < SAME_PLACE * self.keep_m:
+        if isinstance(end, Enclosed) and left_m < SAME_PLACE_SHARE * self.keep_m:
             return self._ended(request, end, taken_back)
         must = taken_back or self._ends_soon(path, at_m, fresh)
         if not must and at_m < self._look_at_m:
@@ -147,7 +147,7 @@ class Walker(ABC, Generic[WalkState]):
         return ends or self.breach_m - arc_length_m < self._near_m
 
     def _ended(self, request: PlanRequest, end: Enclosed, taken_back: bool) -> Plan:
-        """At the end of the algorithm: it is begun anew where the world may not be what it was."""
+        """The answer where the goal is enclosed: begins anew if the world may have changed, else says UNREACHABLE."""
         doubtful = taken_back or (self.known.taken_back and not self._tried_again)
         if doubtful or not self._unrest.settled(request.time_s):
             self._tried_again |= doubtful
@@ -156,7 +156,7 @@ class Walker(ABC, Generic[WalkState]):
         return Plan(PlanStatus.UNREACHABLE, end.sentence)
 
     def _taken_up(self, place: Point, state: WalkState, taken_back: bool) -> tuple[WalkLeg[WalkState], ...]:
-        """The walk from a state on; from the beginning where the boundary that was followed has gone."""
+        """The walk from a state on; begins anew where the boundary that was followed has gone."""
         gone = taken_back and any(self.known.off_m(each) > self.keep_m for each in self.follows(place, state))
         return tuple(self.walk(place, self.begin(place) if gone else state))
 
@@ -171,6 +171,7 @@ class Walker(ABC, Generic[WalkState]):
         return self.after(leg.state, piece(leg.way, 0.0, arc_length_m - begin))
 
     def _found(self, walk: Iterable[WalkLeg[WalkState]], request: PlanRequest, place: Point) -> Plan:
+        """The plan that flies a walk; NO_PATH or UNREACHABLE where it leads nowhere."""
         legs = tuple(connected(walk, place))
         corners = np.concatenate([leg.way for leg in legs])
         apart = np.hypot(*np.diff(corners, axis=0).T) > SHORTEST_M
@@ -187,7 +188,7 @@ class Walker(ABC, Generic[WalkState]):
         return self._plan
 
     def enclosed(self) -> str:
-        """How a sentence on a goal that cannot be reached begins."""
+        """Beginning of a sentence that says why the goal cannot be reached."""
         return f"an obstacle encloses the goal at a distance of {self.keep_m:.0f} m from its edge"
 
     def straight(self, place: Point, target: Point) -> tuple[FloatArray, bool]:
@@ -204,7 +205,7 @@ class Walker(ABC, Generic[WalkState]):
         if len(way) < 2:
             return math.inf
         away, at, along = beside(way, mark.place)
-        same = (away < SAME_PLACE * self.keep_m) & (along @ (mark.ux, mark.uy) > 0.0) & (at >= from_m)
+        same = (away < SAME_PLACE_SHARE * self.keep_m) & (along @ (mark.ux, mark.uy) > 0.0) & (at >= from_m)
         if not same.any():
             return math.inf
         same &= at < at[same].min() + self.keep_m
@@ -212,12 +213,12 @@ class Walker(ABC, Generic[WalkState]):
 
 
 def place_at_end(way: FloatArray, otherwise: Point) -> Point:
-    """Where a way ends; a way without a place ends elsewhere."""
+    """The end of a way; `otherwise` for a way without a place."""
     return (float(way[-1, 0]), float(way[-1, 1])) if len(way) else otherwise
 
 
 def connected(legs: Iterable[WalkLeg[WalkState]], begin: Point) -> Iterator[WalkLeg[WalkState]]:
-    """Legs that begin where the one before ends, the first one where the vehicle is: by a straight line."""
+    """Joins each leg by a straight line to the end of the one before, and the first leg to the vehicle."""
     at = np.array([begin])
     for leg in legs:
         yield replace(leg, way=np.concatenate((at, leg.way))) if len(leg.way) else leg

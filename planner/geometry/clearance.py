@@ -1,4 +1,4 @@
-"""Distances between paths and sensed edge points, and how much is planned to be kept."""
+"""Distances between paths and sensed edge points, and the margin that plans keep."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from planner.geometry.curves import Point
 from planner.interface import BoolArray, FloatArray, Mission, Path
 from planner.kernels import segments
 
-TOLERATED_SHARE = 0.1
+MARGIN_SHARE = 0.1
 """The default margin beyond the clearance is at least this share of the clearance."""
 
-TOLERATED_ERRORS = 2.0
-"""The default margin is at least this many times the tracking error that the aircraft showed in tight turns."""
+MARGIN_ERRORS = 2.0
+"""The default margin is at least this many times the tracking error of the aircraft in tight turns."""
 
 
 def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -22,16 +22,14 @@ def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]
     return segments.distances(path.segments, points_m)
 
 
-def first_breach(
-    path: Path, points_m: FloatArray, radius_m: float | FloatArray, from_m: float = 0.0
-) -> float:
+def first_breach(path: Path, points_m: FloatArray, keep_m: float | FloatArray, from_m: float = 0.0) -> float:
     """Arc length (m) at which a path is nearest to the first of (m, 2) points that it passes too near to.
 
-    Infinite where there is none. `radius_m` is the distance to be kept, one for all or (m,) m. What lies before
+    Infinite where there is none. `keep_m` is the distance to be kept, one for all or (m,) m. What lies before
     `from_m` does not count.
     """
-    radii_m = radius_m if isinstance(radius_m, np.ndarray) else np.array((radius_m,))
-    return segments.first_breach(path.segments, points_m, radii_m, from_m)
+    keeps_m = keep_m if isinstance(keep_m, np.ndarray) else np.array((keep_m,))
+    return segments.first_breach(path.segments, points_m, keeps_m, from_m)
 
 
 def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bool:
@@ -63,4 +61,4 @@ def behind(places_m: FloatArray, eye_m: Point, edges_m: FloatArray, beside_m: fl
 
 def margin_of(mission: Mission) -> float:
     """Planned distance beyond the clearance where none is given (m)."""
-    return max(TOLERATED_SHARE * mission.clearance_m, TOLERATED_ERRORS * mission.tracking_error_m)
+    return max(MARGIN_SHARE * mission.clearance_m, MARGIN_ERRORS * mission.tracking_error_m)

@@ -1,4 +1,4 @@
-"""The whole way that a plan in effect is the beginning of, and on which side of things it passes."""
+"""The course: the whole way to the goal, of which a plan in effect is the beginning."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Course:
     to_goal: bool = True  # it leads to the goal, not only into a turn
 
     def ahead(self, arc_length_m: float) -> Course:
-        """What is left of it from an arc length on."""
+        """The rest of the course from an arc length on."""
         segments = between(self.path, arc_length_m, self.path.length_m)
         if not segments:
             return self
@@ -33,9 +33,6 @@ class Course:
         return replace(self, path=Path(np.array(segments)), nodes=(*left, self.nodes[-1]))
 
     def same_side(self, nodes: Sequence[Point], points_m: FloatArray) -> bool:
-        """Whether another way from here to the goal passes all that was known on the same side.
-
-        That is so where the two ways together go round none of it.
-        """
+        """Tells whether the closed loop of this course and another way to the goal encircles no point then known."""
         loop = np.array([*nodes, *self.nodes[-2::-1]])
         return not encircled(loop, points_m[: self.known]).any()

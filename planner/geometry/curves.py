@@ -21,8 +21,8 @@ Segment = tuple[float, float, float, float, float, float]
 SHORTEST_M = 1e-6
 """Segments shorter than this are left out of a path."""
 
-ON_TURN = 1e-6
-"""A place is on a turn that is no further from it than this share of its radius."""
+ON_TURN_SHARE = 1e-6
+"""A place counts as on a turn if it is at most this share of the radius off the circle."""
 
 
 class Pose(NamedTuple):
@@ -133,10 +133,8 @@ def turns_onto(pose: Pose, target: Point, radius_m: float) -> list[list[Segment]
     """
     ways: list[tuple[float, list[Segment]]] = []
     for side in (1.0, -1.0):  # left, right
-        cx, cy = (
-            pose.east_m - side * radius_m * pose.tangent_north,
-            pose.north_m + side * radius_m * pose.tangent_east,
-        )
+        cx = pose.east_m - side * radius_m * pose.tangent_north
+        cy = pose.north_m + side * radius_m * pose.tangent_east
         dx, dy = target[0] - cx, target[1] - cy
         distance = math.hypot(dx, dy)
         if distance <= radius_m:
@@ -170,12 +168,12 @@ class Limits(NamedTuple):
 
     @classmethod
     def of(cls, mission: Mission) -> Limits:
-        """Those of a mission."""
+        """The limits of a mission."""
         return cls(mission.turn_radius_m, mission.ground_speed_mps * mission.roll_in_s)
 
     @classmethod
     def of_holds(cls, mission: Mission) -> Limits:
-        """Those of the full turns that plans of a mission end in."""
+        """The limits of the full turns that plans of a mission end in."""
         return cls(mission.hold_radius_m, mission.ground_speed_mps * mission.roll_in_s)
 
 
@@ -202,9 +200,8 @@ def fillet(
         longer_turn: begin with the longer of the two turns towards the first corner.
         first_radius_m: radius of that turn.
     """
-    segments = _first_turn(
-        start, nodes[0], limits, start_curvature, longer_turn, first_radius_m or limits.radius_m
-    )
+    first_radius_m = first_radius_m or limits.radius_m
+    segments = _first_turn(start, nodes[0], limits, start_curvature, longer_turn, first_radius_m)
     if segments is None:
         return None
     corner, last_turn = start, start_curvature
@@ -242,7 +239,7 @@ def fillet(
 def _rounded(
     turn: float, least_radius_m: float, room_m: float, free_m: float, most_m: float, cut_m: float
 ) -> tuple[float, float] | None:
-    """How much of its legs the arc of a corner takes, and its radius; None where the least radius has no room."""
+    """Length of each leg that the arc of a corner takes, and its radius; None where the least radius has no room."""
     tangent = math.tan(0.5 * abs(turn))
     if tangent <= 1e-9:
         return 0.0, math.inf
@@ -270,7 +267,7 @@ def _first_turn(
 
 
 def onward(path: Path, arc_length_m: float, length_m: float) -> list[Segment]:
-    """The segments of a stretch of a path; where that ends in a loiter circle, round it as often as need be."""
+    """The segments of `length_m` of a path from an arc length on; a closing loiter repeats as often as needed."""
     stretch = between(path, arc_length_m, arc_length_m + length_m)
     left = arc_length_m + length_m - max(path.length_m, arc_length_m)
     turn = path.segments[-1].tolist()
@@ -286,7 +283,7 @@ def full_turn(pose: Pose, radius_m: float, side: float) -> Segment:
 
 
 def moved(segments: Sequence[Segment], to: Pose) -> list[Segment]:
-    """Segments as a whole brought to where they begin at another pose."""
+    """Moves and turns segments as a whole, so that they begin at another pose."""
     x, y, tx, ty = segments[0][:4]
     turn = complex(to.tangent_east, to.tangent_north) * complex(tx, -ty)
     turn /= abs(turn)  # else what is moved again and again shrinks or grows: the error doubles each time
@@ -311,6 +308,6 @@ def onward_in_turn(pose: Pose, curvature: float, to: Pose) -> list[Segment] | No
     )
     turn = math.copysign(1.0, curvature) * turned % math.tau
     arc: Segment = (*pose, curvature, turn / abs(curvature))
-    if math.dist(along(arc, arc[5])[:2], to[:2]) > ON_TURN / abs(curvature):
+    if math.dist(along(arc, arc[5])[:2], to[:2]) > ON_TURN_SHARE / abs(curvature):
         return None
     return [arc] if SHORTEST_M < arc[5] < math.tau / abs(curvature) - SHORTEST_M else []

@@ -1,4 +1,4 @@
-"""Joints of paths that bend: how a new path leaves the one in effect, and the turn to hold in where there is none."""
+"""Joins paths: how a new path leaves the one in effect, and the holding turn where no path is found."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequ
 LEAD_S = 1.0
 """A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
 
-SHARES = (1.0, 0.5, 0.1)
+HOLD_KEEP_SHARES = (1.0, 0.5, 0.1)
 """Shares of the clearance that a holding turn keeps, tried in this order: a turn too near is better than none. Turns in
 space that has been seen to be free come first."""
 
-AHEAD_RADII, APART_RADII = 4.0, 0.25
-"""The holding turn begins within so many turn radii ahead of the aircraft, at places so many apart."""
+HOLD_AHEAD_RADII, HOLD_STEP_RADII = 4.0, 0.25
+"""A holding turn begins at most the first number of turn radii ahead, at places the second number apart."""
 
 
 def stuck(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray) -> Plan:
-    """The answer where there is no way on: a turn to hold in, or the one that is being flown."""
+    """The answer where a planner finds no way: a holding turn, or the one that is being flown."""
     path = request.flown.path if request.flown else None
     if path is not None and path.loiter:
         turn = Path(path.segments[-1:])
-        if math.isinf(first_breach(turn, points_m, SHARES[-1] * mission.clearance_m)):
+        if math.isinf(first_breach(turn, points_m, HOLD_KEEP_SHARES[-1] * mission.clearance_m)):
             return Plan(PlanStatus.NO_PATH, f"{why}; holding")
     limits = Limits.of(mission)
     arc_length_m = request.arc_length_m
     if path is None or path.loiter or path.length_m - arc_length_m < limits.roll_m:
         path = Path(np.array([(*request.position_m, *request.direction, 0.0, max(limits.roll_m, 1.0))]))
         arc_length_m = 0.0
-    to_m = min(path.length_m, arc_length_m + AHEAD_RADII * limits.radius_m)
-    for seen, share in product((request.seen, None), SHARES):
+    to_m = min(path.length_m, arc_length_m + HOLD_AHEAD_RADII * limits.radius_m)
+    for seen, share in product((request.seen, None), HOLD_KEEP_SHARES):
         terrain = Terrain(points_m, np.full(len(points_m), share * mission.clearance_m), mission.bounds_m)
         hold = divert_to_loiter(path, arc_length_m, to_m, limits, terrain, seen)
         if hold is not None:
@@ -58,7 +58,7 @@ def stuck(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray
 def divert_to_loiter(
     path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrain, seen: MapView | None = None
 ) -> Path | None:
-    """The path in effect from one arc length on, left before another, as late as may be, for a full turn.
+    """The path in effect from arc length `from_m` on, left as late as possible before `to_m` for a full turn.
 
     The turn lies in `terrain` and, if given, in space `seen` to be free. None where there is no room for one.
     """
@@ -67,7 +67,7 @@ def divert_to_loiter(
     breach = first_breach(Path(np.array(way)), terrain.points_m, terrain.keep_m) if way else math.inf
     if breach < math.inf:
         to_m = max(from_m, from_m + breach - float(terrain.keep_m.max()))
-    step_m = APART_RADII * limits.radius_m
+    step_m = HOLD_STEP_RADII * limits.radius_m
     for i in range(max(int((to_m - from_m) / step_m), 0), -1, -1):
         pose, curvature = place_on(path, from_m + i * step_m)
         for side in (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0):

@@ -1,4 +1,4 @@
-"""Where a curve may lie, and the work of asking that, which is counted."""
+"""The terrain in which curves may lie; tests of curves against it are counted as work."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from planner.geometry.clearance import first_breach, inside_bounds
 from planner.interface import FloatArray, Path
 from planner.kernels.buckets import Buckets, bucketed
 
-SQUARE = 3.0
-"""Side of the squares in which edge points near a line are looked for, as a multiple of the distance kept."""
+SQUARE_SIDE_KEEPS = 3.0
+"""Side of the squares that edge points are sorted into, in distances kept."""
 
 CALL_WORK, TANGENT_WORK, POINT_WORK, HUG_WORK = 14.0, 0.04, 0.0016, 0.006
-"""Counted work, some microseconds, of a call, and in it of each point at which tangents are laid, that is compared with
-a line, or along which a step may lead."""
+"""Counted work, about 1 us a unit: of a call, and in it of each point that tangents are drawn to, that is compared with
+a line, or that a step may hug."""
 
 
 class WorkCount:
@@ -25,16 +25,13 @@ class WorkCount:
         self.done = 0.0
 
     def add(self, calls: float, each: float = 0.0, count: int = 0) -> None:
-        """Counts questions, and what each of so many points or pairs adds to them."""
+        """Counts `calls`, and `each` more for each of `count` points or pairs."""
         self.done += CALL_WORK * calls + each * count
 
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
-    """Where a curve may lie: (m, 2) edge points, (m,) the distance to be kept from each, and the area.
-
-    The work of asking is counted.
-    """
+    """The space for curves: (m, 2) edge points, (m,) distance to be kept from each, area; tests count as work."""
 
     points_m: FloatArray
     keep_m: FloatArray
@@ -42,7 +39,7 @@ class Terrain:
     work_count: WorkCount = field(default_factory=WorkCount)
 
     def admits(self, path: Path) -> bool:
-        """Whether a path keeps its distance and stays inside."""
+        """Tells whether a path keeps its distance from every edge point and stays inside the area."""
         if not inside_bounds(path, self.bounds_m):
             return False
         self.work_count.add(1, POINT_WORK, len(self.points_m) * len(path.segments))
@@ -51,5 +48,5 @@ class Terrain:
     @cached_property
     def squares(self) -> Buckets:
         """The edge points by squares."""
-        side_m = SQUARE * max(float(self.keep_m.max(initial=0.0)), 1.0)
+        side_m = SQUARE_SIDE_KEEPS * max(float(self.keep_m.max(initial=0.0)), 1.0)
         return bucketed(self.points_m, self.keep_m, side_m)[1]

@@ -1,4 +1,4 @@
-"""Edge points by squares of the plane, so that a question about a few of them does not go through all.
+"""Sorts edge points into squares of the plane, so that a search near a place does not go through all points.
 
 Compiled: see `planner.kernels`.
 """
@@ -13,7 +13,7 @@ from planner.compiled import COUNT, COUNTS, FLOAT, FLOATS, ROWS, compiled
 from planner.interface import FloatArray, IntArray
 
 MOST_BUCKETS = 4096
-"""Where the squares would be more, over all of the ground, they are made larger."""
+"""Most squares over the whole area; over a large area they are made larger."""
 
 Cells = tuple[IntArray, IntArray, IntArray, IntArray]
 """(c,) where each square begins among gathered points; (c,) how many it has; (p,) twice: squares that touch each other,
@@ -25,10 +25,10 @@ among them, and the end; (3, b) centre and radius of a circle about each that ho
 
 
 def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray, Cells]:
-    """Some points by squares: what lies in one of them is looked at as one piece of wall.
+    """Sorts the points of some indices into squares of `side`; those in one square count as one piece of wall.
 
     Returns:
-        (m,) the indices, those of a square next to each other; where the squares begin, and which touch.
+        (m,) the indices, square by square; the squares.
     """
     squares = np.floor(points[some] / side).astype(np.int64)
     squares -= squares.min(axis=0) - 1
@@ -72,7 +72,7 @@ def _touching(keys: IntArray, width: int) -> Cells:
 
 @compiled(COUNT, COUNTS, COUNTS)
 def joined(count: int, one: IntArray, other: IntArray) -> IntArray:
-    """(count,) the first of the squares that each is joined with, by pairs that touch: union-find."""
+    """(count,) the first square of the group that each square is joined to by touching pairs: union-find."""
     first = np.arange(count)
     for pair in range(len(one)):
         a, b = one[pair], other[pair]

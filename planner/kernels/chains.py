@@ -44,7 +44,7 @@ def crosses_line(ax: float, ay: float, bx: float, by: float, ends: FloatArray) -
 
 @compiled(COUNTS_OUT, BOOLS_OUT, COUNT, COUNT, BOOL)
 def link(parent: IntArray, parity: BoolArray, a: int, b: int, crosses: bool) -> bool:
-    """Links two nodes; whether that closes a chain that parts start and goal."""
+    """Links two nodes; returns whether that closes a chain that separates start and goal."""
     root_a, parity_a = root_of(parent, parity, a)
     root_b, parity_b = root_of(parent, parity, b)
     odd = parity_a ^ parity_b ^ crosses
@@ -67,7 +67,7 @@ def link_all(
     clearance: float,
     border: float,
 ) -> bool:
-    """Links nodes, from the first one on, with all before that are near enough; whether that closes a chain."""
+    """Links each node from `first` on with all nodes before it that are near; returns whether that closes a chain."""
     closed, reach = False, 2.0 * clearance
     for node in range(first, len(places)):
         x, y = places[node, 0], places[node, 1]

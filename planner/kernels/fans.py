@@ -1,4 +1,4 @@
-"""What obstacles look like from a track point: where their fans end, and how far lines lead past their edge points.
+"""Obstacles as seen from a track point: where their fans end, and how far lines lead past their edge points.
 
 Metres, ENU. `places`, `first` and `circles` are all edge points by squares, `planner.kernels.buckets.Buckets`. `own`
 are those of one obstacle, (3, m): east, north and the distance to be kept from each. Its cells, of a `side`, are
@@ -23,7 +23,7 @@ EDGE_OFF_RAD = 1e-7
 def _first_of(
     places: FloatArray, begin: int, end: int, east: float, north: float, ux: float, uy: float
 ) -> tuple[float, int]:
-    """`first_met` of the points from one on to another."""
+    """Does the same as `first_met` for the points of indices `begin` to `end` alone."""
     nearest, met = math.inf, 0
     for k in range(begin, end):
         dx, dy = places[0, k] - east, places[1, k] - north
@@ -40,7 +40,7 @@ def _first_of(
 def first_met(
     places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float, ux: float, uy: float
 ) -> tuple[float, int]:
-    """How far a ray leads before it comes too near to a point, and to which; infinite and 0: it never does."""
+    """Distance along a ray at which it comes too near to a point, and the point's index; infinite and 0: never."""
     squares, begins, count = np.empty(len(first), dtype=np.intp), np.empty(len(first)), 0
     for block in range(len(first) - 1):
         dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
@@ -67,7 +67,7 @@ def first_met(
 
 @compiled(FLOATS_OUT, FLOATS_OUT, COUNT, COUNT)
 def _sift_down(key: FloatArray, value: FloatArray, place: int, count: int) -> None:
-    """Restores a binary heap of so many pairs, the least key first, where one at a place may have too great a key."""
+    """Restores a binary heap of `count` pairs, least key first, in which the key at `place` may be too great."""
     while 2 * place + 1 < count:
         child = 2 * place + 1
         if child + 1 < count and key[child + 1] < key[child]:
@@ -92,7 +92,7 @@ def hugged(
     outer: float,
     touch: float,
 ) -> float:
-    """How far along a ray an outer distance from an obstacle, which it touches, is reached again; 0: it never is."""
+    """Distance along a ray that touches an obstacle at which it is `outer` away from the obstacle again; 0: never."""
     begin, end, count = np.empty(own.shape[1]), np.empty(own.shape[1]), 0
     within = outer + 1.5 * side  # points of one cell lie no further apart than its diagonal
     for cell in range(len(first)):
@@ -174,7 +174,7 @@ def fan_edges(
     north: float,
     outer: float,
 ) -> tuple[FloatArray, IntArray, int]:
-    """The tangents to the ends of an obstacle's fan that are free as far as they touch, and what hides the others.
+    """Finds the tangents to the ends of an obstacle's fan that are free up to the touch, and what hides the others.
 
     Returns:
         (k, 6) unit vector, distance at which it touches, distance up to which it is free, side (1 for M, -1 for N),
@@ -234,7 +234,7 @@ def entered(
 ) -> tuple[FloatArray, IntArray]:
     """The discs about points by squares that the line from a to b enters: distances from a, and their indices.
 
-    A disc that holds `a` counts only when the line leads deeper into it. So many at most are looked for.
+    A disc that holds `a` counts only when the line leads deeper into it. At most `most` discs are returned.
     """
     most = min(most, len(places[0]))
     entry, which, count = np.empty(most), np.empty(most, dtype=np.intp), 0
@@ -264,10 +264,10 @@ def entered(
 def shortcuts(
     places: FloatArray, first: IntArray, circles: FloatArray, nodes: FloatArray
 ) -> tuple[IntArray, int]:
-    """Which of (n, 2) track points are left where each is followed by the furthest that it sees, or by the next.
+    """Drops those of (n, 2) track points that lie between one and the furthest that it sees.
 
     Returns:
-        (k,) indices, the first and the last among them; how many lines were looked along.
+        (k,) indices of the points left, the first and the last among them; number of lines tested.
     """
     kept, count, here, lines = np.zeros(len(nodes), dtype=np.intp), 1, 0, 0
     while here < len(nodes) - 1:

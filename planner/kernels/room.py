@@ -1,7 +1,4 @@
-"""How near an aircraft comes to edge points that stand and to those that move.
-
-Compiled: see `planner.kernels`.
-"""
+"""Least distance of an aircraft from still and moving edge points; compiled, see `planner.kernels`."""
 
 from __future__ import annotations
 
@@ -26,7 +23,7 @@ def room_along(
     latest: float,
     unknown_s: float,
 ) -> float:
-    """How far an aircraft that flies along (n, 2) places, a step (m) apart, keeps from all edge points, m.
+    """Least distance (m) from all edge points of an aircraft that flies along (n, 2) places, `step` (m) apart.
 
     Those that stand are `Buckets`; `moving` are (k, 5): edge points now, their velocity, and how fast they may come
     nearer beyond that, for `unknown_s`. For each metre along the way, what is met counts as `farther` m further away.

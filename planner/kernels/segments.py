@@ -17,7 +17,7 @@ from planner.interface import FloatArray
 
 @compiled(ROWS, COUNT, FLOAT)
 def place(rows: FloatArray, which: int, along: float) -> tuple[float, float]:
-    """East and north so far along a segment."""
+    """East and north (m) at a distance `along` a segment."""
     x, y, tx, ty = rows[which, 0], rows[which, 1], rows[which, 2], rows[which, 3]
     half = 0.5 * rows[which, 4] * along
     chord = along * (math.sin(half) / half if half else 1.0)
@@ -123,7 +123,7 @@ def to_nearest(places: FloatArray, points: FloatArray) -> FloatArray:
 
 @compiled(ROWS, FLOAT)
 def pose(rows: FloatArray, arc_length: float) -> tuple[float, float, float, float, float]:
-    """Place and tangent at a arc_length, clamped to the ends, and the curvature there."""
+    """Place and tangent at an arc length, clamped to the ends, and the curvature there."""
     which, along = 0, max(arc_length, 0.0)
     while along > rows[which, 5] and which < len(rows) - 1:
         along -= rows[which, 5]

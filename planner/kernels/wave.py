@@ -1,7 +1,4 @@
-"""A wave that spreads through a grid: distances to go.
-
-Compiled: see `planner.kernels`.
-"""
+"""A wave that spreads through a grid and finds distances to go; compiled, see `planner.kernels`."""
 
 from __future__ import annotations
 
@@ -10,9 +7,9 @@ import math
 from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, FLOATS, FLOATS_OUT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
-EIGHT = (2, 4)
-"""Of five levels of the wave these go on to all 8 neighbours of a cell, the others to 4: what is counted is between the
-length of a way and 0.92 of it, so that what looks shortest on the grid seldom is not."""
+CORNER_LEVELS = (2, 4)
+"""Of five levels of the wave these two spread to all 8 neighbours of a cell, the others to 4: a counted length is then
+between the true length of a way and 0.92 of it."""
 
 
 @compiled(BOOLS_OUT, ROWS, FLOATS, FLOAT, FLOAT, FLOAT, COUNT, COUNT)
@@ -26,7 +23,7 @@ def close_cells(
     columns: int,
     rows: int,
 ) -> None:
-    """Closes the cells that lie as a whole within what is to be kept from one of some points."""
+    """Closes the cells that lie wholly within the distance `keep` of one of the points."""
     for i in range(len(points)):
         x, y, within = points[i, 0] - west, points[i, 1] - south, keep[i] - math.sqrt(0.5) * cell
         if within <= 0.0:
@@ -43,7 +40,7 @@ def close_cells(
 def spread_wave(
     levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int
 ) -> None:
-    """Lets the wave go on, by `most` cells and to the end of a level.
+    """Spreads the wave by `most` cells and on to the end of a level.
 
     `levels`, `open_` (the wave may go there, and has not) are of each cell; `order` are cells as the wave came to them.
     `state` is the level, the first in that order that has yet to go on to what touches it at a corner, where the last
@@ -53,7 +50,7 @@ def spread_wave(
     enough = end + most
     while cornered < end < enough:
         level += 1
-        corners = level % 5 in EIGHT
+        corners = level % 5 in CORNER_LEVELS
         # What touches only at a corner is come to later, from all that was new since the last time.
         front, begin = (cornered if corners else begin), end
         for i in range(front, begin):

@@ -25,7 +25,7 @@ from planner.paper.config import ImprovedBugConfig
 from planner.paper.model import within
 from planner.paper.multi_step_search import Window, multi_step_search
 from planner.paper.route_optimisation import Route, optimise, shortest
-from planner.paper.sectors import ALL, fan_shaped_sectors
+from planner.paper.sectors import FULL_CIRCLE, fan_shaped_sectors
 
 
 class ImprovedBug:
@@ -128,7 +128,7 @@ class ImprovedBug:
 def _picture(position_m: tuple[float, float], window: Window, routes: list[Route]) -> PlanPicture:
     """What was searched: guide vector, window, the sectors at the first track point, the optimised candidates."""
     sectors = fan_shaped_sectors(window.points_m, window.keep_m, routes[0].nodes[0])
-    edges = np.array([each for each in sectors if each != ALL]).reshape(-1, 2)
+    edges = np.array([each for each in sectors if each != FULL_CIRCLE]).reshape(-1, 2)
     return PlanPicture(
         np.array([position_m, window.mission.goal_m]),
         window.radius_m,

@@ -22,7 +22,7 @@ class Sector(NamedTuple):
     left: float
 
 
-ALL = Sector(-math.pi, math.pi)
+FULL_CIRCLE = Sector(-math.pi, math.pi)
 """The sector where no obstacle is in the window."""
 
 
@@ -45,7 +45,7 @@ def fan_shaped_sectors(points_m: FloatArray, keep_m: float, node_m: Point) -> li
     on its right. Obstacles whose fans overlap are one.
     """
     if not len(points_m):
-        return [ALL]
+        return [FULL_CIRCLE]
     east, north = points_m[:, 0] - node_m[0], points_m[:, 1] - node_m[1]
     half = np.arcsin(np.minimum(keep_m / np.maximum(np.hypot(east, north), 1e-9), 1.0))
     right = np.arctan2(north, east) - half

@@ -21,7 +21,7 @@ from planner.shield.committed_plan import Start
 
 
 class _Found(NamedTuple):
-    """A route, where it begins, how far from obstacles it was searched, and among which points."""
+    """A route found, with its start, the attempt that found it and the edge points it was found among."""
 
     route: FlyableRoute
     start: Start
@@ -52,7 +52,7 @@ class AnytimeSearch:
         self.candidates: list[Candidate] = []  # looked at so far
 
     def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
-        """Ways found with one more portion of work."""
+        """Yields the courses found with one more portion of work."""
         enough = self._local.work_count.done + work
         self._start, self._flown = start, flown
         for step in self._steps:
@@ -67,7 +67,7 @@ class AnytimeSearch:
         return self._start, self._flown
 
     def _searched(self) -> Generator[Course | None, None, None]:
-        """Ways as they are found; None after each step of work."""
+        """Yields courses as they are found, and None after each step of work."""
         found = False
         waiting: list[_Found] = []
         closed_m = math.inf
@@ -101,7 +101,7 @@ class AnytimeSearch:
                 yield self._course(route, self._local.known, shortest=False)
 
     def _courses(self, found: list[_Found]) -> Iterator[Course]:
-        """Courses along routes, the shorter first, from where a plan would begin now."""
+        """Yields courses along routes, the shorter first, from where a plan would begin now."""
         for each in sorted(found, key=lambda each: each.route.path.length_m):
             start, flown = self._now()
             route: FlyableRoute | None = each.route
@@ -112,13 +112,13 @@ class AnytimeSearch:
                 yield self._course(route, each.known, each.shortest)
 
     def _passed_over(self, found: list[_Found]) -> bool:
-        """Whether a much shorter way could not be flown: further from obstacles it may have room for its turns."""
+        """Tells whether a much shorter way could not be flown: further from obstacles its turns may have room."""
         least_m = min((each.route.path.length_m for each in found), default=0.0)
         searched_m = min((candidate.cost_m for candidate in self.candidates), default=math.inf)
         return least_m > (1.0 + DOUBTFUL_SHARE) * searched_m
 
     def _switches(self, route: FlyableRoute) -> bool:
-        """Whether a way leaves obstacles on the other side than what is flown."""
+        """Tells whether a route passes obstacles on another side than the course that is flown."""
         start, flown = self._now()
         nodes = (start.pose[:2], *route.nodes)
         return flown is not None and not flown.same_side(nodes, self._local.points_m)

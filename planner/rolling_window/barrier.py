@@ -16,15 +16,14 @@ from planner.interface import FloatArray, Mission
 from planner.kernels.chains import link_all
 from planner.memory import ObstacleMemory
 
-PROVED_AT_ONCE = 500
-"""So many edge points at most are taken into a proof in one call, but where it is to hold for what is left after some
-were let go of (a millisecond for every 2,000 of them)."""
+POINTS_A_CALL = 500
+"""Most edge points that a proof takes in at one call (2,000 take a millisecond); after a removal it takes in all."""
 
-THIN = 0.1
-"""Of points within this share of the clearance one is taken in. Fewer points prove less, but nothing that is not so."""
+THINNING_SHARE = 0.1
+"""One point is taken in per square of this share of the clearance. Fewer points prove less, but nothing false."""
 
-SQUARES = 4096
-"""Into so many lists nodes are put, by where they lie."""
+NODE_LISTS = 4096
+"""Number of lists that nodes are put into by their place."""
 
 
 class Barrier:
@@ -44,13 +43,13 @@ class Barrier:
         self._places = np.zeros((1, 2))
         self._parent, self._before = np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp)
         self._parity = np.zeros(1, dtype=np.bool_)
-        self._last = np.zeros(SQUARES, dtype=np.intp)
+        self._last = np.zeros(NODE_LISTS, dtype=np.intp)
         self.closed = False
 
     def add(self, points_m: FloatArray) -> None:
         """Takes in edge points, (k, 2)."""
         known, fresh = len(self._places), []
-        places = np.floor(points_m / (THIN * self._clearance)).astype(np.int64).tolist()
+        places = np.floor(points_m / (THINNING_SHARE * self._clearance)).astype(np.int64).tolist()
         for i, (column, row) in enumerate(places):
             if (column, row) not in self._thinned:
                 self._thinned.add((column, row))
@@ -68,7 +67,7 @@ class Barrier:
 
 
 class Proof:
-    """Asks what a planner remembers, again and again, whether it leaves no way to the goal."""
+    """Proves, as edge points come in, that those remembered leave no way to the goal."""
 
     def __init__(
         self,
@@ -88,8 +87,8 @@ class Proof:
         self._taken = 0
         self._begun_at = self._gone = self._memory.cleared
 
-    def closed(self, position: Point, most: int = PROVED_AT_ONCE) -> bool:
-        """Takes in so many more of the points and says whether they close all ways from the first position given."""
+    def closed(self, position: Point, most: int = POINTS_A_CALL) -> bool:
+        """Takes in at most `most` more points; returns whether they close all ways from the first position given."""
         # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
         self._ends = self._ends or (position, self._mission.goal_m)
         closed = self._taken_in(self._ends, most)
@@ -100,7 +99,7 @@ class Proof:
         return closed
 
     def _taken_in(self, ends: tuple[Point, Point], most: int) -> bool:
-        """Whether the ways are closed with so many more points."""
+        """Takes in at most `most` more points; returns whether they close all ways."""
         memory, keeps_m = self._memory, self._keeps_m
         if self._barrier is None:
             self._barrier = Barrier(*ends, self._mission.bounds_m, keeps_m, self._border_m)
@@ -117,7 +116,7 @@ class Proof:
 
 
 class Proofs:
-    """What a planner asks of the edge points seen, one proof a question.
+    """The proofs that a planner makes from the edge points seen.
 
     `no_way`: no vehicle can pass; every gap that it counts as open is wider than `no_way_gap_m`. `no_room_to_turn`:
     none can that keeps a hold radius beside the clearance (`turning_gap_m`). `only_given_up`: no way but through places

@@ -1,4 +1,4 @@
-"""What of a course is put into effect: as much as ends in a turn seen to be free, or in the goal circle."""
+"""Commits to the part of a course that ends in a turn seen to be free, or in the goal circle."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from planner.rolling_window.window import guide_vector
 from planner.shield.certificate import Certified, Certifier, hold_centre
 from planner.shield.committed_plan import CommittedPlan, Start
 
-PROGRESS = 0.25
-"""A new plan leads on if it gains at least this share of the hold radius along its course, and ends in a hold at least
-as far from that of the plan in effect."""
+PROGRESS_SHARE = 0.25
+"""A new plan leads on if it gains this share of the hold radius along its course, and its hold lies at least as far
+from that of the plan in effect."""
 
-CONCENTRIC = 0.05
+CONCENTRIC_SHARE = 0.05
 """An arc whose centre lies within this share of the hold radius from that of a hold is part of the hold."""
 
 
@@ -69,7 +69,7 @@ class Commitment:
         return CommittedPlan(plan, certified.path, course, certified.loiter_entry_m)
 
     def _certified(self, seen: MapView, course: Course, cut_m: float) -> Certified | None:
-        """The part of a course that is certified."""
+        """The part of a course that is certified; None where no part is."""
         certifier = self._certifier(1.5 * seen.spacing_m)
         terrain = self._local.room.terrain(self._mission.clearance_m + self._mission.tracking_error_m)
         certified = certifier.certify(course.path, seen, terrain, cut_m)
@@ -86,7 +86,7 @@ class Commitment:
         """
         if not found.path.loiter:
             return True
-        hold_m = PROGRESS * self._mission.hold_radius_m
+        hold_m = PROGRESS_SHARE * self._mission.hold_radius_m
         before_m = sum(segment[5] for segment in start.prefix)
         if effective is not None and effective.path.loiter:
             circle = hold_centre(effective.path.segments[-1])
@@ -96,13 +96,10 @@ class Commitment:
         return found.loiter_entry_m - before_m >= hold_m
 
     def _circled_m(self, path: Path, circle: Point) -> float:
-        """How far a path leads along a hold at its beginning."""
-        circled_m = 0.0
+        """Length (m) of the beginning of a path that lies on a hold's circle."""
+        circled_m, off_m = 0.0, CONCENTRIC_SHARE * self._mission.hold_radius_m
         for segment in path.segments.tolist():
-            if (
-                not segment[4]
-                or math.dist(hold_centre(segment), circle) > CONCENTRIC * self._mission.hold_radius_m
-            ):
+            if not segment[4] or math.dist(hold_centre(segment), circle) > off_m:
                 break
             circled_m += segment[5]
         return circled_m
@@ -130,7 +127,7 @@ class Commitment:
 
 
 def explanation(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
-    """What is ahead of the aircraft, and on which side it is passed."""
+    """Says what is ahead of the aircraft, and on which side it is passed."""
     ux, uy, left = guide_vector(position, goal)
     if len(nodes) < 2:
         return f"way to the goal in view, {left / 1000:.1f} km to go"
@@ -142,7 +139,7 @@ def explanation(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
 def picture_of(
     position: Point, goal: Point, nodes: Sequence[Point], candidates: Iterable[Candidate], met_m: FloatArray
 ) -> PlanPicture:
-    """Guide vector, what was compared (the chosen course first), what is met."""
+    """The picture of a plan: guide vector, candidates with the chosen course first, moving obstacles where met."""
     return PlanPicture(
         guide_m=np.array([position, goal]),
         candidates=(np.array([position, *nodes]), *(np.array(candidate.nodes) for candidate in candidates)),

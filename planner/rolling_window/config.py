@@ -32,13 +32,12 @@ class RollingWindowConfig(MarginConfig):
             ValueError: the sensing range is too short for the turn radius.
         """
         reaction_s = LEAD_S + mission.sensor_latency_s + mission.compute_latency_s + mission.roll_in_s
-        least = least_sensor_range_m(
-            mission.hold_radius_m, mission.clearance_m, mission.ground_speed_mps, reaction_s
-        )
+        radius_m, keep_m = mission.hold_radius_m, mission.clearance_m
+        least = least_sensor_range_m(radius_m, keep_m, mission.ground_speed_mps, reaction_s)
         if mission.sensor_range_m < least:
             raise ValueError(
                 f"sensor.range_m is {mission.sensor_range_m:g}, too short for a turn radius of "
-                f"{mission.hold_radius_m:.0f} m with a clearance of {mission.clearance_m:g} m; "
+                f"{radius_m:.0f} m with a clearance of {keep_m:g} m; "
                 f"must be at least {math.ceil(least)}, to see room for a safe turn ahead"
             )
         step = mission.sensor_range_m / 16.0 if self.rolling_step_m is None else self.rolling_step_m

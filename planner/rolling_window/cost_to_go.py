@@ -17,17 +17,17 @@ from planner.geometry.terrain import WorkCount
 from planner.interface import FloatArray
 from planner.kernels.wave import close_cells, spread_wave
 
-CELLS, LEAST_M = 5.0, 1.0
-"""The distance that is kept from edge points, `LEAST_M` (m) where less is kept, is so many cells long."""
+KEEP_CELLS, LEAST_KEEP_M = 5.0, 1.0
+"""Number of cells in the distance kept from edge points, which counts as at least `LEAST_KEEP_M`."""
 
 MOST_CELLS = 250_000
-"""A grid has at most so many cells; else it is made coarser. It then closes fewer cells, but no open one."""
+"""Most cells of a grid; a larger one is made coarser. It then closes fewer cells, but no open one."""
 
 PAIRS_AT_ONCE = 20_000
-"""One step of work is so many pairs of an edge point and a cell, or so many cells that the wave comes to."""
+"""Pairs of an edge point and a cell, or cells that the wave comes to, in one step of work."""
 
-CLOSED, REACHED = 0.002, 0.012
-"""Work (about microseconds) of a pair of an edge point and a cell near it, and of each cell that the wave comes to."""
+CLOSED_WORK, REACHED_WORK = 0.002, 0.012
+"""Counted work (about 1 us a unit) of a pair of an edge point and a cell near it, and of a cell of the wave."""
 
 
 class CostToGo:
@@ -44,11 +44,11 @@ class CostToGo:
     ) -> None:
         self._goal, self._points, self._keep, self._work_count = goal, points_m, keep_m, work_count
         # Beyond all that is known, and a way round it, nothing is nearer to anything.
-        most = max(float(keep_m.max(initial=0.0)), LEAST_M)
+        most = max(float(keep_m.max(initial=0.0)), LEAST_KEEP_M)
         places = np.vstack((points_m, start, goal))
         low = np.maximum(places.min(axis=0) - 2.0 * most, np.minimum(bounds_m[:2], places.min(axis=0)))
         high = np.minimum(places.max(axis=0) + 2.0 * most, np.maximum(bounds_m[2:], places.max(axis=0)))
-        self._cell = max(most / CELLS, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
+        self._cell = max(most / KEEP_CELLS, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
         self._low = low
         self._columns, self._rows = (int(each) + 3 for each in (high - low) / self._cell)
         self._levels = np.full(self._columns * self._rows, math.inf)
@@ -73,7 +73,7 @@ class CostToGo:
         for i in range(0, len(self._points), some):
             points, keep = self._points[i : i + some], self._keep[i : i + some]
             close_cells(open_, points, keep, west, south, self._cell, self._columns, self._rows)
-            self._work_count.add(1, CLOSED, len(points) * width**2)
+            self._work_count.add(1, CLOSED_WORK, len(points) * width**2)
             yield
         goal = self._index(self._goal)
         order = np.zeros(len(open_), dtype=np.intp)
@@ -82,7 +82,7 @@ class CostToGo:
         while state[1] < state[3]:
             before = int(state[3])
             spread_wave(self._levels, open_, order, state, self._rows, PAIRS_AT_ONCE)
-            self._work_count.add(1, REACHED, int(state[3]) - before)
+            self._work_count.add(1, REACHED_WORK, int(state[3]) - before)
             yield
 
     def _index(self, place: Point) -> int:

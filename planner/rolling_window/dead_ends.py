@@ -1,4 +1,4 @@
-"""Places that could not be seen to be safe to enter: remembered like edge points, so that no course leads there.
+"""Gives up places that could not be seen to be safe to enter, and remembers them like edge points.
 
 They are tried again where nothing else is left, and where something that moved may have been in the way.
 """
@@ -12,21 +12,21 @@ from planner.interface import MapView, Mission
 from planner.memory import ObstacleMemory
 from planner.world_stability import WorldStability
 
-ENOUGH = 2
-"""A place that the aircraft has turned before this many times has shown all that can be seen of it."""
+TURNS_TO_GIVE_UP = 2
+"""A place is given up when the aircraft has turned away in front of it this many times."""
 
 RETRY_S = 60.0
-"""So many seconds after something last moved or appeared, what was given up is tried again."""
+"""Given-up places are tried again this long after something last moved or appeared."""
 
 MOST_EFFORT = 4
-"""A search that found nothing is repeated with twice the effort, this many times; from then on once a turn."""
+"""A search in vain is repeated with twice the effort, this many times; from then on once a turn."""
 
 MOST_RETRIES = 8
-"""Everything is tried again this many times before a flight ends for want of room to turn."""
+"""All given-up places are tried again this many times before a flight ends for want of room to turn."""
 
 
 class GivingUp:
-    """Gives places up that the aircraft turned before, and tells what follows from searches that found no way."""
+    """Gives up places that the aircraft turned away from, and decides what follows a search in vain."""
 
     def __init__(self, mission: Mission, memory: ObstacleMemory) -> None:
         self._mission, self._memory = mission, memory
@@ -40,17 +40,17 @@ class GivingUp:
         self.tried_again = False  # what was given up has been tried again for want of another way
 
     def turned_twice(self, place: Point) -> bool:
-        """Counts one more turn before a place; returns whether these are enough to give it up."""
+        """Counts one more turn in front of a place; returns whether these are enough to give it up."""
         self._turned_before.append(place)
         reach_m = 2.0 * self._mission.clearance_m  # places nearer to each other are one
         near = [each for each in self._turned_before if math.dist(each, place) < reach_m]
-        if len(near) < ENOUGH:
+        if len(near) < TURNS_TO_GIVE_UP:
             return False
         self._turned_before = [each for each in self._turned_before if each not in near]
         return True
 
     def note_change(self, time_s: float, seen: MapView) -> None:
-        """Has what was given up tried again when what moved or appeared may have left the way."""
+        """Forgets the given-up places some time after something moved or appeared, which may have left the way."""
         if self.stability.note(time_s, seen):
             self._retry_s = self.stability.changed_s + RETRY_S
         if time_s > self._retry_s:
@@ -59,11 +59,11 @@ class GivingUp:
 
     @property
     def waits(self) -> bool:
-        """Whether a time is set at which what was given up is tried again."""
+        """Whether a time is set at which given-up places are tried again."""
         return self._retry_s < math.inf
 
     def refuse(self, place: Pose) -> None:
-        """Gives up a place on a course, and what lies to its sides: a turn takes so much room."""
+        """Gives up a place on a course, and places to its sides as far as a turn takes room."""
         east, north, along_east, along_north = place
         clearance_m, radius_m = self._mission.clearance_m, self._mission.turn_radius_m
         beside = int(radius_m / clearance_m)
@@ -77,7 +77,7 @@ class GivingUp:
     @property
     def certain(self) -> bool:
         """Whether all that was seen still stands, and nothing has contradicted seen-free space."""
-        return not (self._memory.ever_cleared or self.stability.ever)
+        return not (self._memory.ever_cleared or self.stability.ever_changed)
 
     @property
     def out_of_effort(self) -> bool:
@@ -95,14 +95,14 @@ class GivingUp:
 
     @property
     def out_of_retries(self) -> bool:
-        """Whether everything has been tried again as often as it is."""
+        """Whether all given-up places have been tried again as often as allowed."""
         return self._retries == MOST_RETRIES
 
     def narrow(self, no_room: bool, time_s: float) -> bool:
-        """Whether nothing is left but ways without room to turn."""
+        """Tells whether it is certain that only ways without room to turn are left; `no_room` is proved."""
         # What moved may have closed the way. Where edge points were taken back the sensor errs, and a place that was
         # given up may be seen to be free at another look.
-        doubtful = self.stability.ever or self._memory.ever_cleared
+        doubtful = self.stability.ever_changed or self._memory.ever_cleared
         return no_room and self.stability.settled(time_s) and not (doubtful and len(self._memory.refused_m))
 
     def try_again(self, narrow: bool, at_end: bool, arc_length_m: float) -> None:

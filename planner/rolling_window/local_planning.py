@@ -26,33 +26,33 @@ SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin. Straight steps keep the first beyond the clearance, the curve through them the second;
 track points keep all of the margin."""
 
-LEAST_HUG, LEAST_MARGIN = 0.005, 0.4
-"""Track points lie further out than straight steps by at least `LEAST_HUG` of the clearance. `LEAST_MARGIN` of the
-margin is still kept where there is no room for all of it."""
+LEAST_HUG_SHARE, LEAST_MARGIN_SHARE = 0.005, 0.4
+"""Track points lie further out than straight steps by at least the first share of the clearance. The second share of
+the margin is still kept where there is no room for all of it."""
 
 MOST_TRACKS = 300
-"""A search looks at so many candidates at most."""
+"""Most candidates that a search expands."""
 
-WIDER, FURTHER = 4, 60
-"""A wide search, where N steps with n candidates find no way, has `WIDER` times as many of both and is led by the cost
-to go, so that the best come first; after the first it looks at only `FURTHER` steps more."""
+WIDE_FACTOR, WIDE_STEPS = 4, 60
+"""A wide search, where N steps with n candidates find no way, has `WIDE_FACTOR` times as many of both and is led by the
+cost to go, so that the best come first; after the first it looks at only `WIDE_STEPS` steps more."""
 
 DOUBTFUL_SHARE, MOST_AROUND = 0.1, 8
 """A way that is longer than the one flown by the share `DOUBTFUL_SHARE` is doubtful. Then the `MOST_AROUND` obstacles
 nearest to the start are looked at as well."""
 
-SWITCH, RETRACE = 0.03, 0.25
-"""Hysteresis: the other way round an obstacle is taken only where it saves the share `SWITCH` of the distance left, and
-the share `RETRACE` of what leads back along where the aircraft has been."""
+SWITCH_SHARE, RETRACE_SHARE = 0.03, 0.25
+"""Hysteresis: the other way round an obstacle is taken only where it saves `SWITCH_SHARE` of the distance left, and
+`RETRACE_SHARE` of what leads back along where the aircraft has been."""
 
 TRAIL_CLEARANCES = 4.0
-"""Places within so many clearances of the flown trail count as where the aircraft has been."""
+"""Places within this many clearances of the flown trail count as retraced."""
 
-LEAVES = 8
-"""A turn is left at one of so many places of it: from some no curve fits the way on."""
+TURN_EXITS = 8
+"""A held turn may be left at this many places of it: from some no curve fits the way on."""
 
-AROUND = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1))
-"""A square and those around it, by columns and rows."""
+NINE_SQUARES = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1))
+"""Offsets in columns and rows of a square and the eight around it."""
 
 
 @dataclass(frozen=True)
@@ -80,10 +80,10 @@ class Trail:
         x, y = math.floor(place[0] / self._side), math.floor(place[1] / self._side)
         if (x, y) != self._last:
             self._last = x, y
-            self._flown.update((x + i, y + j) for i, j in AROUND)
+            self._flown.update((x + i, y + j) for i, j in NINE_SQUARES)
 
     def retraced_m(self, nodes: Sequence[Point]) -> float:
-        """How much of a polyline lies where the aircraft has been, to about a square."""
+        """Length (m) of a polyline that lies where the aircraft has been, to about a square."""
         back_m = 0.0
         for (ax, ay), (bx, by) in pairwise(nodes):
             length = math.hypot(bx - ax, by - ay)
@@ -105,15 +105,15 @@ class LocalPlanning:
         self._steps, self._candidates = steps, candidates
         self.work_count = WorkCount()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
-        self._hug_m = LEAST_HUG * mission.clearance_m
-        self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
+        self._hug_m = LEAST_HUG_SHARE * mission.clearance_m
+        self._tight = Attempt(mission.clearance_m, LEAST_MARGIN_SHARE * margin_m)
         self.limits = Limits.of(mission)
         self.room = Room(mission, memory, mission.clearance_m + PATH_SHARE * margin_m, self.work_count)
 
     @property
     def least_keeps_m(self) -> float:
-        """What a way has to keep from every edge point to be found at all."""
-        return self._mission.clearance_m + SEARCH_SHARE * LEAST_MARGIN * self._margin_m
+        """Least distance (m) from every edge point of a way that can be found at all."""
+        return self._mission.clearance_m + SEARCH_SHARE * LEAST_MARGIN_SHARE * self._margin_m
 
     def attempts(self) -> list[Attempt]:
         """Distances to search with, in order of preference.
@@ -186,14 +186,14 @@ class LocalPlanning:
         return next((route for route in routes if route is not None), None)
 
     def _reluctance_m(self, candidate: Candidate, course: Course | None) -> float:
-        """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""
+        """Length (m) added to a candidate that passes obstacles on another side than the course, or leads back."""
         switching = 0.0
         if course is not None:
             self.work_count.add(4, POINT_WORK, 4 * len(candidate.nodes) * course.known)
             if course.same_side(candidate.nodes, self._memory.points_m):
                 return 0.0
-            switching = SWITCH * candidate.cost_m
-        return switching + RETRACE * self.trail.retraced_m(candidate.nodes)
+            switching = SWITCH_SHARE * candidate.cost_m
+        return switching + RETRACE_SHARE * self.trail.retraced_m(candidate.nodes)
 
     def fitted(
         self,
@@ -205,13 +205,13 @@ class LocalPlanning:
     ) -> FlyableRoute | None:
         """The curve along track points found among (m, 2) points, from where a plan would begin now; None: none is.
 
-        Who is `turning` may fly the turn on and leave it later: the shortest of these, with what is flown before.
+        An aircraft that is `turning` may leave its turn later: the shortest of these curves, with the rest of the turn.
         """
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         terrain = self._terrain(start, attempt, points)
         in_turn = self.room.terrain(BROKEN_SHARE * self._mission.clearance_m)
         best: FlyableRoute | None = None
-        for each in start.later(LEAVES if turning else 1):
+        for each in start.later(TURN_EXITS if turning else 1):
             pose, before = each.pose, each.prefix[len(start.prefix) :]
             least_m = sum(segment[5] for segment in before) + math.dist(pose[:2], nodes[-1])
             if best is not None and least_m >= best.path.length_m:
@@ -249,7 +249,7 @@ class LocalPlanning:
         return FlyableRoute(route.nodes, path) if terrain.admits(path) else None
 
     def beginning(self, now: Now, candidate: Candidate) -> Generator[None, None, FlyableRoute | None]:
-        """As much of a candidate as can be flown, where all of it cannot: from there the rest may look otherwise."""
+        """The longest beginning of a candidate that can be flown, where all of it cannot; None where none can."""
         for end in range(len(candidate.nodes) - 1, 1, -1):
             start, _ = now()
             nodes = (start.pose[:2], *candidate.nodes[1:end])
@@ -265,7 +265,7 @@ class LocalPlanning:
         return Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.work_count)
 
     def _room_m(self, start: Start, points: FloatArray) -> FloatArray:
-        """(m,) distance of each point to the nearer of start and goal: more than that cannot be kept from it."""
+        """(m,) most distance that can be kept from each point: its distance from the nearer of start and goal."""
         ends = (start.pose[:2], self._mission.goal_m)
         away: FloatArray = np.minimum(*(np.hypot(*(points - end).T) for end in ends)) - 1e-3
         return away
@@ -291,7 +291,7 @@ class LocalPlanning:
                 yield self._searched(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
         elif not closed():
             around = window.nearest_obstacles(MOST_AROUND)
-            yield self._searched(window, attempt, WIDER * 2**effort, around)
+            yield self._searched(window, attempt, WIDE_FACTOR * 2**effort, around)
 
     def _searched(
         self, window: Window, attempt: Attempt, widening: int, around: Sequence[int] = ()
@@ -318,5 +318,5 @@ class LocalPlanning:
             yield candidate
             found += candidate is not None
             steps_since += found > 0
-            if found == self._candidates or steps_since > (MOST_TRACKS if to_go is None else FURTHER):
+            if found == self._candidates or steps_since > (MOST_TRACKS if to_go is None else WIDE_STEPS):
                 return

@@ -20,16 +20,16 @@ from planner.paper.sectors import distance_left_m
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.window import SectorEdge, Window, guide_vector
 
-SHORT_OF = 0.005
+SHORT_OF_SHARE = 0.005
 """A step ends before the obstacle that it meets by this share of the distance kept: from there the edges of that
 obstacle can be seen."""
 
-BACK_RAD, AWAY_RAD = 2.1, 0.8
+MOST_TURN_RAD, MOST_AWAY_RAD = 2.1, 0.8
 """Largest turn from one step to the next, and largest turn away from the obstacle that the last step hugged; rad."""
 
-APART, APART_WIDE = 0.06, 0.25
-"""Track points count as one that are nearer to each other than this share of the distance kept; in a wide search, of
-the shortest step about a corner: that step has to lead on."""
+APART_SHARE, WIDE_APART_SHARE = 0.06, 0.25
+"""Track points nearer to each other than the first share of the distance kept count as one; in a wide search the second
+share of the shortest step about a corner counts instead: that step has to lead on."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,12 @@ class Candidate:
 
     @property
     def cost_m(self) -> float:
-        """C: the length of the whole candidate if nothing more is met."""
+        """C: the length (m) of the whole candidate if it meets nothing more."""
         return self.flown_m + self.left_m
 
     @property
     def hugged(self) -> list[int]:
-        """The obstacle that the last step hugged, if it did."""
+        """Label of the obstacle that the last step hugged; empty if it hugged none."""
         return [] if self.last is None else [self.last.obstacle]
 
 
@@ -74,7 +74,7 @@ def search_candidates(
     start = window.center_m
     _, _, straight = guide_vector(start, goal)
     queue = [(straight if to_go is None else to_go(start), 0, 0, Candidate((start,), 0.0, straight))]
-    apart_m = APART * outer_m if not wide else _wide_apart_m(window, outer_m)
+    apart_m = APART_SHARE * outer_m if not wide else _wide_apart_m(window, outer_m)
     kept_at = [0] * (steps + 1)
     visited: set[tuple[int, int]] = set()
     count = 0
@@ -115,7 +115,7 @@ def search_candidates(
 def _wide_apart_m(window: Window, outer_m: float) -> float:
     """How far apart track points of a wide search are not counted as one."""
     kept_m = float(window.keep_m.max(initial=0.0))
-    return max(APART * outer_m, APART_WIDE * 2.0 * math.sqrt(outer_m * outer_m - kept_m * kept_m))
+    return max(APART_SHARE * outer_m, WIDE_APART_SHARE * 2.0 * math.sqrt(outer_m * outer_m - kept_m * kept_m))
 
 
 def _steps(
@@ -126,7 +126,7 @@ def _steps(
     outer_m: float,
     back_too: bool,
 ) -> Iterator[Candidate]:
-    """The steps along some edges that lead anywhere in the area; those that lead away or back only if wanted."""
+    """Yields the candidate lengthened by a step along each edge, inside the area; those away or back only if wanted."""
     xmin, ymin, xmax, ymax = bounds_m
     for edge in edges:
         if not back_too and _leads_away(candidate, edge):
@@ -137,20 +137,20 @@ def _steps(
 
 
 def _leads_away(candidate: Candidate, edge: SectorEdge) -> bool:
-    """Whether a step leads away from what the last one hugged, or back: a shortest way bends round it."""
+    """Tells whether a step leads back, or away from what the last one hugged: shortest ways bend round that."""
     if candidate.last is None:
         return False
     turn = math.atan2(
         candidate.last.ux * edge.uy - candidate.last.uy * edge.ux,
         candidate.last.ux * edge.ux + candidate.last.uy * edge.uy,
     )
-    return abs(turn) > BACK_RAD or turn * candidate.last.side > AWAY_RAD
+    return abs(turn) > MOST_TURN_RAD or turn * candidate.last.side > MOST_AWAY_RAD
 
 
 def _step(candidate: Candidate, edge: SectorEdge, goal: Point, outer_m: float) -> Candidate | None:
-    """One step along the edge of a free sector; None where it leads nowhere."""
+    """The candidate lengthened by one step along the edge of a free sector; None where that is too short."""
     here = candidate.nodes[-1]
-    length = min(edge.hugged_m, edge.clear_m - SHORT_OF * outer_m)
+    length = min(edge.hugged_m, edge.clear_m - SHORT_OF_SHARE * outer_m)
     if length < 1e-2 * outer_m:
         return None
     x, y = here[0] + edge.ux * length, here[1] + edge.uy * length

@@ -37,11 +37,11 @@ from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import meets, room_m
 from planner.shield.intervention_log import ShieldReport
 
-KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
+KEPT_PLAN = Plan(PlanStatus.KEPT, "the plan in effect serves")
 NO_BETTER = "the plan in effect serves as well as any other"
 THINKING_ON = "thinking on; the plan in effect goes on"
 CHAIN = "a closed chain of obstacles lies between the aircraft and the goal"
-NO_WAY_BARE = "no way is found"
+NO_WAY_UNSHIELDED = "no way is found"
 NO_WAY_ON = "no way on can be seen to be safe; the plan in effect goes on"
 
 
@@ -79,14 +79,14 @@ class RollingWindow(CertifiedPlanner):
 
     @property
     def report(self) -> ShieldReport | None:
-        """What the shield did so far; None without it."""
+        """The figures of the shield so far; None without it."""
         return super().report if self._shielded else None
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
         if self._serves_on(request):
             self._log.note(request.time_s, "")
-            return KEPT
+            return KEPT_PLAN
         answer = self._planned(request)
         on_course = self.state is PlanningState.FOLLOWING or (
             self._monitor.plan is None and answer.status is not PlanStatus.FOUND
@@ -98,7 +98,7 @@ class RollingWindow(CertifiedPlanner):
         return answer
 
     def _serves_on(self, request: PlanRequest) -> bool:
-        """Whether the plan in effect served last, and nothing was seen since or is due: so it is with most requests."""
+        """Tells whether the plan in effect served at the last request, and nothing new was seen or is due since."""
         seen, plan, here_m = request.seen, self._monitor.plan, request.arc_length_m
         if self._served != (request.flown, seen.revision, seen.last_contradiction_s) or seen.moving:
             return False
@@ -129,19 +129,19 @@ class RollingWindow(CertifiedPlanner):
         if not self._due(request, plan, now.here_m, newly_cut) and self._search.running is None:
             if self._nothing_waits(request.seen):
                 self._served = request.flown, request.seen.revision, request.seen.last_contradiction_s
-            return KEPT
+            return KEPT_PLAN
         if self._search.running is None:
             self._monitor.searched_at_m = request.arc_length_m
         return self._roll(now)
 
     def _nothing_waits(self, seen: MapView) -> bool:
-        """Whether, as long as nothing is seen, only the way flown can make a search due."""
+        """Whether only distance flown, and nothing that waits or threatens, can make the next search due."""
         feared = self._threats is not None or len(seen.moving) > 0
         waits = self._search.freed or self._monitor.waits or self._giving_up.waits
         return self.state is PlanningState.FOLLOWING and not (feared or waits)
 
     def _take_in(self, request: PlanRequest) -> FloatArray:
-        """Takes in what was seen and flown since the last request; returns (k, 2) edge points that have come in."""
+        """Takes in what was seen and flown since the last request; returns the (k, 2) new edge points."""
         self._giving_up.note_change(request.time_s, request.seen)
         fresh_m = self._sense(request)
         self._local.trail.add(request.position_m)
@@ -190,7 +190,7 @@ class RollingWindow(CertifiedPlanner):
         return self._no_way_found(now)
 
     def _work(self, now: Situation, serves: bool) -> Work:
-        """How much is searched before this answer."""
+        """The portion of search work before this answer."""
         if now.request.seen.moving:
             return Work.WHILE_MOVING
         if self._unsafe(now):
@@ -198,7 +198,7 @@ class RollingWindow(CertifiedPlanner):
         return Work.WHILE_SERVING if serves else Work.WHILE_CUT
 
     def _unsafe(self, now: Situation) -> bool:
-        """Whether there is no safe plan in effect to think on."""
+        """Whether no safe plan is in effect while a search goes on."""
         return now.plan is None or self._monitor.urgent(now.plan, now.here_m)
 
     def _follow(self, found: CommittedPlan) -> Plan:
@@ -263,7 +263,7 @@ class RollingWindow(CertifiedPlanner):
         """Any state -> ESCAPING: nothing is certified; a turn that keeps clear is flown, or what does so longest."""
         self.state = PlanningState.ESCAPING
         if not self._shielded:
-            return Plan(PlanStatus.NO_PATH, NO_WAY_BARE)
+            return Plan(PlanStatus.NO_PATH, NO_WAY_UNSHIELDED)
         return self._escaped(
             now.request,
             now.here_m,

@@ -18,11 +18,11 @@ from planner.interface import Path
 from planner.paper.model import step
 from planner.rolling_window.route_optimisation import FlyableRoute
 
-EXPANSIONS = 1000
-"""Poses looked at before the search gives up."""
+MOST_POSES = 1000
+"""Most poses that a search expands before it gives up."""
 
-AWAY = 12.0
-"""So many turn radii nearer to the goal is far enough: from there on ways are looked for in the free sectors again."""
+ENOUGH_RADII = 12.0
+"""A route ends this many turn radii nearer to the goal: from there on the free sectors are searched again."""
 
 
 def search_poses(
@@ -37,12 +37,12 @@ def search_poses(
     step_m = limits.radius_m
     largest = 2.0 * math.asin(step_m / (2.0 * limits.radius_m))
     course = math.atan2(start.tangent_north, start.tangent_east)
-    enough_m = to_go(start[:2]) - AWAY * limits.radius_m
+    enough_m = to_go(start[:2]) - ENOUGH_RADII * limits.radius_m
     queue: list[tuple[float, int, float, float, float, float, tuple[Segment, ...]]]
     queue = [(to_go(start[:2]), 0, 0.0, start.east_m, start.north_m, course, ())]
     seen: set[tuple[int, int, int]] = set()
     count = 0
-    while queue and len(seen) < EXPANSIONS:
+    while queue and len(seen) < MOST_POSES:
         cost, _, flown, x, y, course, done = heapq.heappop(queue)
         key = (round(2 * x / step_m), round(2 * y / step_m), round(course % math.tau / (0.5 * largest)))
         if key in seen:

@@ -1,4 +1,4 @@
-"""One rolling step of the search: a portion of work, and the committed plan that comes of it."""
+"""One rolling step of the search: does a portion of work and returns the committed plan it leads to."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import room_m
 from planner.shield.evasion import Threats
 
-BETTER = 0.005
-"""A course that can still be flown is replaced only by one that is shorter by this share of the length that is left."""
+BETTER_SHARE = 0.005
+"""A course that can still be flown is replaced only by one shorter by this share of its remaining length."""
 
 
 class Work(Enum):
-    """Counted work of a search when it begins, and each further time that the planner is asked; a unit is some 1 us."""
+    """Counted work (about 1 us a unit) of a search when it begins, and each further time that the planner is asked."""
 
     WHILE_SERVING = (3000.0, 1000.0)  # the plan in effect can still be flown: there is time
     WHILE_CUT = (5000.0, 2000.0)  # an edge cuts the course ahead: the plan in effect leads into its turn
@@ -84,7 +84,7 @@ class RollingSearch:
     ) -> CommittedPlan | None:
         """Searches with one portion of work, and returns the first certified plan that may be flown.
 
-        `ahead` is what is left of the course in effect; `serves`: it can be flown on.
+        `ahead` is what is left of the course in effect, and `serves` tells whether that can still be flown.
         """
         first, more = work.value
         begins = self.running is None
@@ -127,7 +127,7 @@ class RollingSearch:
         self._monitor.lengthened_m = course.path.length_m - before_m
 
     def _worth_m(self, ahead: Course | None) -> float:
-        """A course that is longer than this is not worth leaving the one in effect for."""
+        """Greatest length (m) of a course that the course in effect is left for."""
         if ahead is None or not ahead.to_goal or ahead.nodes[-1] != self._mission.goal_m:
             return math.inf
-        return ahead.path.length_m * (1.0 - BETTER)
+        return ahead.path.length_m * (1.0 - BETTER_SHARE)

@@ -13,7 +13,7 @@ from planner.interface import Path
 from planner.kernels.fans import shortcuts
 
 MOST_LEFT_OUT = 6
-"""It is tried to leave out one of so many corners at most, from the first on."""
+"""Most corners, from the first on, that are left out one at a time."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,10 @@ def optimise(
         flown = max(1.0 / abs(start_curvature), tightest)
         choices += [(short[i:], cut_m, False, flown) for i in range(min(len(short), MOST_LEFT_OUT))]
     choices += [(short, cut_m, True, tightest)]
-    choices += [
-        ([*short[:i], *short[i + 1 :]], cut_m, False, tightest)
-        for i in range(min(len(short) - 1, MOST_LEFT_OUT))
-    ]
-    choices += [
-        (way, 0.0, longer, tightest)
-        for way, longer in ((short, False), (short, True), (list(nodes[1:]), False))
-    ]
+    left_out = range(min(len(short) - 1, MOST_LEFT_OUT))
+    choices += [([*short[:i], *short[i + 1 :]], cut_m, False, tightest) for i in left_out]
+    uncut = ((short, False), (short, True), (list(nodes[1:]), False))
+    choices += [(way, 0.0, longer, tightest) for way, longer in uncut]
     for choice, cut, longer_turn, first_radius in choices:
         path = fillet(start, choice, limits, cut, start_curvature, longer_turn, first_radius)
         if path is not None and terrain.admits(path):

@@ -1,4 +1,4 @@
-"""The states of the planner, and what a request finds."""
+"""The states of the planner, and its situation at a request."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Situation:
 
     @property
     def ahead(self) -> Course | None:
-        """What is left of the course in effect; None without one, and in the loiter, which has left it."""
+        """The rest of the course in effect; None without one, and in the loiter, which has left it."""
         if self.plan is None or self.plan.holds(self.here_m):
             return None
         return self.plan.course.ahead(self.here_m)

@@ -22,11 +22,11 @@ from planner.interface import FloatArray, IntArray
 from planner.kernels.buckets import Buckets, Cells, bucketed, cells_of, gathered
 from planner.kernels.fans import entered, fan_edges
 
-MOST_HIDING = 12
-"""For the edges of one obstacle at most so many are looked at: those that hide its edges are looked at with it."""
+MOST_OBSTACLES = 12
+"""Most obstacles whose edges are taken at one track point: the first ones, and those that hide their edges."""
 
-BUCKET_CELLS = 4
-"""Side, in cells, of the squares in which edge points near a line are looked for."""
+SQUARE_SIDE_CELLS = 4
+"""Side, in cells, of the squares that edge points are sorted into."""
 
 
 def guide_vector(position: Point, goal: Point) -> tuple[float, float, float]:
@@ -69,8 +69,8 @@ class Window:
 
     @cached_property
     def _buckets(self) -> tuple[Buckets, IntArray]:
-        """The points by squares, and the obstacle of each."""
-        order, squares = bucketed(self.points_m, self.keep_m, BUCKET_CELLS * self.cell_m)
+        """The points by squares, and the label of the obstacle of each."""
+        order, squares = bucketed(self.points_m, self.keep_m, SQUARE_SIDE_CELLS * self.cell_m)
         return squares, self.labels[order]
 
     def _obstacle(self, label: int) -> _Obstacle:
@@ -90,7 +90,7 @@ class Window:
         return entry, labels[which]
 
     def nearest_obstacles(self, most: int) -> list[int]:
-        """The obstacles nearest to the centre, so many at most."""
+        """Labels of the obstacles nearest to the centre, at most `most`."""
         self.work_count.add(2, TANGENT_WORK, len(self.points_m))
         order = np.argsort(np.hypot(*(self.points_m - self.center_m).T))
         return list(itertools.islice(dict.fromkeys(self.labels[order].tolist()), most))
@@ -117,7 +117,7 @@ class Window:
             edges += [SectorEdge._make((*edge, obstacle)) for edge in found.tolist()]
             # Hidden, or closed right behind: the way goes round what hides it.
             for other in hiding.tolist():
-                if other not in looked_at and len(looked_at) < MOST_HIDING:
+                if other not in looked_at and len(looked_at) < MOST_OBSTACLES:
                     looked_at.add(other)
                     pending.append(other)
         return edges

@@ -36,29 +36,29 @@ from planner.geometry.curves import (
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, MapView, Path
 
-DISC = 1.04
-"""Radius of the certified disc over that of the turn in it, at least: for tracking error and rolling in."""
+DISC_RADII = 1.04
+"""Least radius of the certified disc, in radii of the turn in it: the rest is for tracking error and rolling in."""
 
-BEYOND = 0.5
+DISC_BEYOND_SHARE = 0.5
 """The certified disc reaches beyond its turn by at least this share of the clearance. With all of the clearance the
 aircraft flies round forests: trees hide each other until it is among them."""
 
 MOST_ARC_LENGTHS = 32
-"""A safe turn is looked for at this many arc lengths of a path at most."""
+"""A safe turn is sought at no more arc lengths of a path than this."""
 
 ARC_LENGTHS_AT_ONCE = 4
 """Turns at this many arc lengths are tested together: mostly one of the first is free."""
 
-AHEAD_STEP, ASIDE = 0.25, (0.0, 0.5)
-"""Turns about places ahead are looked for in steps of `AHEAD_STEP` of the turn radius along a path; their centres lie
-beside it by the shares `ASIDE`."""
+AHEAD_STEP_RADII, ASIDE_RADII = 0.25, (0.0, 0.5)
+"""Turns about places ahead are tried in steps of `AHEAD_STEP_RADII` turn radii along a path; their centres lie beside
+the path by one of `ASIDE_RADII`."""
 
-STRAIGHT_ON = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
-"""A path may be left straight on for so many turn radii: where it bends behind an obstacle, only the space straight
-ahead is in sight."""
+STRAIGHT_ON_RADII = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
+"""A path may be left on a straight of one of these numbers of turn radii: where it bends behind an obstacle, only the
+space straight ahead is in sight."""
 
-SPARSE = 16
-"""One in so many places of a disc is tested first: most discs that are not free fail there."""
+SPARSE_STEP = 16
+"""Every place of this number in a disc is tested before the others: most discs that are not free fail there."""
 
 SIDES = (1.0, -1.0)
 """Signs of the curvature of a turn: left, right."""
@@ -115,10 +115,10 @@ class Certifier:
 
     def __init__(self, limits: Limits, clearance_m: float, horizon_m: float, spacing_m: float) -> None:
         self._limits, self._horizon, self._spacing = limits, horizon_m, spacing_m
-        self._beside = BEYOND * clearance_m
+        self._beside = DISC_BEYOND_SHARE * clearance_m
         radius_m = limits.radius_m
-        self._exits = [_Exit.about_place_ahead(side, share, limits) for share in ASIDE for side in SIDES]
-        on = product(STRAIGHT_ON, SIDES)
+        self._exits = [_Exit.about_place_ahead(side, at, limits) for at in ASIDE_RADII for side in SIDES]
+        on = product(STRAIGHT_ON_RADII, SIDES)
         self._exits += [_Exit(side, 0.0, n * radius_m, side * radius_m) for n, side in on]
         self._disc = _disc(disc_radius_m(radius_m, clearance_m), spacing_m)
 
@@ -151,17 +151,17 @@ class Certifier:
         return None
 
     def certify_ahead(self, path: Path, seen: MapView, terrain: Terrain, to_m: float) -> Certified | None:
-        """The same for a path that is left ahead or straight on: in or beyond a gap narrower than a turn beside it."""
+        """Certifies as `certify` does, but with turns about places ahead or straight on: in or beyond a narrow gap."""
         radius_m = self._limits.radius_m
         free_to = min(self.seen_free_to_m(path, seen), to_m)
-        step = AHEAD_STEP * radius_m
+        step = AHEAD_STEP_RADII * radius_m
         arc_lengths_m: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
         poses = poses_at(path, arc_lengths_m)
         ahead = poses[:, None, 2:]
         aside = np.stack((-ahead[..., 1], ahead[..., 0]), axis=-1)
         offsets = np.array([(each.ahead_m, each.aside_m) for each in self._exits])[:, :, None]
         centres = poses[:, None, :2] + offsets[:, 0] * ahead + offsets[:, 1] * aside
-        places = centres[:, :, None] + self._disc[::SPARSE]
+        places = centres[:, :, None] + self._disc[::SPARSE_STEP]
         free = seen.seen_free(places.reshape(-1, 2)).reshape(*centres.shape[:2], -1).all(axis=2)
         for i, which in np.argwhere(free).tolist():
             arc_length_m, leaving = float(arc_lengths_m[i]), self._exits[which]
@@ -183,7 +183,7 @@ class Certifier:
     def certify_up_to(
         self, over_m: float, path: Path, seen: MapView, bounds_m: tuple[float, float, float, float]
     ) -> Certified | None:
-        """All of a path that is free, also beside it, and inside up to the arc length `over_m`, the goal."""
+        """The whole path as certified, if up to `over_m`, the goal, it is seen to be free, also beside, and inside."""
         flown = between(path, 0.0, over_m)
         if not flown or over_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
             return None
@@ -230,7 +230,7 @@ def _disc(radius_m: float, spacing_m: float) -> FloatArray:
 
 def disc_radius_m(radius_m: float, clearance_m: float) -> float:
     """Radius of the disc that has to be seen to be free for a turn of one radius to be certified, m."""
-    return max(DISC * radius_m, radius_m + BEYOND * clearance_m)
+    return max(DISC_RADII * radius_m, radius_m + DISC_BEYOND_SHARE * clearance_m)
 
 
 def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, reaction_s: float) -> float:
@@ -239,4 +239,4 @@ def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, 
     A turn beside the course reaches two radii to the side; beyond it lie the clearance and what is flown within
     `reaction_s`: latency of sensor and planner, and the time to roll.
     """
-    return 2.0 * DISC * radius_m + clearance_m + speed_mps * reaction_s
+    return 2.0 * DISC_RADII * radius_m + clearance_m + speed_mps * reaction_s

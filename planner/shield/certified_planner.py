@@ -1,4 +1,4 @@
-"""What the shield and `rolling_window` share: certified plans are flown, and escapes where there is none."""
+"""Base class of the shield and `rolling_window`: flies certified plans, and escapes where there is none."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from planner.shield.intervention_log import InterventionLog, ShieldReport
 
 
 def lead_of(mission: Mission) -> float:
-    """How much of the plan in effect is flown before a new one is, m."""
+    """Length (m) of the plan in effect that is flown before a new plan begins."""
     return mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
 
 
 class CertifiedPlanner:
-    """The certified plan in effect under its monitor, what is to be feared, and what is done without such a plan."""
+    """Watches the certified plan in effect and the threats to it, and escapes where no plan is certified."""
 
     def __init__(self, mission: Mission, memory: ObstacleMemory, room: Room, monitor: PlanMonitor) -> None:
         self._mission, self._memory, self._room, self._monitor = mission, memory, room, monitor
@@ -31,7 +31,7 @@ class CertifiedPlanner:
 
     @property
     def report(self) -> ShieldReport | None:
-        """What the shield did so far; None without it."""
+        """The figures of the shield so far; None without it."""
         return self._log.report
 
     @property
@@ -40,7 +40,7 @@ class CertifiedPlanner:
         return self._log.backup
 
     def _sense(self, request: PlanRequest) -> FloatArray:
-        """Remembers what was seen since the last request; returns (k, 2) edge points that have come in."""
+        """Takes in what was seen since the last request; returns the (k, 2) new edge points."""
         met = encounters(request, self._mission) if request.seen.moving else []
         fresh_m = self._memory.take_in(request.seen, met)
         self._threats = self._escapes.threats(request)
@@ -67,7 +67,7 @@ class CertifiedPlanner:
         to_m: float = math.inf,
         nearer: CommittedPlan | None = None,
     ) -> Escape:
-        """What is flown where nothing is certified: a turn that keeps clear, or what does so longest.
+        """The escape where nothing is certified: a turn that keeps clear, or the way that keeps clear longest.
 
         Of the plan in effect no more than to the arc length `to_m` is flown in any case. See `Escapes.from_plan`.
         """

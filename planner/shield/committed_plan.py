@@ -14,23 +14,23 @@ from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, Segment, along, between, moved, onward, place_on
 from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest
 
-COMPARED_TOGETHER = 16
-"""Edge points that are not near the aircraft are compared with the course once in so many requests."""
+COMPARED_EVERY = 16
+"""Edge points that are not near the aircraft are compared with the course once in this many requests."""
 
 BROKEN_SHARE = 0.99
 """Share of the clearance: an edge point seen nearer than that to a certified turn breaks the certificate."""
 
-PROLONG = 0.6
+PROLONG_SHARE = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-REPLAN_SHARE, CUT, GRAZED = 0.0625, 0.02, 0.005
-"""The next search begins after this share of the distance to what is wrong with the plan: `CUT` where the course is
-cut, for that may be a dead end, but for a course that the last search made longer by less than the share `GRAZED`."""
+REPLAN_SHARE, CUT_SHARE, GRAZED_SHARE = 0.0625, 0.02, 0.005
+"""The next search begins after the first share of the distance to what is wrong with the plan, but after the second
+where the course is cut, for that may be a dead end, unless the last search lengthened it by less than the third."""
 
 
 @dataclass(frozen=True, eq=False)
 class CommittedPlan:
-    """A plan in effect, and what it is the beginning of."""
+    """A plan in effect, and the course that it is the beginning of."""
 
     plan: Plan  # as it was given to the loop
     path: Path  # of the plan: along the course, then into the turn; or the course, where that is flown to the goal
@@ -39,19 +39,19 @@ class CommittedPlan:
 
     @cached_property
     def turn(self) -> Path:
-        """The turn that the path ends with; nothing where it ends at the goal."""
+        """The turn that the path ends with; empty where the path ends at the goal."""
         return Path(self.path.segments[-1:] if self.path.loiter else self.path.segments[:0])
 
     def holds(self, arc_length_m: float) -> bool:
-        """Whether an aircraft there is in the turn, or at the goal."""
+        """Tells whether an aircraft at this arc length is in the turn, or at the goal."""
         return arc_length_m >= self.loiter_entry_m
 
     def over(self, arc_length_m: float) -> bool:
-        """Whether an aircraft there has nothing left to fly: it missed the goal."""
+        """Tells whether no path is left at this arc length: the aircraft missed the goal."""
         return not (self.path.loiter or between(self.path, arc_length_m, self.path.length_m))
 
     def left(self, arc_length_m: float) -> Path:
-        """What is left of it: the way to its turn, with the straight to roll on before that, and the turn."""
+        """The rest of the path: the way to its turn, with the straight to roll on before that, and the turn."""
         turn_at_m = self.path.length_m - self.turn.length_m
         return Path(np.array([*between(self.path, arc_length_m, turn_at_m), *self.turn.segments.tolist()]))
 
@@ -110,7 +110,7 @@ class PlanMonitor:
         self._turn_keeps_m = BROKEN_SHARE * mission.clearance_m
         self._waiting: list[FloatArray] = []
         self._nearest_m = math.inf
-        self._since = COMPARED_TOGETHER  # requests since edge points were compared
+        self._since = COMPARED_EVERY  # requests since edge points were compared
         self.plan: CommittedPlan | None = None  # in effect
         self.proposed: CommittedPlan | None = None  # given to the loop last, until it is in effect
         self.cut_m = math.inf  # arc length at which the course comes too near to an edge point seen since
@@ -147,7 +147,7 @@ class PlanMonitor:
             self._nearest_m = min(self._nearest_m, away_m)
         elif not self._waiting:
             return False
-        if self._since < COMPARED_TOGETHER and self._nearest_m > self._urgent_m:
+        if self._since < COMPARED_EVERY and self._nearest_m > self._urgent_m:
             return False
         self._since = 0
         edges = np.concatenate(self._waiting)
@@ -162,11 +162,11 @@ class PlanMonitor:
 
     @property
     def waits(self) -> bool:
-        """Whether edges that came in have yet to be compared."""
+        """Whether edges that came in have not been compared yet."""
         return len(self._waiting) > 0
 
     def nothing_new(self) -> None:
-        """Takes in that no edge has come in, while none waits."""
+        """Counts a request in which no edge came in and none waits."""
         self._since += 1
 
     def urgent(self, plan: CommittedPlan, here_m: float) -> bool:
@@ -184,9 +184,9 @@ class PlanMonitor:
             return True
         serves = plan.course.shortest and self.cut_m == math.inf and not self.broken
         whole = plan.loiter_entry_m >= plan.course.path.length_m - self._mission.goal_radius_m
-        if serves and (whole or plan.loiter_entry_m - here_m > PROLONG * self._mission.sensor_range_m):
+        if serves and (whole or plan.loiter_entry_m - here_m > PROLONG_SHARE * self._mission.sensor_range_m):
             return False
         if self.cut_m < math.inf:
-            grazed = self.lengthened_m < GRAZED * wrong
-            return since_m >= max(self._lead_m, (REPLAN_SHARE if grazed else CUT) * wrong)
+            grazed = self.lengthened_m < GRAZED_SHARE * wrong
+            return since_m >= max(self._lead_m, (REPLAN_SHARE if grazed else CUT_SHARE) * wrong)
         return since_m >= max(self._lead_m if near else self._step_m, REPLAN_SHARE * wrong)

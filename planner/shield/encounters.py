@@ -1,10 +1,10 @@
-"""Where obstacles that move will be met.
+"""Where moving obstacles will be met.
 
 An obstacle that moves is in the way where it and the aircraft arrive at the same time: its outline, moved on by the
 time that the aircraft needs to get there, is planned around as if it stood still. (The collision cone of A.
 Chakravarthy and D. Ghose, "Obstacle avoidance in a dynamic environment", IEEE Trans. SMC 28, 1998.) Ways round take
 longer and wind changes when one arrives: so each point of it is drawn out over all the times in question. Assumed: an
-obstacle keeps its velocity, and it is no faster than `FASTEST` of the aircraft.
+obstacle keeps its velocity, and it is no faster than `FASTEST_SHARE` of the aircraft.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import numpy as np
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission, MovingEdges, PlanRequest
 
-FASTEST = 0.8
+FASTEST_SHARE = 0.8
 """Share of the aircraft's airspeed. An obstacle that is faster may be met anywhere; it is taken to be this fast."""
 EARLIEST, LATEST = 0.85, 1.3
 """The aircraft may be at a place between these shares of the time that a straight line there takes at its airspeed."""
-LATER_S = 3.0
-"""And so many seconds later than the latest, to turn and pass by."""
+PASSING_S = 3.0
+"""Time that the aircraft may be later than the latest, to turn and pass by."""
 
 
 def encounters(request: PlanRequest, mission: Mission) -> list[FloatArray]:
@@ -40,7 +40,7 @@ def met_at(
     velocity = np.array(moving.velocity_mps)
     now = moving.points_m + velocity * (time_s - moving.time_s)
     after_s = meeting_s(now - position, velocity, speed_mps)
-    first_s, last_s = EARLIEST * after_s, LATEST * after_s + LATER_S
+    first_s, last_s = EARLIEST * after_s, LATEST * after_s + PASSING_S
     longest_m = math.hypot(*moving.velocity_mps) * float((last_s - first_s).max())
     share = np.linspace(0.0, 1.0, max(math.ceil(longest_m / spacing_m), 1) + 1)
     times = first_s + share[:, None] * (last_s - first_s)
@@ -51,12 +51,12 @@ def met_at(
 
 
 def meeting_s(offsets_m: FloatArray, velocity_mps: FloatArray, speed_mps: float) -> FloatArray:
-    """(k,) how long an aircraft takes straight to points that move: |offset + velocity t| = speed t.
+    """(k,) time (s) that an aircraft takes straight to moving points: |offset + velocity t| = speed t.
 
-    `offsets_m` are (k, 2) from the aircraft; what is faster than `FASTEST` of it is taken to be that fast.
+    `offsets_m` are (k, 2) from the aircraft; what is faster than `FASTEST_SHARE` of it is taken to be that fast.
     """
     pace = float(np.hypot(*velocity_mps))
-    velocity = velocity_mps * min(1.0, FASTEST * speed_mps / max(pace, 1e-9))
+    velocity = velocity_mps * min(1.0, FASTEST_SHARE * speed_mps / max(pace, 1e-9))
     along = offsets_m @ velocity
     gain = speed_mps * speed_mps - float(velocity @ velocity)
     after_s: FloatArray = (along + np.sqrt(along * along + gain * (offsets_m**2).sum(axis=1))) / gain

@@ -1,4 +1,4 @@
-"""Escapes: what is flown where no certified plan is left.
+"""Escapes: the ways that are flown where no certified plan is left.
 
 The plan in effect goes on to its end, or it is left for a turn, or for a way that evades what moves or has appeared.
 """
@@ -23,17 +23,17 @@ from planner.memory import ObstacleMemory
 from planner.plan_checks import start_tolerance_m
 from planner.shield.certificate import CertificateBroken, Certifier
 from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan
-from planner.shield.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out, step_along_m
+from planner.shield.evasion import AHEAD_S, DISCOUNT, Threats, clearest, rolled_out, step_along_m
 
 LOITER_SHARES = (1.0, 0.5, 0.25)
-"""Shares of the distance that paths keep from edge points. A turn is looked for with one share after the other."""
+"""Shares of the distance that paths keep from edge points; a turn is sought with one share after the other."""
 
-CLEARER = 0.2
+CLEARER_SHARE = 0.2
 """An option is better than those before it only if it keeps further from everything by this share of the distance that
 paths keep."""
 
 EVADING_S = 60.0
-"""Certificates hold for a world that stands still. They may be broken for so many seconds after something appeared."""
+"""Certified plans are checked against threats for this long after something appeared: they assume a still world."""
 
 
 TURNING_AWAY = "no way on can be seen to be safe; turning away"
@@ -96,7 +96,7 @@ class Escapes:
         self._began_hidden = False  # the first turn led behind something: nothing was certain of it
 
     def threats(self, request: PlanRequest) -> Threats | None:
-        """What is near, while something moves or has just appeared: then what was certified may be met all the same."""
+        """The threats near the aircraft while something moves or has just appeared; None otherwise."""
         appeared = request.time_s - request.seen.last_contradiction_s < EVADING_S
         return self._near(request) if appeared or len(request.seen.moving) > 0 else None
 
@@ -122,12 +122,12 @@ class Escapes:
         first: Path | None = None
         for way in self._turns_at_start(ahead, lead_m, ways, threats):
             if not self._leads_behind(way, request):
-                return self._away(request, way, TURNING_AWAY)
+                return self._turn_away(request, way, TURNING_AWAY)
             first = first or way
         if first is None:
             return Escape(Plan(PlanStatus.NO_PATH, NO_ROOM))
         self._began_hidden = True
-        return self._away(request, first, TURNING_AWAY)
+        return self._turn_away(request, first, TURNING_AWAY)
 
     def _turns_at_start(
         self, ahead: Path, lead_m: float, ways: Sequence[Path], threats: Threats | None
@@ -141,7 +141,7 @@ class Escapes:
                     yield way
 
     def _leads_behind(self, path: Path, request: PlanRequest) -> bool:
-        """Whether a path leads behind a face that is seen: what lies there may be part of the obstacle."""
+        """Tells whether a path leads behind a seen face, where the rest of the obstacle may lie."""
         places = sample(path, 0.25 * self._mission.clearance_m)
         beside_m = request.seen.spacing_m + 0.5 * self._mission.clearance_m
         return bool(behind(places, request.position_m, self._memory.genuine_m, beside_m).any())
@@ -193,7 +193,7 @@ class Escapes:
                 return Escape(Plan(PlanStatus.NO_PATH, best.reason), broken=False)
             if best.committed is not None:
                 return Escape(best.committed.plan, best.committed)
-            return self._away(request, best.path, best.reason)
+            return self._turn_away(request, best.path, best.reason)
         if certain and not self._began_hidden:
             raise CertificateBroken(request.time_s)
         ways = ways or list(rolled_out(prefix, self._room.limits))
@@ -207,18 +207,18 @@ class Escapes:
         until_m: float,
         prefix: Sequence[Segment],
     ) -> tuple[Path, float, float]:
-        """What is left for a turn, between which arc lengths: `prefix` where the aircraft is off the plan in effect."""
+        """The path to leave for a turn, between two arc lengths; `prefix` if the aircraft is off the plan in effect."""
         off_m = math.dist(place_on(committed.path, here)[0][:2], request.position_m)
         if off_m > start_tolerance_m(self._mission):  # as after a jump of the believed position
             return Path(np.array(prefix)), 0.0, sum(segment[5] for segment in prefix)
         return committed.path, here, until_m
 
     def _clearest(self, request: PlanRequest, threats: Threats, left: Path, ways: Sequence[Path]) -> Escape:
-        """The way with the most room where none has enough; what is left of the plan in effect, if that has as much."""
-        more_than_m = threats.room_m(left) + CLEARER * self._room.path_keeps_m
+        """The way with the most room, where none has enough; the rest of the plan in effect if that has as much."""
+        more_than_m = threats.room_m(left) + CLEARER_SHARE * self._room.path_keeps_m
         clear = clearest(ways, self._mission.bounds_m, threats, more_than_m)
         if clear is not None:
-            return self._away(request, clear, IN_THE_WAY)
+            return self._turn_away(request, clear, IN_THE_WAY)
         reason = "something is in the way; the plan in effect keeps as clear of it as any other"
         return Escape(Plan(PlanStatus.NO_PATH, reason))
 
@@ -238,42 +238,43 @@ class Escapes:
         keeps_m = self._room.path_keeps_m
         best, least_m = None, share * keeps_m
         for each in options:
-            room = room_m(each.path, threats, least_m, share * LATER)
+            room = room_m(each.path, threats, least_m, share * DISCOUNT)
             if room < least_m or not (each.standing is None or terrain.admits(each.standing)):
                 continue
             if seen is None or self._certifier.seen_free_to_m(each.path, seen) >= each.path.length_m:
-                best, least_m = each, room + CLEARER * keeps_m
+                best, least_m = each, room + CLEARER_SHARE * keeps_m
             if least_m > keeps_m:
                 break
         return best
 
     def _standing(self, share: float) -> Terrain:
-        """Where a curve keeps a share of what is wanted from what stands: what was only refused is in nobody's way."""
+        """Terrain of a share of the distance kept from what stands; refused places do not count."""
         return self._room.terrain(share * self._room.path_keeps_m, standing=True)
 
     def _near(self, request: PlanRequest) -> Threats:
+        """The threats near the aircraft."""
         return Threats.about(request, self._memory.genuine_m, self._mission)
 
     @staticmethod
-    def _away(request: PlanRequest, path: Path, reason: str) -> Escape:
-        """A plan that leads nowhere but into its turn."""
+    def _turn_away(request: PlanRequest, path: Path, reason: str) -> Escape:
+        """An escape along a path that leads only into its closing turn."""
         waypoints = np.array([request.position_m, path.segments[-1, :2]])
         plan = Plan(PlanStatus.FOUND, reason, waypoints, path)
         course = Course(path, (request.position_m,), 0, shortest=False, to_goal=False)
         return Escape(plan, CommittedPlan(plan, path, course, path.length_m - float(path.segments[-1, 5])))
 
 
-def room_m(path: Path, threats: Threats | None, least_m: float = -math.inf, later: float = LATER) -> float:
-    """How far a path keeps from what is near; infinite where nothing is to be feared. See `Threats.room_m`."""
+def room_m(path: Path, threats: Threats | None, least_m: float = -math.inf, later: float = DISCOUNT) -> float:
+    """Distance (m) that a path keeps from threats; infinite without any. See `Threats.room_m`."""
     return math.inf if threats is None else threats.room_m(path, least_m, later)
 
 
 def meets(plan: CommittedPlan, here_m: float, mission: Mission, threats: Threats | None) -> bool:
-    """Whether the plan in effect would come too near to what moves or has just appeared."""
+    """Tells whether the plan in effect would come too near to something that moves or has just appeared."""
     least_m = BROKEN_SHARE * mission.clearance_m
     return threats is not None and room_m(left_of(plan, here_m, mission), threats, least_m) < least_m
 
 
 def left_of(committed: CommittedPlan, here: float, mission: Mission) -> Path:
-    """What of a plan in effect is flown within `AHEAD_S`."""
+    """The part of a plan in effect that is flown within `AHEAD_S`."""
     return Path(np.array(onward(committed.path, here, AHEAD_S * mission.speed_mps)))

@@ -1,4 +1,4 @@
-"""Evading: the way on that keeps clear longest, of what stands and of what moves, where none is safe.
+"""Evasion: where no way is safe, the way that keeps clear longest of what stands and of what moves.
 
 Ways are rolled out from a little ahead: a turn at the least radius to one side, one back to the other, straight on,
 and a full turn at the end. Each is judged by how near it comes to what was seen, where that will be when the aircraft
@@ -25,29 +25,29 @@ from planner.shield.encounters import EARLIEST, LATEST
 AHEAD_S = 30.0
 """Moving obstacles are taken to keep their velocity for this time; a way is judged up to it."""
 
-LATER = 0.05
-"""For each metre along a way, an obstacle that is met there counts as so many metres further away: there is time left
-to evade it."""
+DISCOUNT = 0.05
+"""For each metre along a way, an obstacle met there counts as this many metres further away: there is time to evade
+it."""
 
 UNKNOWN_MPS, UNKNOWN_S = 10.0, 8.0
 """An obstacle that has just appeared is taken to come nearer at this speed for this time: its velocity is not known."""
 
-STEP_SHARE, LEAST_STEP = 0.25, 0.02
-"""Ways are judged in steps of the first share of the clearance, at least the second of the turn radius."""
+STEP_SHARE, LEAST_STEP_RADII = 0.25, 0.02
+"""Ways are tested in steps of the first share of the clearance, but at least the second share of the turn radius."""
 
-SQUARE_STEPS = 8.0
-"""Side of the squares in which edge points that stand still are sorted, in steps."""
+SQUARE_SIDE_STEPS = 8.0
+"""Side of the squares that still edge points are sorted into, in steps."""
 
-FIRST_DEG, BACK_DEG = (0.0, 20.0, 45.0, 75.0, 110.0, 150.0, 180.0), (0.0, 20.0, 45.0, 75.0, 110.0)
+FIRST_TURNS_DEG, BACK_TURNS_DEG = (0.0, 20.0, 45.0, 75.0, 110.0, 150.0, 180.0), (0.0, 20.0, 45.0, 75.0, 110.0)
 """Angles of the first turn of a way, to one side, and of the second, back to the other; deg."""
 
 WAYS = [
     (first, back, straight)
-    for first in FIRST_DEG
-    for back in BACK_DEG
+    for first in FIRST_TURNS_DEG
+    for back in BACK_TURNS_DEG
     if back <= first
     for straight in (2.0, 0.0)
-    if straight or not first or back == BACK_DEG[1]
+    if straight or not first or back == BACK_TURNS_DEG[1]
 ]
 """First turn, second turn (deg) and the straight after them (turn radii), of each way that is rolled out. Without a
 straight all second turns that lead into the same last turn are one way."""
@@ -64,11 +64,11 @@ class Threats:
     still_m: FloatArray  # (n, 2)
     moving: FloatArray  # (k, 5)
     speed_mps: float  # of the aircraft
-    step_m: float  # ways are looked at so often
+    step_m: float  # ways are tested at places this far apart
 
     @classmethod
     def about(cls, request: PlanRequest, still_m: FloatArray, mission: Mission) -> Threats:
-        """What can be met within `AHEAD_S`; still_m: (n, 2) all edge points that stand still."""
+        """The threats that can be met within `AHEAD_S`; `still_m` are all (n, 2) edge points that stand still."""
         reach_m = AHEAD_S * LATEST * mission.speed_mps + mission.clearance_m
         near_m = still_m[np.hypot(*(still_m - request.position_m).T) < reach_m]
         moving = [np.zeros((0, 5))]
@@ -79,8 +79,8 @@ class Threats:
             moving.append(np.column_stack((now, np.broadcast_to(told, (len(now), 3)))))
         return cls(near_m, np.concatenate(moving), mission.speed_mps, step_along_m(mission))
 
-    def room_m(self, path: Path, least_m: float = -math.inf, later: float = LATER) -> float:
-        """How far a way from the aircraft on keeps from all, what is far along it counted as further away (`LATER`); m.
+    def room_m(self, path: Path, least_m: float = -math.inf, later: float = DISCOUNT) -> float:
+        """Distance (m) that a way from the aircraft keeps from all threats; far along it they count for less (`later`).
 
         With less than `least_m` it is not looked at to its end.
         """
@@ -96,16 +96,16 @@ class Threats:
     @cached_property
     def _still(self) -> Buckets:
         """What stands, by squares."""
-        return bucketed(self.still_m, np.zeros(len(self.still_m)), SQUARE_STEPS * self.step_m)[1]
+        return bucketed(self.still_m, np.zeros(len(self.still_m)), SQUARE_SIDE_STEPS * self.step_m)[1]
 
 
 def step_along_m(mission: Mission) -> float:
-    """Ways are looked at so often, m."""
-    return max(STEP_SHARE * mission.clearance_m, LEAST_STEP * mission.turn_radius_m)
+    """Step (m) in which ways are tested."""
+    return max(STEP_SHARE * mission.clearance_m, LEAST_STEP_RADII * mission.turn_radius_m)
 
 
 def far_side(face_m: FloatArray, position_m: Point) -> FloatArray:
-    """(k, 2) what of a body is taken to lie behind its (k, 2) face, seen from a place: half a circle."""
+    """(k, 2) assumed far side of a body whose (k, 2) face is seen from a place: half a circle."""
     middle, half = 0.5 * (face_m[0] + face_m[-1]), 0.5 * (face_m[-1] - face_m[0])
     away = np.array((-half[1], half[0]))
     away *= np.copysign(1.0, away @ (middle - position_m))
@@ -129,7 +129,7 @@ def rolled_out(prefix: Sequence[Segment], limits: Limits) -> Iterator[Path]:
 def clearest(
     ways: Iterable[Path], bounds_m: tuple[float, float, float, float], threats: Threats, more_than_m: float
 ) -> Path | None:
-    """The way with the most room of those that stay in the area and have more than so much; None without one."""
+    """The way in the area with the most room, if that is more than `more_than_m`; else None."""
     best: Path | None = None
     for way in ways:
         if inside_bounds(way, bounds_m) and (room_m := threats.room_m(way, more_than_m)) > more_than_m:
@@ -140,7 +140,7 @@ def clearest(
 def _chain(
     pose: Pose, curvature: float, turns: tuple[tuple[float, float, float], ...], limits: Limits
 ) -> list[Segment]:
-    """Turns one after the other, each with so much straight after it; straight on too to roll to the other side."""
+    """Chains turns (side, degrees, straight after it, m), with a straight to roll on before a change of side."""
     out: list[Segment] = []
     for side, degrees, straight_m in turns:
         if degrees > 0.0:

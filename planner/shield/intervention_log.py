@@ -1,4 +1,4 @@
-"""What a shield did in a flight."""
+"""The log of a shield's interventions in a flight."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class InterventionLog:
         self._interventions, self._on_backup_s, self._last_s = 0, 0.0, 0.0
 
     def note(self, time_s: float, backup: str) -> None:
-        """Takes in what is flown from now on: the planner's path (empty), or the backup and why."""
+        """Notes that from now on the planner's path is flown (`backup` empty), or the backup and why."""
         if self.backup:
             self._on_backup_s += time_s - self._last_s
         elif backup:

@@ -16,12 +16,12 @@ from planner.nearest_edge import distance_to_edges
 
 
 def with_places(seen: MapView, places: Sequence[tuple[int, Point]]) -> MapView:
-    """A map with edge points beside its own: the map's revision before each, and where it is."""
+    """A map with more edge points than its own: `places` are the map's revision before each, and where it is."""
     return cast(MapView, _SeenWith(seen, places)) if places else seen
 
 
 class _SeenWith:
-    """Each place counts as one revision more."""
+    """A map view with places added; each counts as one more revision."""
 
     def __init__(self, seen: MapView, places: Sequence[tuple[int, Point]]) -> None:
         self._seen, self._places = seen, tuple(places)

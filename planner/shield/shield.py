@@ -39,13 +39,13 @@ from planner.shield.certified_planner import CertifiedPlanner, lead_of
 from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import Room, meets, room_m
 from planner.shield.refused_places import with_places
-from planner.shield.tracking import MOST_RADII, Tracked, can_be_flown, tracked
+from planner.shield.tracking import MOST_TRACK_RADII, Tracked, can_be_flown, tracked
 
-PROGRESS = 0.25
-"""A part of a path gets on if it gains at least this share of the hold radius along the planner's path."""
+PROGRESS_SHARE = 0.25
+"""A certified part makes progress if it gains this share of the hold radius along the planner's path."""
 
-HOLD_WITHIN = 1.0
-"""A path of a planner that begins its full turn within so many turn radii only asks to circle."""
+HOLD_WITHIN_RADII = 1.0
+"""A path of a planner that begins its full turn within this many turn radii only asks to circle."""
 
 GOES_ON = "the certified plan in effect goes on"
 
@@ -94,7 +94,7 @@ class Shield(CertifiedPlanner):
             here_m = on_loiter(effective.path, here_m)
             self._monitor.look(effective, here_m, request.position_m, fresh_m)
             self._monitor.broken |= meets(effective, here_m, self._mission, self._threats)
-        answer = self._asked(request, here_m)
+        answer = self._inner_answer(request, here_m)
         found = self._certified(request, here_m, answer)
         if found is not None:
             self._log.note(request.time_s, "")
@@ -102,7 +102,7 @@ class Shield(CertifiedPlanner):
             return found.plan
         return self._backup(request, here_m, answer)
 
-    def _asked(self, request: PlanRequest, here_m: float) -> Plan:
+    def _inner_answer(self, request: PlanRequest, here_m: float) -> Plan:
         """The inner planner's answer, checked; a refusal where it raised, or where nobody could fly its answer."""
         flown, arc_length_m = None, 0.0
         effective, adopted = self._monitor.plan, self._adopted
@@ -130,6 +130,7 @@ class Shield(CertifiedPlanner):
         return Plan(PlanStatus.NO_PATH, reason)
 
     def _refuse(self, place: Point, reason: str) -> None:
+        """Counts a refused plan and keeps place and reason for the planner."""
         self._log.refused_plans += 1
         self._refused = Refused(place, reason)
 
@@ -147,7 +148,7 @@ class Shield(CertifiedPlanner):
     def _committed(
         self, request: PlanRequest, here_m: float, adopted: Adopted, *, new: bool
     ) -> CommittedPlan | None:
-        """As much of an inner path as is certified and gets on."""
+        """The part of an inner path that is certified and makes progress; None, with a refusal, where there is none."""
         mission = self._mission
         inner = adopted.plan.path
         assert inner is not None
@@ -162,9 +163,8 @@ class Shield(CertifiedPlanner):
         points = self._memory.points_m
         keeps = np.minimum(mission.clearance_m, np.hypot(*(points - way.segments[0, :2]).T) - 1e-3)
         cut_m = min(first_breach(way, points, keeps), first_exit_m(way, mission.bounds_m))
-        certifier = Certifier(
-            self._room.holds, mission.clearance_m, mission.sensor_range_m, 1.5 * request.seen.spacing_m
-        )
+        spacing_m = 1.5 * request.seen.spacing_m
+        certifier = Certifier(self._room.holds, mission.clearance_m, mission.sensor_range_m, spacing_m)
         terrain = self._room.terrain(mission.clearance_m + mission.tracking_error_m)
         found = certifier.certify(way, request.seen, terrain, cut_m)
         gets_on = found is not None and self._gets_on(found, track, adopted, new)
@@ -184,11 +184,11 @@ class Shield(CertifiedPlanner):
         return CommittedPlan(plan, found.path, course, found.loiter_entry_m)
 
     def _both_hold(self, inner: Path, here_m: float) -> bool:
-        """Whether a planner that has no way on asks to circle here while the aircraft is in a certified turn anyway."""
+        """Tells whether the planner only asks to circle here while the aircraft is in a certified turn anyway."""
         effective = self._monitor.plan
         if not inner.loiter or effective is None or not effective.holds(here_m):
             return False
-        return inner.length_m <= (math.tau + HOLD_WITHIN) * self._room.limits.radius_m
+        return inner.length_m <= (math.tau + HOLD_WITHIN_RADII) * self._room.limits.radius_m
 
     def _leads_on(self, here_m: float) -> bool:
         """Whether the aircraft is on the certified part of a plan, before its turn."""
@@ -202,7 +202,7 @@ class Shield(CertifiedPlanner):
         if new and not inner.loiter and can_be_flown(inner, here, self._room.limits):
             ends = np.concatenate(((0.0,), np.cumsum(inner.segments[:, 5])))
             return Tracked(inner, ends)
-        most_m = min(MOST_RADII * self._room.limits.radius_m, self._mission.sensor_range_m)
+        most_m = min(MOST_TRACK_RADII * self._room.limits.radius_m, self._mission.sensor_range_m)
         track = tracked(start.pose, start.curvature, inner, from_m, self._room.limits, most_m)
         if track is None:
             return None
@@ -211,7 +211,7 @@ class Shield(CertifiedPlanner):
 
     def _gets_on(self, found: Certified, track: Tracked, adopted: Adopted, new: bool) -> bool:
         """Whether a certified part gains along the planner's path, and ends in another turn than that in effect."""
-        least_m = PROGRESS * self._room.holds.radius_m
+        least_m = PROGRESS_SHARE * self._room.holds.radius_m
         effective = self._monitor.plan
         if effective is not None and effective.path.loiter:
             circle = hold_centre(effective.path.segments[-1])
@@ -223,7 +223,7 @@ class Shield(CertifiedPlanner):
     def _to_goal(
         self, certifier: Certifier, request: PlanRequest, way: Path, cut_m: float
     ) -> Certified | None:
-        """The way up to where the flight is over, where it leads into the goal circle and is seen to be free."""
+        """The way as certified into the goal circle, where all of it up to there is seen to be free; else None."""
         mission = self._mission
         inside_m = mission.goal_radius_m - mission.tracking_error_m
         at = np.arange(0.0, min(way.length_m, cut_m), 0.1 * max(inside_m, 1.0))
@@ -235,7 +235,7 @@ class Shield(CertifiedPlanner):
         return certifier.certify_up_to(over_m, flown, request.seen, mission.bounds_m)
 
     def _backup(self, request: PlanRequest, here_m: float, answer: Plan) -> Plan:
-        """What is flown where the planner has nothing that is certified: the plan in effect, or an escape."""
+        """The answer where nothing of the planner's is certified: the plan in effect, or an escape."""
         effective, time_s = self._monitor.plan, request.time_s
         why = self._refused.reason if self._refused is not None else answer.reason
         if effective is None or self._monitor.broken:
@@ -252,11 +252,11 @@ class Shield(CertifiedPlanner):
         self._log.note(time_s, why)
         if answer.status is PlanStatus.UNREACHABLE and self._refused is None and not self._places:
             return answer
-        self._show_where(request)
+        self._show_refused(request)
         return Plan(PlanStatus.NO_PATH, f"stuck in the turn since {self._log.since_s:.0f} s: {why}")
 
-    def _show_where(self, request: PlanRequest) -> None:
-        """After every full turn that is held the place that was refused last becomes an edge point to the planner."""
+    def _show_refused(self, request: PlanRequest) -> None:
+        """After every full holding turn, adds the place refused last to the planner's map as an edge point."""
         mission, here = self._mission, request.position_m
         turn_s = math.tau * self._room.holds.radius_m / mission.speed_mps
         if self._refused is None or request.time_s < max(self._log.since_s, self._shown_s) + turn_s:
@@ -269,7 +269,7 @@ class Shield(CertifiedPlanner):
 
 
 def why_not(free_m: float, cut_m: float) -> str:
-    """Why a path is refused that is free up to one arc length and cut at another."""
+    """Says why a path is refused that is seen free up to one arc length and cut at another."""
     if cut_m <= free_m:
         return "the path comes too near to something or leaves the area"
     return "no turn off the path that gets on has been seen to be free"
@@ -284,6 +284,6 @@ def first_exit_m(path: Path, bounds_m: tuple[float, float, float, float]) -> flo
 
 
 def _nearest_m(path: Path, place: Point, before_m: float) -> float:
-    """Arc length of the place of a path that is nearest to a place, not beyond `before_m`."""
+    """Arc length of a path nearest to a place, at most `before_m`."""
     at = np.linspace(0.0, min(path.length_m, before_m), 201)
     return float(at[np.hypot(*(poses_at(path, at)[:, :2] - place).T).argmin()])

@@ -1,4 +1,4 @@
-"""The path of a planner as an aircraft can fly it: pursuit at the turn radius with a limited change of curvature.
+"""Makes a planner's path flyable: pursuit at the turn radius with a limited change of curvature.
 
 A path may have corners, or begin beside the aircraft: it is tracked by pure pursuit (R. C. Coulter, "Implementation of
 the pure pursuit path tracking algorithm", CMU-RI-TR-92-01, 1992), and the track is what is certified and flown.
@@ -14,14 +14,14 @@ import numpy as np
 from planner.geometry.curves import Limits, Pose, Segment, along, sample
 from planner.interface import FloatArray, Path
 
-STEP_SHARE, AHEAD_SHARE = 1.0 / 12.0, 0.6
-"""In turn radii: length of a step of the track, and how far ahead of the nearest place of the path it aims."""
+STEP_RADII, AHEAD_RADII = 1.0 / 12.0, 0.6
+"""Length of a step of the track, and look-ahead distance of the pursuit, in turn radii."""
 
 SMOOTH_RAD, SMOOTH_M = math.radians(2.0), 1.0
 """A path whose joints turn and jump by no more than this can be flown as it is."""
 
-MOST_RADII = 30.0
-"""No more of a path is tracked than so many turn radii, and no less than what is seen."""
+MOST_TRACK_RADII = 30.0
+"""Longest track of a path, in turn radii; the sensing range limits it as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Tracked:
     stations_m: FloatArray  # (n + 1,) of the planner's path, at the beginning of each segment and at the end
 
     def station_m(self, arc_length_m: float) -> float:
-        """Arc length of the planner's path beside a place of the track."""
+        """Arc length of the planner's path abeam of an arc length of the track."""
         ends = np.concatenate(((0.0,), np.cumsum(self.path.segments[:, 5])))
         return float(np.interp(arc_length_m, ends, self.stations_m))
 
@@ -44,7 +44,7 @@ def tracked(
 
     Before the arc length `from_m` the pose is not beside the path.
     """
-    step_m, ahead_m = STEP_SHARE * limits.radius_m, AHEAD_SHARE * limits.radius_m
+    step_m, ahead_m = STEP_RADII * limits.radius_m, AHEAD_RADII * limits.radius_m
     places = sample(path, step_m)
     stations = np.concatenate(((0.0,), np.cumsum(np.hypot(*np.diff(places, axis=0).T))))
     stations *= path.length_m / max(float(stations[-1]), 1e-9)

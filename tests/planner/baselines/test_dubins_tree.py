@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.baselines.dubins_tree import HOLDING_S, DubinsTree, DubinsTreeConfig
+from planner.baselines.dubins_tree import HOLD_REGROW_S, DubinsTree, DubinsTreeConfig
 from planner.contract import MISSION, GivenMap
 from planner.geometry.curves import sample
 from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
@@ -65,10 +65,10 @@ def test_from_a_turn_to_hold_in_another_way_is_looked_for(ring: MakePoints) -> N
 
     gone = GivenMap(around[:0])
     gone.revision = gone.last_removal_revision = 2
-    assert asked(0.9 * HOLDING_S, GivenMap(around)) is PlanStatus.KEPT
-    assert asked(HOLDING_S, GivenMap(around)) is PlanStatus.NO_PATH
-    assert asked(1.9 * HOLDING_S, gone) is PlanStatus.KEPT
-    assert asked(2.0 * HOLDING_S, gone) is PlanStatus.FOUND
+    assert asked(0.9 * HOLD_REGROW_S, GivenMap(around)) is PlanStatus.KEPT
+    assert asked(HOLD_REGROW_S, GivenMap(around)) is PlanStatus.NO_PATH
+    assert asked(1.9 * HOLD_REGROW_S, gone) is PlanStatus.KEPT
+    assert asked(2.0 * HOLD_REGROW_S, gone) is PlanStatus.FOUND
 
 
 def test_in_a_turn_that_a_shield_holds_a_tree_is_grown_as_seldom(ring: MakePoints) -> None:
@@ -79,8 +79,8 @@ def test_in_a_turn_that_a_shield_holds_a_tree_is_grown_as_seldom(ring: MakePoint
         return planner.plan(PlanRequest(time_s, START, (1.0, 0.0), GivenMap(points), committed=held)).status
 
     assert asked(0.0) is PlanStatus.FOUND
-    assert asked(0.9 * HOLDING_S) is PlanStatus.NO_PATH
-    assert asked(HOLDING_S) is PlanStatus.FOUND
+    assert asked(0.9 * HOLD_REGROW_S) is PlanStatus.NO_PATH
+    assert asked(HOLD_REGROW_S) is PlanStatus.FOUND
 
 
 def test_a_path_stays_inside_the_area_where_the_way_round_leads_along_its_border(wall: MakePoints) -> None:

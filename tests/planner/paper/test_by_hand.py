@@ -20,7 +20,7 @@ from planner.paper.model import crosses, guide_vector, most_units, step, within
 from planner.paper.multi_step_search import Window, multi_step_search
 from planner.paper.route_optimisation import Route, cancel_nodes, flyable, shortest, turn_fits
 from planner.paper.sectors import (
-    ALL,
+    FULL_CIRCLE,
     Sector,
     clip,
     distance_left_m,
@@ -113,7 +113,7 @@ def test_fan_shaped_sectors() -> None:
     def at(*bearings: float) -> FloatArray:
         return 200.0 * np.column_stack((np.cos(np.radians(bearings)), np.sin(np.radians(bearings))))
 
-    assert fan_shaped_sectors(NOTHING, 100.0, (0.0, 0.0)) == [ALL]
+    assert fan_shaped_sectors(NOTHING, 100.0, (0.0, 0.0)) == [FULL_CIRCLE]
     near(fan_shaped_sectors(at(0.0), 100.0, (0.0, 0.0)), (30.0, 330.0))
     near(fan_shaped_sectors(at(0.0, 180.0), 100.0, (0.0, 0.0)), (30.0, 150.0), (210.0, 330.0))
     near(fan_shaped_sectors(at(0.0, 50.0), 100.0, (0.0, 0.0)), (80.0, 330.0))

@@ -17,7 +17,7 @@ from planner import contract
 from planner.geometry.curves import Point
 from planner.interface import FloatArray, MapView
 from planner.memory import ObstacleMemory
-from planner.rolling_window.barrier import PROVED_AT_ONCE, THIN, Barrier, Proof
+from planner.rolling_window.barrier import POINTS_A_CALL, THINNING_SHARE, Barrier, Proof
 from tests.examples import examples
 from tests.planner.rolling_window.test_rolling_window import Seen
 
@@ -27,7 +27,7 @@ Known = Callable[[FloatArray], MapView]
 BOUNDS = (0.0, 0.0, 1000.0, 1000.0)
 CLEARANCE = 40.0
 START, GOAL = (200.0, 480.0), (800.0, 530.0)
-SURE = 1.0 - 2.0 * THIN
+SURE = 1.0 - 2.0 * THINNING_SHARE
 """Two points may each be left out for one this share of the clearance away, and by no more."""
 
 
@@ -136,7 +136,7 @@ def proof_of(seen: MapView, keeps_m: float) -> tuple[Proof, int]:
     mission = replace(contract.MISSION, goal_m=GOAL, bounds_m=BOUNDS, clearance_m=CLEARANCE)
     memory = ObstacleMemory(CLEARANCE)
     memory.take_in(seen)
-    return Proof(mission, memory, keeps_m), math.ceil(len(memory.points_m) / PROVED_AT_ONCE)
+    return Proof(mission, memory, keeps_m), math.ceil(len(memory.points_m) / POINTS_A_CALL)
 
 
 def proved(seen: MapView, keeps_m: float) -> bool:

@@ -35,7 +35,7 @@ def test_in_the_open_it_is_the_distance(place: Point) -> None:
     assume(np.hypot(*(far - place).T).min() > KEEP)
     straight = math.dist(place, GOAL)
     # Both ends lie somewhere in their cells, and what a level is short of is made up for after five.
-    assert straight <= spread(far)(place) <= straight + 3.0 * KEEP / cost_to_go.CELLS
+    assert straight <= spread(far)(place) <= straight + 3.0 * KEEP / cost_to_go.KEEP_CELLS
 
 
 def test_round_a_wall(wall: MakePoints) -> None:

@@ -16,7 +16,7 @@ from planner.geometry.curves import Limits, Point, Pose, end_of, sample
 from planner.geometry.terrain import Terrain, WorkCount
 from planner.interface import FloatArray, Path
 from planner.rolling_window.cost_to_go import CostToGo
-from planner.rolling_window.pose_search import AWAY, search_poses
+from planner.rolling_window.pose_search import ENOUGH_RADII, search_poses
 from planner.rolling_window.route_optimisation import FlyableRoute, optimise
 from tests.examples import examples
 
@@ -74,7 +74,7 @@ def found_way(
     nodes, path = found.nodes, found.path
     if nodes[-1] != goal:
         to_go = distances_to_go(start, goal, points, bounds)
-        assert to_go(nodes[-1]) < to_go(start[:2]) - AWAY * RADIUS
+        assert to_go(nodes[-1]) < to_go(start[:2]) - ENOUGH_RADII * RADIUS
     assert_flyable(path, RADIUS)
     np.testing.assert_allclose(path.segments[0, :4], start, atol=1e-6)
     np.testing.assert_allclose(end_of(path)[:2], nodes[-1], atol=1e-4)

@@ -13,7 +13,7 @@ from planner import contract
 from planner.geometry.course import Course
 from planner.geometry.curves import pose_at
 from planner.interface import FloatArray, Path, Plan, PlanRequest, PlanStatus
-from planner.shield.committed_plan import CUT, CommittedPlan, PlanMonitor, start_of
+from planner.shield.committed_plan import CUT_SHARE, CommittedPlan, PlanMonitor, start_of
 from tests.planner.rolling_window.test_rolling_window import Seen
 
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
@@ -127,7 +127,7 @@ def test_the_window_rolls_on_the_sooner_the_nearer_something_is_wrong() -> None:
     assert monitor.due(flown, 1100.0, 60.0, newly_cut=False)  # it is near
     assert not monitor.due(flown, 1100.0, 40.0, newly_cut=False)
     in_effect(monitor, committed(1), EDGES[:2])
-    least_m = CUT * monitor.cut_m
+    least_m = CUT_SHARE * monitor.cut_m
     assert not monitor.due(committed(1), 0.0, 0.9 * 50.0, newly_cut=False)
     assert monitor.due(committed(1), 0.0, max(least_m, 50.0), newly_cut=False)
     assert monitor.due(committed(1), 1100.0, 0.0, newly_cut=True)

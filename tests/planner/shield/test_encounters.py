@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from planner.interface import FloatArray, MovingEdges
 from planner.shield.encounters import (
     EARLIEST,
-    FASTEST,
-    LATER_S,
+    FASTEST_SHARE,
     LATEST,
+    PASSING_S,
     meeting_s,
     met_at,
 )
@@ -22,7 +22,7 @@ from tests.examples import examples
 
 SPEED, SPACING = 25.0, 20.0
 SEEDS = st.integers(0, 2**32 - 1)
-PACES = st.floats(0.0, FASTEST * SPEED)
+PACES = st.floats(0.0, FASTEST_SHARE * SPEED)
 COURSES = st.floats(0.0, math.tau)
 
 
@@ -54,10 +54,14 @@ def test_the_time_is_that_of_a_simulation(seed: int, pace: float, course: float)
 
 
 @example(seed=1, pace=15.0, course=0.3, share=EARLIEST, later=0.0)
-@example(seed=1, pace=15.0, course=0.3, share=LATEST, later=LATER_S)
+@example(seed=1, pace=15.0, course=0.3, share=LATEST, later=PASSING_S)
 @settings(max_examples=examples(15))
 @given(
-    seed=SEEDS, pace=PACES, course=COURSES, share=st.floats(EARLIEST, LATEST), later=st.floats(0.0, LATER_S)
+    seed=SEEDS,
+    pace=PACES,
+    course=COURSES,
+    share=st.floats(EARLIEST, LATEST),
+    later=st.floats(0.0, PASSING_S),
 )
 def test_whoever_flies_to_any_point_of_the_outline_meets_it_where_it_is_drawn(
     seed: int, pace: float, course: float, share: float, later: float
@@ -84,7 +88,7 @@ def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
     for place in met_at(each, (0.0, 0.0), 0.0, SPEED, SPACING):
         # The point that it comes from, and when that is there.
         along = (place - each.points_m) @ velocity / max(pace * pace, 1e-12)
-        after_s = np.clip(along, EARLIEST * straight_s, LATEST * straight_s + LATER_S)
+        after_s = np.clip(along, EARLIEST * straight_s, LATEST * straight_s + PASSING_S)
         off = np.hypot(*(each.points_m + after_s[:, None] * velocity - place).T)
         assert off.min() < 1e-6
 

@@ -19,7 +19,7 @@ from planner.shield.encounters import EARLIEST, LATEST
 from planner.shield.escape import LOITER_SHARES
 from planner.shield.evasion import (
     AHEAD_S,
-    LATER,
+    DISCOUNT,
     UNKNOWN_MPS,
     UNKNOWN_S,
     Threats,
@@ -63,7 +63,7 @@ def room_by_hand(path: Path, of: Threats) -> float:
         for share in np.linspace(EARLIEST, LATEST, 40):
             now = of.moving[:, :2] + of.moving[:, 2:4] * share * arc_length_m / SPEED
             away.append(np.hypot(*(now - place).T))
-        room = min(room, np.concatenate(away).min(initial=math.inf) + LATER * arc_length_m)
+        room = min(room, np.concatenate(away).min(initial=math.inf) + DISCOUNT * arc_length_m)
     return room
 
 
@@ -107,13 +107,15 @@ def test_from_what_has_just_appeared_it_keeps_further(place: tuple[float, float]
     arc_lengths_m = np.arange(0.0, AHEAD_S * SPEED, STEP)
     away = np.hypot(*(poses_at(path, arc_lengths_m)[:, :2] - place).T)
     reach = UNKNOWN_MPS * np.minimum(LATEST * arc_lengths_m / SPEED, UNKNOWN_S)
-    assert unknown.room_m(path) == pytest.approx((away - reach + LATER * arc_lengths_m).min())
+    assert unknown.room_m(path) == pytest.approx((away - reach + DISCOUNT * arc_lengths_m).min())
 
 
 def test_round_a_loiter_circle_room_is_that_of_the_place_it_will_be_at() -> None:
     """What comes to a circle is met only where it comes while the aircraft is there."""
     circle = Path(np.array([(0.0, 0.0, 1.0, 0.0, 1 / 100.0, math.tau * 100.0)]), loiter=True)
-    assert threats(np.array([(0.0, 200.0)])).room_m(circle) == pytest.approx(LATER * 100.0 * math.pi, abs=2.0)
+    assert threats(np.array([(0.0, 200.0)])).room_m(circle) == pytest.approx(
+        DISCOUNT * 100.0 * math.pi, abs=2.0
+    )
     # 200 m to the north after half a turn, 12.6 s: what is there by then, and what has gone by then.
     comes = moving(np.array([(400.0, 200.0)]), (-400.0 / 12.6, 0.0))
     goes = moving(np.array([(0.0, 200.0)]), (0.0, 20.0))
