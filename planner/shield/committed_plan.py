@@ -66,7 +66,7 @@ class Start:
     prefix: list[Segment] = field(default_factory=list)
 
     def later(self, count: int) -> Iterator[Start]:
-        """This start, and on a turn others further round it: so many in all, evenly spaced."""
+        """Yields this start, and on a turn `count` - 1 others further round it, evenly spaced."""
         yield self
         for i in range(1, count if self.curvature else 1):
             arc: Segment = (*self.pose, self.curvature, math.tau * i / count / abs(self.curvature))
