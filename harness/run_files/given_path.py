@@ -36,6 +36,8 @@ LIMIT_SHARE: Final = 0.9
 CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
 """Only this share of a corner's limit is used if the arc then has at least this many least radii, which leaves the rest
 of both for gusts."""
+SAME_TURN_RAD: Final = 0.01
+"""Legs whose directions differ by less have no apex."""
 WIND_SAMPLES: Final = 9
 """The ground speed is computed in this many directions of a turn."""
 
@@ -55,6 +57,10 @@ class Tightest:
     def of(self, kept: NDArray[np.int64], count: int) -> Tightest:
         """Returns the limits at the kept points, without the ends."""
         return Tightest(*(np.broadcast_to(each, count)[kept][1:-1] for each in vars(self).values()))
+
+    def at(self, corner: int) -> Tightest:
+        """Returns the limits of one corner of several."""
+        return Tightest(*(each[corner] for each in vars(self).values()))
 
 
 @dataclass(frozen=True)
@@ -120,16 +126,22 @@ def fly_by(
     one radius before the corner. With `every`, corners are told however little they are cut.
     """
     kept = needed(points_m)
-    least, free = (np.broadcast_to(each, len(points_m))[kept][1:-1] for each in (radius_m, free_cut_m))
     points = points_m[kept]
     place = points[:, 0] + 1j * points[:, 1]
-    length = np.abs(np.diff(place))
-    ahead = np.diff(place) / length
-    turn = np.angle(ahead[1:] / ahead[:-1])
+    joined = [] if tightest is None or every else _joined(place, tightest.of(kept, len(points_m)))
+    own = np.arange(len(place))
+    for each in joined:
+        own[each.first : each.last + 1] = each.sharpest
+        place[each.sharpest] = each.apex
+    own = np.unique(own)
+    place = place[own]
+    of = kept[own]
+    least, free = (np.broadcast_to(each, len(points_m))[of][1:-1] for each in (radius_m, free_cut_m))
+    length, ahead, turn = _legs(place)
     shape = _shapes(turn)
     wanted = np.where(shape.past, least, np.maximum(least, free / np.maximum(shape.cut, LEAST_CUT)))
     if tightest is not None:
-        wanted = _tightened(wanted, shape, ahead, turn, tightest.of(kept, len(points_m)))
+        wanted = _tightened(wanted, shape, ahead, turn, tightest.of(of, len(points_m)))
     radius = np.minimum(_fitting(length, least, shape), wanted)
 
     before, after = radius * shape.before, radius * shape.after
@@ -151,9 +163,9 @@ def fly_by(
     middles, over = begun + radius * shape.corner, begun + radius * (np.abs(turn) + 2.0 * shape.back_turn)
     cut = radius * shape.cut
     half = np.maximum(middles - begun, over - middles)
-    told = np.column_stack((points[1:-1], np.degrees(turn), radius, cut, middles, half))
+    told = np.column_stack((points[own][1:-1], np.degrees(turn), radius, cut, middles, half))
     corners = tuple(
-        CutCorner(int(kept[i + 1]), *told[i].tolist())
+        CutCorner(int(of[i + 1]), *told[i].tolist())
         for i in np.flatnonzero(every | (cut > free * (1.0 + 1e-9))).tolist()
     )
     stations = np.concatenate(([0.0], middles, [station]))
@@ -163,7 +175,95 @@ def fly_by(
     drawn = np.concatenate((place[:1], inner.ravel(), place[-1:]))
     along = np.concatenate(([0.0], np.stack((begun, middles, over), axis=1).ravel(), [station]))
     given = np.column_stack((drawn.real, drawn.imag, along))
-    return FlyBy(points, np.array(rows), corners, kept, stations, given)
+    every_station = np.interp(np.arange(len(points)), own, stations)
+    order = np.arange(float(len(given)))
+    for each in joined:  # what is judged are the points given, not the apex or what touches the legs to it
+        at = int(np.searchsorted(own, each.sharpest)) - 1
+        share = each.shares(points, float(before[at]), float(after[at]))
+        inside = slice(each.first, each.last + 1)
+        every_station[inside] = begun[at] + (over[at] - begun[at]) * share
+        order[max(3 * at, 1) : min(3 * at + 5, 3 * len(turn) + 1)] = np.nan
+        given = np.concatenate((given, np.column_stack((points[inside], every_station[inside]))))
+        order = np.append(order, np.full(len(share), 3.0 * at + 2.0))
+    given = given[np.argsort(order, kind="stable")[: np.isfinite(order).sum()]]
+    return FlyBy(points, np.array(rows), corners, kept, every_station, given)
+
+
+@dataclass(frozen=True)
+class _Joined:
+    """Neighbouring corners, `first` to `last`, that are flown as one at the apex of the legs before and after them."""
+
+    first: int
+    last: int
+    sharpest: int
+    apex: complex
+
+    def shares(self, points_m: FloatArray, before_m: float, after_m: float) -> FloatArray:
+        """Returns how far along the turn each of the points lies, from 0 to 1, both left out, and rising."""
+        own = points_m[self.first : self.last + 1] @ np.array([1.0, 1j])
+        along = np.append(0.0, np.cumsum(np.abs(np.diff(own)))) + before_m - abs(own[0] - self.apex)
+        whole = max(float(along[-1]) + after_m - abs(own[-1] - self.apex), SHORTEST_M)
+        spread = np.linspace(1e-3, 2e-3, len(own))
+        shares: FloatArray = spread + (1.0 - 3e-3) * np.clip(along / whole, 0.0, 1.0)
+        return shares
+
+
+def _legs(place: NDArray[np.complex128]) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:
+    """Returns lengths and directions of the legs between places, and the turns between legs."""
+    length = np.abs(np.diff(place))
+    ahead = np.diff(place) / length
+    return length, ahead, np.angle(ahead[1:] / ahead[:-1])
+
+
+def _joined(place: NDArray[np.complex128], tightest: Tightest) -> list[_Joined]:
+    """Returns the kinks whose legs have no room for the least turn, each with the neighbours that make room for it.
+
+    An aircraft that turns at such a kink overshoots by about R (1 - cos(turn)). Legs are left out one by one, until
+    an arc about the apex of those before and after fits, within the limit of the points or that overshoot.
+    """
+    length, ahead, turn = _legs(place)
+    tangent = np.concatenate(([0.0], np.tan(0.5 * np.minimum(np.abs(turn), PAST_RAD)), [0.0]))
+    least = _least_m(ahead, turn, tightest)
+    overshoot_m = (least - _fitting(length, least, _shapes(turn))) * (1.0 - np.cos(turn))
+    found: list[_Joined] = []
+    for kink in (1 + np.flatnonzero(overshoot_m > (1.0 - LIMIT_SHARE) * tightest.limit_m)).tolist():
+        first = last = kink
+        while (found[-1].last if found else 0) < first and last < len(place) - 1:
+            onto = ahead[last] / ahead[first - 1]
+            angle, gap = abs(np.angle(onto)), (place[last] - place[first]) / ahead[first - 1]
+            if not SAME_TURN_RAD < angle < PAST_RAD:
+                break
+            beyond = gap.imag / onto.imag  # how far the apex lies before the last leg, and behind the first
+            ahead_m = gap.real - beyond * onto.real
+            half = float(np.tan(0.5 * angle))
+            rooms = length[first - 1] + ahead_m, length[last] + beyond
+            radius = float(
+                _least_m(ahead[[first - 1, first]], np.angle(onto)[None], tightest.at(kink - 1))[0]
+            )
+            fits = rooms[0] / (half + tangent[first - 1]), rooms[1] / (half + tangent[last + 1])
+            if min(fits) >= radius:
+                apex = place[first] + ahead_m * ahead[first - 1]
+                off_m = _off_arc_m(place[first : last + 1], apex, (ahead[first - 1], ahead[last]), radius)
+                if first < last and off_m <= max(
+                    LIMIT_SHARE * tightest.at(kink - 1).limit_m, radius * (1.0 - np.cos(angle))
+                ):
+                    sharpest = first + int(np.abs(turn[first - 1 : last]).argmax())
+                    found.append(_Joined(first, last, sharpest, complex(apex)))
+                break
+            first, last = (first - 1, last) if fits[0] < fits[1] else (first, last + 1)
+    return found
+
+
+def _off_arc_m(
+    places: NDArray[np.complex128], apex: complex, legs: tuple[complex, complex], radius_m: float
+) -> float:
+    """Returns how far places, and the middles between them, are at most from the arc that rounds an apex."""
+    every = np.concatenate((places, 0.5 * (places[1:] + places[:-1])))
+    turn = np.angle(legs[1] / legs[0])
+    reach = radius_m * np.tan(0.5 * abs(turn))
+    centre = apex - reach * legs[0] + 1j * np.sign(turn) * radius_m * legs[0]
+    inside = (((every - apex) / legs[0]).real > -reach) & (((every - apex) / legs[1]).real < reach)
+    return float((np.abs(np.abs(every - centre) - radius_m) * inside).max())
 
 
 class _Shapes(NamedTuple):
@@ -210,7 +310,17 @@ def _shapes(turn: FloatArray) -> _Shapes:
 def _tightened(
     wanted_m: FloatArray, shape: _Shapes, ahead: NDArray[Any], turn: FloatArray, tightest: Tightest
 ) -> FloatArray:
-    """(k,) radii that keep every corner within its limit, as far as the aircraft turns so tightly in the wind.
+    """(k,) radii that keep every corner within its limit, as far as the aircraft turns so tightly in the wind."""
+    least_m = _least_m(ahead, turn, tightest)
+    limit_m = tightest.limit_m / np.maximum(shape.furthest, LEAST_CUT)
+    careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * least_m)
+    most_m = np.minimum(careful_m, LIMIT_SHARE * limit_m)
+    tight: FloatArray = np.maximum(np.minimum(wanted_m, most_m), least_m)
+    return tight
+
+
+def _least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> FloatArray:
+    """(k,) least radii in the wind.
 
     A steady turn at one bank has the radius of calm air times the square of ground speed over airspeed, where that is
     largest along the turn.
@@ -219,12 +329,8 @@ def _tightened(
     course = ahead[:-1, None] * np.exp(1j * turn[:, None] * along)
     seen = np.conj(course) * np.asarray(tightest.wind)[..., None]
     ground_speed = seen.real + np.sqrt(np.maximum(1.0 - seen.imag**2, 0.0))
-    least_m = tightest.radius_m * np.square(ground_speed).max(axis=1)
-    limit_m = tightest.limit_m / np.maximum(shape.furthest, LEAST_CUT)
-    careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * least_m)
-    most_m = np.minimum(careful_m, LIMIT_SHARE * limit_m)
-    tight: FloatArray = np.maximum(np.minimum(wanted_m, most_m), least_m)
-    return tight
+    least_m: FloatArray = tightest.radius_m * np.square(ground_speed).max(axis=1)
+    return least_m
 
 
 def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float) -> list[Row]:

@@ -173,6 +173,24 @@ def test_a_yes_says_what_bank_the_turns_take_in_the_wind(radius_m: float, told: 
     assert metrics["check"]["verdict"].endswith(f", turns take {told} deg of bank")
 
 
+@pytest.mark.parametrize("turn_deg", [30.0, 50.0])
+def test_a_kink_before_a_sampled_curve_is_rounded_as_any_corner(turn_deg: float) -> None:
+    """A circle of 63.7 m (25 m/s, 45 deg) that touches the line and, from within, the circle of 150 m cuts the kink.
+
+    Its centre is 63.7 m beside the line and 150 - 63.7 m from that of the other. Of points 3 m apart none has room.
+    """
+    least, wide, turn = 25.0**2 / 9.80665, 150.0, math.radians(turn_deg)
+    east = math.sqrt((wide - least) ** 2 - (wide * math.cos(turn) - least) ** 2) - wide * math.sin(turn)
+    cut_m = math.hypot(east, least) - least
+    angle = turn + np.linspace(0.0, 2.0, 100)
+    arc = wide * np.column_stack((np.sin(angle) - math.sin(turn), math.cos(turn) - np.cos(angle)))
+    metrics, track = flown(np.concatenate(([(-400.0, 0.0)], arc)))
+    assert metrics["check"]["ok"], metrics["check"]["verdict"]
+    nearest = float(np.hypot(*track.T).min())
+    assert nearest == pytest.approx(cut_m, abs=1.5)
+    assert metrics["check"]["limit_used"]["off_path"] == pytest.approx(nearest / 10.0, abs=0.05)
+
+
 @pytest.mark.flights
 @pytest.mark.parametrize("law", ["preview", "l1"])
 @pytest.mark.parametrize("navigation", ["perfect", "rtk"])

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.flight.polylines import polylines
-from harness.run_files.given_path import FloatArray, fly_by
+from harness.run_files.given_path import FloatArray, Tightest, fly_by
 from planner.geometry.curves import end_of
 from planner.interface import Path
 
@@ -108,3 +109,19 @@ def test_any_polyline_becomes_a_path_from_its_start_to_its_end(grid: list[tuple[
     assert np.hypot(way.segments[:, 2], way.segments[:, 3]) == pytest.approx(1.0)
     assert way.segments[0, :2] == pytest.approx(points[0])
     assert end_of(Path(way.segments))[:2] == pytest.approx(points[-1], abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_kinks_that_are_flown_as_one_are_judged_by_the_points_given(seed: int) -> None:
+    """Short legs and sharp turns at random, in wind: the way is continuous, and what is judged is the polyline."""
+    rng = np.random.default_rng(seed)
+    leg = rng.choice([2.0, 5.0, 20.0, 60.0, 200.0], 30) * rng.uniform(0.5, 1.5, 30)
+    angle = np.cumsum(rng.normal(0.0, rng.choice([0.2, 0.8, 2.0]), 30))
+    points = np.cumsum(np.column_stack((leg * np.cos(angle), leg * np.sin(angle))), axis=0)
+    way = fly_by(points, 110.0, 2.5, Tightest(63.7, 10.0, 0.3 * np.exp(1j * seed)))
+    assert joints(way.segments).max(initial=0.0) < 1e-5
+    assert np.diff(way.stations_m).min() >= 0.0
+    assert np.diff(way.given_m[:, 2]).min() >= -1e-9
+    given_line, line = shapely.LineString(way.given_m[:, :2]), shapely.LineString(points)
+    assert shapely.hausdorff_distance(given_line, line) < 0.02  # a point so near to its line is left out
+    assert float(way.segments[:, 5].sum()) == pytest.approx(way.stations_m[-1])
