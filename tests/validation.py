@@ -17,8 +17,8 @@ import pyarrow.parquet as pq
 
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
-from harness.replays.measures import rows_of
-from harness.replays.replay import Replay, replay
+from harness.replays.measures import Replay, rows_of
+from harness.replays.replay import replay
 from harness.replays.replay_figure import replay_figure
 from harness.replays.wind import fit_wind
 from harness.report.figure_style import svg

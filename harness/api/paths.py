@@ -17,7 +17,7 @@ from harness.scenario.shipped import scenario_path
 if TYPE_CHECKING:
     import numpy as np
 
-    from harness.replays.replay import Replay
+    from harness.replays.measures import Replay
 
     Points = Sequence[Sequence[float]] | np.ndarray[Any, Any]
 

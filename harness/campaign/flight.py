@@ -19,7 +19,7 @@ from harness.scenario.kinds import GUIDANCE, PLANNER, registered_source
 from harness.scenario.scenario import Scenario, unpacked
 
 if TYPE_CHECKING:
-    from harness.run.path_check import PathCheck
+    from harness.run.path_flight import PathCheck
 
 DISK_FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """Errors of a disk that takes no more, for which a run is not to blame."""

@@ -24,8 +24,9 @@ from harness.campaign.runs import SEED_STREAM, CampaignRuns
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, node_of
 from harness.flight.record import FloatArray
-from harness.run.path_check import PathCheck, origin_of
 from harness.run.path_check import asked as path_check
+from harness.run.path_check import origin_of
+from harness.run.path_flight import PathCheck
 from harness.run_files.path_files import read_path
 from harness.scenario.keys import NORMALS
 from harness.scenario.scenario import Scenario, overridden

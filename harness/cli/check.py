@@ -17,7 +17,7 @@ from harness.cli.replacing import NOTHING, Given, replacing, sources
 from harness.cli.terminal import plain, print_table, say
 
 if TYPE_CHECKING:
-    from harness.run.path_check import PathCheck
+    from harness.run.path_flight import PathCheck
 
 
 PATH: Final = "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints)."

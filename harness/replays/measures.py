@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -49,6 +50,22 @@ def legs_of(
             reached, nearest_m = reached + 1, np.inf
         found[row] = reached
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A flown flight beside the same mission simulated: content of `replay.json`, columns of both, (k, 2) corners."""
+
+    told: dict[str, Any]
+    flown: Mapping[str, FloatArray]
+    simulated: Mapping[str, FloatArray]
+    corners_m: FloatArray
+    folder: Path
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        between = self.told["distance_between_m"]
+        return f"Replay({self.told['log']}: tracks {between['p50']:.1f} m apart (median))"
 
 
 @dataclass(frozen=True, eq=False)

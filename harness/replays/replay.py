@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 from harness.replays.flown import TABLES, FlownFlight, read_flown
-from harness.replays.measures import Side, compared, legs_of, rows_of
+from harness.replays.measures import Replay, Side, compared, legs_of, rows_of
 from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, read_mission
 from harness.replays.simulated import Asked, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows
@@ -24,22 +23,6 @@ from harness.replays.wind import FittedWind, fit_wind, fit_windows
 INDEX, RECORDING, SCHEMA = "replay.json", "flight.rrd", "wayproof/replay/1"
 SIMULATED: Final = "simulated"
 """The run folder of the simulated flight, in the folder of a replay."""
-
-
-@dataclass(frozen=True, eq=False)
-class Replay:
-    """A flown flight beside the same mission simulated: content of `replay.json`, columns of both, (k, 2) corners."""
-
-    told: dict[str, Any]
-    flown: Mapping[str, FloatArray]
-    simulated: Mapping[str, FloatArray]
-    corners_m: FloatArray
-    folder: Path
-
-    def __repr__(self) -> str:
-        """A line for people."""
-        between = self.told["distance_between_m"]
-        return f"Replay({self.told['log']}: tracks {between['p50']:.1f} m apart (median))"
 
 
 def default_folder(log: Path) -> Path:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from harness.report.figure_style import COLOURS, WIDTH_IN, styled
 
 if TYPE_CHECKING:
-    from harness.replays.replay import Replay
+    from harness.replays.measures import Replay
 
 
 def replay_figure(found: Replay) -> Figure:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
@@ -16,11 +15,10 @@ from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.files.strict_yaml import COMMAND_LINE, Loc, Node, node_of
 from harness.flight.observer import Progress
-from harness.run.path_flight import PathPlan, fly_along, planned
+from harness.run.path_flight import PathCheck, fly_along, planned
 from harness.run.path_verdict import measured
 from harness.run.scenario_flight import flight_limits, fly_to_folder, jsbsim_aircraft, make_loop
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
-from harness.run_files.mission.vertices import corner_limit_m
 from harness.run_files.path_files import PathAsGiven
 from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of
@@ -44,34 +42,6 @@ KEYS_OF_THE_WORLD: Final = (
 """Single keys that it takes from there too: the altitude, and what sets the limits."""
 UNUSED: Final = re.compile(r"planner\.(?!clearance_m$)|mission\.(?!altitude_m$|goal_radius_m$)")
 """Begin of keys in whose place the path stands: who plans, start, goal, and until when."""
-
-
-@dataclass(frozen=True, eq=False)
-class PathCheck:
-    """A path, and what it is to be flown and judged with."""
-
-    given: PathAsGiven
-    scenario: Scenario
-    plan: PathPlan
-    bounded: bool = False
-    """The bounds of the area were named, and must not be crossed."""
-    corner_m: float | None = None
-    """How far off a corner may be passed; None: what `allowed_cut_m` says."""
-    files: tuple[FileSpec, ...] = ()
-    """Files among the obstacles, for a path that is not flown at one altitude."""
-
-    def allowed_cut_m(self, waypoint: int) -> float:
-        """How far off a corner may be passed; nothing of the aircraft or its guidance enters.
-
-        It is `corner_m` where that is given. Else a drawn path is to be flown as drawn: it is the cross-track limit. At
-        a waypoint of a mission it is the acceptance radius of the file, else `CORNER_M`.
-        """
-        if self.corner_m is not None:
-            return self.corner_m
-        if self.given.mission is None:
-            return self.scenario.trackability.cross_track_m
-        accepted_m = {step.item: step.acceptance_m for step in self.given.mission.steps}
-        return corner_limit_m(accepted_m.get(waypoint, 0.0), None)
 
 
 def origin_of(world: FilePath | None) -> tuple[float, float] | None:

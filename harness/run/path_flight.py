@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from harness.flight.record import Flight, Outcome
 from harness.flight.termination import Ending
 from harness.run_files.given_path import FloatArray, FlyBy, Tightest, fly_by
 from harness.run_files.mission.route import CLIMB_SHARE, mission_route
-from harness.run_files.mission.vertices import Flying, Ground, without_steps
+from harness.run_files.mission.vertices import Flying, Ground, corner_limit_m, without_steps
 from harness.run_files.path_files import PathAsGiven
 from harness.scenario.parts import airframe_of
 from harness.scenario.performance import performance_of, steady_wind_mps
@@ -32,6 +33,9 @@ from harness.scenario.scenario import Scenario
 from harness.scenario.sections import ALTITUDES_M
 from harness.scenario.validation import KeyFault
 from planner.interface import Path, Plan, PlanRequest, PlanStatus
+
+if TYPE_CHECKING:
+    from harness.world_files.expansion import FileSpec
 
 BEND_SHARE = 0.25
 """Altitudes of a drawn line that are straight within this share of the altitude threshold are one slope."""
@@ -72,6 +76,34 @@ class PathPlan:
         if self.profile.level:
             return None
         return max(max(self.climb_mps(speed)) for speed in set(self.profile.airspeed_mps.tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class PathCheck:
+    """A path, and what it is to be flown and judged with."""
+
+    given: PathAsGiven
+    scenario: Scenario
+    plan: PathPlan
+    bounded: bool = False
+    """The bounds of the area were named, and must not be crossed."""
+    corner_m: float | None = None
+    """How far off a corner may be passed; None: what `allowed_cut_m` says."""
+    files: tuple[FileSpec, ...] = ()
+    """Files among the obstacles, for a path that is not flown at one altitude."""
+
+    def allowed_cut_m(self, waypoint: int) -> float:
+        """How far off a corner may be passed; nothing of the aircraft or its guidance enters.
+
+        It is `corner_m` where that is given. Else a drawn path is to be flown as drawn: it is the cross-track limit. At
+        a waypoint of a mission it is the acceptance radius of the file, else `CORNER_M`.
+        """
+        if self.corner_m is not None:
+            return self.corner_m
+        if self.given.mission is None:
+            return self.scenario.trackability.cross_track_m
+        accepted_m = {step.item: step.acceptance_m for step in self.given.mission.steps}
+        return corner_limit_m(accepted_m.get(waypoint, 0.0), None)
 
 
 def planned(

@@ -25,8 +25,7 @@ from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray
 from harness.world.world import World
 
 if TYPE_CHECKING:
-    from harness.run.path_check import PathCheck
-    from harness.run.path_flight import PathPlan
+    from harness.run.path_flight import PathCheck, PathPlan
     from harness.scenario.scenario import Scenario
     from harness.world_files.expansion import FileSpec
 
