@@ -6,12 +6,12 @@ import math
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from harness.cli.command_line import interruptible, load, print_json, told_apart
-from harness.cli.options import Count, Json, Out, Quiet, ScenarioArgument, option
+from harness.cli.options import Json, Out, Quiet, ScenarioArgument, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say, step_bar
 from harness.files.wording import counted
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from harness.falsify.breaking_point import Breaking
     from harness.scenario.scenario import Scenario
 
-RUNS_PER_KEY: Final = 40
 Claim = Literal["reached", "no-contact", "trackable"]
 
 
@@ -32,7 +31,7 @@ def falsify(
     claim: Annotated[
         Claim, option("CLAIM", "What fails to hold: reached, no-contact or trackable.")
     ] = "reached",
-    runs: Annotated[Count, option("N", f"Number of flights. Default: {RUNS_PER_KEY} a key.", min=2)] = None,
+    runs: Annotated[int, option("N", "Number of flights at most.", min=2)] = 40,
     tolerance: Annotated[float, option("SHARE", "Precision, as a share of each range.")] = 0.01,
     out: Out = None,
     quiet: Quiet = False,
@@ -43,7 +42,7 @@ def falsify(
     The answer is the mildest failure found. A scan in equal steps finds it; a failing range narrower than a step may be
     missed, and more --runs make the steps finer.
 
-    LO is the mild end; LO > HI if smaller is harder. With several keys, the key furthest from its mild end counts.
+    LO is the mild end; LO > HI if smaller is harder. Several keys get harder together, each by the same share.
 
     For example: wayproof falsify aerosonde_forest --vary environment.wind.speed_mps=0:20
 
@@ -77,13 +76,12 @@ def falsify(
             ended.append(done)
             bar(done, of, told)
 
-        most = runs or RUNS_PER_KEY * len(ranges)
         found = search(
             loaded,
             varied,
             folder,
             claim=claim,
-            conditions=most,
+            conditions=runs,
             tolerance=tolerance,
             progress=report,
         )
@@ -125,7 +123,7 @@ def breaking_rows(breaking: Breaking) -> dict[str, str]:
     rows = {"tried": counted(breaking.conditions, "condition")}
     for each in breaking.vary:
         rows[plain(each.key)] = f"{number_text(each.mild)} (mild) to {number_text(each.hard)} (hard)"
-    share = max(found.displacement) if found else 0.0
+    share = breaking.displacement or 0.0
     if found is None:
         rows["mildest found"] = f"none: every condition tried was {breaking.claim}"
     else:

@@ -1,21 +1,20 @@
 """The breaking point: flies a scenario under ever harder conditions until the mildest is known that makes it fail.
 
-All keys get harder together, in equal steps, until a condition fails; bisection narrows that step down. With several
-keys each is then taken back towards its mild end while the condition still fails. A failing range below the answer that
-is narrower than a step may have been missed. When the search ends `falsify.json` is written, with every flight, and
-where something failed `falsified.yaml`, the whole scenario that does.
+All keys get harder together, in equal steps, until a condition fails; bisection narrows that step down. A failing range
+below the answer that is narrower than a step may have been missed. When the search ends `falsify.json` is written, with
+every flight, and where something failed `falsified.yaml`, the whole scenario that does.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
@@ -29,11 +28,9 @@ from harness.files.whole_file import replace_text
 from harness.run.scenario_flight import fly_and_measure
 from harness.scenario.scenario import Scenario, dump_scenario
 
-SCHEMA: Final = "wayproof/falsify/3"
+SCHEMA: Final = "wayproof/falsify/4"
 INDEX: Final = "falsify.json"
 FALSIFIED: Final = "falsified.yaml"
-MAX_KEYS: Final = 6
-"""At most this many keys are varied at once: every combination of their ends is made before the search."""
 FIGURES: Final = (
     *("outcome", "reason", "trackable", "min_clearance_m", "flown_length_m", "flight_time_s", "digest"),
 )
@@ -63,115 +60,68 @@ class Vary:
             self.mild + displacement * (self.hard - self.mild), None if self.whole else self.decimals
         )
 
-    def displacement(self, value: float) -> float:
-        """How far a value is on the way from the mild end to the hard one."""
-        return (value - self.mild) / (self.hard - self.mild)
 
-
-@dataclass
 class Search:
-    """Conditions tried, each once."""
+    """Looks for the least displacement that fails, from 0 (mild) to 1 (hard).
 
-    vary: Sequence[Vary]
-    judge: Callable[[Values], bool]
-    """Whether a condition fails; an InputError, where there is none, passes while a key is taken back."""
-    left: int
-    """How many more may be tried, at least 2 at the beginning."""
-    tolerance: float
-    """A displacement is narrowed down to this, above 0 and below 1."""
-    steps: int = 1
-    """Number of equal steps of the scan."""
-    settled: bool = True
-    """Whether the conditions sufficed to narrow the answer down."""
-    verdicts: dict[Values, bool] = field(default_factory=dict)
+    Args:
+        at: the condition at a displacement; equal ones are tried once.
+        judge: whether a condition fails.
+        most: how many may be tried, at least 2.
+        tolerance: the displacement is narrowed down to this, above 0 and below 1.
+    """
+
+    def __init__(
+        self, at: Callable[[float], Values], judge: Callable[[Values], bool], most: int, tolerance: float
+    ) -> None:
+        self._at, self._judge, self._most, self._tolerance = at, judge, most, tolerance
+        self._failed: dict[Values, bool] = {}
+        self.steps = self._affordable()
+        self.settled = True
+        """Whether the conditions sufficed to narrow the answer down."""
+        self.passes: float | None = None
+        self.fails: float | None = None
+        """The greatest displacement known to pass below the least that is known to fail."""
 
     def run(self) -> Search:
-        """Looks for the mildest condition that fails."""
-        steps = self.steps = self._affordable(self.left if len(self.vary) == 1 else self.left // 2)
-        failing = next((step for step in range(steps + 1) if self._fails(self.at(step / steps))), None)
-        if failing:
-            self._narrowed(self.at, (failing - 1) / steps, failing / steps)
-            found = self.mildest
-            assert found is not None
-            order = sorted(range(len(self.vary)), key=self.hardness(found).__getitem__, reverse=True)
-            for key in order if len(order) > 1 else ():
-                found = self._taken_back(found, key)
+        """Scans in equal steps from the mild end, and halves the step at whose end a condition fails."""
+        for step in range(self.steps + 1):
+            if self._fails(step / self.steps):
+                self.fails = step / self.steps
+                break
+            self.passes = step / self.steps
+        if self.fails is not None and self.passes is not None:
+            self._halve(self.passes, self.fails)
         return self
 
-    def at(self, displacement: float) -> Values:
-        """The condition with all keys at a displacement."""
-        return tuple(each.value(displacement) for each in self.vary)
-
-    def hardness(self, values: Values) -> tuple[float, ...]:
-        """Displacement of each key, from 0 (mild) to 1 (hard)."""
-        return tuple(each.displacement(value) for each, value in zip(self.vary, values, strict=True))
-
-    @property
-    def mildest(self) -> Values | None:
-        """The failing condition whose largest displacement is least; of equal ones, that with the smallest sum."""
-        by_hardness = {self.hardness(each): each for each, failed in self.verdicts.items() if failed}
-        least = min(by_hardness, key=lambda each: (max(each), sum(each)), default=None)
-        return None if least is None else by_hardness[least]
-
-    @property
-    def passed_below(self) -> Values | None:
-        """The hardest condition that passed and is no harder than the mildest failure in any key."""
-        if (found := self.mildest) is None:
-            return None
-        limits = self.hardness(found)
-        by_hardness = {self.hardness(each): each for each, failed in self.verdicts.items() if not failed}
-        below = [key for key in by_hardness if all(a <= b for a, b in zip(key, limits, strict=True))]
-        return by_hardness[max(below, key=sum)] if below else None
-
-    def _affordable(self, conditions: int) -> int:
-        """The most equal steps of the scan for which the conditions suffice, the bisection of one step included."""
-        most = min(conditions - 1, math.ceil(1.0 / self.tolerance))
-        halved = {steps: math.ceil(-math.log2(steps * self.tolerance)) for steps in range(1, most + 1)}
-        return max((steps for steps in halved if steps + 1 + max(0, halved[steps]) <= conditions), default=1)
-
-    def _fails(self, values: Values) -> bool:
-        """Whether a condition fails; one that can no longer be tried counts as passing, and nothing is settled."""
-        if values not in self.verdicts:
-            if not self.left:
-                self.settled = False
-                return False
-            self.left -= 1
-            self.verdicts[values] = self.judge(values)
-        return self.verdicts[values]
-
-    def _narrowed(self, at: Callable[[float], Values], passes: float, fails: float) -> Values:
-        """The mildest failing condition on a way, between a displacement that passes and one that fails."""
-        while fails - passes > self.tolerance and self.settled:
+    def _halve(self, passes: float, fails: float) -> None:
+        while fails - passes > self._tolerance:
             middle = 0.5 * (passes + fails)
-            if at(middle) in (at(passes), at(fails)):
+            if self._at(middle) in (self._at(passes), self._at(fails)):
                 break
-            passes, fails = (passes, middle) if self._fails_if_any(at(middle)) else (middle, fails)
-        return at(fails)
+            if len(self._failed) == self._most:
+                self.settled = False
+                break
+            passes, fails = (passes, middle) if self._fails(middle) else (middle, fails)
+        self.passes, self.fails = passes, fails
 
-    def _taken_back(self, values: Values, key: int) -> Values:
-        """A condition that fails, one of its keys as near to its mild end as that goes."""
+    def _affordable(self) -> int:
+        """The most equal steps of the scan for which the conditions suffice, the bisection of one step included."""
+        most = min(self._most - 1, math.ceil(1.0 / self._tolerance))
+        halved = {steps: math.ceil(-math.log2(steps * self._tolerance)) for steps in range(1, most + 1)}
+        return max((steps for steps in halved if steps + 1 + max(0, halved[steps]) <= self._most), default=1)
 
-        def at(displacement: float) -> Values:
-            return (*values[:key], self.vary[key].value(displacement), *values[key + 1 :])
-
-        hardness = self.hardness(values)[key]
-        if hardness == 0.0 or self._fails_if_any(at(0.0)):
-            return at(0.0)
-        return self._narrowed(at, 0.0, hardness)
-
-    def _fails_if_any(self, values: Values) -> bool:
-        """Whether there is such a condition and it fails."""
-        try:
-            return self._fails(values)
-        except InputError:
-            return False
+    def _fails(self, displacement: float) -> bool:
+        values = self._at(displacement)
+        if values not in self._failed:
+            self._failed[values] = self._judge(values)
+        return self._failed[values]
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One flight: the displacement of each key from 0 (mild) to 1 (hard), and `FIGURES`; `error` is a crash."""
+    """One flight: the value of each key, and `FIGURES`; the outcome `error` is a crash."""
 
-    displacement: tuple[float, ...]
     values: Values
     failed: bool
     figures: Mapping[str, Any]
@@ -192,9 +142,11 @@ class Breaking:
     steps: int
     settled: bool
     verdict: Literal["found", "not_found", "fails_at_the_mild_end"]
+    displacement: float | None
+    """How far the mildest failure is on the way from the mild end (0) to the hard one (1)."""
     found: Trial | None
     passes: Values | None
-    """The hardest condition that passed and is no harder in any key."""
+    """The hardest condition below it that passed."""
     trials: tuple[Trial, ...]
 
     def plain(self) -> dict[str, Any]:
@@ -206,15 +158,11 @@ class Breaking:
 def vary_of(
     load: Load, given: Sequence[tuple[str, float, float]], fixed: Sequence[str] = (), tolerance: float = 0.01
 ) -> tuple[Vary, ...]:
-    """The keys to vary, once every combination of their ends has been found to be a scenario; or an InputError.
+    """The keys to vary, once nine conditions from end to end have been found to be scenarios; or an InputError.
 
     `given`: key path, mild end and hard end of each; `fixed`: keys that are given a value.
     `tolerance`: values are flown rounded to a hundredth of this share of a range, so that what is printed was flown.
     """
-    if len(given) > MAX_KEYS:
-        raise InputError(
-            f"command line: --vary is given {len(given)} times; at most {MAX_KEYS} keys are varied"
-        )
     valued = [_spelt("--set", each) for each in fixed]
     ranges: dict[str, tuple[float, float]] = {}
     for name, mild, hard in given:
@@ -233,11 +181,14 @@ def vary_of(
         Vary(key, mild, hard, takes_whole_numbers(base, loc_of(key)), _decimals(abs(hard - mild) * tolerance))
         for key, (mild, hard) in ranges.items()
     )
-    ends = itertools.product(*((each.mild, each.hard) for each in vary))
-    diagonal = (tuple(each.value(step / 8) for each in vary) for step in range(9))
-    for values in dict.fromkeys([*ends, *diagonal]):
-        scenario_at(load, vary, values)
+    for step in (8, *range(8)):
+        scenario_at(load, vary, condition(vary, step / 8))
     return vary
+
+
+def condition(vary: Sequence[Vary], displacement: float) -> Values:
+    """The condition with all keys at a displacement from 0 (mild) to 1 (hard)."""
+    return tuple(each.value(displacement) for each in vary)
 
 
 def scenario_at(load: Load, vary: Sequence[Vary], values: Values) -> Scenario:
@@ -289,20 +240,19 @@ def falsify(
         except Exception as error:
             figures = {"outcome": "error", "reason": sentence(error), "trackable": None}
         kept = {name: figures.get(name) for name in FIGURES}
-        trials[values] = trial = Trial(search.hardness(values), values, not holds(claim, figures), kept)
+        trials[values] = trial = Trial(values, not holds(claim, figures), kept)
         if progress is not None:
             told = ", ".join(f"{value:.4g}" for value in values)
             progress(len(trials), conditions, f"{told}: {figures['outcome']}")
         return trial.failed
 
-    search = Search(vary, judge, conditions, tolerance)
-    base = scenario_at(load, vary, search.at(0.0))
+    search = Search(partial(condition, vary), judge, conditions, tolerance)
+    base = scenario_at(load, vary, condition(vary, 0.0))
     made = [each for each in (out, *out.parents) if not each.exists()]
     lock = claim_folder(out, "search", INDEX, SCHEMA)
     try:
-        mildest = search.run().mildest
-        found = trials[mildest] if mildest else None
-        hard = found is not None and max(found.displacement) > 0.0
+        fails = search.run().fails
+        found = None if fails is None else trials[condition(vary, fails)]
         result = Breaking(
             base.name,
             base.planner.label,
@@ -314,12 +264,13 @@ def falsify(
             len(trials),
             search.steps,
             search.settled,
-            "found" if hard else "not_found" if found is None else "fails_at_the_mild_end",
+            "not_found" if fails is None else "found" if fails else "fails_at_the_mild_end",
+            fails,
             found,
-            search.passed_below,
+            None if fails is None or search.passes is None else condition(vary, search.passes),
             tuple(trials.values()),
         )
-        _write(out, result.plain(), scenario_at(load, vary, mildest) if mildest else None)
+        _write(out, result.plain(), scenario_at(load, vary, found.values) if found else None)
     except KeyboardInterrupt:
         if trials:
             done = [asdict(each) for each in trials.values()]

@@ -51,19 +51,16 @@ def test_the_time_that_is_too_short_is_found(to_break: Path) -> None:
 
 
 @pytest.mark.flights
-def test_two_keys_are_brought_to_the_edge_between_passing_and_failing(to_break: Path) -> None:
+def test_two_keys_get_harder_together(to_break: Path) -> None:
     keys = ("mission.time_limit_s", 100.0, 40.0), ("aircraft.airspeed_mps", 28.0, 18.0)
-    result = broken(to_break, *keys, tolerance=0.02, conditions=80)
+    result = broken(to_break, *keys, tolerance=0.02)
     assert result.found is not None
     assert result.settled
-    limit_s, speed_mps = result.found.values
-    assert WAY_M / speed_mps > limit_s - 0.5, "it fails there"
-    for limit, speed in ((limit_s + 0.02 * 60, speed_mps), (limit_s, speed_mps + 0.02 * 10)):
-        assert WAY_M / speed < limit + 0.5, "and a little milder in either key it does not"
-    # On the diagonal the two meet where 1400 / (28 - 10 u) = 100 - 60 u.
+    # The way takes as long as the limit where 1400 / (28 - 10 u) = 100 - 60 u.
     shares = [share / 1e4 for share in range(10001)]
     mildest = next(share for share in shares if WAY_M / (28 - 10 * share) >= 100 - 60 * share)
-    assert max(result.found.displacement) == pytest.approx(mildest, abs=0.03)
+    assert result.displacement == pytest.approx(mildest, abs=0.03)
+    assert result.found.values == pytest.approx((100 - 60 * mildest, 28 - 10 * mildest), abs=2.0)
 
 
 def test_nothing_fails_and_it_is_said(to_break: Path) -> None:
@@ -204,7 +201,6 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
         (["--vary", "sensor.dropout=0:1", "--tolerance", "0"], "is 0; must be between 0 and 1"),
         (["--vary", "sensor.dropout=0:1", "--runs", "1"], "--runs"),
         (["--vary", "sensor.dropout=0:1", "--claim", "later"], "--claim"),
-        ([item for key in "abcdefg" for item in ("--vary", f"sensor.{key}=0:1")], "at most 6 keys"),
     ],
 )
 def test_bad_usage_is_one_line_and_writes_nothing(
