@@ -48,10 +48,13 @@ class Compiled(Generic[P, R]):
         function: the function.
         arguments: their types. Others are refused: nothing is ever compiled anew.
         rare: few flights call it.
+        inner: compiled functions alone call it. What Python needs to call it is not compiled.
     """
 
-    def __init__(self, function: Callable[P, R], arguments: tuple[str, ...], rare: bool = False) -> None:
-        self._function, self._arguments, self.rare = function, arguments, rare
+    def __init__(
+        self, function: Callable[P, R], arguments: tuple[str, ...], rare: bool = False, inner: bool = False
+    ) -> None:
+        self._function, self._arguments, self.rare, self._inner = function, arguments, rare, inner
         self._code: Callable[..., R] = self._compile_first
         self.anew, self.kept = False, True
         """It was compiled by this process, not loaded; what was compiled is on disk."""
@@ -78,14 +81,15 @@ class Compiled(Generic[P, R]):
 
         seal()
         signature = f"({', '.join(self._arguments)},)"
+        wrappers: Any = {"no_cfunc_wrapper": True, "no_cpython_wrapper": self._inner}
         try:
-            code: Any = numba.njit(signature, cache=True, error_model="numpy")(self._function)
+            code: Any = numba.njit(signature, cache=True, error_model="numpy", **wrappers)(self._function)
         except (OSError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "cannot cache" not in str(error):
                 raise
             # There is no place to keep it, or no room there.
             self.kept = False
-            code = numba.njit(signature, error_model="numpy")(self._function)
+            code = numba.njit(signature, error_model="numpy", **wrappers)(self._function)
         self.anew = not code.stats.cache_hits
         self._code = code
         # Functions of the same file that call it find what is compiled.
@@ -96,11 +100,13 @@ _waiting: list[Compiled[..., Any]] = []
 _compiling = threading.RLock()
 
 
-def compiled(*arguments: str, rare: bool = False) -> Callable[[Callable[P, R]], Compiled[P, R]]:
+def compiled(
+    *arguments: str, rare: bool = False, inner: bool = False
+) -> Callable[[Callable[P, R]], Compiled[P, R]]:
     """Decorates a function that is compiled later, for arguments of these types."""
 
     def compile_later(function: Callable[P, R]) -> Compiled[P, R]:
-        made = Compiled(function, arguments, rare)
+        made = Compiled(function, arguments, rare, inner)
         _waiting.append(made)
         return made
 

@@ -20,7 +20,7 @@ FLAGS, FLAGS_OUT, LOOKS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[
 BEAMS = "UniTuple(float64, 5)"
 
 
-@compiled(FLOAT, FLOAT, FLOAT, COUNT)
+@compiled(FLOAT, FLOAT, FLOAT, COUNT, inner=True)
 def first_over(bearing_rad: float, spacing_rad: float, beam_rad: float, aside: int) -> int:
     """Returns the last beam that begins before a bearing, less `aside`; where beams do not touch, it may end before it.
 
@@ -29,7 +29,7 @@ def first_over(bearing_rad: float, spacing_rad: float, beam_rad: float, aside: i
     return math.floor((bearing_rad + 0.5 * min(beam_rad, spacing_rad)) / spacing_rad) - aside
 
 
-@compiled(FLOAT, FLOAT, FLOAT)
+@compiled(FLOAT, FLOAT, FLOAT, inner=True)
 def clockwise_of(east: float, north: float, start_rad: float) -> float:
     """Returns the bearing (rad) of an offset, clockwise from `start_rad`, in [0, 2 pi)."""
     turned = math.atan2(east, north) - start_rad
@@ -38,7 +38,7 @@ def clockwise_of(east: float, north: float, start_rad: float) -> float:
     return turned
 
 
-@compiled(FLOATS, COUNT, COUNT, FLOAT)
+@compiled(FLOATS, COUNT, COUNT, FLOAT, inner=True)
 def first_short(ranges: FloatArray, first: int, many: int, beyond: float) -> int:
     """Returns the first of `many` neighbouring beams that does not go beyond a distance; -1 where all do."""
     rays = len(ranges)

@@ -142,7 +142,7 @@ class ReflectionMap(EdgePoints):
                 self.last_removal_revision = self.revision
 
 
-@compiled(COUNTED_OUT, "int32", FLOAT, FLOAT, FLOAT, rare=True)
+@compiled(COUNTED_OUT, "int32", FLOAT, FLOAT, FLOAT, rare=True, inner=True)
 def _count(counts: NDArray[np.float32], slot: int, beyond: float, half: float, noise: float) -> None:
     """Counts a ray that went `beyond` (m) a cell's middle: the cell stopped it, let it pass, or it ended before."""
     if abs(beyond) <= half:

@@ -149,7 +149,7 @@ class RangeScan:
         return turned.view(np.float64).reshape(-1, 2)
 
 
-@compiled(FLOATS, COUNT, COUNT, BOOL, BOOL)
+@compiled(FLOATS, COUNT, COUNT, BOOL, BOOL, inner=True)
 def _beside(ranges: FloatArray, ray: int, step: int, closed: bool, lossy: bool) -> float:
     """Returns the range of the next beam to one side, or where that may be lost, of the one after it."""
     rays, beside = len(ranges), math.inf
@@ -160,7 +160,7 @@ def _beside(ranges: FloatArray, ray: int, step: int, closed: bool, lossy: bool) 
     return beside
 
 
-@compiled(FLOATS, COUNT, FLOAT, FLOAT, BOOL, BOOL)
+@compiled(FLOATS, COUNT, FLOAT, FLOAT, BOOL, BOOL, inner=True)
 def _side(ranges: FloatArray, ray: int, beam_rad: float, noise_m: float, closed: bool, lossy: bool) -> float:
     """Tells where within a beam its return comes from: 1 its right side, -1 its left side, 0 the axis.
 

@@ -82,7 +82,7 @@ class Fan:
         return ranges
 
 
-@compiled(FLOAT, FLOAT, FLOAT, FLOAT, COUNT)
+@compiled(FLOAT, FLOAT, FLOAT, FLOAT, COUNT, inner=True)
 def _beams_between(
     bearing_rad: float, width_rad: float, first_rad: float, spacing_rad: float, rays: int
 ) -> tuple[int, int, int]:
@@ -100,13 +100,13 @@ def _beams_between(
     return low, rays, min(math.floor(last - math.tau / spacing_rad + _MARGIN_RAYS) + 1, rays)
 
 
-@compiled(PLACE, FLOAT, FLOAT)
+@compiled(PLACE, FLOAT, FLOAT, inner=True)
 def _side(ray: complex, right: float, ahead: float) -> float:
     """Returns how far (m) a place lies clockwise of a ray, negative if it lies the other way."""
     return ray.imag * right - ray.real * ahead
 
 
-@compiled(PLACE, PLACE, FLOAT, FLOAT)
+@compiled(PLACE, PLACE, FLOAT, FLOAT, inner=True)
 def _between(left: complex, right: complex, to_right: float, ahead: float) -> bool:
     """Tells whether a place lies between the two sides of a beam, which is narrower than a half turn."""
     return (
@@ -116,7 +116,7 @@ def _between(left: complex, right: complex, to_right: float, ahead: float) -> bo
     )
 
 
-@compiled(FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(FLOAT, FLOAT, FLOAT, FLOAT, inner=True)
 def _nearest_of(
     start_right: float, start_ahead: float, end_right: float, end_ahead: float
 ) -> tuple[float, float, float]:
@@ -128,7 +128,7 @@ def _nearest_of(
     return right, ahead, math.hypot(right, ahead)
 
 
-@compiled(FACES, COUNT, FOUR)
+@compiled(FACES, COUNT, FOUR, inner=True)
 def _seen(faces: FloatArray, face: int, pose: Four) -> tuple[Four, tuple[float, float, float], float, float]:
     """Returns a face as the nose sees it: the argument for `_along`, its nearest place with distance, its bearings.
 
@@ -152,7 +152,7 @@ def _seen(faces: FloatArray, face: int, pose: Four) -> tuple[Four, tuple[float, 
     return (right, ahead, end_right, end_ahead), foot, begins_rad, abs(width_rad)
 
 
-@compiled(PLACE, FOUR, BOOL)
+@compiled(PLACE, FOUR, BOOL, inner=True)
 def _along(ray: complex, face: Four, circular: bool) -> float:
     """Returns the distance along a ray to a face, +inf where it does not meet it.
 
@@ -177,7 +177,7 @@ def _along(ray: complex, face: Four, circular: bool) -> float:
     return distance if distance >= 0.0 else math.inf
 
 
-@compiled(PLACE, PLACE, FOUR, "UniTuple(float64, 3)", BOOL)
+@compiled(PLACE, PLACE, FOUR, "UniTuple(float64, 3)", BOOL, inner=True)
 def _inside(
     left: complex, right: complex, face: Four, foot: tuple[float, float, float], circular: bool
 ) -> float:

@@ -38,42 +38,24 @@ def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray,
     return some[order], _touching(keys[order], width)
 
 
-@compiled(COUNTS, COUNT)
 def _touching(keys: IntArray, width: int) -> Cells:
     """`Cells` of (m,) sorted keys: column times `width`, one more than there are rows, and row added."""
-    count = 1
-    for j in range(1, len(keys)):
-        if keys[j] != keys[j - 1]:
-            count += 1
-    first, counts = np.empty(count, dtype=np.intp), np.empty(count, dtype=np.intp)
-    at = 0
-    first[0] = 0
-    for j in range(1, len(keys)):
-        if keys[j] != keys[j - 1]:
-            counts[at] = j - first[at]
-            at += 1
-            first[at] = j
-    counts[at] = len(keys) - first[at]
-    one, other = np.empty(4 * count, dtype=np.intp), np.empty(4 * count, dtype=np.intp)
-    pairs = 0
-    for turn in range(4):
-        step = 1 if turn == 0 else width + turn - 2
-        # As one goes on from square to square so does what lies a step further.
-        k = 0
-        for j in range(count):
-            there = keys[first[j]] + step
-            while k < count and keys[first[k]] < there:
-                k += 1
-            if k < count and keys[first[k]] == there:
-                one[pairs], other[pairs] = j, k
-                pairs += 1
-    return first, counts, one[:pairs], other[:pairs]
+    first = np.flatnonzero(np.diff(keys, prepend=-1))
+    squares, one, other = keys[first], [], []
+    for step in (1, width - 1, width, width + 1):
+        there = np.searchsorted(squares, squares + step)
+        touched = squares[np.minimum(there, len(squares) - 1)] == squares + step
+        one.append(np.flatnonzero(touched))
+        other.append(there[touched])
+    return first, np.diff(first, append=len(keys)), np.concatenate(one), np.concatenate(other)
 
 
 @compiled(COUNT, COUNTS, COUNTS)
 def joined(count: int, one: IntArray, other: IntArray) -> IntArray:
     """(count,) the first square of the group that each square is joined to by touching pairs: union-find."""
-    first = np.arange(count)
+    first = np.empty(count, dtype=np.intp)
+    for square in range(count):
+        first[square] = square
     for pair in range(len(one)):
         a, b = one[pair], other[pair]
         while first[a] != a:
@@ -88,23 +70,26 @@ def joined(count: int, one: IntArray, other: IntArray) -> IntArray:
     return first
 
 
-@compiled(ROWS, FLOATS, COUNTS)
 def gathered(points: FloatArray, keep: FloatArray, some: IntArray) -> FloatArray:
     """(3, k) east and north of k of (n, 2) points, and the distance to be kept from each, one row after the other."""
     rows = np.empty((3, len(some)))
-    for j in range(len(some)):
-        i = some[j]
-        rows[0, j], rows[1, j], rows[2, j] = points[i, 0], points[i, 1], keep[i]
+    rows[:2], rows[2] = points[some].T, keep[some]
     return rows
 
 
-@compiled(ROWS, FLOATS, FLOAT)
 def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, Buckets]:
     """All points by squares.
 
     Returns:
         (m,) indices, those of a square next to each other; the points in this order.
     """
+    order, first, circles = _in_squares(points, keep, side)
+    return order, (gathered(points, keep, order), first, circles)
+
+
+@compiled(ROWS, FLOATS, FLOAT)
+def _in_squares(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, IntArray, FloatArray]:
+    """What `bucketed` returns, but the points."""
     count, order = len(points), np.empty(len(points), dtype=np.intp)
     west, south, east, north = math.inf, math.inf, -math.inf, -math.inf
     for i in range(count):
@@ -147,4 +132,4 @@ def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArra
         first[used] = begins[square]
         used += 1
     first[used] = count
-    return order, (gathered(points, keep, order), first, circles)
+    return order, first, circles

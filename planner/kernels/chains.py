@@ -14,7 +14,7 @@ OUTSIDE = 0
 """Node of the world outside of the area."""
 
 
-@compiled(COUNTS_OUT, BOOLS_OUT, COUNT)
+@compiled(COUNTS_OUT, BOOLS_OUT, COUNT, inner=True)
 def root_of(parent: IntArray, parity: BoolArray, node: int) -> tuple[int, bool]:
     """The root of a node's tree and the parity of crossings on the way there; shortens the way."""
     root, odd = node, False
@@ -29,7 +29,7 @@ def root_of(parent: IntArray, parity: BoolArray, node: int) -> tuple[int, bool]:
     return root, odd
 
 
-@compiled(FLOAT, FLOAT, FLOAT, FLOAT, ROWS)
+@compiled(FLOAT, FLOAT, FLOAT, FLOAT, ROWS, inner=True)
 def crosses_line(ax: float, ay: float, bx: float, by: float, ends: FloatArray) -> bool:
     """Whether the line from a to b crosses that from start to goal."""
     sx, sy, dx, dy = ends[0, 0], ends[0, 1], ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
@@ -42,7 +42,7 @@ def crosses_line(ax: float, ay: float, bx: float, by: float, ends: FloatArray) -
     return bool(0.0 <= (x - sx) * dx + (y - sy) * dy < dx * dx + dy * dy)
 
 
-@compiled(COUNTS_OUT, BOOLS_OUT, COUNT, COUNT, BOOL)
+@compiled(COUNTS_OUT, BOOLS_OUT, COUNT, COUNT, BOOL, inner=True)
 def link(parent: IntArray, parity: BoolArray, a: int, b: int, crosses: bool) -> bool:
     """Links two nodes; returns whether that closes a chain that separates start and goal."""
     root_a, parity_a = root_of(parent, parity, a)
@@ -87,7 +87,7 @@ def link_all(
                 other = last[(i * 7919 + j) % len(last)]
                 while other > 0:
                     other_x, other_y = places[other, 0], places[other, 1]
-                    if (other_x - x) ** 2 + (other_y - y) ** 2 < reach * reach:
+                    if (other_x - x) * (other_x - x) + (other_y - y) * (other_y - y) < reach * reach:
                         closed |= link(
                             parent, parity, node, other, crosses_line(x, y, other_x, other_y, ends)
                         )

@@ -19,7 +19,7 @@ EDGE_OFF_RAD = 1e-7
 """Edges are turned this much into the free sector, clear of rounding errors."""
 
 
-@compiled(ROWS, COUNT, COUNT, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, COUNT, COUNT, FLOAT, FLOAT, FLOAT, FLOAT, inner=True)
 def _first_of(
     places: FloatArray, begin: int, end: int, east: float, north: float, ux: float, uy: float
 ) -> tuple[float, int]:
@@ -65,7 +65,7 @@ def first_met(
     return max(nearest, 0.0), met
 
 
-@compiled(FLOATS_OUT, FLOATS_OUT, COUNT, COUNT)
+@compiled(FLOATS_OUT, FLOATS_OUT, COUNT, COUNT, inner=True)
 def _sift_down(key: FloatArray, value: FloatArray, place: int, count: int) -> None:
     """Restores a binary heap of `count` pairs, least key first, in which the key at `place` may be too great."""
     while 2 * place + 1 < count:
@@ -79,7 +79,7 @@ def _sift_down(key: FloatArray, value: FloatArray, place: int, count: int) -> No
         place = child
 
 
-@compiled(ROWS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, inner=True)
 def hugged(
     own: FloatArray,
     first: IntArray,
@@ -120,7 +120,7 @@ def hugged(
     return furthest
 
 
-@compiled(ROWS, COUNT, COUNTS, COUNTS, COUNTS, COUNTS, COUNTS_OUT, BOOLS_OUT)
+@compiled(ROWS, COUNT, COUNTS, COUNTS, COUNTS, COUNTS, COUNTS_OUT, BOOLS_OUT, inner=True)
 def _find_ends(
     tangents: FloatArray,
     row: int,

@@ -15,7 +15,7 @@ from planner.compiled import COUNT, FLOAT, FLOATS, ROWS, compiled
 from planner.interface import FloatArray
 
 
-@compiled(ROWS, COUNT, FLOAT)
+@compiled(ROWS, COUNT, FLOAT, inner=True)
 def place(rows: FloatArray, which: int, along: float) -> tuple[float, float]:
     """East and north (m) at a distance `along` a segment."""
     x, y, tx, ty = rows[which, 0], rows[which, 1], rows[which, 2], rows[which, 3]
@@ -25,7 +25,7 @@ def place(rows: FloatArray, which: int, along: float) -> tuple[float, float]:
     return x + chord * (tx * cos - ty * sin), y + chord * (ty * cos + tx * sin)
 
 
-@compiled(ROWS, COUNT, FLOAT, FLOAT)
+@compiled(ROWS, COUNT, FLOAT, FLOAT, inner=True)
 def to_segment(rows: FloatArray, which: int, east: float, north: float) -> tuple[float, float]:
     """Distance of a place to a segment, and how far along it the nearest place is."""
     tx, ty, curvature, length = rows[which, 2], rows[which, 3], rows[which, 4], rows[which, 5]
@@ -49,8 +49,9 @@ def to_segment(rows: FloatArray, which: int, east: float, north: float) -> tuple
 @compiled(ROWS, ROWS)
 def distances(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(m,) distance of each of (m, 2) points to a path, and (m,) arc length of the nearest place."""
-    nearest, arc_lengths = np.full(len(points), np.inf), np.zeros(len(points))
-    begins = 0.0
+    nearest, arc_lengths, begins = np.empty(len(points)), np.empty(len(points)), 0.0
+    for i in range(len(points)):
+        nearest[i], arc_lengths[i] = math.inf, 0.0
     for which in range(len(rows)):
         for i in range(len(points)):
             distance, along = to_segment(rows, which, points[i, 0], points[i, 1])
@@ -108,7 +109,7 @@ def inside_bounds(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax:
     return True
 
 
-@compiled(ROWS, ROWS)
+@compiled(ROWS, ROWS, rare=True)
 def to_nearest(places: FloatArray, points: FloatArray) -> FloatArray:
     """(k,) distance of each of (k, 2) places to the nearest of (m, 2) points, m; infinite where there is none."""
     away = np.empty(len(places))
@@ -121,7 +122,7 @@ def to_nearest(places: FloatArray, points: FloatArray) -> FloatArray:
     return away
 
 
-@compiled(ROWS, FLOAT)
+@compiled(ROWS, FLOAT, inner=True)
 def pose(rows: FloatArray, arc_length: float) -> tuple[float, float, float, float, float]:
     """Place and tangent at an arc length, clamped to the ends, and the curvature there."""
     which, along = 0, max(arc_length, 0.0)

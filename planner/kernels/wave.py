@@ -12,7 +12,7 @@ CORNER_LEVELS = (2, 4)
 between the true length of a way and 0.92 of it."""
 
 
-@compiled(BOOLS_OUT, ROWS, FLOATS, FLOAT, FLOAT, FLOAT, COUNT, COUNT)
+@compiled(BOOLS_OUT, ROWS, FLOATS, FLOAT, FLOAT, FLOAT, COUNT, COUNT, rare=True)
 def close_cells(
     open_: BoolArray,
     points: FloatArray,
@@ -36,7 +36,7 @@ def close_cells(
                     open_[(column + 1) * rows + row + 1] = False
 
 
-@compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT)
+@compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT, rare=True)
 def spread_wave(
     levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int
 ) -> None:
