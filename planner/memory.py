@@ -15,6 +15,7 @@ FIRST_MOVING_LABEL = -1000
 MOVED_SHARE = 0.3
 """A moving outline is brought up to date once it has moved by this share of a cell."""
 NO_POINTS = np.zeros((0, 2))
+"""An empty array of edge points."""
 
 
 class ObstacleMemory:
@@ -35,6 +36,7 @@ class ObstacleMemory:
         self._drop_all()
 
     def _drop_all(self) -> None:
+        """Drops all points that stand still."""
         self._points, self._genuine = NO_POINTS, np.zeros(0, dtype=np.bool_)
         self._labels: IntArray | None = None
         self._with_moving: FloatArray | None = None
@@ -125,6 +127,7 @@ class ObstacleMemory:
         self._add(genuine_m, genuine=True)
 
     def _add(self, fresh: FloatArray, genuine: bool) -> None:
+        """Adds (k, 2) points that stand still: seen ones (`genuine`), or refused places."""
         self._points = np.ascontiguousarray(np.concatenate((self._points, fresh)))
         self._genuine = np.concatenate((self._genuine, np.full(len(fresh), genuine)))
         self._labels = self._with_moving = None

@@ -79,14 +79,17 @@ def _type_text(value: object) -> str:
 
 
 def _shape_text(value: Any) -> str:
+    """Names the shape of an array, or else the type of a value."""
     return str(value.shape) if isinstance(value, np.ndarray) else _type_text(value)
 
 
 def _is_table(value: Any, columns: int) -> bool:
+    """Tells whether a value is an (n, `columns`) array."""
     return issubclass(type(value), np.ndarray) and value.ndim == 2 and value.shape[1] == columns
 
 
 def _path_error(what: str) -> WrongAnswerError:
+    """The error for a path that cannot be flown; `what` says why."""
     return WrongAnswerError(f"the planner gave a path that cannot be flown: {what}")
 
 

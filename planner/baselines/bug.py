@@ -166,6 +166,7 @@ class Bug2(Bug1):
         return Straight()
 
     def _stops(self, state: Circling | Returning, way: FloatArray) -> tuple[float, bool]:
+        """Arc length of the hit point or the first leave point, and whether the boundary is left there."""
         closed, leave = super()._stops(state, way)[0], self._leaves(way, state)
         return min(closed, leave), leave <= closed
 

@@ -296,10 +296,7 @@ def moved(segments: Sequence[Segment], to: Pose) -> list[Segment]:
 
 
 def onward_in_turn(pose: Pose, curvature: float, to: Pose) -> list[Segment] | None:
-    """The arc of a turn of some curvature (1/m; 0: none) from one pose in it to another, with its tangent.
-
-    None where that is not on it.
-    """
+    """The arc of a turn of a curvature (1/m) from one pose on it to another; None where the other is not on it."""
     if not curvature:
         return None
     turned = math.atan2(

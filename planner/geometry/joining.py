@@ -83,10 +83,7 @@ def divert_to_loiter(
 
 
 def branch_off(request: PlanRequest, mission: Mission) -> tuple[Pose, list[Segment]]:
-    """Where a new path leaves the one in effect, and the stretch up to there; the aircraft where it is off it.
-
-    From a holding turn a new path leaves at once.
-    """
+    """Where a new path leaves the one in effect, and the stretch up to there; at the aircraft if off it or holding."""
     path, arc_length_m = request.flown.path if request.flown else None, request.arc_length_m
     here = Pose(*request.position_m, *request.direction)
     if path is None or path.loiter or arc_length_m >= path.length_m:

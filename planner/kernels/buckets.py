@@ -78,10 +78,10 @@ def gathered(points: FloatArray, keep: FloatArray, some: IntArray) -> FloatArray
 
 
 def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, Buckets]:
-    """All points by squares.
+    """Sorts points into squares at least `side` wide; `keep` is the (n,) distance to be kept from each.
 
     Returns:
-        (m,) indices, those of a square next to each other; the points in this order.
+        (n,) indices, square by square; the points in this order.
     """
     order, first, circles = _in_squares(points, keep, side)
     return order, (gathered(points, keep, order), first, circles)

@@ -63,6 +63,7 @@ class AnytimeSearch:
         self.done = True
 
     def _now(self) -> tuple[Start, Course | None]:
+        """Where a plan would begin now, and the course that is flown."""
         assert self._start is not None
         return self._start, self._flown
 
@@ -124,5 +125,6 @@ class AnytimeSearch:
         return flown is not None and not flown.same_side(nodes, self._local.points_m)
 
     def _course(self, route: FlyableRoute, known: int, shortest: bool) -> Course:
+        """The course along a route, after the stretch of the plan in effect up to its start."""
         path = Path(np.array([*self._now()[0].prefix, *route.path.segments.tolist()]))
         return Course(path, route.nodes, known, shortest)

@@ -83,6 +83,7 @@ class Proof:
         self._begin()
 
     def _begin(self) -> None:
+        """Begins the proof anew, with no point taken in."""
         self._barrier: Barrier | None = None
         self._taken = 0
         self._begun_at = self._gone = self._memory.cleared

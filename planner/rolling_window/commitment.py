@@ -122,6 +122,7 @@ class Commitment:
         return certifier.certify_up_to(over_m, course.path, seen, bounds_m)
 
     def _certifier(self, spacing_m: float) -> Certifier:
+        """The certifier of holds that asks for free space every `spacing_m`."""
         mission = self._mission
         return Certifier(self._local.room.holds, mission.clearance_m, mission.sensor_range_m, spacing_m)
 

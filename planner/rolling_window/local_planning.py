@@ -260,6 +260,7 @@ class LocalPlanning:
         return None
 
     def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:
+        """The terrain for the curves of an attempt among (m, 2) points."""
         keep = self._mission.clearance_m + PATH_SHARE * attempt.margin_m
         room = self._room_m(start, points)
         return Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.work_count)

@@ -110,6 +110,7 @@ class RollingWindow(CertifiedPlanner):
         return True
 
     def _planned(self, request: PlanRequest) -> Plan:
+        """Takes in what is new, and keeps the plan in effect or rolls the window."""
         self._served = ()
         fresh_m = self._take_in(request)
         plan = self._monitor.plan

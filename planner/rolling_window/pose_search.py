@@ -72,4 +72,5 @@ def search_poses(
 
 
 def _route(segments: tuple[Segment, ...], end: Point) -> FlyableRoute:
+    """The route along segments; its track points are their ends."""
     return FlyableRoute((*(segment[:2] for segment in segments[1:]), end), Path(np.array(segments)))

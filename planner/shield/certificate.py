@@ -76,10 +76,7 @@ class CertificateBroken(RuntimeError):
 
 @dataclass(frozen=True)
 class Certified:
-    """The part of a path that may be flown: up to a turn, and the turn; or all of it, to the goal.
-
-    At the arc length `loiter_entry_m` the turn begins, or the flight is over.
-    """
+    """The part of a path that may be flown: up to a turn, begun at `loiter_entry_m`, and that; or all, to the goal."""
 
     path: Path
     loiter_entry_m: float

@@ -31,14 +31,17 @@ class _SeenWith:
 
     @property
     def revision(self) -> int:
+        """The revision of the map and one more for each place."""
         return self._seen.revision + len(self._places)
 
     @property
     def last_removal_revision(self) -> int:
+        """The map's own, counted with all places; 0 where no edge point was ever removed."""
         last = self._seen.last_removal_revision
         return last + len(self._places) if last else 0
 
     def edges_since(self, revision: int) -> FloatArray:
+        """(k, 2) places added and edge points seen after a revision."""
         known = sum(at + i < revision for i, (at, _) in enumerate(self._places))
         fresh = np.array([place for _, place in self._places[known:]]).reshape(-1, 2)
         return np.concatenate((fresh, self._seen.edges_since(revision - known)))
