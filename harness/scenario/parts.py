@@ -159,20 +159,9 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     at = ("guidance", "kind")
     with _code_of_others(lambda said: KeyFault(at, f"{spec.kind}: it cannot be flown: {said}")):
         try:
-            frame, speed_mps, within_m = (
-                airframe_of(aircraft),
-                aircraft.airspeed_mps,
-                spec.acceptance_radius_m,
-            )
-            return law_card(
-                frame,
-                kind,
-                config,
-                speed_mps,
-                waypoints=waypoints,
-                acceptance_radius_m=within_m,
-                before_flying=seal,
-            )
+            how: dict[str, Any] = {"waypoints": waypoints, "acceptance_radius_m": spec.acceptance_radius_m}
+            frame, speed_mps = airframe_of(aircraft), aircraft.airspeed_mps
+            return law_card(frame, kind, config, speed_mps, before_flying=seal, **how)
         except AircraftError as error:
             raise KeyFault(at, str(error)) from error
 

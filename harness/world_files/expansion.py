@@ -162,10 +162,8 @@ def loaded_file(spec: FileSpec) -> Contents:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"cannot be read ({reason}); give the path of a file") from error
     # One path, however its folder is written, of a link by its name.
-    path, reading = (
-        spec.path.parent.resolve() / spec.path.name,
-        Reading(spec.metres_per_cell, spec.crs, spec.default_height_m),
-    )
+    path = spec.path.parent.resolve() / spec.path.name
+    reading = Reading(spec.metres_per_cell, spec.crs, spec.default_height_m)
     return _loaded(path, (stamp.st_size, stamp.st_mtime_ns), spec.kind, reading)
 
 
