@@ -127,12 +127,10 @@ class GrownObstacles:
         return float(begins[first]), int(met[which[first]])
 
     def hiding(self, place: Point, corners: list[Point]) -> set[int]:
-        """The obstacles that lines from a place to corners enter first."""
+        """The obstacles that lines from a place to corners of what is known enter first."""
         lines = shapely.linestrings(np.array([(place, corner) for corner in corners]).reshape(-1, 2, 2))
-        self._unite()
         met = shapely.intersects(self.cores[:, None], lines)
-        inside = shapely.intersects_xy(self.cores, *place).any()
-        alone = (met.sum(axis=0) == 1) & ~inside
+        alone = (met.sum(axis=0) == 1) & ~shapely.intersects_xy(self.cores, *place).any()
         doubtful = {self.first_hit(place, corners[i])[1] for i in np.flatnonzero(~alone).tolist()}
         return doubtful | set(np.flatnonzero(met[:, alone].any(axis=1)).tolist())
 
@@ -192,9 +190,9 @@ class GrownObstacles:
             corners = shapely.get_coordinates(ring)[:-1]
             before, after = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
             to = corners - place
-            sides = np.stack([_cross(to, before), _cross(to, after)])
+            sides = np.stack([cross(to, before), cross(to, after)])
             away = np.hypot(*to.T)
-            touched = (sides[0] * sides[1] >= 0.0) & (_cross(before, after) < 0.0)
+            touched = (sides[0] * sides[1] >= 0.0) & (cross(before, after) < 0.0)
             chosen = np.flatnonzero(touched & (away < reach_m) & (away > 1e-6))
             lines = shapely.linestrings(np.stack(np.broadcast_arrays(place, corners[chosen]), axis=1))
             hidden = shapely.intersects(self.cores[:, None], lines).any(axis=0)
@@ -212,6 +210,6 @@ class GrownObstacles:
         return shape is None or not shapely.intersects(self.cores, shape).any()
 
 
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """(n,) cross products of (n, 2) vectors."""
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(...) cross products of (..., 2) vectors."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

@@ -50,20 +50,19 @@ class ImprovedBug:
         start, before = self._start(request, cut)
         routes = self.local_planning(window, start)
         plan = self._found(request, window, routes, before) if routes else None
-        flown_on = None if path is None or path.loiter or cut else self._flown_on(path, at_m, plan)
-        return (
-            flown_on or plan or stuck("no candidate in the window", request, self._mission, window.points_m)
-        )
+        if path is not None and not (path.loiter or cut) and (goes_on := self._goes_on(path, at_m, plan)):
+            return goes_on
+        return plan or stuck("no candidate in the window", request, self._mission, window.points_m)
 
-    def _flown_on(self, path: Path, at_m: float, plan: Plan | None) -> Plan | None:
+    def _goes_on(self, path: Path, at_m: float, plan: Plan | None) -> Plan | None:
         """The plan in effect, where that found is longer by more than S_0 or none is; None in its last step."""
-        step_m, goal = self._config.resolved_step_m, self._mission.goal_m
-        if path.length_m - at_m <= step_m:
+        goal, left_m, step_m = self._mission.goal_m, path.length_m - at_m, self._config.resolved_step_m
+        if left_m <= step_m:
             return None
         if plan is None or plan.path is None:
             return Plan(PlanStatus.NO_PATH, "no candidate in the window; the plan in effect is flown on")
-        old_m, new_m = (each.length_m + math.dist(end_of(each)[:2], goal) for each in (path, plan.path))
-        if new_m > old_m - at_m + step_m:
+        new_m = plan.path.length_m + math.dist(end_of(plan.path)[:2], goal)
+        if new_m > left_m + math.dist(end_of(path)[:2], goal) + step_m:
             return Plan(PlanStatus.NO_BETTER, "every candidate is longer than the plan in effect")
         return None
 

@@ -21,7 +21,7 @@ import shapely
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
-from planner.baselines.grown import GrownObstacles
+from planner.baselines.grown import GrownObstacles, cross
 from planner.baselines.polyline import length_of, piece
 from planner.contract import GivenMap
 from planner.geometry.curves import Point
@@ -102,10 +102,6 @@ def shortest(known: GrownObstacles, start: Point, goal: Point) -> list[Point]:
     return way
 
 
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-
-
 def walked_m(obstacles: list[Any], mission: Mission, start: Point, most_m: float) -> float:
     """Length of its way to the goal circle; infinite where it finds none, or none so short."""
     keep_m, step_m = mission.clearance_m, mission.sensor_range_m / LOOKS
@@ -132,18 +128,9 @@ def over_the_optimum(world: dict[str, Any]) -> float:
     """Its length over the optimum in a shared world, to the goal circle as flights are."""
     circles = [shapely.Point(each[:2]).buffer(each[2], quad_segs=64) for each in world["circles_m"]]
     obstacles = [*circles, *(shapely.Polygon(each) for each in world["polygons_m"])]
+    kept_m, range_m = world["clearance_m"], world["sensor_range_m"]
     goal, bounds = tuple(world["goal_m"]), tuple(world["bounds_m"])
-    mission = Mission(
-        goal,
-        world["goal_radius_m"],
-        bounds,
-        world["clearance_m"],
-        1.0,
-        1.0,
-        1.0,
-        1.0,
-        world["sensor_range_m"],
-    )
+    mission = Mission(goal, world["goal_radius_m"], bounds, kept_m, 1.0, 1.0, 1.0, 1.0, range_m)
     optimum_m = float(world["optimum_m"])
     return walked_m(obstacles, mission, tuple(world["start_m"]), FURTHEST * optimum_m) / optimum_m
 
