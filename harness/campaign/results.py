@@ -168,7 +168,7 @@ class Runs:
         about = json.loads((results.schema.metadata or {}).get(b"wayproof", b"{}"))
         self.campaign: Mapping[str, Any] = about.get("campaign", {})
         self.planned: int | None = about.get("runs")
-        self.rare: bool = about.get("rare", False)  # drawn near failure by a subset simulation
+        self.rare: bool = about.get("rare", False)
         self._count = results.num_rows
         self._columns: dict[str, list[Any]] = {
             name: [None if value != value else value for value in results[name].to_pylist()]
@@ -189,7 +189,10 @@ class Runs:
     def of(cls, folder: Path) -> Runs:
         """Reads the runs in a campaign's folder; an InputError where it holds none, or a file cannot be read."""
         timings = folder / TIMINGS
-        return cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)
+        runs = cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)
+        if runs.rare:
+            raise InputError(f"wayproof: {folder} has days drawn near failure; see its certificate.json")
+        return runs
 
     def __len__(self) -> int:
         return int(self._count)

@@ -219,11 +219,6 @@ def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms)
     over = [(run, folder.over[run]) for run in range(tally.runs)]
     failing = [{**each.row, "run": run} for run, each in over if not each.held]
     first = days.scenario(0)
-    flew = [each for each in over if each[0] not in days.grounded]
-    quantities: dict[str, list[Any]] = {}
-    if failing and not days.rare:
-        quantities = differing([days.scenario(run).model_dump(by_alias=True) for run, _ in flew])
-        quantities |= {key: [each.row[key] for _, each in flew] for key in days.varied}
     return Certificate(
         claim=days.claim,
         runs=tally.runs,
@@ -239,11 +234,18 @@ def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms)
         seed=days.campaign.seed,
         varied=dict(days.vary),
         failures=failures(failing),
-        explained=explained(np.array([not each.held for _, each in flew]), quantities),
+        explained=_explained(days, over) if failing and not days.rare else (),
         failing_runs=tuple(row["run"] for row in failing),
         command=shlex.join(["wayproof", *sys.argv[1:]]),
         versions=versions(),
     )
+
+
+def _explained(days: Days, over: Sequence[tuple[int, Answer]]) -> tuple[Explained, ...]:
+    flew = [each for each in over if each[0] not in days.grounded]
+    quantities = differing([days.scenario(run).model_dump(by_alias=True) for run, _ in flew])
+    quantities |= {key: [each.row[key] for _, each in flew] for key in days.varied}
+    return explained(np.array([not each.held for _, each in flew]), quantities)
 
 
 def _sure(tally: Tally, terms: Terms, grown: bool) -> dict[str, Any]:
