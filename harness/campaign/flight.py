@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
+from aircraft.model_files import TrimError
 from harness.analysis.metric import ERROR, Claim, holds, margin
 from harness.campaign.results import metric_cells, time_cells
 from harness.files.errors import PlannerError, RunFolderError, WriteError, sentence, trace
@@ -82,6 +83,8 @@ def fly_job(job: Job) -> Answer | None:
         raise
     except RunFolderError as error:
         raise OSError(str(error)) from error
+    except TrimError as error:
+        return Answer(job.run, {"outcome": Outcome.LOST_CONTROL.value, "reason": str(error)}, {})
     except Exception as error:
         if _is_out_of_memory(error):
             return None

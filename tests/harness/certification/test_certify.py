@@ -128,6 +128,10 @@ def test_a_day_whose_drawn_aircraft_cannot_fly_fails_with_its_cause(
     assert found["failing_runs"] == refused
     assert {each["outcome"] for each in found["failures"]} == {"lost_control"}
     assert found["failures"][0]["cause"].startswith("aerosonde cannot be trimmed for level flight at 18 m/s")
+    more = ["--set", "aircraft.airspeed_mps=19", "--set", "uncertainty.mass=0.2", "--conditions", "typical"]
+    _, found = certify(place, *words, *more, "--runs", "14", out="as the flight begins")
+    assert [each["outcome"] for each in found["failures"]] == ["lost_control"] * len(found["failures"])
+    assert "JSBSim finds no trim" in found["failures"][-1]["cause"]
     assert certify(place, *words, "--set", "aircraft.deviation.mass=0.5", out="written")[0] == 2
     assert "aircraft.deviation" in capsys.readouterr().err
 
