@@ -27,11 +27,12 @@ def read_text(path: Path, max_bytes: int, what: str) -> str:
     return decoded(read_data(path, max_bytes, what), str(path), what)
 
 
-def read_data(path: Path, max_bytes: int, what: str) -> bytes:
-    """Reads the bytes of a regular file; arguments and faults are those of `read_text`."""
+def read_data(path: Path, max_bytes: int, what: str, first: int | None = None) -> bytes:
+    """Reads the bytes of a regular file, or only its first ones; arguments and faults are those of `read_text`."""
     try:
         with open_regular(path) as file:
-            data: bytes = file.read(max_bytes + 1)
+            too_large = path.stat().st_size > max_bytes
+            data: bytes = b"" if too_large else file.read(max_bytes if first is None else first)
     except InputError:
         raise
     except FileNotFoundError as error:
@@ -39,7 +40,7 @@ def read_data(path: Path, max_bytes: int, what: str) -> bytes:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"{path}: cannot be read ({reason}); give the path of a file") from error
-    if len(data) > max_bytes:
+    if too_large:
         raise InputError(f"{path}: is larger than {max_bytes // 10**6} MB; must be {what}")
     return data
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
-from harness.files.input_file import InputError, open_regular, parsed_json
+from harness.files.input_file import InputError, parsed_json, read_data
 
 MAX_BYTES: Final = 400_000_000
 """Largest file that is read in pieces, or whose numbers take little more room than its bytes."""
@@ -16,17 +16,9 @@ MAX_TREE_BYTES: Final = 64_000_000
 def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> bytes:
     """Reads a regular file of at most `most` bytes, or only its first `first` bytes."""
     try:
-        with open_regular(path) as file:
-            too_large = path.stat().st_size > most
-            data: bytes = b"" if too_large else file.read(most if first is None else first)
+        return read_data(path, most, "smaller: cut the area of interest out of it", first)
     except InputError as error:
         raise InputError(str(error).removeprefix(f"{path}: ")) from error
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"cannot be read ({reason}); give the path of a file") from error
-    if too_large:
-        raise InputError(f"is larger than {most // 10**6} MB; cut the area of interest out of it")
-    return data
 
 
 def text_of(data: bytes) -> str:
