@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ PILOT_LEAST, PILOT_SHARE, PILOT_MOST = 50, 0.02, 0.25
 """The pilot has at least so many days at a level, else this share of all, and ends with this share of them."""
 ACCEPTED, ADAPTED = 0.42, 0.7
 """The pilot adapts the length of the moves until this share stays below the level, and how fast it does so."""
+
+WIDEST: Final = 1.0
+"""Estimates whose logarithms have a larger variance than this are too far apart for bounds of their mean."""
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
@@ -52,18 +55,6 @@ class Rare:
     method: str
 
 
-class _Days(NamedTuple):
-    """Days by their standard normal numbers (n, d), seeds, margins, and the independent run that they belong to."""
-
-    normals: FloatArray
-    seeds: IntArray
-    margins: FloatArray
-    run: IntArray
-
-    def at(self, rows: IntArray) -> _Days:
-        return _Days(self.normals[rows], self.seeds[rows], self.margins[rows], self.run[rows])
-
-
 def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, confidence: float) -> Rare:
     """Estimates how often the margin of a day is not above 0, with at most `most` evaluations.
 
@@ -74,19 +65,19 @@ def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, co
     levels, lengths, plain, used = sampler.pilot(normals, most)
     number = (most - used) * CHAIN // (RUNS * (CHAIN + (CHAIN - 1) * len(levels))) // CHAIN * CHAIN
     days, weights = sampler.first(number, normals, RUNS), np.full(RUNS, 1.0 / number)
-    plain = np.append(plain, days.margins)
+    plain = np.append(plain, days["margin"])
     failed, count = int((plain <= 0.0).sum()), len(plain)
     for level, length in zip(levels, lengths, strict=True):
-        kept, share = sampler.thinned(days.at(np.flatnonzero(days.margins <= level)), number // CHAIN)
+        kept, share = sampler.thinned(days[days["margin"] <= level], number // CHAIN)
         days, weights = sampler.multiplied(kept, level, length)[0], weights * share / CHAIN
-    estimates = np.bincount(days.run[days.margins <= 0.0], minlength=RUNS) * weights
+    estimates = np.bincount(days["run"][days["margin"] <= 0.0], minlength=RUNS) * weights
     mean = float(estimates.mean()) if levels else failed / count
-    if levels and estimates.all():
+    if levels and estimates.all() and np.log(estimates).var(ddof=1) < WIDEST:
         low, high = lognormal_bounds(estimates, confidence)
         method = f"subset simulation, {RUNS} independent runs with fixed levels, their estimates taken as lognormal"
     else:
         low, high = clopper_pearson(failed, count, confidence)
-        why = "a run of the subset simulation met none" if levels else "they are not rare"
+        why = "runs of the subset simulation differ too much" if levels else "they are not rare"
         method = f"Clopper-Pearson, failures of the {count} days drawn as they come: {why}"
     told = tuple(levels), tuple(estimates.tolist()), count, failed
     return Rare(mean, min(low, mean), max(high, mean), *told, method)
@@ -94,67 +85,65 @@ def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, co
 
 @dataclass(frozen=True)
 class _Sampler:
-    """Draws days and moves them."""
+    """Draws days and moves them: arrays of their numbers `normals`, their `seed`, `margin` and independent `run`."""
 
     evaluate: Evaluate
     rng: np.random.Generator
 
-    def first(self, number: int, normals: int, runs: int = 1) -> _Days:
+    def first(self, number: int, normals: int, runs: int = 1) -> Any:
         """So many days of every run, as they come."""
-        drawn = self.rng.standard_normal((number * runs, normals))
-        seeds = self.rng.integers(0, 2**53, len(drawn))
-        return _Days(drawn, seeds, self.evaluate(drawn, seeds), np.repeat(np.arange(runs), number))
+        kinds = [("normals", float, (normals,)), ("seed", np.int64), ("margin", float), ("run", np.int64)]
+        days = np.zeros(number * runs, kinds)
+        days["normals"] = self.rng.standard_normal((len(days), normals))
+        days["seed"] = self.rng.integers(0, 2**53, len(days))
+        days["run"] = np.repeat(np.arange(runs), number)
+        days["margin"] = self.evaluate(days["normals"], days["seed"])
+        return days
 
     def pilot(self, normals: int, most: int) -> tuple[list[float], list[float], FloatArray, int]:
         """Levels, the length of the moves at each, the margins of days drawn as they come, and all days used."""
         days = self.first(max(PILOT_LEAST, int(PILOT_SHARE * most)), normals)
-        plain, kept, length = days.margins, len(days.run) // CHAIN, 0.5
+        plain, kept, length = days["margin"], len(days) // CHAIN, 0.5
         used, levels, lengths = len(plain), [np.inf], [length]
         while used + kept * (CHAIN - 1) <= PILOT_MOST * most:
-            nearest = np.argsort(days.margins, kind="stable")[:kept]
-            level = float(days.margins[nearest[-1]])
+            nearest = np.argsort(days["margin"], kind="stable")[:kept]
+            level = float(days["margin"][nearest[-1]])
             if not 0.0 < level < levels[-1]:
                 break
-            days, length = self.multiplied(days.at(nearest), level, length, ADAPTED)
+            days, length = self.multiplied(days[nearest], level, length, ADAPTED)
             used += kept * (CHAIN - 1)
             levels.append(level)
             lengths.append(length)
         known = slice(1, None if len(levels) > 2 else 1)  # with one level, counting is as good
         return levels[known], lengths[known], plain, used
 
-    def thinned(self, days: _Days, most: int) -> tuple[_Days, FloatArray]:
+    def thinned(self, days: Any, most: int) -> tuple[Any, FloatArray]:
         """At most so many days of each run, and how many days one of them stands for then.
 
         They lie at equal steps in the order of their margins, each as likely as the others (systematic sampling).
         """
-        count = np.bincount(days.run, minlength=RUNS)
+        count = np.bincount(days["run"], minlength=RUNS)
         step = np.maximum(count / most, 1.0)
-        rows, begin = (
-            np.lexsort((days.margins, days.run)),
-            step * self.rng.random(RUNS) - np.cumsum(count) + count,
-        )
-        place, each = np.arange(len(rows)) + np.repeat(begin, count), np.repeat(step, count)
-        return days.at(rows[np.floor(place / each) < np.floor((place + 1.0) / each)]), step
+        begin = step * self.rng.random(RUNS) - np.cumsum(count) + count
+        place, each = np.arange(len(days)) + np.repeat(begin, count), np.repeat(step, count)
+        taken = np.floor(place / each) < np.floor((place + 1.0) / each)
+        return days[np.lexsort((days["margin"], days["run"]))][taken], step
 
-    def multiplied(
-        self, days: _Days, level: float, length: float, adapted: float = 0.0
-    ) -> tuple[_Days, float]:
+    def multiplied(self, days: Any, level: float, length: float, adapted: float = 0.0) -> tuple[Any, float]:
         """The chains that begin at days below a level, and the length of the next move.
 
         A move takes the normal numbers a part of the way to new ones (preconditioned Crank-Nicolson: Cotter, Roberts,
         Stuart and White, Statistical Science 28, 2013), and draws the seed anew in one of two cases.
         """
         rng, chain = self.rng, [days]
-        for _ in range(CHAIN - 1) if len(days.run) else ():
-            there = np.sqrt(1.0 - length**2) * days.normals + length * rng.standard_normal(days.normals.shape)
-            new = rng.integers(0, 2**53, len(days.seeds))
-            seeds = np.where(rng.random(len(new)) < 0.5, new, days.seeds)
-            moved = days._replace(normals=there, seeds=seeds, margins=self.evaluate(there, seeds))
-            below = moved.margins <= level
-            both = zip(moved, days, strict=True)
-            days = _Days(
-                *(np.where(below if new.ndim == 1 else below[:, None], new, old) for new, old in both)
-            )
+        for _ in range(CHAIN - 1) if len(days) else ():
+            moved, new = days.copy(), rng.standard_normal(days["normals"].shape)
+            moved["normals"] = np.sqrt(1.0 - length**2) * days["normals"] + length * new
+            seeds = rng.integers(0, 2**53, len(days))
+            moved["seed"] = np.where(rng.random(len(days)) < 0.5, seeds, days["seed"])
+            moved["margin"] = self.evaluate(moved["normals"], moved["seed"])
+            below = moved["margin"] <= level
+            days = np.where(below, moved, days)
             length = min(1.0, length * float(np.exp(adapted * (below.mean() - ACCEPTED))))
             chain.append(days)
-        return _Days(*map(np.concatenate, zip(*chain, strict=True))), length
+        return np.concatenate(chain), length
