@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 if TYPE_CHECKING:
     from harness.analysis.flight_limits import FlightLimits
     from harness.flight.record import Flight
 
 Claim: TypeAlias = Literal["reached", "no-contact", "trackable", "as-given"]
-CLAIMS: Final[tuple[Claim, ...]] = get_args(Claim)
 UNKNOWN_AFTER: Final = ("collision", "lost_control", "planner_failed", "error")
 """Outcomes after which nobody can say that nothing is touched: `no-contact` does not hold."""
 LEAST_MARGIN: Final = 1e-9
