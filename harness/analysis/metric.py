@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
@@ -107,6 +108,12 @@ def number(value: float | None, factor: float = 1.0) -> str:
     return (
         f"{scaled:.0f}" if abs(scaled) >= 1000 else f"{scaled:.3g}" if abs(scaled) < 100 else f"{scaled:.1f}"
     )
+
+
+def round_length_m(most_m: float) -> float:
+    """The longest of 1, 2, 5, 10, 20 ... m that is at most so long: of a scale bar."""
+    decade = 10.0 ** math.floor(math.log10(most_m))
+    return decade * max(step for step in (1, 2, 5) if step * decade <= most_m)
 
 
 def severity(outcome: str) -> float:

@@ -84,10 +84,15 @@ def certify(
         print_json(found.plain())
     elif not quiet:
         _print(found, f"{found.subject}: {found.planner}, {found.aircraft}", folder)
-        folders = (folder / "runs" / str(run) for run in found.failing_runs)
-        for kept in itertools.islice(filter(Path.is_dir, folders), 1):
-            say(f"view: {shlex.join(['wayproof', 'view', str(kept)])}")
+        _say_failed(folder, found.failing_runs)
     return 0 if found.verdict == "shown" else FAILED
+
+
+def _say_failed(folder: Path, failing: Sequence[int]) -> None:
+    """Says how to see the first failing run that was kept."""
+    folders = (folder / "runs" / str(run) for run in failing)
+    for kept in itertools.islice(filter(Path.is_dir, folders), 1):
+        say(f"view: {shlex.join(['wayproof', 'view', str(kept)])}")
 
 
 def _drawn(vary: Sequence[str]) -> Mapping[str, Any]:

@@ -89,7 +89,7 @@ def check(
     check = on_day(())
     beside = {"scenario": scenario, "altitude_m": altitude_m, "corner_m": corner_m}
     differs = [(name, str(value)) for name, value in beside.items() if value is not None]
-    apart = told_apart([*differs, *(each for each in replaced if each[0] != "aircraft.model")], named=())
+    apart = told_apart([*differs, *replaced], named=("aircraft.model",))
     folder = out or Path("runs") / "check" / f"{check.scenario.name}-{Path(aircraft).name}{apart}"
     metrics = _fly(check, folder, recording=not no_recording, silent=quiet)
     if as_json:
@@ -99,16 +99,24 @@ def check(
     if days is not None:
         from harness.certification.days import PathDays
         from harness.cli.certify import fly_path_days
-        from harness.scenario.kinds import own_words
 
         content = f"{path.read_bytes().hex()} {differs} {replaced} {world and world.read_text()}"
-        again = ["wayproof", "check", str(path), "--aircraft", aircraft, *own_words(None, given.guidance)]
-        again += [word for name, value in differs for word in (f"--{name.replace('_', '-')}", value)]
-        own = ("aircraft.model", *(["guidance.kind"] if sources(given.guidance) else []))
-        again += [word for key, value in replaced if key not in own for word in ("--set", f"{key}={value}")]
+        again = ["wayproof", "check", str(path), "--aircraft", aircraft, *_words(differs, given, replaced)]
         drawn = PathDays(on_day, content, again, {}, claim="as-given", most=days, band=True)
         fly_path_days(drawn, folder, silent=quiet or as_json)
     return 0 if metrics["check"]["ok"] else FAILED
+
+
+def _words(
+    differs: Sequence[tuple[str, str]], given: Given, replaced: Sequence[tuple[str, str]]
+) -> list[str]:
+    """The options of a check with which a day is flown again: its own, its law, the keys replaced."""
+    from harness.scenario.kinds import own_words
+
+    words = [word for name, value in differs for word in (f"--{name.replace('_', '-')}", value)]
+    own = ("aircraft.model", *(["guidance.kind"] if sources(given.guidance) else []))
+    words += [word for key, value in replaced if key not in own for word in ("--set", f"{key}={value}")]
+    return [*own_words(None, given.guidance), *words]
 
 
 def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:

@@ -44,7 +44,6 @@ def compare(
     2 bad input or usage, nothing flown
     """
     from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
-    from harness.run_files.run_folder import OVERLAY
 
     kinds, laws = _split(planners), _split(guidance)
     variants = [[*given_by(kind, law).keys, *given.keys] for kind in kinds for law in laws]
@@ -66,11 +65,18 @@ def compare(
         print_json(comparison.plain())
     else:
         print_comparison(comparison.rows)
-        say(f"report: {folder / 'report.html'}")
-        overlays = [folder / each.name / OVERLAY for each in loaded]
-        for overlay in [each for each in overlays if each.is_file()][:1]:
-            say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
+        _say_where(folder, [each.name for each in loaded])
     return 0 if comparison.all_reached else FAILED
+
+
+def _say_where(folder: Path, scenarios: Sequence[str]) -> None:
+    """Says where the report is, and how to see the first of the overlays."""
+    from harness.run_files.run_folder import OVERLAY
+
+    say(f"report: {folder / 'report.html'}")
+    overlays = (folder / name / OVERLAY for name in scenarios)
+    for overlay in itertools.islice(filter(Path.is_file, overlays), 1):
+        say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
 
 
 def _split(names: str | None) -> list[str | None]:

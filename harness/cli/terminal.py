@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import operator
 import os
-import re
 import sys
 import threading
 import time
@@ -35,8 +34,6 @@ MOST_COLUMNS: Final = 80
 """Tables are at most this many letters wide."""
 LEAST_NAME_WIDTH: Final = 14
 """Figures are kept in one line where they leave the first column this width."""
-BREAKS: Final = re.compile(r"(?<=[ _+./:=-])")
-"""Matches places within a name at which it may go on in the next line."""
 OUTCOME_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
 """Style of an outcome; all others are bold red."""
 
@@ -136,20 +133,9 @@ def _add_columns(table: Table, lines: Sequence[Sequence[str]], columns: Sequence
     return width - 2 - taken if fits else LEAST_NAME_WIDTH - 4
 
 
-def _broken(name: str, room: int) -> Text:
-    """Breaks a name into lines of `room` letters, behind a space or punctuation."""
-    shown: list[Text] = []
-    for line in Text.from_markup(name).split():
-        ends: list[int] = []
-        last = begin = 0
-        for place in [*(found.start() for found in BREAKS.finditer(line.plain)), len(line)]:
-            if place - begin > room - bool(ends) and line.plain[begin:last].strip():
-                ends.append(last)
-                begin = last
-            last = place
-        first, *others = line.divide(ends)
-        shown += [first, *(Text(" ") + other for other in others)]
-    return Text("\n").join(shown)
+def _broken(name: str, room: int) -> str:
+    """Breaks a name longer than `room` letters behind its plus, as a planner's under the shield; rich folds others."""
+    return name if Text.from_markup(name).cell_len <= room else name.replace("+", "+\n ")
 
 
 def print_line(text: str, style: str | None = None) -> None:

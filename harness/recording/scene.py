@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 import rerun as rr
 
+from harness.analysis.metric import round_length_m
 from harness.flight.record import FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
@@ -211,7 +212,7 @@ def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
     """Logs a scale bar and an arrow along the wind, in two corners of the plan view."""
     xmin, ymin, xmax, ymax = scene.mission.bounds_m
     margin_m = 0.04 * scene.frame.span_m
-    bar_m = scale_bar_m(scene.frame.span_m)
+    bar_m = round_length_m(0.25 * scene.frame.span_m)
     bar = np.array([(xmax - margin_m - bar_m, ymin + margin_m), (xmax - margin_m, ymin + margin_m)])
     told = f"{bar_m / 1000:g} km" if bar_m >= 1000 else f"{bar_m:g} m"
     _log_labelled(rec, "scale", bar, told)
@@ -224,12 +225,6 @@ def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
         arrow = [middle - margin_m * towards, head, head - 0.5 * margin_m * (towards - 0.5 * left)]
         arrow += [head, head - 0.5 * margin_m * (towards + 0.5 * left)]
         _log_labelled(rec, "wind", np.array(arrow), f"wind {speed_mps:.1f} m/s from {from_deg:.0f}°")
-
-
-def scale_bar_m(span_m: float) -> float:
-    """Returns the length of a scale bar: the largest of 1, 2, 5, 10, 20 ... m that is at most a quarter of a span."""
-    decade = 10.0 ** math.floor(math.log10(0.25 * span_m))
-    return decade * max(step for step in (1, 2, 5) if step * decade <= 0.25 * span_m)
 
 
 def _log_labelled(rec: rr.RecordingStream, name: str, line: FloatArray, label: str) -> None:

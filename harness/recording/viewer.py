@@ -12,7 +12,6 @@ import json
 import os
 import re
 import shutil
-import signal
 import socket
 import subprocess
 import sys
@@ -31,6 +30,7 @@ from urllib.parse import quote
 
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
+from harness.flight.signals import taken_as_interrupt
 from harness.recording.overlay import send_recording, write_overlay
 from harness.run_files.run_folder import OVERLAY, RECORDING, recording_of
 
@@ -228,7 +228,7 @@ def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iter
         ) as viewer,
     ):
         try:
-            with _terminated_as_interrupted():
+            with taken_as_interrupt():
                 if not all(answers(port, viewer) for port in ports):
                     raise ViewerError(_why_not(scratch) if "--serve-web" in arguments else NO_DRIVER)
                 yield viewer
@@ -240,19 +240,6 @@ def viewer_process(arguments: Sequence[str], scratch: Path, *ports: int) -> Iter
 def _why_not(scratch: Path) -> str:
     lines = (scratch / VIEWER_LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
     return f"the viewer does not start: {lines[-1] if lines else 'it gave no reason'}"
-
-
-@contextlib.contextmanager
-def _terminated_as_interrupted() -> Iterator[None]:
-    """Lets SIGTERM end the block like Ctrl-C, so that no viewer is left behind."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def in_notebook() -> bool:

@@ -6,7 +6,6 @@ Drawn without a screen. The same values give the same files: SVG carries no date
 from __future__ import annotations
 
 import io
-import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -46,13 +45,6 @@ WIDTH_IN = 4.8
 def colour(index: int) -> str:
     """Returns the colour of a planner by its number."""
     return COLOURS[index % len(COLOURS)]
-
-
-def round_length_m(half_m: float) -> float:
-    """Returns a round length of about a third of a picture that spans twice `half_m`."""
-    third = 2 * half_m / 3
-    size = 10.0 ** math.floor(math.log10(third))
-    return float(max(step * size for step in (1, 2, 5) if step * size <= third))
 
 
 def svg(figure: Figure) -> bytes:

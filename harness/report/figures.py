@@ -17,8 +17,9 @@ from matplotlib.lines import Line2D
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 
+from harness.analysis.metric import round_length_m
 from harness.analysis.smoothness import Profile, flown_lengths, flown_profile, planned_profile, window_m
-from harness.report.figure_style import BEHIND_TEXT, DASHES, WIDTH_IN, colour, round_length_m, styled
+from harness.report.figure_style import BEHIND_TEXT, DASHES, WIDTH_IN, colour, styled
 from harness.world.obstacle import Circle
 
 if TYPE_CHECKING:
@@ -38,7 +39,6 @@ NEAREST_MARK: dict[str, Any] = {"marker": "s", "mfc": "none", "mec": "0.2", "mew
 LEGEND_ROW_IN = 0.19
 TALLEST_MAP_IN = 6.0
 
-MOST_POINTS_DRAWN = 1500
 SPARE_FACTOR = 1.35
 """A curvature plot reaches up to this many times the turn limit or, where that is more, the flown curve."""
 
@@ -112,14 +112,14 @@ def profiles(scene: FigureScene, runs: Numbered) -> Figure:
             planned = _steps(planned_profile(run.track, run.plans, window_m(run.track)), scene.turn_radius_m)
             flown = _steps(flown_profile(run.track), scene.turn_radius_m)
             most = float(np.abs(planned[1]).max(initial=0.0))
-            bend.plot(*_extremes(*planned), color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
-            bend.plot(*_extremes(*flown), color=colour(index), lw=0.9, label="flown")
+            bend.plot(*planned, color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
+            bend.plot(*flown, color=colour(index), lw=0.9, label="flown")
             _limit_turns(bend, flown[1])
             bend.set_ylabel("curvature · R")
             bend.set_title(run.planner, loc="left", color=colour(index))
             bend.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, borderpad=0)
             cross.axhline(0.0, color="0.8", lw=0.6)
-            cross.plot(*_extremes(distance, run.track.cross_track_m), color=colour(index), lw=0.9)
+            cross.plot(distance, run.track.cross_track_m, color=colour(index), lw=0.9)
             cross.set_ylabel("cross-\ntrack, m")
         strips[-1].set_xlabel("distance flown, km")
         figure.align_ylabels()
@@ -169,7 +169,7 @@ def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
     """Draws ticks, a bar of a round length, and an arrow with the wind's speed that points where it blows to."""
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(6, min_n_ticks=3))
-    bar_m = round_length_m(0.25 * (scene.bounds_m[2] - scene.bounds_m[0]))
+    bar_m = round_length_m((scene.bounds_m[2] - scene.bounds_m[0]) / 6)
     label = f"{bar_m / 1e3:g} km" if bar_m >= 1e3 else f"{bar_m:g} m"
     xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)
     right, low = xmax - 0.04 * (xmax - xmin), ymin + 0.03 * (ymax - ymin)
@@ -211,7 +211,7 @@ def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **sty
 
 def draw_flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
     """Draws a track with the marks that `legend_marks` explains; the first planner's lies on top."""
-    points = thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
+    points = np.column_stack((run.track.east_m, run.track.north_m))
     style: dict[str, Any] = {"color": colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
     (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
     if run.outcome != "reached":
@@ -237,17 +237,6 @@ def legend_marks(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
     return marks
 
 
-def thinned(points: FloatArray, scene: FigureScene) -> FloatArray:
-    """Leaves out the points of a track that no one could see on the map."""
-    import shapely
-
-    xmin, ymin, xmax, ymax = scene.bounds_m
-    drawn: FloatArray = np.array(
-        shapely.LineString(points).simplify(max(xmax - xmin, ymax - ymin) / 5000).coords
-    )
-    return drawn
-
-
 def _limit_turns(axes: Axes, flown: FloatArray) -> None:
     """Draws the aircraft's turn limit and scales the axis to the flown curve; corners may leave it."""
     for limit in (-1.0, 1.0):
@@ -267,14 +256,3 @@ def _steps(profile: Profile, radius_m: float) -> tuple[FloatArray, FloatArray]:
     ends = np.cumsum(profile.length_m)
     along = np.column_stack((ends - profile.length_m, ends)).ravel() / 1e3
     return along, radius_m * np.repeat(profile.curvature_1pm, 2)
-
-
-def _extremes(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Thins a curve to its least and greatest value in each of many bins, so that no peak is lost."""
-    kept = np.isfinite(y)
-    x, y = x[kept], y[kept]
-    if len(x) <= MOST_POINTS_DRAWN:
-        return x, y
-    bins = np.array_split(np.arange(len(x)), MOST_POINTS_DRAWN // 2)
-    chosen = np.unique([part[pick] for part in bins for pick in (y[part].argmin(), y[part].argmax())])
-    return x[chosen], y[chosen]

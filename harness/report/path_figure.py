@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from harness.report.figure_style import colour, styled
-from harness.report.figures import LEGEND_ROW_IN, DrawnRun, FigureScene, draw_map, map_height_in, thinned
+from harness.report.figures import LEGEND_ROW_IN, DrawnRun, FigureScene, draw_map, map_height_in
 from harness.report.planner_figure import NEAR_MISS_HEIGHT_IN, close_up
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ MARGIN_SHARE = 0.15
 def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics: Mapping[str, Any]) -> Figure:
     """Draws a checked path."""
     check = metrics["check"]
-    flown = thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
+    flown = np.column_stack((run.track.east_m, run.track.north_m))
     points = given_m.tolist() if len(given_m) <= MOST_POINTS else []
     every = {
         "point given": (POINT_MARK, points),

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from harness.analysis.metric import number
+from harness.analysis.metric import number, round_length_m
 from harness.flight.polylines import polylines
-from harness.report.figure_style import BEHIND_TEXT, colour, round_length_m, styled
+from harness.report.figure_style import BEHIND_TEXT, colour, styled
 from harness.report.figures import (
     LEGEND_ROW_IN,
     NEAREST_MARK,
@@ -120,7 +120,7 @@ def close_up(
     axes.set(xlim=(east - wide, east + wide), ylim=(north - high, north + high), aspect="equal")
     axes.set_xticks([])
     axes.set_yticks([])
-    bar_m = round_length_m(half_m[1])
+    bar_m = round_length_m(2 * half_m[1] / 3)
     left, low = east - 0.93 * wide, north - 0.88 * high
     axes.plot([left, left + bar_m / 1e3], [low, low], color="black", lw=2, solid_capstyle="butt")
     text = axes.annotate(f"{bar_m:g} m", (left, low), (0, 4), textcoords="offset points", fontsize=8)

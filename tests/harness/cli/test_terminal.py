@@ -61,12 +61,12 @@ def test_the_table_of_a_flight_fits_80_columns_and_says_what_happened(
     [
         ("rolling_window+shield", ["rolling_window+", " shield"]),
         ("improved_bug+shield\n vector_field", ["improved_bug+", " shield", " vector_field"]),
-        ("[bold]campaign.yaml: slow[/]", ["campaign.yaml:", " slow"]),
+        ("[bold]campaign.yaml: slow[/]", ["campaign.yaml:", "slow"]),
         ("AwordLongerThanItsColumn", ["AwordLongerThan", "ItsColumn"]),
         ("bug2", ["bug2"]),
     ],
 )
-def test_a_long_name_in_a_table_goes_on_below_from_behind_its_punctuation_on(
+def test_a_long_name_in_a_table_goes_on_below_from_behind_its_plus_on(
     name: str, lines: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
