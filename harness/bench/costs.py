@@ -1,8 +1,7 @@
 """What the closed loop costs on this machine, against the bare flight model.
 
-All costs are processor time of the whole process, threads of libraries included. The speed of a machine that others
-share changes from one second to the next: so a flight and its bare run take turns, half a minute of flight each, and
-only their ratio counts: the median of some, after one that loads what is loaded at its first use.
+All costs are processor time of the whole process, threads of libraries included. The speed of a shared machine changes
+from one second to the next: so a flight and its bare run take turns, and only their ratio counts.
 """
 
 from __future__ import annotations

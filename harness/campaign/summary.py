@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from harness.analysis.causes import FINDINGS
-from harness.analysis.metric import number, severity
+from harness.analysis.metric import severity
 from harness.campaign.cell import CONFIDENCE, QUESTIONS, Axis, Cell, cell_of, grouped
 from harness.campaign.paired import TESTED, Duel, duels
 from harness.campaign.results import LAW_KEY, NAMED, RESULTS, RUNS, Runs, fly_again
@@ -200,7 +200,6 @@ def write_summary(summary: Summary, folder: Path) -> Path:
             questions=QUESTIONS,
             pictures=_pictures(folder, summary.varied) if summary.total.runs else [],
             findings=FINDINGS,
-            number=number,
         )
         replace_text(folder / PAGE, text)
     except OSError as error:

@@ -9,9 +9,7 @@ from harness.cli.terminal import coloured, legible, plain, spread
 from harness.files.wording import counted, tallied
 
 MOST_SHOWN: Final = 6
-"""At most this many corners, legs, contacts and breaches are listed; the others are counted."""
-MOST_ITEMS: Final = 12
-"""At most this many items of a mission are listed one by one."""
+"""At most this many corners, legs, contacts, breaches and items of a mission are listed; the others are counted."""
 TO_LIST: Final = ("not flown", "flown", "not reached")
 """Items of a mission that were treated so are listed if there is a reason to tell; items not flown always are."""
 HEIGHT_CAUSES: Final = (
@@ -179,11 +177,11 @@ def _items(items: Sequence[Mapping[str, str]]) -> dict[str, str]:
         item for item in items if item["what"] in TO_LIST and (item["why"] or item["what"] == "not flown")
     ]
     rows = {"items": f"{len(items)}: {tally}"}
-    for item in told[:MOST_ITEMS]:
+    for item in told[:MOST_SHOWN]:
         why = f": {item['why']}" if item["why"] else ""
         rows[f"  item {item['item']} "] = plain(f"{item['name']}, {item['what']}{why}")
-    if len(told) > MOST_ITEMS:
-        rows["  more"] = f"{len(told) - MOST_ITEMS}, in metrics.json"
+    if len(told) > MOST_SHOWN:
+        rows["  more"] = f"{len(told) - MOST_SHOWN}, in metrics.json"
     return rows
 
 

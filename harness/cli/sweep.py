@@ -69,7 +69,11 @@ def sweep(
     runs = checked(campaign_path(campaign), named, given.keys, given.sources[1])
     folder = out or Path("runs") / runs.campaign.name
     local = partial(local_workers, at_a_time(workers))
-    flyers = dask_workers(scheduler, unencrypted, _warn) if scheduler else local()
+
+    def warn(told: str) -> None:
+        say(f"wayproof: {told}", err=True)
+
+    flyers = dask_workers(scheduler, unencrypted, warn) if scheduler else local()
     told, whole = _fly(runs, folder, flyers, resume=resume, silent=quiet)
     summary = summarise(folder)
     page = write_summary(summary, folder)
@@ -87,10 +91,6 @@ def _check_usage(scheduler: str | None, workers: int | None, unencrypted: bool) 
         raise typer.BadParameter("--workers goes with this machine, --scheduler with a cluster; give one")
     if unencrypted and not scheduler:
         raise typer.BadParameter("--unencrypted goes with --scheduler")
-
-
-def _warn(text: str) -> None:
-    say(f"wayproof: {text}", err=True)
 
 
 def checked(

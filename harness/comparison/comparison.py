@@ -28,7 +28,7 @@ from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
 from harness.report.chapters import ReportedFlight, chapter, entry, optimum_of
-from harness.report.page import report_html
+from harness.report.page import rendered
 from harness.run_files.run_folder import OVERLAY, RECORDING, REPORT, load_run
 from harness.scenario.scenario import Scenario, packed
 from harness.world.optimum import Optimum
@@ -165,7 +165,14 @@ def _written(
     versions = {name: version for name, version in flown.items() if version}
     done = replace(begun, versions=versions, rows=tuple(each.row for each in every))
     replace_text(out / CSV, to_csv(done.rows))
-    page = report_html(chapters, done.command, done.versions, done.started_utc, _duels(done.rows))
+    page = rendered(
+        "comparison.html",
+        duels=_duels(done.rows),
+        chapters=chapters,
+        command=done.command,
+        versions=done.versions,
+        written=done.started_utc,
+    )
     replace_text(out / REPORT, page)
     done.write(out, complete=True)
     return done

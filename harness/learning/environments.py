@@ -118,7 +118,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         drawn = int(self.np_random.integers(2**31)) if self._seeded and seed is None else seed
         self._seeded |= seed is not None
         self._flown = self._own if drawn is None else self._own.with_({"seed": drawn})
-        self._scans.forget()
+        self._scans = ScanKeeper()
         self._loop = SteppedLoop(lambda: self._steered(make_loop(self._flown)), [self._scans])
         status = self._advanced(self._loop.reset())
         self._to_go_m = status.to_go_m
@@ -194,11 +194,6 @@ class ScanKeeper(Observer):
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Keeps a scan."""
         self._coming.append(scan)
-
-    def forget(self) -> None:
-        """Begins anew, for the next flight."""
-        self._coming.clear()
-        self._last = None
 
     def ranges(self, time_s: float, beams: int) -> Floats:
         """(beams,) the nearest return of neighbouring rays over the sensing range, clockwise; 1: there was none."""

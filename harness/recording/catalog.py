@@ -55,18 +55,12 @@ def catalog(name: str, recordings: Sequence[Path]) -> Iterator[tuple[str, Any]]:
         server = Server(host=LOCALHOST, datasets={name: [str(path.resolve()) for path in recordings]})
     except (RuntimeError, ValueError, OSError, ConnectionError) as error:
         raise ViewerError(f"rerun's server does not start: {error}") from error
-    with ended_in_time(server), tempfile.TemporaryDirectory(prefix="wayproof-table-") as scratch:
-        dataset = server.client().get_dataset(name)
-        _lay_out(dataset, Path(scratch))
-        yield f"{server.url()}/entry/{dataset.id}", dataset
-
-
-@contextlib.contextmanager
-def ended_in_time(server: Any) -> Iterator[None]:
-    """Ends a server with the block, without waiting for clients that are still connected."""
     try:
-        yield
-    finally:
+        with tempfile.TemporaryDirectory(prefix="wayproof-table-") as scratch:
+            dataset = server.client().get_dataset(name)
+            _lay_out(dataset, Path(scratch))
+            yield f"{server.url()}/entry/{dataset.id}", dataset
+    finally:  # without waiting for clients that are still connected
         ender = threading.Thread(target=server.shutdown, name="server", daemon=True)
         ender.start()
         ender.join(ENDING_S)

@@ -1,8 +1,7 @@
 """The recording of a flight for the rerun viewer: an observer of the loop that writes while it flies.
 
-Coordinates are the local ENU plane throughout (the viewer holds them as float32: exact to a centimetre in 100
-km). Everything is on the timeline `sim_time`. What happens is kept until the block of the track that it
-belongs to, and then sent as columns, so that a recording that stops shows everything up to the same moment.
+Frame: local ENU plane (float32 in the viewer: exact to a centimetre in 100 km). What happens is kept until the block of
+the track that it belongs to, so that a recording that stops shows everything up to the same moment.
 """
 
 from __future__ import annotations

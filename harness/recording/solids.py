@@ -1,8 +1,7 @@
 """Obstacles and ground as drawings: solids and rims between heights, outlines seen from above, a shaded mesh.
 
-Frame: local ENU plane, metres. An obstacle without heights has no end in the simulated world; it is cut off somewhat
-above the flight altitude. Terrain is drawn as a rim at the height it was cut at: its body is the ground. Polylines are
-turned into what rerun keeps all at once: rerun itself would turn them one by one, a tenth of what a recording costs.
+Frame: local ENU plane, metres. Terrain is drawn as a rim at the height it was cut at. Polylines are turned into what
+rerun keeps all at once: rerun itself would turn them one by one, a tenth of what a recording costs.
 """
 
 from __future__ import annotations

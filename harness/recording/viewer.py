@@ -1,8 +1,7 @@
 """Looking at recordings: the rerun viewer of the installed wheel, in a window, a browser or without a screen.
 
-The viewer runs as a process of its own, listens on 127.0.0.1 only and sends no usage statistics; nor does the page
-that it serves to a browser. rerun's web page posts usage statistics and asks for fonts, examples and versions: it is
-passed on with a content security policy (W3C, CSP level 3), with which the browser itself refuses every other address.
+It listens on 127.0.0.1 only and sends no usage statistics. rerun's web page would, and asks for fonts and versions: it
+is passed on with a content security policy (W3C, CSP level 3), with which the browser refuses every other address.
 """
 
 from __future__ import annotations
@@ -186,14 +185,11 @@ def wait_for(viewer: subprocess.Popen[str]) -> None:
 
 
 def run_names(run_dirs: Sequence[Path]) -> list[str]:
-    """Names runs by as much of the end of each path as tells them apart, with a number where nothing does."""
+    """Names runs by as much of the end of each path as tells them apart."""
     paths = [folder.resolve().parts for folder in run_dirs]
     longest = max(map(len, paths))
     length = next((n for n in range(1, longest) if len({path[-n:] for path in paths}) == len(paths)), 1)
-    names = ["/".join(path[-length:]) for path in paths]
-    return [
-        name if names.count(name) == 1 else f"{name} ({place})" for place, name in enumerate(names, start=1)
-    ]
+    return ["/".join(path[-length:]) for path in paths]
 
 
 def _executable() -> str:

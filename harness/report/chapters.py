@@ -119,8 +119,8 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     facts = {"conditions": told(scenario)} | _facts(scene, optimum)
     if "check" in metrics:  # a path that was given is compared with no other
         del facts["clairvoyant optimum"], facts["estimate with turn radius R"]
-    if "check" in metrics and not scene.obstacles:
-        del facts["obstacles"], facts["wanted clearance"]
+        if not scene.obstacles:
+            del facts["obstacles"], facts["wanted clearance"]
     return Chapter(scene.name, facts, [flight.row], pictures, optimum.reason)
 
 

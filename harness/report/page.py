@@ -38,27 +38,8 @@ class Chapter:
     note: str = ""
 
 
-def report_html(
-    chapters: Sequence[Chapter],
-    command: str,
-    versions: Mapping[str, str],
-    written: str,
-    duels: Sequence[Any] = (),
-) -> str:
-    """Returns the text of `report.html`; `duels` are planners in pairs, as `harness.campaign.paired` has them."""
-    return rendered(
-        "comparison.html",
-        duels=duels,
-        number=number,
-        chapters=chapters,
-        command=command,
-        versions=versions,
-        written=written,
-    )
-
-
 def rendered(template: str, **values: Any) -> str:
-    """Renders one of our templates with values by the names that it uses."""
+    """Renders one of our templates with values by the names that it uses; beside them `number`, `dash`, `shown`."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("harness.report"),
         autoescape=True,
@@ -66,7 +47,7 @@ def rendered(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(template).render(shown=_shown, dash=DASH, **values)
+    return environment.get_template(template).render(shown=_shown, dash=DASH, number=number, **values)
 
 
 def _shown(rows: Sequence[Row]) -> list[Metric]:

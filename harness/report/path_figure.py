@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,13 +48,10 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     points = given_m.tolist() if len(given_m) <= MOST_POINTS else []
     every = {
         "point given": (POINT_MARK, points),
-        "corner cut as allowed": (KEPT_MARK, _corners(check["corners"], kept=True)),
-        "corner cut too far": (CUT_MARK, _corners(check["corners"], kept=False)),
-        "contact": (TOUCHED, [(each["east_m"], each["north_m"]) for each in metrics["contacts"]]),
-        "fence or bound crossed": (
-            CROSSED,
-            [(each["east_m"], each["north_m"]) for each in metrics["breaches"]],
-        ),
+        "corner cut as allowed": (KEPT_MARK, _places(each for each in check["corners"] if each["kept"])),
+        "corner cut too far": (CUT_MARK, _places(each for each in check["corners"] if not each["kept"])),
+        "contact": (TOUCHED, _places(metrics["contacts"])),
+        "fence or bound crossed": (CROSSED, _places(metrics["breaches"])),
     }
     marks = {name: entry for name, entry in every.items() if entry[1]}
     kinds = list(dict.fromkeys(fence["kind"] for fence in check["fences"]))
@@ -92,8 +89,8 @@ def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[s
     )
 
 
-def _corners(corners: Sequence[Mapping[str, Any]], *, kept: bool) -> list[tuple[float, float]]:
-    return [(corner["east_m"], corner["north_m"]) for corner in corners if corner["kept"] is kept]
+def _places(entries: Iterable[Mapping[str, Any]]) -> list[tuple[float, float]]:
+    return [(each["east_m"], each["north_m"]) for each in entries]
 
 
 def _about(scene: FigureScene, points_m: FloatArray) -> FigureScene:

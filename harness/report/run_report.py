@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from harness.analysis.causes import FINDINGS
-from harness.analysis.metric import number
 from harness.analysis.rows import to_csv
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
@@ -46,7 +45,6 @@ def _written(run: Run, folder: Path) -> Path:
     if not isinstance(line, str):
         raise TypeError(f"command: must be text; got {type(line).__name__}")
     _, *arguments = shlex.split(line)
-    command = shlex.join(["wayproof", *_found_again(arguments, folder)])
     legs, given = run.metrics["trackability"], "check" in run.metrics
     lost = [leg for leg in legs if not leg["trackable"]]
     remarks = [(each["kind"], each["text"]) for each in run.metrics.get("findings", ())]
@@ -54,7 +52,6 @@ def _written(run: Run, folder: Path) -> Path:
         "run.html",
         chapter=run_chapter(scenario, flight, optimum),
         row=flight.row,
-        number=number,
         legs=legs,
         lost=lost,
         findings={cause: text for cause, text in FINDINGS.items() if cause in {leg["cause"] for leg in lost}},
@@ -63,7 +60,7 @@ def _written(run: Run, folder: Path) -> Path:
         remarks=remarks,
         aircraft=Path(scenario.aircraft.model).name,
         scenario_yaml=run.scenario_yaml,
-        command=command,
+        command=shlex.join(["wayproof", *arguments]),
         versions={name: version for name, version in manifest["versions"].items() if version},
         platform=manifest["platform"]["system"],
         written=manifest["started_utc"],
@@ -86,13 +83,3 @@ def _exceeded(scenario: Scenario, lost: Sequence[Mapping[str, Any]]) -> list[dic
         for figure, label, most in given
         if most is not None and any((leg.get(figure) or 0.0) > most for leg in lost)
     ]
-
-
-def _found_again(arguments: list[str], folder: Path) -> list[str]:
-    """Replaces the table that a command names by where it lies now, as campaigns are moved."""
-    found = list(arguments)
-    for place in [place for place, each in enumerate(arguments[:-1], 1) if each == "--from"]:
-        before, now = Path(arguments[place]), folder.resolve().parent.parent / Path(arguments[place]).name
-        if not before.exists() and now.is_file():
-            found[place] = str(now)
-    return found

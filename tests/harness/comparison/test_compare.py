@@ -24,7 +24,7 @@ from harness.cli.app import main
 from harness.cli.compare import print_comparison
 from harness.flight.record import AcceptedPlan, Track
 from harness.report import figures
-from harness.report.page import Chapter, report_html
+from harness.report.page import Chapter, rendered
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.world.obstacle import Circle, Obstacle
@@ -385,7 +385,8 @@ def test_the_legend_explains_every_mark_that_is_there_and_no_other(
 def test_a_planner_that_came_too_near_is_marked_on_the_page() -> None:
     near = Row("s", "near", "reached", "there", min_clearance_m=1.1, clearance_violation_s=66.2)
     fair = Row("s", "fair", "reached", "there", min_clearance_m=102.2, clearance_violation_s=0.0)
-    html = report_html([Chapter("s", {}, [near, fair], [])], command="", versions={}, written="")
+    chapters, told = [Chapter("s", {}, [near, fair], [])], {"command": "", "versions": {}, "written": ""}
+    html = rendered("comparison.html", chapters=chapters, duels=(), **told)
     for text in ("1.1", "66.2"):
         assert f'<td data-planner="near" class="bad">{text}</td>' in html
     for text in ("102.2", "0"):

@@ -463,7 +463,6 @@ def test_an_overlay_says_which_runs_are_of_other_worlds(tmp_path: Path) -> None:
         (["runs/a", "runs/b"], ["a", "b"]),
         (["one/bug2-1", "two/bug2-1"], ["one/bug2-1", "two/bug2-1"]),
         (["one/x/run", "two/x/run", "two/y/run"], ["one/x/run", "two/x/run", "two/y/run"]),
-        (["a", "a"], ["a (1)", "a (2)"]),
     ],
 )
 def test_overlaid_runs_have_names_of_their_own(folders: list[str], names: list[str]) -> None:

@@ -104,10 +104,6 @@ def test_the_report_of_a_campaigns_run_says_how_to_fly_it_again(tmp_path: Path) 
     assert command in (out / "runs" / "0" / "report.html").read_text()
     again = [*shlex.split(command)[1:], "--out", str(tmp_path / "again"), "--no-recording", "--quiet"]
     assert main(again) == 0
-    moved = out.rename(tmp_path / "moved")
-    assert main(["report", str(moved / "runs" / "0")]) == 0
-    command = f"wayproof fly --from {moved / 'results.parquet'} --run 0"
-    assert command in (moved / "runs" / "0" / "report.html").read_text()
 
 
 @pytest.mark.flights
