@@ -126,8 +126,6 @@ def test_a_scan_is_observed_when_it_is_available() -> None:
     assert keeper.ranges(0.2, 2).tolist() == [1.0, 1.0]
     assert keeper.ranges(0.3, 2).tolist() == [0.25, 1.0]
     assert keeper.ranges(0.3, 4).tolist() == [0.5, 0.25, 1.0, 1.0]
-    keeper.forget()
-    assert keeper.ranges(9.0, 2).tolist() == [1.0, 1.0]
 
 
 def test_the_state_is_what_it_says() -> None:
