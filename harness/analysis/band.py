@@ -15,7 +15,7 @@ from harness.flight.record import FloatArray
 
 BAND: Final = "band.json"
 SCHEMA: Final = "wayproof/band/1"
-SHARE: Final = 0.95
+BAND_SHARE: Final = 0.95
 STATIONS, STEP_M = 400, 5.0
 """The band has at most this many places along the path, at least this far apart."""
 
@@ -30,18 +30,18 @@ def band_of(tracks: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     known = [track[np.isfinite(track[:, 0])] for track in tracks]
     length_m = float(np.median([track[:, 0].max() for track in known]))
     stations_m = np.linspace(0.0, length_m, max(3, min(STATIONS, int(length_m / STEP_M))))
-    places = np.stack([_at(track, stations_m) for track in known])
+    places = np.stack([_positions_at(track, stations_m) for track in known])
     middle = np.nanmedian(places, axis=0)
     ahead = np.gradient(middle, axis=0)
     ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     left = np.column_stack((-ahead[:, 1], ahead[:, 0]))
     off_m = ((places - middle) * left).sum(axis=2)
-    low_m, high_m = np.nanpercentile(off_m, (50 * (1 - SHARE), 50 * (1 + SHARE)), axis=0)
+    low_m, high_m = np.nanpercentile(off_m, (50 * (1 - BAND_SHARE), 50 * (1 + BAND_SHARE)), axis=0)
     return middle + high_m[:, None] * left, middle + low_m[:, None] * left
 
 
-def _at(track: FloatArray, stations_m: FloatArray) -> FloatArray:
-    """(n, 2) positions of a day at distances along the path; NaN beyond where it ended."""
+def _positions_at(track: FloatArray, stations_m: FloatArray) -> FloatArray:
+    """Returns the (n, 2) positions of a day at distances along the path; NaN beyond where it ended."""
     along_m = np.maximum.accumulate(track[:, 0])
     beyond = stations_m > along_m[-1]
     columns = [np.where(beyond, np.nan, np.interp(stations_m, along_m, track[:, axis])) for axis in (1, 2)]
@@ -59,7 +59,7 @@ def write_band(folder: Path, runs: Sequence[Path]) -> None:
     tracks = [np.column_stack([table[name].to_numpy() for name in columns]) for table in tables]
     left, right = band_of([track for track in tracks if np.isfinite(track[:, 0]).any()])
     edges = {"left_m": left.tolist(), "right_m": right.tolist()}
-    told = {"schema": SCHEMA, "share": SHARE, "days": len(runs), **edges}
+    told = {"schema": SCHEMA, "share": BAND_SHARE, "days": len(runs), **edges}
     replace_text(folder / BAND, json.dumps(told, allow_nan=False) + "\n")
 
 

@@ -44,7 +44,7 @@ class Breach:
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """What a track kept from obstacles and fences."""
+    """How far a flown track stayed from obstacles, fences and the ground, and where it did not."""
 
     breaches: tuple[Breach, ...]
     """In order of time."""
@@ -55,12 +55,12 @@ class Kept:
 
     @property
     def contacts(self) -> tuple[Breach, ...]:
-        """Those with obstacles."""
+        """Returns the breaches that are contacts with obstacles or terrain."""
         return tuple(each for each in self.breaches if each.kind in CONTACTS)
 
     @property
     def crossings(self) -> tuple[Breach, ...]:
-        """Those of fences and of the area's bounds."""
+        """Returns the breaches that are crossings of fences and of the area's bounds."""
         return tuple(each for each in self.breaches if each.kind not in CONTACTS)
 
 
@@ -97,7 +97,7 @@ def kept(
 
 
 def _heights(track: Track, heights_m: FloatArray | None) -> dict[str, float] | None:
-    """What is told of the height above ground."""
+    """Returns least and mean height of a track above ground, and where the least was; None if not known."""
     if heights_m is None or not np.isfinite(heights_m).any():
         return None
     row = int(np.nanargmin(heights_m))
@@ -109,7 +109,7 @@ def _where(track: Track, row: int) -> dict[str, float]:
 
 
 def _contacts(track: Track, world: World) -> list[Breach]:
-    """Contacts with obstacles, one by one."""
+    """Returns the contacts of a track with obstacles, one by one."""
     steps_m = np.append(np.hypot(np.diff(track.east_m), np.diff(track.north_m)), 0.0)
     steps_m += world.max_obstacle_speed_mps * np.append(np.diff(track.time_s), 0.0)
     fixes = np.column_stack((track.east_m, track.north_m, track.time_s))
@@ -131,7 +131,7 @@ def _contacts(track: Track, world: World) -> list[Breach]:
 
 
 def inside_m(track: Track, area: Geometry) -> FloatArray:
-    """(n,) how far inside of an area the rows of a track are; negative outside."""
+    """Returns (n,) how far inside an area the rows of a track are; negative outside."""
     import shapely
 
     shapely.prepare(area)
@@ -163,7 +163,7 @@ def crossings(
 
 
 def _stretches(track: Track, margin_m: FloatArray, kind: str, name: str) -> list[Breach]:
-    """One breach for every run of rows with a negative margin."""
+    """Returns one breach for every run of rows with a negative margin."""
     wrong = np.concatenate(([False], margin_m < 0.0, [False]))
     edges = np.flatnonzero(wrong[1:] != wrong[:-1])
     found = []

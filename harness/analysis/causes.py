@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.interface import GRAVITY_MPS2
-from harness.analysis.flight_limits import LOAD_S, AsGiven, FlightLimits
+from harness.analysis.flight_limits import LOAD_AVERAGED_S, AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.flight.record import SURFACES, AcceptedPlan, FloatArray, Track
 from harness.run_files.given_path import CutCorner
@@ -22,7 +22,7 @@ from harness.run_files.given_path import CutCorner
 LEAD_S = 5.0
 """The cause is looked for from this time before the error became too large up to where it is largest."""
 SATURATED_SHARE = 0.2
-"""Share of the lead time with a signal at its limit that makes this limit the cause."""
+"""A limit is the cause if a signal was at it for this share of the time that is looked at (see `LEAD_S`)."""
 ROLL_RATE_SHARE = 0.8
 """Share of the roll rate limit from which on the aircraft rolls as fast as it may; the loop behind it lags."""
 WIND_SHARE = 0.1
@@ -36,11 +36,11 @@ ROLLED_SHARE = 0.1
 AT_STOP = 0.995
 """A control surface deflected by this share of its travel is at its stop."""
 CLIMBS_IN_S = 1.0
-"""A change of climb takes an aircraft about so long: a corner of a path's slope is cut by as much flight."""
+"""An aircraft takes about so long to change its climb; so near a change of slope it may cut the corner."""
 LEAST_CLIMB_MPS = 0.2
 """A path that climbs or sinks more slowly is level."""
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
-"""Throttle from which on, and down to which, it is at a stop."""
+"""A throttle (0 to 1) is at a stop from the first of these on, and down to the second."""
 NAVIGATION_ERROR = "navigation error"
 """Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
 SURE_SIGMAS = 3.0
@@ -112,7 +112,7 @@ def cross_track_cause(
         return speed_cause(lead, fast_mps, limits)
     if asked.windy > ROUNDING:
         return "wind drift"
-    return _at_a_limit(lead, limits, force, asked.roll_rate > ROUNDING)
+    return _limit_reached(lead, limits, force, asked.roll_rate > ROUNDING)
 
 
 def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) -> str | None:
@@ -175,8 +175,8 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     return "climb too steep" if up >= down else "descent too steep"
 
 
-def _at_a_limit(lead: Track, limits: FlightLimits, force: InForce, rolls_too_fast: bool) -> str:
-    """The limit that the aircraft was at while it came off a plan that asks for no more than is in force."""
+def _limit_reached(lead: Track, limits: FlightLimits, force: InForce, rolls_too_fast: bool) -> str:
+    """Returns the limit that the aircraft was at while it came off a plan that asks for no more than is in force."""
     rate = np.abs(np.diff(lead.roll_deg)) / np.maximum(np.diff(lead.time_s), 1e-9)
     rolling = np.append(False, rate >= ROLL_RATE_SHARE * math.degrees(force.roll_rate_radps))
     rolled = float(rolling.mean())
@@ -186,7 +186,7 @@ def _at_a_limit(lead: Track, limits: FlightLimits, force: InForce, rolls_too_fas
     across = -lead.airspeed_mps * np.sin(np.radians(lead.heading_deg - lead.course_deg))
     drift, blown = float(across.mean()), WIND_SHARE * lead.airspeed_mps.mean()
     lateral_servos = _servo_share(lead, lateral=True)
-    load = averaged(lead.load_factor, lead, LOAD_S).max()
+    load = averaged(lead.load_factor, lead, LOAD_AVERAGED_S).max()
     # The demand of turns of less than a second is not in their mean curvature: then the command moves at its limit.
     slew = np.abs(np.diff(lead.roll_command_deg)) / np.maximum(np.diff(lead.time_s), 1e-9)
     slewing = np.append(False, slew >= AT_STOP * math.degrees(force.roll_rate_radps))
@@ -215,7 +215,7 @@ def _vertical_limit(lead: Track, limits: FlightLimits) -> str | None:
 
 
 def _stalled(lead: Track, limits: FlightLimits) -> bool:
-    """Whether the angle of attack was beyond that of the stall; not where it is not known."""
+    """Tells whether the angle of attack was beyond that of the stall; False where it is not known."""
     assert lead.angle_of_attack_deg is not None
     return bool((np.abs(lead.angle_of_attack_deg) > limits.stall_angle_deg).any())
 
@@ -246,7 +246,7 @@ def _throttle_share(track: Track) -> float:
 
 
 def averaged(values: FloatArray, track: Track, over_s: float) -> FloatArray:
-    """Running mean over a time, over the whole where that is shorter."""
+    """Returns the running mean of values over a time, over the whole where that is shorter."""
     span = float(track.time_s[-1] - track.time_s[0])
     rows = 1 + round(over_s * (len(values) - 1) / span) if span > over_s else len(values)
     total = np.append(0.0, np.cumsum(values))

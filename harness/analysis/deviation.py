@@ -18,13 +18,13 @@ from harness.run_files.given_path import CutCorner
 
 Rows = np.ndarray[tuple[int], np.dtype[np.intp]]
 
-BLOCK = 64
-"""Points that are measured together: what is near them is a short part of the other line, and fits into the cache."""
+POINTS_PER_BLOCK = 64
+"""So many points are measured together: what is near them is a short part of the other line and fits the cache."""
 MOST_SAMPLES = 400_000
 """A path has no more points measured than this, however long it is."""
 
-ABOUT = 3.0
-"""A corner's limit holds this many times the limit before and behind it, along the path."""
+CORNER_REACH = 3.0
+"""A corner's own limit holds on the path up to this many times the limit before and behind the corner."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: flo
     rows[flown] = distances_m(line, given_m, window_m)
     points = _along(given_m, spacing_m)
     points = points[points[:, 2] <= line[-1, 2]]
-    return Deviation(rows, distances_m(points, line, window_m), flown[_row(line[:, 2], points[:, 2])])
+    return Deviation(rows, distances_m(points, line, window_m), flown[_rows_at(line[:, 2], points[:, 2])])
 
 
 class Stations:
@@ -83,16 +83,16 @@ class Stations:
     def at_corner(self, corner: CutCorner) -> Rows:
         """(k,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
 
-        They reach one limit further than the planned path is off the corner's legs, and at least `ABOUT` limits to each
-        side: within these an aircraft that overshoots has come back to the next leg.
+        They reach one limit further than the planned path is off the corner's legs, and at least `CORNER_REACH` limits
+        to each side: within these an aircraft that overshoots has come back to the next leg.
         """
-        reach_m = max(corner.half_m + corner.allowed_cut_m, ABOUT * corner.allowed_cut_m)
+        reach_m = max(corner.half_m + corner.allowed_cut_m, CORNER_REACH * corner.allowed_cut_m)
         at_m, wider_m = corner.arc_length_m, 1.001 * reach_m
         first = np.searchsorted(self._furthest_m, at_m - wider_m)
         end = np.searchsorted(self._least_ahead_m, at_m + wider_m, side="right")
         near = self._flown[first:end]
         near = near[np.abs(self._along_m[near] - at_m) <= reach_m]
-        passes = self._flown[_row(self._furthest_m, at_m)] if len(self._flown) else near
+        passes = self._flown[_rows_at(self._furthest_m, at_m)] if len(self._flown) else near
         rows: Rows = np.union1d(near, passes)
         return rows
 
@@ -114,17 +114,17 @@ def distances_m(points: FloatArray, line: FloatArray, window_m: float) -> FloatA
     line = np.concatenate((line, line[-1:])) if len(line) == 1 else line
     along = line[:, 2]
     found = np.empty(len(points))
-    for first in range(0, len(points), BLOCK):
-        block = points[first : first + BLOCK]
+    for first in range(0, len(points), POINTS_PER_BLOCK):
+        block = points[first : first + POINTS_PER_BLOCK]
         low, high = block[:, 2].min() - window_m, block[:, 2].max() + window_m
         begin = int(np.clip(np.searchsorted(along, low, side="right") - 1, 0, len(line) - 2))
         end = int(np.clip(np.searchsorted(along, high, side="left"), begin + 1, len(line) - 1))
-        found[first : first + BLOCK] = _block_distances(block, line[begin : end + 1], window_m)
+        found[first : first + POINTS_PER_BLOCK] = _block_distances(block, line[begin : end + 1], window_m)
     return found
 
 
-def _row(along_m: FloatArray, at_m: FloatArray | float) -> Rows:
-    """The first rows that are as far along as this, or the last of all."""
+def _rows_at(along_m: FloatArray, at_m: FloatArray | float) -> Rows:
+    """Finds the first row that is at least so far along, for each of `at_m`, or the last row where none is."""
     return np.minimum(np.searchsorted(along_m, at_m), len(along_m) - 1)
 
 

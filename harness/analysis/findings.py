@@ -14,7 +14,7 @@ from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.smoothness import flown_profile, smoothness, tangent_of
 from harness.flight.record import AcceptedPlan, Flight, FloatArray, Track
 
-SLACK_S: Final = 1.0
+IN_TIME_S: Final = 1.0
 """A flight that is over, or a plan that comes, within this time of the end of a plan is in time."""
 AHEAD_S: Final = 5.0
 """Two plans are compared where they lead to within this time of flight."""
@@ -43,7 +43,7 @@ class Finding:
 
 def findings(flight: Flight, limits: FlightLimits) -> tuple[Finding, ...]:
     """All findings of a flight, in order of time."""
-    found = (_ended(flight, limits), _slow(flight, limits), _contradicted(flight))
+    found = (_plan_ended(flight, limits), _planner_too_slow(flight, limits), _plans_contradict(flight))
     return tuple(sorted((each for each in found if each is not None), key=lambda each: each.time_s))
 
 
@@ -58,7 +58,7 @@ def beyond_end_m(track: Track, plans: Sequence[AcceptedPlan]) -> FloatArray:
 
 def is_past_end(track: Track, plans: Sequence[AcceptedPlan], limits: FlightLimits) -> NDArray[np.bool_]:
     """(n,) whether the aircraft is further beyond the end of its plan than it may be off it and flies in a second."""
-    allowed_m = limits.cross_track_threshold_m + SLACK_S * track.groundspeed_mps
+    allowed_m = limits.cross_track_threshold_m + IN_TIME_S * track.groundspeed_mps
     return np.greater(beyond_end_m(track, plans), allowed_m)
 
 
@@ -87,7 +87,7 @@ def contradictions_s(track: Track, plans: Sequence[AcceptedPlan]) -> list[float]
     return times
 
 
-def _ended(flight: Flight, limits: FlightLimits) -> Finding | None:
+def _plan_ended(flight: Flight, limits: FlightLimits) -> Finding | None:
     beyond = beyond_end_m(flight.track, flight.plans)
     rows = np.flatnonzero(is_past_end(flight.track, flight.plans, limits))
     if not len(rows):
@@ -96,7 +96,7 @@ def _ended(flight: Flight, limits: FlightLimits) -> Finding | None:
     return Finding("plan ended", float(flight.track.time_s[rows[0]]), text)
 
 
-def _slow(flight: Flight, limits: FlightLimits) -> Finding | None:
+def _planner_too_slow(flight: Flight, limits: FlightLimits) -> Finding | None:
     allowed_ms = 1e3 * max(limits.scan_period_s, limits.compute_latency_s)
     slow = [each for each in flight.compute_ms if each > allowed_ms]
     if not slow:
@@ -110,7 +110,7 @@ def _slow(flight: Flight, limits: FlightLimits) -> Finding | None:
     return Finding("planner slower than the scans", next(iter(times), float(flight.track.time_s[0])), text)
 
 
-def _contradicted(flight: Flight) -> Finding | None:
+def _plans_contradict(flight: Flight) -> Finding | None:
     times = contradictions_s(flight.track, flight.plans)
     if len(times) <= FEW_CONTRADICTIONS:
         return None

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from harness.flight.record import FloatArray
 from harness.run_files.given_path import CutCorner
 
-SPEED_S = 20.0
+SPEED_AVERAGED_S = 20.0
 """The airspeed error is averaged over this time, so that a gust does not count."""
-LOAD_S = 1.0
+LOAD_AVERAGED_S = 1.0
 """The load factor is averaged over this time, so that a gust does not count."""
 
 

@@ -18,7 +18,7 @@ from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.smoothness import flown_lengths, planned_profile, turn_onto_first_plan_1pm, window_m
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 
-WIND_S = 20.0
+WIND_AVERAGED_S = 20.0
 """The wind is averaged over this time, s, so that it is the wind and not a gust of turbulence."""
 LEAST_WIND_MPS = 1.0
 """A wind that seems to be less is taken for the sideslip of a turn in calm air."""
@@ -28,7 +28,7 @@ LEAST_WIND_MPS = 1.0
 class InForce:
     """What an aircraft was told and flew in, row by row of a track: true airspeed commanded, wind, limits of the bank.
 
-    The wind (n, 2) is its velocity, east and north, averaged over `WIND_S`; sideslip is taken to be zero.
+    The wind (n, 2) is its velocity, east and north, averaged over `WIND_AVERAGED_S`; sideslip is taken to be zero.
     """
 
     commanded_mps: FloatArray
@@ -38,7 +38,7 @@ class InForce:
 
     @classmethod
     def of(cls, track: Track, limits: FlightLimits, commanded_mps: FloatArray | None = None) -> InForce:
-        """Of a whole track; without a commanded airspeed that of the limits, or else the one flown."""
+        """Returns what was in force on a track; the airspeed is the one given, or else of the limits, or flown."""
         if commanded_mps is None:
             known = math.isfinite(limits.airspeed_mps)
             commanded_mps = np.full(len(track), limits.airspeed_mps) if known else track.airspeed_mps
@@ -46,7 +46,9 @@ class InForce:
         level = np.sqrt(np.maximum(track.airspeed_mps**2 - climb**2, 0.0))
         wind = track.groundspeed_mps * np.exp(1j * np.radians(track.course_deg))
         wind -= level * np.exp(1j * np.radians(track.heading_deg))
-        rows = 1 if len(track) < 2 else max(round(WIND_S / float(np.median(np.diff(track.time_s)))), 1)
+        rows = (
+            1 if len(track) < 2 else max(round(WIND_AVERAGED_S / float(np.median(np.diff(track.time_s)))), 1)
+        )
         rows = min(rows, len(track))
         around = np.convolve(np.ones(len(track)), np.ones(rows), "same")
         mean = np.convolve(wind, np.ones(rows), "same") / around
@@ -55,7 +57,7 @@ class InForce:
         return cls(commanded_mps, east_north, limits.bank_limit_rad, limits.roll_rate_radps)
 
     def part(self, first: int, stop: int) -> InForce:
-        """Some of its rows."""
+        """Returns what was in force in the rows from `first` up to `stop`."""
         return replace(self, commanded_mps=self.commanded_mps[first:stop], wind_mps=self.wind_mps[first:stop])
 
 
@@ -73,7 +75,7 @@ class Demand:
 
 
 def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand:
-    """What was planned for some rows of a track, and for the window after them, asks for.
+    """Returns what was planned for some rows of a track, and for the window after them, asks for.
 
     The curvature is the change of the plan's direction over a window of about one second, as long as it takes to roll.
     """

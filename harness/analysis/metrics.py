@@ -79,7 +79,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
 
 
 def _timing(flight: Flight) -> dict[str, Any]:
-    """What the flight took of the clock."""
+    """Returns how much simulated and computing time the flight took."""
     return {
         "sim_s": flight.sim_s,
         "wall_s": flight.wall_s,
@@ -99,7 +99,7 @@ def _off_path(track: Track) -> dict[str, Any]:
 
 
 def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:
-    """How far off the believed position was, and the margin for it; nothing where navigation was perfect."""
+    """Returns how far off the believed position was, and the margin for it; nothing if navigation is perfect."""
     if not track.has_beliefs:
         return {}
     off_m = track.believed_m[:, :2] - np.column_stack((track.east_m, track.north_m))
@@ -143,6 +143,6 @@ def _planned_length_m(flight: Flight) -> float:
 
 
 def _least(values: FloatArray | None) -> float | None:
-    """The least of those that are known."""
+    """Returns the least of those values that are known; None without any."""
     known = np.zeros(0) if values is None else values[np.isfinite(values)]
     return float(known.min()) if len(known) else None

@@ -16,10 +16,12 @@ DASH: Final = "\N{EN DASH}"
 
 COMPARED: Final = {metric.name: metric for metric in METRICS if metric.short or metric.derived}
 """The figures of a row, by name: those that people are shown, and those that take more than `metrics.json`."""
-_FIT: Final = ("outcome", "km", "ratio", "clear m", "κ·R", "tracks", "tse max", "p99 ms")
-ON_TERMINAL: Final = tuple(next(metric for metric in METRICS if metric.short == each) for each in _FIT)
-"""Those that fit 80 columns."""
-LATEX: Final = str.maketrans(
+_HEADINGS_ON_TERMINAL: Final = ("outcome", "km", "ratio", "clear m", "κ·R", "tracks", "tse max", "p99 ms")
+ON_TERMINAL: Final = tuple(
+    next(metric for metric in METRICS if metric.short == each) for each in _HEADINGS_ON_TERMINAL
+)
+"""The figures that a table on a terminal shows: those that fit 80 columns."""
+LATEX_ESCAPES: Final = str.maketrans(
     {
         **{each: f"\\{each}" for each in "&%$#_{}"},
         **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"},
@@ -27,7 +29,7 @@ LATEX: Final = str.maketrans(
         **{"\N{MIDDLE DOT}": r"$\cdot$", "\N{DEGREE SIGN}": r"$^\circ$"},
     }
 )
-"""What LaTeX takes for something else, or its fonts lack, as it takes it."""
+"""How characters are written that LaTeX takes for commands or that its fonts lack."""
 
 
 class Row:
@@ -50,7 +52,7 @@ class Row:
 
     @property
     def label(self) -> str:
-        """What people are shown as its name."""
+        """The name of the row, as people are shown it."""
         return f"{self.planner}, {self.guidance}" if self.guidance else self.planner
 
     def text(self, metric: Metric) -> str:
@@ -58,7 +60,7 @@ class Row:
         return metric.text(self.figures[metric.name])
 
     def plain(self) -> dict[str, Any]:
-        """All of it, column by column."""
+        """All values of the row, column by column."""
         begin = {"scenario": self.scenario, "planner": self.planner, "outcome": self.outcome}
         return {**begin, "reason": self.reason, **self.figures, "guidance": self.guidance}
 
@@ -93,7 +95,7 @@ def shown_figures(rows: Sequence[Row]) -> list[Metric]:
 
 
 def rows_for_paper(rows: Sequence[Row]) -> tuple[list[str], list[list[str]], list[str]]:
-    """Headings, a line a flight, and what each heading is, with its unit: the figures of `ON_TERMINAL`."""
+    """Returns headings, the cells of a line for each flight, and what each heading means, with its unit."""
     heads = ["scenario", "planner", *(each.short for each in ON_TERMINAL)]
     lines = [[row.scenario, row.label, *(row.text(each) or DASH for each in ON_TERMINAL)] for row in rows]
     named = [each for each in ON_TERMINAL if each.title != each.short]
@@ -106,7 +108,9 @@ def latex(heads: Sequence[str], rows: Iterable[Sequence[str]], legend: Sequence[
 
     The first column is aligned left, numbers right.
     """
-    first, *others = (" & ".join(printable(cell).translate(LATEX) for cell in row) for row in (heads, *rows))
+    first, *others = (
+        " & ".join(printable(cell).translate(LATEX_ESCAPES) for cell in row) for row in (heads, *rows)
+    )
     lines = [
         *(r"% \usepackage{booktabs}", *(f"% {printable(each)}" for each in legend)),
         *(f"\\begin{{tabular}}{{l{'r' * (len(heads) - 1)}}}", "\\toprule", f"{first} \\\\", "\\midrule"),

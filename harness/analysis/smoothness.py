@@ -28,7 +28,7 @@ the most that are no longer: 0.9 s at 10 Hz."""
 CORNER_RAD = 1e-6
 """A smaller change of tangent between two segments is rounding, not a corner."""
 ROUNDING_M = 1e-6
-"""Joints closer than this are one."""
+"""Two joints of curvature profiles that are closer than this are taken for one."""
 
 
 class Profile(NamedTuple):
@@ -69,7 +69,7 @@ def smoothness(profile: Profile, window_m: float) -> Smoothness:
 
 
 def window_m(track: Track) -> float:
-    """Distance flown in `COURSE_WINDOW_S` at the mean ground speed."""
+    """Returns the distance flown in `COURSE_WINDOW_S` at the mean ground speed."""
     return max(float(track.groundspeed_mps.mean()) * COURSE_WINDOW_S, 1e-3)
 
 
@@ -192,7 +192,7 @@ def tangent_of(accepted: FlownPlan, arc_length_m: float) -> tuple[float, float]:
 
 
 def _corner(before: Sequence[float], after: Sequence[float], window_m: float) -> list[tuple[float, float]]:
-    """The arc, positive to the left, that counts for a change of direction; none for rounding."""
+    """Returns the arc, positive to the left, that counts for a change of direction; none for rounding."""
     (x0, y0), (x1, y1) = before, after
     angle = math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
     return [(window_m, angle / window_m)] if abs(angle) > CORNER_RAD else []

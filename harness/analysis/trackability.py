@@ -24,9 +24,9 @@ from harness.analysis.causes import (
     speed_cause,
     steepness_cause,
 )
-from harness.analysis.deviation import ABOUT
+from harness.analysis.deviation import CORNER_REACH
 from harness.analysis.findings import is_past_end
-from harness.analysis.flight_limits import LOAD_S, SPEED_S, AsGiven, FlightLimits
+from harness.analysis.flight_limits import LOAD_AVERAGED_S, SPEED_AVERAGED_S, AsGiven, FlightLimits
 from harness.analysis.in_force import InForce
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 
@@ -38,11 +38,11 @@ SHORTEST_LEG_S = 5.0
 class Leg:
     """A stretch of flight under one plan, and the verdict on it.
 
-    Errors are absolute; airspeed is averaged over `SPEED_S` (None where it is not judged), load factor over `LOAD_S`.
-    `threshold_m` is what the cross-track error may be. Of a given path: `waypoint` is the number of the point that the
-    leg leads to, `corner_cut_m` how far from the corner there the plan passes, `max_deviation_m` the largest distance
-    from it. Of several limits that were exceeded the first is the cause: control lost, cross-track error or distance
-    from the path as given, load factor, airspeed, altitude.
+    Errors are absolute; airspeed is averaged over `SPEED_AVERAGED_S` (None where it is not judged), load factor over
+    `LOAD_AVERAGED_S`. `threshold_m` is what the cross-track error may be. Of a given path: `waypoint` is the number of
+    the point that the leg leads to, `corner_cut_m` how far from the corner there the plan passes, `max_deviation_m`
+    the largest distance from it. Of several limits that were exceeded the first is the cause: control lost, cross-
+    track error or distance from the path as given, load factor, airspeed, altitude.
     """
 
     start_s: float
@@ -68,6 +68,7 @@ def legs(
 ) -> tuple[Leg, ...]:
     """Judges a flight leg by leg; empty where no plan was flown.
 
+    A leg is flown under one plan, or of a given path lies between two of its corners; a short one joins the next.
     `plans[i]` is the plan of rows with `plan_index` i, and `given` the path that the only plan follows, if there was
     one. `lost` says why control was lost at the end of the flight, whose last leg is then not trackable.
     """
@@ -122,14 +123,14 @@ class _Flown:
         return self.track.plan_index + passed
 
     def leg(self, first: int, last: int) -> Leg:
-        """A leg by its plan, or of a given path by altitude, airspeed and load factor alone."""
+        """Judges a leg by its plan; a leg of a given path by altitude, airspeed and load factor alone."""
         leg, limits, given = self.track.part(first, last + 1), self.limits, self.given
         rows = slice(first, last + 1)
         high = leg.up_m - (given.altitude_m[rows] if given else limits.altitude_m)
         fast = leg.airspeed_mps - (given.airspeed_mps[rows] if given else limits.airspeed_mps)
-        mean_fast = averaged(fast, leg, SPEED_S)
+        mean_fast = averaged(fast, leg, SPEED_AVERAGED_S)
         off, slow = np.nan_to_num(np.abs(leg.cross_track_m)), np.abs(mean_fast)
-        loads = averaged(leg.load_factor, leg, LOAD_S)
+        loads = averaged(leg.load_factor, leg, LOAD_AVERAGED_S)
         cause = None
         if given is None and off.max() > limits.cross_track_threshold_m:
             cause = self._cross_track_cause(leg, first, int(off.argmax()))
@@ -221,7 +222,7 @@ class _Flown:
         if believed_m is not None and believed_m[worst] <= max(allowed_m, track.navigation_error_m[worst]):
             return NAVIGATION_ERROR
         for corner in given.corners:
-            reach_m = max(corner.half_m, ABOUT * allowed_m)
+            reach_m = max(corner.half_m, CORNER_REACH * allowed_m)
             after_m = reach_m + LEAD_S * float(track.groundspeed_mps[worst])
             if -reach_m <= along_m - corner.arc_length_m <= after_m:
                 cause = corner_cause(corner, max(allowed_m, corner.allowed_cut_m), worst, self.force)

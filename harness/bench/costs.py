@@ -26,10 +26,10 @@ from harness.scenario.performance import start_conditions
 from harness.scenario.scenario import Scenario
 
 ROUNDS = 5
-"""Each is one flight without and one with the recording; one round more goes before them and does not count."""
+"""Each round is one flight without and one with the recording; a further one goes before and does not count."""
 TURN_S = 30.0
-"""The bare model follows the flight in turns of so long, simulated."""
-WATCHED = {
+"""The bare model and the flight are flown by turns, for so long (simulated) each."""
+TIMED_PARTS = {
     "world": ("record", "clearance"),
     "sensor": ("sensor", "scan"),
     "seen": ("map", "update"),
@@ -37,7 +37,7 @@ WATCHED = {
     "model": ("dynamics", "state", "fault", "command", "advance"),
     "guidance": ("guidance", "follow", "update"),
 }
-"""Parts of a loop: the block that each is booked to, and its methods."""
+"""Parts of a loop whose time is measured: for each, the block that the time is booked to and its methods."""
 T = TypeVar("T")
 
 
@@ -99,7 +99,7 @@ def watched(loop: Loop, seconds: dict[str, float]) -> Loop:
     """A loop whose blocks are timed; what is left over is the loop itself: verdicts, log and turns."""
     parts = {
         name: _Watched(getattr(loop, name), block, methods, seconds)
-        for name, (block, *methods) in WATCHED.items()
+        for name, (block, *methods) in TIMED_PARTS.items()
     }
     return replace(loop, **parts)  # type: ignore[arg-type]
 
@@ -144,13 +144,13 @@ class Bare(Observer):
         self.cpu_s, self.steps, self._turn_s = 0.0, 0, TURN_S
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
-        """Takes a turn where it is due."""
+        """Every `TURN_S`, flies the bare model up to the time of the flight."""
         if state.time_s >= self._turn_s:
             self._turn_s = state.time_s + TURN_S
             self._fly_to(state.time_s)
 
     def on_event(self, time_s: float, text: str) -> None:
-        """Flies up to it: the last one is the end."""
+        """Flies the bare model up to the time of the event: the last event is the end of the flight."""
         self._fly_to(time_s)
 
     def _fly_to(self, time_s: float) -> None:
@@ -162,7 +162,7 @@ class Bare(Observer):
 
 
 def in_turns(scenario: Scenario, recording: bool) -> Turns:
-    """One flight into a folder that is thrown away, and its bare run."""
+    """Flies once into a folder that is thrown away, by turns with the bare model."""
     bare = Bare(scenario)
     with tempfile.TemporaryDirectory(prefix="wayproof-bench-") as folder:
         out = Path(folder) / "run"

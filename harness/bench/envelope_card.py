@@ -24,14 +24,14 @@ from harness.scenario.kinds import GUIDANCE
 from planner.kernel_cache import seal
 
 BANKS_DEG: Final = (10.0, 20.0, 30.0, 40.0, 45.0)
-SETTLING_S: Final = 10.0
-TURNING_S: Final = 30.0
+ROLL_IN_AND_SETTLE_S: Final = 10.0
+MEASURED_TURN_S: Final = 30.0
 COURSE_SEED: Final = 1
 COURSE_TURNS: Final = 8
 RADIUS_TOLERANCE: Final = 0.02
 DEFAULT_WIND_SHARE: Final = 0.3
-FORMAT: Final = 2
-"""Goes up with what a card consists of, so that older ones are made anew."""
+CARD_FORMAT: Final = 2
+"""The number goes up when cards get other content, so that older ones are made anew."""
 Report = Callable[[int, int, str], None]
 
 
@@ -62,7 +62,7 @@ def envelope_card(
         winds = sorted({0.0, *(winds_mps or (round(DEFAULT_WIND_SHARE * speed, 2),))})
         if report is not None:
             report(done, len(speeds), f"{frame.name} at {speed:g} m/s")
-        title = f"{frame.name}-envelope-{FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
+        title = f"{frame.name}-envelope-{CARD_FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
         pages.append(cached(title, digest, partial(_page, frame, speed, winds), dict))
     limits = frame.guidance_limits()
     return {
@@ -106,14 +106,14 @@ def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, floa
     model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
     length = turned = 0.0
     states = [model.state()]
-    while states[-1].time_s < SETTLING_S + TURNING_S:
+    while states[-1].time_s < ROLL_IN_AND_SETTLE_S + MEASURED_TURN_S:
         model.advance(UPDATE_STEPS)
         if model.fault():
             turned = math.nan
             break
         before, state = states[-1], model.state()
         states.append(state)
-        if before.time_s >= SETTLING_S:
+        if before.time_s >= ROLL_IN_AND_SETTLE_S:
             length += state.groundspeed_mps * (state.time_s - before.time_s)
             turned += math.remainder(state.course_rad - before.course_rad, math.tau)
     return {

@@ -24,7 +24,7 @@ from aircraft.start import Atmosphere
 from harness.scenario.kinds import guidance_kinds
 from planner.kernel_cache import seal
 
-COURSE_RAD: Final = 0.3
+FIRST_COURSE_RAD: Final = 0.3
 TURNS: Final = 14
 TURN_DEG: Final = (20.0, 120.0)
 STRAIGHT_RADII: Final = (1.0, 4.0)
@@ -89,12 +89,12 @@ LIMIT_FACTORS: Final = {
 }
 """By how much the limits of the Aerosonde are multiplied, for the aircraft whose tracking is verified: the least of 1,
 4, 8 and 16 of which no more than two thirds is flown; of the 737's altitude in severe turbulence 0.78 of 16."""
-NOT_HELD: Final = frozenset({("f15", "severe"), ("F80C", "severe")})
-"""Aircraft that are out of thrust in turbulence of an intensity: nothing is promised of their altitude there."""
+ALTITUDE_NOT_HELD: Final = frozenset({("f15", "severe"), ("F80C", "severe")})
+"""Aircraft and turbulence in which thrust does not suffice: nothing is promised of the altitude there."""
 
 
 def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
-    """Lines and arcs of 20 to 120 degrees, left and right, at one radius, from (0, 0) along `COURSE_RAD`."""
+    """Lines and arcs of 20 to 120 degrees, left and right, at one radius, from (0, 0) along `FIRST_COURSE_RAD`."""
     rng = np.random.default_rng((seed, 1))
     pieces = [(0.0, STRAIGHT_RADII[1] * radius_m)]
     for _ in range(turns):
@@ -102,7 +102,7 @@ def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
         pieces.append((curvature, math.radians(rng.uniform(*TURN_DEG)) * radius_m))
         pieces.append((0.0, rng.uniform(*STRAIGHT_RADII) * radius_m))
     rows = []
-    point = (0.0, 0.0, math.sin(COURSE_RAD), math.cos(COURSE_RAD))
+    point = (0.0, 0.0, math.sin(FIRST_COURSE_RAD), math.cos(FIRST_COURSE_RAD))
     for curvature, length in pieces:
         rows.append((*point, curvature, length))
         point = arc_point(rows[-1], length)
@@ -159,7 +159,9 @@ def bench_tracking(
     for done, case in enumerate(CASES):
         if progress is not None:
             progress(done, len(CASES), case.name)
-        limits = case.limits.times(factor) if factor and (name, case.intensity) not in NOT_HELD else None
+        limits = (
+            case.limits.times(factor) if factor and (name, case.intensity) not in ALTITUDE_NOT_HELD else None
+        )
         row: dict[str, Any] = {"case": case.name, "limits": vars(limits) if limits else None, "lost": None}
         try:
             flown = tracked(name, case, range(1, seeds + 1), guidance=guidance)

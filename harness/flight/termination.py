@@ -12,7 +12,7 @@ from harness.world.world import Fix, World
 from planner.interface import Mission
 
 LONGEST_UNCHECKED_S = 5.0
-"""Contact is looked for at least this often, and sooner where an obstacle could be reached sooner."""
+"""Contact is checked at least this often, and sooner where an obstacle could be reached sooner."""
 
 
 class Ending(NamedTuple):
@@ -24,22 +24,22 @@ class Ending(NamedTuple):
 
 
 class Termination(Protocol):
-    """Says when and how a flight is over, from the true state. One object serves one flight."""
+    """Decides when and how a flight is over, from the true state. One object serves one flight."""
 
     contact_m: float
     """Clearance at a contact between the last two rows of the track; +inf without."""
 
     def to_go_m(self, state: AircraftState) -> float:
-        """Distance that is left."""
+        """Returns the distance (m) that is left to the end of the flight."""
         ...
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
-        """How the flight ends at a true state, control lost by a fault or not; None while it goes on."""
+        """Returns how the flight ends at a true state, also for a `fault`; None while it goes on."""
         ...
 
 
 class MissionEnd:
-    """A flight to a goal: reached, contact, bounds, time limit (simulated). Implements `Termination`."""
+    """Ends a flight to a goal: reached, contact, bounds, time limit (simulated). Implements `Termination`."""
 
     def __init__(self, world: World, mission: Mission, time_limit_s: float) -> None:
         self._world, self._mission, self._time_limit_s = world, mission, time_limit_s
@@ -57,7 +57,7 @@ class MissionEnd:
         return math.hypot(state.east_m - east, state.north_m - north)
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
-        """How the flight ends now; None while it goes on."""
+        """Returns how the flight ends now; None while it goes on."""
         if fault is not None:
             return Ending(Outcome.LOST_CONTROL, fault)
         if state.time_s < self._next_look_s:
@@ -98,7 +98,7 @@ class MissionEnd:
         return "" if self._world.ground is None else self._ground_hit(self._world.ground, state)
 
     def _ground_hit(self, ground: Ground, state: AircraftState) -> str:
-        """A sentence if the aircraft is below the ground, or was since the last look; else empty."""
+        """Returns a sentence if the aircraft is below the ground, or was since the last look; else empty."""
         here = state.east_m, state.north_m, state.up_m
         before, self._above_before = self._above_before, here
         above_m = ground.above_m(here)
@@ -109,7 +109,7 @@ class MissionEnd:
         return ""
 
     def _surely_clear_m(self, east: float, north: float, time_s: float) -> float:
-        """The true clearance; or what is surely left of that of the last look, while more than a quarter is."""
+        """Returns the true clearance, or what surely remains of the last one while that is more than a quarter."""
         world, here = self._world, (east, north, time_s)
         there_east, there_north, then_s, clearance = self._measured
         lost = math.hypot(east - there_east, north - there_north)

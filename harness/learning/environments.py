@@ -37,9 +37,9 @@ Observation = dict[str, NDArray[Any]]
 Action = NDArray[Any]
 Floats = NDArray[np.float32]
 
-MOST_BEAMS: Final = 72
-"""Beams of an observation where nobody says how many."""
-BAD: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)
+DEFAULT_BEAMS: Final = 72
+"""An observation has at most so many beams where nobody says how many."""
+BAD_OUTCOMES: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)
 STATE: Final = (
     "goal distance over the diagonal of the area",
     "cosine of the goal's bearing from the course",
@@ -51,9 +51,9 @@ STATE: Final = (
     "bank over the bank limit, positive to the right",
     "ground speed over twice the airspeed of the mission",
 )
-"""What each number of `state` is."""
-LEAST: Final = np.array([0, -1, -1, 0, 0, -1, -1, -1, 0], dtype=np.float32)
-MOST: Final = np.ones(len(STATE), dtype=np.float32)
+"""What each number of the observation's `state` is, in order."""
+STATE_LOW: Final = np.array([0, -1, -1, 0, 0, -1, -1, -1, 0], dtype=np.float32)
+STATE_HIGH: Final = np.ones(len(STATE), dtype=np.float32)
 
 
 class WaypointsEnv(gymnasium.Env[Observation, Action]):
@@ -87,7 +87,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         if self._updates < 1 or abs(self._updates - step_s * UPDATE_RATE_HZ) > 1e-9:
             raise ValueError(f"step_s is {step_s:g}; must be a multiple of {1.0 / UPDATE_RATE_HZ:g} s")
         rays = self._own.sensor.rays
-        self._beams = min(rays, MOST_BEAMS) if beams is None else beams
+        self._beams = min(rays, DEFAULT_BEAMS) if beams is None else beams
         if not 1 <= self._beams <= rays:
             raise ValueError(f"beams is {beams}; must be from 1 to the {rays} rays of the scenario's sensor")
         self._mission = replace(mission_of(self._own), bounds_m=self._own.area.bounds_m)
@@ -104,7 +104,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         self._seeded, self._to_go_m = False, math.nan
         scan, state = (
             spaces.Box(0.0, 1.0, (self._beams,), np.float32),
-            spaces.Box(LEAST, MOST, dtype=np.float32),
+            spaces.Box(STATE_LOW, STATE_HIGH, dtype=np.float32),
         )
         observed: Any = spaces.Dict({"scan": scan, "state": state})
         self.observation_space = observed
@@ -138,7 +138,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         reward = (self._to_go_m - status.to_go_m) / whole_m
         self._to_go_m = status.to_go_m
         if not before.done:  # else it has been given
-            reward += float(status.outcome is Outcome.REACHED) - float(status.outcome in BAD)
+            reward += float(status.outcome is Outcome.REACHED) - float(status.outcome in BAD_OUTCOMES)
         truncated = status.outcome is Outcome.TIMEOUT
         return self._observed(status), reward, status.done and not truncated, truncated, self._info(status)
 
@@ -222,4 +222,4 @@ def state_of(state: AircraftState, mission: Mission, bank_limit_rad: float) -> F
         state.roll_rad / bank_limit_rad,
         state.groundspeed_mps / (2.0 * mission.speed_mps),
     )
-    return np.clip(np.array(values, dtype=np.float32), LEAST, MOST)
+    return np.clip(np.array(values, dtype=np.float32), STATE_LOW, STATE_HIGH)

@@ -59,12 +59,12 @@ class WaypointPilot:
 
 @dataclass(frozen=True)
 class Episode:
-    """What was flown; `wayproof.fly(episode.scenario, **episode.pilots)` flies it again, to the same digest."""
+    """What an agent flew; `wayproof.fly(episode.scenario, **episode.pilots)` flies it again, to the same digest."""
 
     scenario: Scenario  # with the seed that was flown
     waypoints: tuple[Waypoint, ...] = ()  # that the agent gave
 
     @property
     def pilots(self) -> dict[str, Callable[[Mission], WaypointPilot]]:
-        """`planner`, as `wayproof.fly` takes it."""
+        """The arguments of `wayproof.fly` that fly the waypoints again: a `planner`."""
         return {"planner": lambda mission: WaypointPilot(mission, self.waypoints)}

@@ -33,13 +33,13 @@ SPACING_SHARE: Final = 0.25
 """Points along the given path are measured so close together, in limits of the cross-track error."""
 WINDOW_RADII: Final = 4.0
 """Track and path are compared where they are no further apart than this along the path, in turn radii."""
-LAYER_M: Final = 10.0
+LEAST_LAYER_M: Final = 10.0
 """Depth of a layer: what of a part reaches into it, and into the vertical clearance about it, is solid all through."""
-MOST_LAYERS: Final = 40
-"""A flight through more has deeper ones."""
+MOST_ALTITUDE_LAYERS: Final = 40
+"""The altitudes of a flight are cut into at most so many layers; where these do not suffice, into deeper ones."""
 WIDER, MOST_WIDER = 1.05, 3.0
 """The limit is made larger by this factor where it does not hold far enough, up to so many times what is needed."""
-MOST_TRIES: Final = 50
+MOST_LIMITS_TRIED: Final = 50
 """A corner limit that would be kept is looked for in so many steps; each makes it, and what it holds for, larger."""
 
 
@@ -88,7 +88,7 @@ def _told(
     # The place where the track is furthest off the path in relation to what is allowed there.
     row = int((passing.off_m / np.maximum(asked.allowed_m, 1e-9)).argmax())
     worst_m, most_m = float(passing.off_m[row]), float(asked.allowed_m[row])
-    line, speed = _line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
+    line, speed = _given_line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
     return {
         "ok": False,
         "verdict": "",
@@ -122,18 +122,24 @@ def verdict(
 ) -> tuple[bool, str]:
     """Whether a path can be flown as given, and a sentence that says so or why not."""
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
-    touched, high_m = _touched(seen), figures["altitude_error_m"]["max"]
+    touched, high_m = _breaches_told(seen), figures["altitude_error_m"]["max"]
     ended = [] if figures["outcome"] in ("reached", "collision") else [str(figures["reason"])]
     share = told["limit_used"]["altitude"]
     high = [f"{high_m:.3g} m off in altitude where {high_m / share:.3g} m are allowed"] if share > 1.0 else []
     alone = not (touched or ended or high) and _at_speed(figures["trackability"], limits)
-    faults = [*touched, *([tallied(bad, "legs")] if bad else []), *_how_far(told, alone), *high, *ended]
+    faults = [
+        *touched,
+        *([tallied(bad, "legs")] if bad else []),
+        *_deviation_told(told, alone),
+        *high,
+        *ended,
+    ]
     if not faults and not figures["trackable"]:
         faults.append("no leg was flown")
-    return (False, "no: " + "; ".join(faults)) if faults else (True, _yes(told, limits))
+    return (False, "no: " + "; ".join(faults)) if faults else (True, _flown_as_given_told(told, limits))
 
 
-def _touched(seen: Kept) -> list[str]:
+def _breaches_told(seen: Kept) -> list[str]:
     """What was touched, entered and left, the deepest of each kind, and how many more there are."""
     kinds = (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves"))
     crossed = [([each for each in seen.crossings if each.kind == kind], verb) for kind, verb in kinds]
@@ -147,7 +153,7 @@ def _touched(seen: Kept) -> list[str]:
     return found
 
 
-def _yes(told: Mapping[str, Any], limits: FlightLimits) -> str:
+def _flown_as_given_told(told: Mapping[str, Any], limits: FlightLimits) -> str:
     """How a path was flown, and how much of the limits was used."""
     used, tolerance_m = told["limit_used"], limits.cross_track_threshold_m
     how = "as drawn" if told["drawn"] else "with its corners cut by no more than allowed"
@@ -184,7 +190,7 @@ def _at_speed(legs: Sequence[Mapping[str, Any]], limits: FlightLimits) -> bool:
     )
 
 
-def _how_far(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
+def _deviation_told(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
     """How far off the path and a corner an aircraft was, where too far; `corners_alone`: nothing else is wrong."""
     worst, enough_m = told["worst"], told["corner_m_that_would_do"]
     missed = next((corner for corner in told["corners"] if not corner["kept"]), None)
@@ -208,7 +214,7 @@ def _sufficient_m(passing: _Passing) -> float | None:
     if all(each["kept"] for each in reached) or any(each["flown_cut_m"] is None for each in reached):
         return None
     limit_m = 0.0
-    for _ in range(MOST_TRIES):
+    for _ in range(MOST_LIMITS_TRIED):
         tried = [replace(corner, allowed_cut_m=limit_m) for corner in passing.corners]
         needed_m = max(passing.of(corner)["most_off_m"] for corner in tried)
         allowed_m = passing.stations.allowed_m(passing.tolerance_m, tried)
@@ -220,7 +226,7 @@ def _sufficient_m(passing: _Passing) -> float | None:
     return None
 
 
-def _line(plan: PathPlan) -> FloatArray:
+def _given_line(plan: PathPlan) -> FloatArray:
     """(k, 2) the line that was given: of a mission with its circles."""
     if not plan.marks:
         return plan.way.waypoints_m
@@ -230,7 +236,7 @@ def _line(plan: PathPlan) -> FloatArray:
 
 
 def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:
-    """What the path asks for, row by row."""
+    """Returns what the path asks for in each row of the track."""
     track, corners = passing.track, passing.corners
     along, profile = np.nan_to_num(track.arc_length_m), plan.profile
     asked = np.maximum(np.searchsorted(profile.speed_from_m, along, side="right") - 1, 0)
@@ -239,7 +245,7 @@ def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:
         rates = {speed: plan.climb_mps(speed) for speed in set(profile.airspeed_mps.tolist())}
         fastest = np.array([rates[speed] for speed in profile.airspeeds(along).tolist()]).reshape(-1, 2)
     return AsGiven(
-        _ends(plan, corners),
+        _leg_ends(plan, corners),
         passing.off_m,
         passing.stations.allowed_m(passing.tolerance_m, corners),
         altitude_m=profile.altitudes(along),
@@ -250,7 +256,7 @@ def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:
     )
 
 
-def _ends(plan: PathPlan, corners: Sequence[CutCorner]) -> list[CutCorner]:
+def _leg_ends(plan: PathPlan, corners: Sequence[CutCorner]) -> list[CutCorner]:
     """Where legs end: at every item of a mission; at the corners of a drawn line, and where its slope changes."""
     known = {(corner.waypoint, round(corner.arc_length_m, 3)): corner for corner in corners}
     plain = {
@@ -282,7 +288,7 @@ class _Passing:
         return np.append(np.flatnonzero(self.off_m <= self.tolerance_m), len(self.track))
 
     def waypoint_at(self, row: int) -> int | None:
-        """Number of the first corner about which a row of the track lies."""
+        """Returns the number of the first corner about which a row of the track lies; None if it is about none."""
         return next((each.waypoint for each in self.corners if row in self.stations.at_corner(each)), None)
 
     def of(self, corner: CutCorner) -> dict[str, Any]:
@@ -317,7 +323,7 @@ def layer_contacts(
     origin = scenario.area.origin
     place = Place(origin.latitude_deg, origin.longitude_deg)
     known = None if scenario.ground is None else scenario.ground.field()
-    deep = max(LAYER_M, float(np.ptp(track.up_m)) / MOST_LAYERS) if specs else LAYER_M
+    deep = max(LEAST_LAYER_M, float(np.ptp(track.up_m)) / MOST_ALTITUDE_LAYERS) if specs else LEAST_LAYER_M
     thick = [replace(spec, vertical_clearance_m=spec.vertical_clearance_m + 0.5 * deep) for spec in specs]
     layer = np.floor(track.up_m / deep).astype(np.int64)
     found: list[Breach] = []

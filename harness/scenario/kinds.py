@@ -23,7 +23,7 @@ from aircraft.guidance.registry import GuidanceKind
 from planner.registry import BUILT_IN as PLANNERS
 from planner.registry import PlannerKind
 
-REMEDY = "mend or uninstall that distribution"
+PLUGIN_REMEDY = "mend or uninstall that distribution"
 
 
 class PluginError(ImportError):
@@ -58,9 +58,9 @@ class LoopPart:
                     kind = point.load()
             except Exception as error:
                 reason = " ".join(f"{type(error).__name__}: {error}".split())
-                raise PluginError(f"{told} cannot be loaded: {reason}; {REMEDY}") from error
+                raise PluginError(f"{told} cannot be loaded: {reason}; {PLUGIN_REMEDY}") from error
             if not isinstance(kind, self.kind):
-                raise PluginError(f"{told} is no {self.kind.__name__}; {REMEDY}")
+                raise PluginError(f"{told} is no {self.kind.__name__}; {PLUGIN_REMEDY}")
             found.setdefault(kind.kind, (kind, owner))
         return found
 
@@ -92,8 +92,8 @@ def _entry_points(find: Callable[..., EntryPoints], group: str, path: tuple[str,
 
 
 PLANNER = LoopPart("planner", PlannerKind, PLANNERS, "wayproof.planners", ("plan(request)",), "mission")
-LAW = ("update(state)", "follow(route, arc_length_m)")
-GUIDANCE = LoopPart("guidance law", GuidanceKind, LAWS, "wayproof.guidance", LAW, "limits")
+LAW_METHODS = ("update(state)", "follow(route, arc_length_m)")
+GUIDANCE = LoopPart("guidance law", GuidanceKind, LAWS, "wayproof.guidance", LAW_METHODS, "limits")
 
 
 def planner_kinds() -> dict[str, PlannerKind]:
@@ -114,7 +114,7 @@ class NoKeys:
     """The own keys of a part that has none."""
 
     def resolved(self, told: object) -> NoKeys:
-        """Itself."""
+        """Returns the keys as they are: there is nothing to fill in."""
         return self
 
 
@@ -163,12 +163,12 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
         return given
     made: Callable[[Any, Any], Any] = lambda _keys, _told: given  # noqa: E731
     if isinstance(given, type) or (callable(given) and not _is_part(given, part)):
-        made = _maker(given, part)
+        made = _factory_of(given, part)
     elif not _is_part(given, part):
         wanted = f"a kind, a class, a function or an object with the method {' and '.join(part.methods)}"
         raise ValueError(f"a {part.noun} must be {wanted}; this is a {type(given).__name__}")
     summary = (inspect.getdoc(given) or f"a {part.noun} given in Python").splitlines()[0]
-    kind: Kind = part.kind(_name(given), summary, NoKeys, made)
+    kind: Kind = part.kind(_name_of(given), summary, NoKeys, made)
     return kind
 
 
@@ -180,13 +180,13 @@ def _is_part(given: object, part: LoopPart) -> bool:
     return all(callable(getattr(given, each.partition("(")[0], None)) for each in part.methods)
 
 
-def _name(given: Any) -> str:
+def _name_of(given: Any) -> str:
     name: str = getattr(given, "__qualname__", type(given).__qualname__).replace("<locals>.", "")
     module = getattr(given, "__module__", "__main__")
     return name if module == "__main__" else f"{module}:{name}"
 
 
-def _maker(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], Any]:
+def _factory_of(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], Any]:
     """Calls what was given with what it may know, where it takes that; else with nothing."""
     try:
         parameters = inspect.signature(given).parameters
@@ -195,7 +195,7 @@ def _maker(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], An
     plain = [each for each in parameters.values() if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
     needed = [each.name for each in plain if each.default is each.empty]
     if len(needed) > 1:
-        told = f"{_name(given)} needs {', '.join(needed)}; must need the {part.factory_parameter} alone, or nothing"
+        told = f"{_name_of(given)} needs {', '.join(needed)}; must need the {part.factory_parameter} alone, or nothing"
         raise ValueError(told)
 
     def make(_keys: Any, told: Any) -> Any:
@@ -203,7 +203,7 @@ def _maker(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], An
         made = given(told) if needed else given(**keys)
         if not _is_part(made, part):
             lacks = f"which has no method {' and '.join(part.methods)}"
-            raise TypeError(f"{_name(given)} makes a {type(made).__name__}, {lacks}")
+            raise TypeError(f"{_name_of(given)} makes a {type(made).__name__}, {lacks}")
         return made
 
     return make

@@ -15,10 +15,10 @@ MAX_ERROR_M: Final = 10_000.0
 Error = Annotated[float, Field(ge=0, le=MAX_ERROR_M)]
 Offset = Annotated[float, Field(ge=-MAX_ERROR_M, le=MAX_ERROR_M)]
 
-SIGMAS: Final = 3.0
+MARGIN_SIGMAS: Final = 3.0
 """The planner's margin covers this many sigma of the position error: 1 - exp(-9 / 2) of all errors in the plane."""
 
-_ZERO: Final = (
+_ERROR_KEYS: Final = (
     *(
         "position_sigma_m",
         "velocity_sigma_mps",
@@ -28,7 +28,7 @@ _ZERO: Final = (
     ),
     *("drift_share", "latency_s"),
 )
-_PERFECT: Final[dict[str, Any]] = dict.fromkeys(_ZERO, 0.0) | {
+_PERFECT: Final[dict[str, Any]] = dict.fromkeys(_ERROR_KEYS, 0.0) | {
     "position_correlation_s": 1100.0,  # [BM], 1 / k_GPS of the Gauss-Markov table
     "position_bias_m": (0.0, 0.0),
     "outages_s": (),
@@ -123,9 +123,9 @@ def planning_margin_m(
 ) -> float:
     """What clearance must have on top, so that the true aircraft keeps it where the believed one does (m).
 
-    `SIGMAS` of the position error, its bias, what is flown at `speed_mps`, wind included, while the state grows old,
-    and the drift of the longest outage, up to `time_limit_s`. The map drifts as the aircraft does: what stands in it is
-    off only by what was drifted since it was last seen, half a turn ago at most.
+    `MARGIN_SIGMAS` of the position error, its bias, what is flown at `speed_mps`, wind included, while the state grows
+    old, and the drift of the longest outage, up to `time_limit_s`. The map drifts as the aircraft does: what stands in
+    it is off only by what was drifted since it was last seen, half a turn ago at most.
 
     A heading error turns the scan: an edge at distance d is misplaced by d times the error, square to where it is seen.
     The map places an edge anew whenever it is seen from 0.7 of the distance (`harness.mapping.obstacle_map`), the last
@@ -134,7 +134,7 @@ def planning_margin_m(
     """
     lasting_s = [min(end, time_limit_s) - min(begin, time_limit_s) for begin, end in navigation.outages_s]
     unseen_m = min(speed_mps * max(lasting_s, default=0.0), math.pi * turn_radius_m)
-    turned_rad = SIGMAS * math.radians(navigation.heading_sigma_deg)
+    turned_rad = MARGIN_SIGMAS * math.radians(navigation.heading_sigma_deg)
     turned_m = turned_rad * max(clearance_m, 4.0 * turn_radius_m * turned_rad)
-    known_m = SIGMAS * navigation.position_sigma_m + math.hypot(*navigation.position_bias_m)
+    known_m = MARGIN_SIGMAS * navigation.position_sigma_m + math.hypot(*navigation.position_bias_m)
     return known_m + navigation.latency_s * speed_mps + navigation.drift_share * unseen_m + turned_m
