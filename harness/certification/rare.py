@@ -77,7 +77,9 @@ def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, co
         method = f"subset simulation, {RUNS} independent runs with fixed levels, their estimates taken as lognormal"
     else:
         low, high = clopper_pearson(failed, count, confidence)
-        why = "runs of the subset simulation differ too much" if levels else "they are not rare"
+        why = "they are not rare" if failed * CHAIN**2 > count else "the pilot found no levels"
+        if levels:
+            why = "runs of the subset simulation differ too much"
         method = f"Clopper-Pearson, failures of the {count} days drawn as they come: {why}"
     told = tuple(levels), tuple(estimates.tolist()), count, failed
     return Rare(mean, min(low, mean), max(high, mean), *told, method)

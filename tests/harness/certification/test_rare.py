@@ -65,7 +65,9 @@ def test_where_no_day_fails_the_bound_is_that_of_counting_and_says_how_near_it_c
     assert (found.failure_probability, found.failure_lower) == (0.0, 0.0)
     assert found.failure_upper == pytest.approx(1.0 - 0.05 ** (1.0 / found.plain_runs), rel=1e-9)
     assert 1.0 < found.levels[-1] < found.levels[0] < 2.0
-    assert subset_simulation(lambda x, _: np.full(len(x), np.inf), 4, 3000, 1, 0.95).levels == ()
+    none = subset_simulation(lambda x, _: np.full(len(x), np.inf), 4, 3000, 1, 0.95)
+    assert none.levels == ()
+    assert none.method.endswith(": the pilot found no levels")
 
 
 @pytest.mark.flights
