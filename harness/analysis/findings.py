@@ -70,7 +70,7 @@ def bank_reversals_per_min(track: Track) -> float:
 
 
 def contradictions_s(track: Track, plans: Sequence[AcceptedPlan]) -> list[float]:
-    """Simulated times at which a plan took effect that leads to the other side of the course than the one before."""
+    """Times (s) at which a plan took effect that soon leads to the other side of the course flown than the last."""
     index = track.plan_index
     times = []
     for row in (np.flatnonzero(np.diff(index) > 0) + 1).tolist():

@@ -182,7 +182,7 @@ def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, asked: As
 
 
 def _at_speed(legs: Sequence[Mapping[str, Any]], limits: FlightLimits) -> bool:
-    """Whether airspeed and load factor were within their limits on every leg."""
+    """Whether load factor and mean airspeed error stayed within their limits on every leg."""
     return all(
         leg["max_load_factor"] <= limits.max_load_factor
         and (leg["max_airspeed_error_mps"] or 0.0) <= limits.max_airspeed_error_mps

@@ -52,6 +52,7 @@ def in_plane(fences: Fences, plane: Callable[[Place], Place], source: str) -> Fe
 
 
 def _clean_fence(fence: Fence, source: str) -> Fence:
+    """The fence without corners that come twice in a row; an InputError if it then encloses no valid area."""
     import shapely
 
     # A ring is closed; a corner that comes twice in a row is one.

@@ -60,7 +60,7 @@ USED_BY: Final = {
 
 
 def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
-    """Returns the keys that a file was given and does not use, each with a sentence that says so."""
+    """Returns the keys set otherwise than by default that a file cannot use, each with the fault to raise."""
     told = {}
     for key, used_by in USED_BY.items():
         if contents.kind not in used_by and getattr(spec, key) != getattr(FileSpec, key):

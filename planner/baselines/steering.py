@@ -125,7 +125,7 @@ def turn_rad(a: ArrayLike, b: ArrayLike) -> FloatArray:
 
 
 def _to_border_m(straight: Segment, bounds_m: tuple[float, float, float, float]) -> float:
-    """Length of a straight line inside the area; negative if it begins outside."""
+    """Distance (m) from where a line begins to the border, however long the line is; -inf if it begins outside."""
     x, y, ux, uy, _, _ = straight
     xmin, ymin, xmax, ymax = bounds_m
     room = [math.inf]

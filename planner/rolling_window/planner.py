@@ -199,7 +199,7 @@ class RollingWindow(CertifiedPlanner):
         return Work.WHILE_SERVING if serves else Work.WHILE_CUT
 
     def _unsafe(self, now: Situation) -> bool:
-        """Whether no safe plan is in effect while a search goes on."""
+        """Whether no plan is in effect, or it is broken and what is wrong with it is near."""
         return now.plan is None or self._monitor.urgent(now.plan, now.here_m)
 
     def _follow(self, found: CommittedPlan) -> Plan:

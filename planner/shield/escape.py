@@ -96,7 +96,7 @@ class Escapes:
         self._began_hidden = False  # the first turn led behind something: nothing was certain of it
 
     def threats(self, request: PlanRequest) -> Threats | None:
-        """The threats near the aircraft while something moves or has just appeared; None otherwise."""
+        """All that stands or moves near the aircraft while something moves or has just appeared; None otherwise."""
         appeared = request.time_s - request.seen.last_contradiction_s < EVADING_S
         return self._near(request) if appeared or len(request.seen.moving) > 0 else None
 

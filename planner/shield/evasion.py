@@ -129,7 +129,7 @@ def rolled_out(prefix: Sequence[Segment], limits: Limits) -> Iterator[Path]:
 def clearest(
     ways: Iterable[Path], bounds_m: tuple[float, float, float, float], threats: Threats, more_than_m: float
 ) -> Path | None:
-    """The way in the area with the most room, if that is more than `more_than_m`; else None."""
+    """The way in the area with the most room from the threats, if more than `more_than_m` (m); else None."""
     best: Path | None = None
     for way in ways:
         if inside_bounds(way, bounds_m) and (room_m := threats.room_m(way, more_than_m)) > more_than_m:
