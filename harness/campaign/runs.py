@@ -308,6 +308,9 @@ def flown_run(
     """
     table, about = read_table(results)
     digests = dict(zip(table["run"].to_pylist(), table["digest"].to_pylist(), strict=True))
+    if "path" in about:
+        told = f"{RUNS}/{run}/manifest.json, where that run was kept, has the command that flies it again"
+        raise InputError(f"{results}: has the days of a given path; {told}")
     if about.get("rare"):
         kept = results.parent / RUNS / str(run) / SCENARIO
         if not kept.is_file():
