@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import sys
+import threading
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
@@ -15,8 +16,17 @@ FRAME = b"\x80\x05\x95"
 """First bytes of an index: numba's version, a pickle of one frame, whose length follows in eight bytes."""
 
 
-@functools.cache
+_sealing = threading.Lock()
+
+
 def seal() -> None:
+    """Seals once, whichever of several threads comes first."""
+    with _sealing:
+        _seal()
+
+
+@functools.cache
+def _seal() -> None:
     """Has numba append a SHA-256 to each file of compiled code, and compile again where it does not match."""
     _put_off_linear_algebra()
     from numba.core.caching import IndexDataCacheFile as File
