@@ -209,14 +209,13 @@ class LocalPlanning:
         """
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         terrain = self._terrain(start, attempt, points)
-        in_turn = self.room.terrain(BROKEN_SHARE * self._mission.clearance_m)
         best: FlyableRoute | None = None
-        for each in start.later(TURN_EXITS if turning else 1):
-            pose, before = each.pose, each.prefix[len(start.prefix) :]
-            least_m = sum(segment[5] for segment in before) + math.dist(pose[:2], nodes[-1])
+        for pose, before in start.later(TURN_EXITS if turning else 1):
+            least_m = sum(arc[5] for arc in before) + math.dist(pose[:2], nodes[-1])
             if best is not None and least_m >= best.path.length_m:
                 break
-            if before and not in_turn.admits(Path(np.array(before))):
+            in_turn = self.room.terrain(BROKEN_SHARE * self._mission.clearance_m) if before else None
+            if in_turn and not in_turn.admits(Path(np.array(before))):
                 break  # something has come near to the turn
             route = optimise(pose, start.curvature, (pose[:2], *nodes[1:]), self.limits, cut, terrain)
             if route is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -65,12 +65,12 @@ class Start:
     curvature: float = 0.0
     prefix: list[Segment] = field(default_factory=list)
 
-    def later(self, count: int) -> Iterator[Start]:
-        """Yields this start, and on a turn `count` - 1 others further round it, evenly spaced."""
-        yield self
+    def later(self, count: int) -> Iterator[tuple[Pose, list[Segment]]]:
+        """Yields the pose, and on a turn `count` - 1 further round it, evenly spaced; each with the way there."""
+        yield self.pose, []
         for i in range(1, count if self.curvature else 1):
             arc: Segment = (*self.pose, self.curvature, math.tau * i / count / abs(self.curvature))
-            yield replace(self, pose=along(arc, arc[5]), prefix=[*self.prefix, arc])
+            yield along(arc, arc[5]), [arc]
 
 
 def start_of(
