@@ -50,9 +50,7 @@ def _mended(text: str) -> str:
     places = set(re.findall(r'id="([^"]*)"', text))
     text = NO_DEFAULT.sub("", text)
     return re.sub(
-        r'<a href="#([^"]*)"([^>]*)>(.*?)</a>',
-        lambda link: link[0] if link[1] in places else link[3],
-        text,
+        r'<a href="#([^"]*)"([^>]*)>(.*?)</a>', lambda link: link[0] if link[1] in places else link[3], text
     )
 
 

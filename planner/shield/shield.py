@@ -22,16 +22,7 @@ from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, between, on_loiter, place_on, poses_at
 from planner.geometry.terrain import WorkCount
-from planner.interface import (
-    Mission,
-    NoWayToBegin,
-    Path,
-    Plan,
-    Planner,
-    PlanRequest,
-    PlanStatus,
-    Refused,
-)
+from planner.interface import Mission, NoWayToBegin, Path, Plan, Planner, PlanRequest, PlanStatus, Refused
 from planner.memory import ObstacleMemory
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.certificate import Certified, Certifier, hold_centre

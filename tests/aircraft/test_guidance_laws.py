@@ -7,11 +7,7 @@ import pytest
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.l1 import L1Circle, L1Config, L1Memory, L1Motion, follow_circle
 from aircraft.guidance.npfg import NpfgConfig, NpfgInput, npfg
-from aircraft.guidance.pure_pursuit import (
-    PurePursuitConfig,
-    look_ahead_distance,
-    pure_pursuit,
-)
+from aircraft.guidance.pure_pursuit import PurePursuitConfig, look_ahead_distance, pure_pursuit
 from aircraft.guidance.vector_field import VectorFieldConfig, VectorFieldLaw, line_course, orbit_course
 from aircraft.interface import GRAVITY_MPS2, AircraftState
 from tests.contracts.test_guidance_contract import LINE, Point, route_of

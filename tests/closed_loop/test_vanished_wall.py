@@ -15,9 +15,7 @@ GOAL = (9600.0, 4000.0)
 
 
 @pytest.mark.parametrize("wind", [None, {"speed_mps": 8.0, "from_deg": 300.0}])
-def test_a_vanished_wall_is_cut_short_within_25_seconds(
-    wind: dict[str, Any] | None,
-) -> None:
+def test_a_vanished_wall_is_cut_short_within_25_seconds(wind: dict[str, Any] | None) -> None:
     # When it vanishes, the end that the aircraft flies to is more than a kilometre away.
     wall = {
         "polygon": {"vertices_m": [[2000, 500], [2100, 500], [2100, 7500], [2000, 7500]]},

@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 
 from harness.analysis.flight_limits import FlightLimits
-from harness.analysis.metrics import (
-    error_figures,
-    metrics,
-    percentiles,
-)
+from harness.analysis.metrics import error_figures, metrics, percentiles
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
 from planner.interface import Path
 from tests.harness.conftest import plan as make_plan

@@ -255,11 +255,7 @@ def test_the_fences_of_a_mission_are_kept(
 
 @pytest.mark.parametrize(
     ("acceptance_m", "options", "status", "allowed_m"),
-    [
-        (0.0, (), 0, 90.0),
-        (50.0, (), 0, 50.0),
-        (50.0, ("--corner-m", "5"), 1, 5.0),
-    ],
+    [(0.0, (), 0, 90.0), (50.0, (), 0, 50.0), (50.0, ("--corner-m", "5"), 1, 5.0)],
 )
 def test_a_mission_may_cut_corners_by_its_acceptance_radius(
     acceptance_m: float,

@@ -164,8 +164,7 @@ def test_of_two_receivers_the_first_is_taken_where_it_has_a_fix(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("ending", "write", "row"),
-    [(".ulg", write_ulog, 3 + 2 + 30), (".bin", write_dataflash, 3 + 20)],
+    ("ending", "write", "row"), [(".ulg", write_ulog, 3 + 2 + 30), (".bin", write_dataflash, 3 + 20)]
 )
 def test_of_a_damaged_log_it_is_said_that_it_is(
     ending: str, write: Callable[[Path], None], row: int, tmp_path: Path

@@ -25,8 +25,7 @@ def shipped(name: str, **overrides: str) -> Scenario:
 
 
 @pytest.mark.parametrize(
-    ("from_deg", "east", "north"),
-    [(0.0, 0.0, -6.0), (90.0, -6.0, 0.0), (180.0, 0.0, 6.0), (270.0, 6.0, 0.0)],
+    ("from_deg", "east", "north"), [(0.0, 0.0, -6.0), (90.0, -6.0, 0.0), (180.0, 0.0, 6.0), (270.0, 6.0, 0.0)]
 )
 def test_wind_comes_from_where_the_scenario_says(from_deg: float, east: float, north: float) -> None:
     air = atmosphere(shipped("polygon_town", environment__wind__from_deg=str(from_deg)))

@@ -12,15 +12,7 @@ import pytest
 
 from harness.files.input_file import InputError
 from harness.world_files.kinds import read
-from harness.world_files.parts import (
-    FOOT_M,
-    NO_BOTTOM,
-    NO_TOP,
-    Contents,
-    Datum,
-    Limit,
-    Reading,
-)
+from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Reading
 from tests.harness.world_files.making import feature, geojson
 
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of rasterio's own

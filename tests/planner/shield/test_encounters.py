@@ -10,14 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planner.interface import FloatArray, MovingEdges
-from planner.shield.encounters import (
-    EARLIEST,
-    FASTEST_SHARE,
-    LATEST,
-    PASSING_S,
-    meeting_s,
-    met_at,
-)
+from planner.shield.encounters import EARLIEST, FASTEST_SHARE, LATEST, PASSING_S, meeting_s, met_at
 from tests.examples import examples
 
 SPEED, SPACING = 25.0, 20.0
@@ -57,11 +50,7 @@ def test_the_time_is_that_of_a_simulation(seed: int, pace: float, course: float)
 @example(seed=1, pace=15.0, course=0.3, share=LATEST, later=PASSING_S)
 @settings(max_examples=examples(15))
 @given(
-    seed=SEEDS,
-    pace=PACES,
-    course=COURSES,
-    share=st.floats(EARLIEST, LATEST),
-    later=st.floats(0.0, PASSING_S),
+    seed=SEEDS, pace=PACES, course=COURSES, share=st.floats(EARLIEST, LATEST), later=st.floats(0.0, PASSING_S)
 )
 def test_whoever_flies_to_any_point_of_the_outline_meets_it_where_it_is_drawn(
     seed: int, pace: float, course: float, share: float, later: float

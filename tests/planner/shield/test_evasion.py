@@ -17,15 +17,7 @@ from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, Pl
 from planner.rolling_window.planner import RollingWindow
 from planner.shield.encounters import EARLIEST, LATEST
 from planner.shield.escape import LOITER_SHARES
-from planner.shield.evasion import (
-    AHEAD_S,
-    DISCOUNT,
-    UNKNOWN_MPS,
-    UNKNOWN_S,
-    Threats,
-    clearest,
-    rolled_out,
-)
+from planner.shield.evasion import AHEAD_S, DISCOUNT, UNKNOWN_MPS, UNKNOWN_S, Threats, clearest, rolled_out
 from tests.examples import examples
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
