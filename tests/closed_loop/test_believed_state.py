@@ -47,17 +47,18 @@ class Asked:
         return self._plan(request)  # type: ignore[no-any-return]
 
 
+Flown = tuple[Flight, Asked, np.ndarray]
+
+
 @pytest.fixture(scope="module")
-def flown() -> tuple[Flight, Asked, np.ndarray]:
+def flown() -> Flown:
     loop = make_loop(small_world(TREE), PointMass)
     asked = Asked(loop.planner)
     flight = fly(replace(loop, planner=asked, navigator=Shifted()))
     return flight, asked, loop.seen.edges_since(0)
 
 
-def test_the_planner_is_told_where_the_aircraft_believes_to_be(
-    flown: tuple[Flight, Asked, np.ndarray],
-) -> None:
+def test_the_planner_is_told_where_the_aircraft_believes_to_be(flown: Flown) -> None:
     flight, asked, _ = flown
     times = flight.track.time_s.tolist()
     for request in asked.requests[::20]:
@@ -66,13 +67,13 @@ def test_the_planner_is_told_where_the_aircraft_believes_to_be(
         assert request.position_m == pytest.approx((true[0] + EAST_M, true[1] + NORTH_M))
 
 
-def test_scans_enter_the_map_from_there(flown: tuple[Flight, Asked, np.ndarray]) -> None:
+def test_scans_enter_the_map_from_there(flown: Flown) -> None:
     edges = flown[2] - (3000.0 + EAST_M, 3000.0 + NORTH_M)
     assert len(edges) > 50
     np.testing.assert_allclose(np.hypot(*edges.T), 300.0, atol=5.0)
 
 
-def test_guidance_follows_the_plan_where_it_believes_to_be(flown: tuple[Flight, Asked, np.ndarray]) -> None:
+def test_guidance_follows_the_plan_where_it_believes_to_be(flown: Flown) -> None:
     """It sees no error; the aircraft is off by all that it is wrong about."""
     flight = flown[0]
     assert flight.outcome is Outcome.REACHED, flight.reason
@@ -89,9 +90,7 @@ def test_guidance_follows_the_plan_where_it_believes_to_be(flown: tuple[Flight, 
         assert point.cross_track_m == pytest.approx(told, abs=1e-6)
 
 
-def test_altitude_and_airspeed_that_are_held_are_believed_ones(
-    flown: tuple[Flight, Asked, np.ndarray],
-) -> None:
+def test_altitude_and_airspeed_that_are_held_are_believed_ones(flown: Flown) -> None:
     track = flown[0].track
     np.testing.assert_allclose(track.up_m[1:], 300.0 - UP_M)
     np.testing.assert_allclose(track.airspeed_mps[1:], 25.0 - AIRSPEED_MPS)

@@ -94,9 +94,7 @@ def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1, day: s
     for _ in range(condition.get("move", 0)):
         obstacles += _moving(rng, start, goal, clearance, range_m)
     way_m = max(world["optimum_m"] or 0.0, abs(goal - start), 10_000.0)
-    if condition.get(
-        "outages"
-    ):  # two of a minute, after a quarter and after three fifths of the straight way
+    if condition.get("outages"):  # two of a minute, after a quarter and three fifths of the straight way
         begins = (max(least_s, round(share * abs(goal - start) / SPEED_MPS)) for share, least_s in OUTAGES)
         navigation = navigation | {"outages_s": [[begin, begin + 60] for begin in begins]}
     return scenario_of(

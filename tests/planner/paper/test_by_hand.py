@@ -181,6 +181,8 @@ def test_with_nothing_in_the_way_the_steps_go_along_the_guide_vector() -> None:
     assert track.left_m == pytest.approx(4200.0)
     (short,) = multi_step_search(window(NOTHING, goal=(250.0, 0.0)), (0.0, 0.0), 0.0)
     np.testing.assert_allclose(short.nodes, [(0.0, 0.0), (100.0, 0.0), (200.0, 0.0), (250.0, 0.0)], atol=1e-9)
+    (inside,) = multi_step_search(window(NOTHING, r1=450.0), (0.0, 0.0), 0.0)
+    assert inside.nodes[-1] == pytest.approx((400.0, 0.0)), "no step leads out of the window"
 
 
 def test_one_obstacle_is_passed_beside_its_tangents() -> None:
@@ -210,11 +212,6 @@ def test_where_all_directions_are_closed_only_what_a_step_can_meet_counts() -> N
     assert max(math.hypot(*node) for node in best.nodes) <= 700.0 * math.cos(0.05) - math.sqrt(
         60.0**2 - 35.0**2
     )
-
-
-def test_no_step_leads_out_of_the_window() -> None:
-    (track,) = multi_step_search(window(NOTHING, r1=450.0), (0.0, 0.0), 0.0)
-    assert track.nodes[-1] == pytest.approx((400.0, 0.0))
 
 
 def test_the_depth_is_halved_where_no_candidate_gets_on() -> None:

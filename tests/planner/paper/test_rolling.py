@@ -72,11 +72,8 @@ def test_a_new_plan_goes_on_from_the_one_in_effect_without_a_kink() -> None:
 @pytest.mark.parametrize(
     ("half_m", "end_m", "status"),
     [
-        (
-            2000.0,
-            15_000.0,
-            PlanStatus.NO_BETTER,
-        ),  # round its end: 3,125 + 7,343 m, 1,268 m more; S_0 is 750 m
+        # Round its end: 3,125 + 7,343 m, 1,268 m more; S_0 is 750 m.
+        (2000.0, 15_000.0, PlanStatus.NO_BETTER),
         (1000.0, 15_000.0, PlanStatus.FOUND),  # 2,515 + 7,105 m, 420 m more
         (2000.0, 10_500.0, PlanStatus.FOUND),  # the last step of the plan in effect
     ],

@@ -192,31 +192,20 @@ def test_a_plan_is_kept_while_nothing_changes(ring: MakePoints) -> None:
     assert 1 <= prolonged <= 40
 
 
-def test_new_points_on_the_plan_bring_a_new_one(ring: MakePoints) -> None:
-    seen, pilot = Seen(nothing()), planner()
+@pytest.mark.parametrize("latency_s", [0.0, 4.0])
+def test_new_points_on_the_plan_bring_a_new_one(latency_s: float, ring: MakePoints) -> None:
+    seen, pilot = Seen(nothing()), planner(replace(MISSION, compute_latency_s=latency_s))
     plan = pilot.plan(first_request(seen))
     points = ring(2500.0, 100.0, 600.0, SPACING)
     seen.show(points)
-    request = request_on(plan, 500.0, seen)
-    answer = pilot.plan(request)
+    answer = pilot.plan(request_on(plan, 500.0, seen))
     assert answer.status is PlanStatus.FOUND
     assert answer.path is not None
     assert room(sample(answer.path, 50.0, 0.01), points) >= MISSION.clearance_m
-    # It leaves the old plan a second of flight ahead of the aircraft, not at it.
-    np.testing.assert_allclose(
-        pose_at(answer.path, 20.0), pose_at(plan.path or Path(nothing()), 520.0), atol=1e-6
-    )
-
-
-def test_a_late_plan_leaves_the_old_one_after_its_latency() -> None:
-    mission = replace(MISSION, compute_latency_s=4.0)
-    seen, pilot = Seen(nothing()), planner(mission)
-    plan = pilot.plan(first_request(seen))
-    assert plan.path is not None
-    seen.show(np.array([(3000.0, 20.0)]))
-    answer = pilot.plan(request_on(plan, 500.0, seen))
-    assert answer.path is not None
-    np.testing.assert_allclose(pose_at(answer.path, 100.0), pose_at(plan.path, 600.0), atol=1e-6)
+    # It leaves the old plan a second of flight ahead of where the aircraft is when it comes, not at it.
+    on_m = 20.0 + 20.0 * latency_s
+    old = plan.path or Path(nothing())
+    np.testing.assert_allclose(pose_at(answer.path, on_m), pose_at(old, 500.0 + on_m), atol=1e-6)
 
 
 def test_a_plan_shows_how_it_came_about(ring: MakePoints) -> None:

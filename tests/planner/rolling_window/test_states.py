@@ -93,21 +93,17 @@ def test_a_plan_that_serves_is_prolonged_and_followed_on() -> None:
     assert {each.reason for each in answers[:-1] if each.status is PlanStatus.NO_BETTER} <= {NO_BETTER}
 
 
-def test_in_its_turn_the_aircraft_loiters() -> None:
+def test_in_its_turn_the_aircraft_loiters_and_gives_up_a_place_that_was_turned_before_twice() -> None:
     pilot, seen, plan, entry_m = loitering()
     pilot.plan(request_on(plan, entry_m + 10.0, seen))
     assert pilot.state in (PlanningState.LOITERING, PlanningState.GIVING_UP)
     pilot.plan(request_on(plan, entry_m + 11.0, seen))
     assert pilot.state is PlanningState.LOITERING
     assert len(pilot._memory.refused_m) == 0
-
-
-def test_a_place_that_was_turned_before_twice_is_given_up_on_entering_the_loiter() -> None:
-    pilot, now = in_the_loiter()
-    assert now.plan is not None
-    assert len(pilot._memory.refused_m) == 0
+    committed = pilot._monitor.plan
+    assert committed is not None
     pilot._loitered = None  # as if another plan had come to the same place
-    pilot._loiter(now, now.plan)
+    pilot._loiter(Situation(request_on(plan, entry_m + 50.0, seen), committed, entry_m + 50.0), committed)
     assert pilot.state is PlanningState.LOITERING
     assert len(pilot._memory.refused_m) > 0
 
@@ -122,15 +118,12 @@ def test_from_the_loiter_a_way_that_opens_is_followed() -> None:
     assert pilot.state is PlanningState.FOLLOWING
 
 
-def test_walled_in_at_the_start_a_turn_is_the_escape(ring: MakePoints) -> None:
+def test_walled_in_at_the_start_a_turn_is_the_escape_where_there_is_room(ring: MakePoints) -> None:
     pilot = planner()
     answer = pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 900.0, SPACING))))
     assert pilot.state is PlanningState.ESCAPING
     assert answer.path is not None
     assert answer.path.loiter
-
-
-def test_without_room_for_a_turn_at_the_start_there_is_no_escape(ring: MakePoints) -> None:
     pilot = planner()
     with pytest.raises(NoWayToBegin):
         pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 250.0, SPACING))))

@@ -251,8 +251,7 @@ def test_it_evades_into_space_that_was_seen_to_be_free(side: float, wall: MakePo
 
 def test_a_plan_is_left_in_time_for_what_comes_to_it(ring: MakePoints) -> None:
     """Flown and met as told: the plan of an aircraft that goes straight, and something that comes from ahead."""
-    mission = replace(MISSION, turn_radius_m=230.0, clearance_m=60.0, sensor_range_m=2000.0)
-    seen, pilot = Seen(nothing()), planner(mission)
+    seen, pilot = Seen(nothing()), planner(MISSION_HERE)
     outline, velocity = ring(2500.0, 0.0, 80.0, 20.0), np.array((-9.0, 0.0))
     plan, arc_length_m, nearest = pilot.plan(first_request(seen)), 0.0, math.inf
     for step in range(160):
@@ -267,4 +266,4 @@ def test_a_plan_is_left_in_time_for_what_comes_to_it(ring: MakePoints) -> None:
         if answer.status is PlanStatus.FOUND:
             plan, arc_length_m = answer, 0.0
         arc_length_m += 0.5 * 25.0
-    assert nearest > 0.9 * mission.clearance_m
+    assert nearest > 0.9 * MISSION_HERE.clearance_m
