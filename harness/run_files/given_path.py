@@ -127,15 +127,13 @@ def fly_by(
     """
     kept = needed(points_m)
     points = points_m[kept]
-    place = points[:, 0] + 1j * points[:, 1]
-    joined = [] if tightest is None or every else _joined(place, tightest.of(kept, len(points_m)))
-    own = np.arange(len(place))
-    for each in joined:
-        own[each.first : each.last + 1] = each.sharpest
+    spots = points[:, 0] + 1j * points[:, 1]
+    place, own = spots.copy(), np.arange(len(points))
+    for each in [] if tightest is None or every else _joined(spots, tightest.of(kept, len(points_m))):
         place[each.sharpest] = each.apex
-    own = np.unique(own)
-    place = place[own]
-    of = kept[own]
+        own[each.first : each.last + 1] = each.sharpest
+    own, first, count = np.unique(own, return_index=True, return_counts=True)
+    place, last, of = place[own], first + count - 1, kept[own]
     least, free = (np.broadcast_to(each, len(points_m))[of][1:-1] for each in (radius_m, free_cut_m))
     length, ahead, turn = _legs(place)
     shape = _shapes(turn)
@@ -168,44 +166,29 @@ def fly_by(
         CutCorner(int(of[i + 1]), *told[i].tolist())
         for i in np.flatnonzero(every | (cut > free * (1.0 + 1e-9))).tolist()
     )
-    stations = np.concatenate(([0.0], middles, [station]))
-    inner = np.stack(
-        (place[1:-1] - before * ahead[:-1], place[1:-1], place[1:-1] + after * ahead[1:]), axis=1
-    )
-    drawn = np.concatenate((place[:1], inner.ravel(), place[-1:]))
-    along = np.concatenate(([0.0], np.stack((begun, middles, over), axis=1).ravel(), [station]))
-    given = np.column_stack((drawn.real, drawn.imag, along))
-    every_station = np.interp(np.arange(len(points)), own, stations)
-    order = np.arange(float(len(given)))
-    for each in joined:  # what is judged are the points given, not the apex or what touches the legs to it
-        at = int(np.searchsorted(own, each.sharpest)) - 1
-        share = each.shares(points, float(before[at]), float(after[at]))
-        inside = slice(each.first, each.last + 1)
-        every_station[inside] = begun[at] + (over[at] - begun[at]) * share
-        order[max(3 * at, 1) : min(3 * at + 5, 3 * len(turn) + 1)] = np.nan
-        given = np.concatenate((given, np.column_stack((points[inside], every_station[inside]))))
-        order = np.append(order, np.full(len(share), 3.0 * at + 2.0))
-    given = given[np.argsort(order, kind="stable")[: np.isfinite(order).sum()]]
-    return FlyBy(points, np.array(rows), corners, kept, every_station, given)
+    # The given line is judged, not the legs to an apex: where along it each turn begins, passes its corner, ends.
+    along = np.append(0.0, np.cumsum(np.abs(np.diff(spots))))
+    begins, ends = along[first][1:-1], along[last][1:-1]
+    early = before - ((place - spots[first])[1:-1] / ahead[:-1]).real
+    late = after + ((place - spots[last])[1:-1] / ahead[1:]).real
+    places = begins - np.maximum(early, 0.0), 0.5 * (begins + ends), ends + np.maximum(late, 0.0)
+    known = begun + np.minimum(early, 0.0), middles, over - np.minimum(late, 0.0)
+    inner = np.transpose((places, known), (0, 2, 1)).reshape(2, -1)
+    both = np.column_stack(((0.0, 0.0), inner, (along[-1], station)))
+    knots, stations = np.maximum.accumulate(both, axis=1)  # an arc may reach beyond a short given leg
+    every_m = np.union1d(along, knots)
+    drawn, belongs = np.interp(every_m, along, spots), np.interp(every_m, knots, stations)
+    given = np.column_stack((drawn.real, drawn.imag, belongs))
+    return FlyBy(points, np.array(rows), corners, kept, np.interp(along, knots, stations), given)
 
 
-@dataclass(frozen=True)
-class _Joined:
+class _Joined(NamedTuple):
     """Neighbouring corners, `first` to `last`, that are flown as one at the apex of the legs before and after them."""
 
     first: int
     last: int
     sharpest: int
     apex: complex
-
-    def shares(self, points_m: FloatArray, before_m: float, after_m: float) -> FloatArray:
-        """Returns how far along the turn each of the points lies, from 0 to 1, both left out, and rising."""
-        own = points_m[self.first : self.last + 1] @ np.array([1.0, 1j])
-        along = np.append(0.0, np.cumsum(np.abs(np.diff(own)))) + before_m - abs(own[0] - self.apex)
-        whole = max(float(along[-1]) + after_m - abs(own[-1] - self.apex), SHORTEST_M)
-        spread = np.linspace(1e-3, 2e-3, len(own))
-        shares: FloatArray = spread + (1.0 - 3e-3) * np.clip(along / whole, 0.0, 1.0)
-        return shares
 
 
 def _legs(place: NDArray[np.complex128]) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:
@@ -227,26 +210,24 @@ def _joined(place: NDArray[np.complex128], tightest: Tightest) -> list[_Joined]:
     overshoot_m = (least - _fitting(length, least, _shapes(turn))) * (1.0 - np.cos(turn))
     found: list[_Joined] = []
     for kink in (1 + np.flatnonzero(overshoot_m > (1.0 - LIMIT_SHARE) * tightest.limit_m)).tolist():
-        first = last = kink
+        first, last, limits = kink, kink, tightest.at(kink - 1)
         while (found[-1].last if found else 0) < first and last < len(place) - 1:
-            onto = ahead[last] / ahead[first - 1]
-            angle, gap = abs(np.angle(onto)), (place[last] - place[first]) / ahead[first - 1]
-            if not SAME_TURN_RAD < angle < PAST_RAD:
+            legs = ahead[[first - 1, last]]
+            onto, gap = legs[1] / legs[0], (place[last] - place[first]) / legs[0]
+            turned = np.angle(onto)
+            if not SAME_TURN_RAD < abs(turned) < PAST_RAD:
                 break
             beyond = gap.imag / onto.imag  # how far the apex lies before the last leg, and behind the first
             ahead_m = gap.real - beyond * onto.real
-            half = float(np.tan(0.5 * angle))
+            half = float(np.tan(0.5 * abs(turned)))
             rooms = length[first - 1] + ahead_m, length[last] + beyond
-            radius = float(
-                _least_m(ahead[[first - 1, first]], np.angle(onto)[None], tightest.at(kink - 1))[0]
-            )
+            radius = float(_least_m(legs, np.array([turned]), limits)[0])
             fits = rooms[0] / (half + tangent[first - 1]), rooms[1] / (half + tangent[last + 1])
             if min(fits) >= radius:
-                apex = place[first] + ahead_m * ahead[first - 1]
-                off_m = _off_arc_m(place[first : last + 1], apex, (ahead[first - 1], ahead[last]), radius)
-                if first < last and off_m <= max(
-                    LIMIT_SHARE * tightest.at(kink - 1).limit_m, radius * (1.0 - np.cos(angle))
-                ):
+                apex = place[first] + ahead_m * legs[0]
+                off_m = _off_arc_m(place[first : last + 1], apex, legs, radius)
+                within_m = max(LIMIT_SHARE * float(limits.limit_m), radius * (1.0 - np.cos(turned)))
+                if first < last and off_m <= within_m:
                     sharpest = first + int(np.abs(turn[first - 1 : last]).argmax())
                     found.append(_Joined(first, last, sharpest, complex(apex)))
                 break
@@ -254,9 +235,7 @@ def _joined(place: NDArray[np.complex128], tightest: Tightest) -> list[_Joined]:
     return found
 
 
-def _off_arc_m(
-    places: NDArray[np.complex128], apex: complex, legs: tuple[complex, complex], radius_m: float
-) -> float:
+def _off_arc_m(places: NDArray[Any], apex: complex, legs: NDArray[Any], radius_m: float) -> float:
     """Returns how far places, and the middles between them, are at most from the arc that rounds an apex."""
     every = np.concatenate((places, 0.5 * (places[1:] + places[:-1])))
     turn = np.angle(legs[1] / legs[0])
