@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -15,7 +13,7 @@ from harness.analysis.metric import Claim
 from harness.cli.command_line import FAILED, at_a_time, print_json, resumable, told_apart
 from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
-from harness.cli.terminal import plain, print_table, say, step_bar
+from harness.cli.terminal import plain, print_table, say, say_view, step_bar
 
 if TYPE_CHECKING:
     from harness.certification.certification import Certificate, Tally, Terms
@@ -86,15 +84,8 @@ def certify(
         print_json(found.plain())
     elif not quiet:
         _print(found, f"{found.subject}: {found.planner}, {found.aircraft}", folder)
-        _say_failed(folder, found.failing_runs)
+        say_view(folder / "runs" / str(run) for run in found.failing_runs)
     return 0 if found.verdict == "shown" else FAILED
-
-
-def _say_failed(folder: Path, failing: Sequence[int]) -> None:
-    """Says how to see the first failing run that was kept."""
-    folders = (folder / "runs" / str(run) for run in failing)
-    for kept in itertools.islice(filter(Path.is_dir, folders), 1):
-        say(f"view: {shlex.join(['wayproof', 'view', str(kept)])}")
 
 
 def _drawn(vary: Sequence[str]) -> Mapping[str, Any]:

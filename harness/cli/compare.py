@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 from harness.cli.command_line import FAILED, at_a_time, interruptible, load, marked_incomplete, print_json
 from harness.cli.options import Json, NoRecording, Out, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, given_by, replacing, sources
-from harness.cli.terminal import coloured, plain, print_line, print_table, say, step_bar
+from harness.cli.terminal import coloured, plain, print_line, print_table, say, say_view, step_bar
 from harness.files.errors import WriteError
 
 if TYPE_CHECKING:
@@ -44,6 +43,7 @@ def compare(
     2 bad input or usage, nothing flown
     """
     from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
+    from harness.run_files.run_folder import OVERLAY
 
     kinds, laws = _split(planners), _split(guidance)
     variants = [[*given_by(kind, law).keys, *given.keys] for kind in kinds for law in laws]
@@ -65,18 +65,9 @@ def compare(
         print_json(comparison.plain())
     else:
         print_comparison(comparison.rows)
-        _say_where(folder, [each.name for each in loaded])
+        say(f"report: {folder / 'report.html'}")
+        say_view(folder / each.name / OVERLAY for each in loaded)
     return 0 if comparison.all_reached else FAILED
-
-
-def _say_where(folder: Path, scenarios: Sequence[str]) -> None:
-    """Says where the report is, and how to see the first of the overlays."""
-    from harness.run_files.run_folder import OVERLAY
-
-    say(f"report: {folder / 'report.html'}")
-    overlays = (folder / name / OVERLAY for name in scenarios)
-    for overlay in itertools.islice(filter(Path.is_file, overlays), 1):
-        say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
 
 
 def _split(names: str | None) -> list[str | None]:

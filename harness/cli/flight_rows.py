@@ -52,7 +52,7 @@ def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     """
     legs, margin_m = metrics["trackability"], metrics.get("navigation_margin_m")
     total = metrics.get("total_system_error_m", metrics["cross_track_m"])
-    threshold_m = legs[0].get("threshold_m") if legs else None
+    threshold_m = legs[0].get("threshold_m") if legs and "check" not in metrics else None
     allowed = "" if threshold_m is None else f", allowed {threshold_m:.3g} m"
     kept = f", of which {legible(margin_m)} m are the navigation margin that was planned" if margin_m else ""
     rows = {"total system error": f"{spread(total)} m{allowed}{kept}"}

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import operator
 import os
+import shlex
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Final, TextIO, TypeAlias
 
 import typer
@@ -134,8 +136,11 @@ def _add_columns(table: Table, lines: Sequence[Sequence[str]], columns: Sequence
 
 
 def _broken(name: str, room: int) -> str:
-    """Breaks a name longer than `room` letters behind its plus, as a planner's under the shield; rich folds others."""
-    return name if Text.from_markup(name).cell_len <= room else name.replace("+", "+\n ")
+    """Breaks a name longer than `room` letters behind each plus, or else each underscore; rich folds others."""
+    for mark in "+_":
+        if max(line.cell_len for line in Text.from_markup(name).split()) > room:
+            name = name.replace(mark, f"{mark}\n ")
+    return name
 
 
 def print_line(text: str, style: str | None = None) -> None:
@@ -169,6 +174,13 @@ def spread(values: Mapping[str, float | None], names: Sequence[str] = ("rms", "p
 def say(text: str, *, err: bool = False) -> None:
     """Prints a line on standard output or standard error, with control characters in it spelt out."""
     typer.echo(printable(text), err=err)
+
+
+def say_view(recorded: Iterable[Path]) -> None:
+    """Says how to see the first of some recordings or run folders that is there."""
+    kept = next(filter(Path.exists, recorded), None)
+    if kept is not None:
+        say(f"view: {shlex.join(['wayproof', 'view', str(kept)])}")
 
 
 def results_alone() -> None:

@@ -34,8 +34,10 @@ def read_moving_ai(path: Path, reading: Reading) -> Contents:
     sizes = {head[1]: int(head[2]), head[3]: int(head[4])}
     rows, columns = sizes["height"], sizes["width"]
     body = [line.encode("latin-1", "replace") for line in text[head.end() :].splitlines()[:rows]]
-    if len(body) != rows or set(map(len, body)) != {columns} or columns == 0:
-        raise InputError(f"has {len(body)} rows, not {rows} of {columns} cells: it may be torn")
+    wrong = next((number for number, line in enumerate(body) if len(line) != columns), len(body))
+    if wrong < rows or not rows * columns:
+        line = text.count("\n", 0, head.end()) + wrong + 1
+        raise InputError(f"has no row of {columns} cells in line {line}, of {rows} rows: it may be torn")
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
     if strange := set(np.unique(cells).tolist()) - set(FREE_CELLS + BLOCKED_CELLS):
         raise InputError(f"has the cell {chr(min(strange))!r}; must be one of . G S @ O T W")

@@ -63,6 +63,7 @@ def test_the_table_of_a_flight_fits_80_columns_and_says_what_happened(
         ("improved_bug+shield\n vector_field", ["improved_bug+", " shield", " vector_field"]),
         ("[bold]campaign.yaml: slow[/]", ["campaign.yaml:", "slow"]),
         ("AwordLongerThanItsColumn", ["AwordLongerThan", "ItsColumn"]),
+        ("wayproof_rolling_window", ["wayproof_", " rolling_", " window"]),
         ("bug2", ["bug2"]),
     ],
 )

@@ -99,7 +99,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
         "must have numbers `elevation`"),
     "a vector file": (text("a.gpkg", "SQLite"), "is a vector file; make GeoJSON of it"),
     "a Gazebo world": (text("a.world", "<sdf><world/></sdf>"), "is a Gazebo world; give its footprints as GeoJSON"),
-    "a torn map": (text("a.map", "type octile\nheight 3\nwidth 3\nmap\n...\n"), "it may be torn"),
+    "a torn map": (text("a.map", "type octile\nheight 3\nwidth 3\nmap\n...\n..\n"), "line 6, of 3 rows"),
     "a map of a height of 5,000 digits": (
         text("a.map", f"type octile\nheight {'9' * 5000}\nwidth 3\nmap\n...\n"),
         "has no height, width and `map`",
