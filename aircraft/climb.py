@@ -43,11 +43,8 @@ class ClimbRates:
 
     def at(self, airspeed_mps: float) -> tuple[float, float]:
         """Fastest climb and fastest descent at an airspeed, both positive."""
-        climb, descent = (
-            float(np.interp(airspeed_mps, self.airspeeds_mps, rates))
-            for rates in (self.climb_mps, self.descent_mps)
-        )
-        return climb, descent
+        at, speeds = airspeed_mps, self.airspeeds_mps
+        return float(np.interp(at, speeds, self.climb_mps)), float(np.interp(at, speeds, self.descent_mps))
 
 
 def climb_rates(frame: Airframe) -> ClimbRates:

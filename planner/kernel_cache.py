@@ -15,7 +15,6 @@ SEAL_BYTES = 32
 FRAME = b"\x80\x05\x95"
 """First bytes of an index: numba's version, a pickle of one frame, whose length follows in eight bytes."""
 
-
 _sealing = threading.Lock()
 
 

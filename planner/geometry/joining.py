@@ -82,6 +82,11 @@ def divert_to_loiter(
     return None
 
 
+def lead_of(mission: Mission) -> float:
+    """Length (m) of the plan in effect that is flown before a new plan begins."""
+    return mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
+
+
 def branch_off(request: PlanRequest, mission: Mission) -> tuple[Pose, list[Segment]]:
     """Where a new path leaves the one in effect, and the stretch up to there; at the aircraft if off it or holding."""
     path, arc_length_m = request.flown.path if request.flown else None, request.arc_length_m
@@ -90,5 +95,5 @@ def branch_off(request: PlanRequest, mission: Mission) -> tuple[Pose, list[Segme
         return here, []
     if math.dist(pose_at(path, arc_length_m)[:2], here[:2]) > mission.off_path_m:
         return here, []
-    leave = arc_length_m + mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
+    leave = arc_length_m + lead_of(mission)
     return pose_at(path, leave), between(path, arc_length_m, leave)

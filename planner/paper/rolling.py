@@ -19,7 +19,7 @@ import numpy as np
 
 from planner.geometry.clearance import first_breach
 from planner.geometry.curves import Pose, Segment, along, between, end_of, place_on
-from planner.geometry.joining import LEAD_S, branch_off, stuck
+from planner.geometry.joining import branch_off, lead_of, stuck
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.paper.config import ImprovedBugConfig
 from planner.paper.model import within
@@ -101,7 +101,7 @@ class ImprovedBug:
         path, at_m = request.flown.path if request.flown else None, request.arc_length_m
         if path is None or not before or cut:
             return start, before
-        leave_m = at_m + self._mission.ground_speed_mps * (LEAD_S + self._mission.compute_latency_s)
+        leave_m = at_m + lead_of(self._mission)
         ends = (end_m for end_m in np.cumsum(path.segments[:, 5]).tolist() if end_m > leave_m)
         end_m = next(ends, None)
         if end_m is not None and place_on(path, leave_m)[1]:

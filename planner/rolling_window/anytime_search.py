@@ -79,7 +79,11 @@ class AnytimeSearch:
         for i, attempt in enumerate(attempts):
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
-            before, known, points = len(self.candidates), self._local.known, self._local.points_m
+            before, known, points = (
+                len(self.candidates),
+                self._local.memory.known,
+                self._local.memory.points_m,
+            )
             route = yield from self._local.route(
                 attempt, self._effort, self._now, self.candidates, self._closed
             )
@@ -99,7 +103,7 @@ class AnytimeSearch:
             if route is None and self.candidates:
                 route = yield from self._local.beginning(self._now, self.candidates[0])
             if route is not None:
-                yield self._course(route, self._local.known, shortest=False)
+                yield self._course(route, self._local.memory.known, shortest=False)
 
     def _courses(self, found: list[_Found]) -> Iterator[Course]:
         """Yields courses along routes, the shorter first, from where a plan would begin now."""
@@ -122,7 +126,7 @@ class AnytimeSearch:
         """Tells whether a route passes obstacles on another side than the course that is flown."""
         start, flown = self._now()
         nodes = (start.pose[:2], *route.nodes)
-        return flown is not None and not flown.same_side(nodes, self._local.points_m)
+        return flown is not None and not flown.same_side(nodes, self._local.memory.points_m)
 
     def _course(self, route: FlyableRoute, known: int, shortest: bool) -> Course:
         """The course along a route, after the stretch of the plan in effect up to its start."""

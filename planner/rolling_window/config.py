@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from planner.geometry.joining import LEAD_S as LEAD_S
+from planner.geometry.joining import LEAD_S
 from planner.interface import Mission
 from planner.keys import MarginConfig, key
 from planner.shield.certificate import least_sensor_range_m

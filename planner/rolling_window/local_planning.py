@@ -101,7 +101,7 @@ class LocalPlanning:
     def __init__(
         self, mission: Mission, memory: ObstacleMemory, *, margin_m: float, steps: int, candidates: int
     ) -> None:
-        self._mission, self._memory, self._margin_m = mission, memory, margin_m
+        self._mission, self.memory, self._margin_m = mission, memory, margin_m
         self._steps, self._candidates = steps, candidates
         self.work_count = WorkCount()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
@@ -127,16 +127,6 @@ class LocalPlanning:
             attempts.append(Attempt(radius, margin))
         return [*attempts, Attempt(clearance + radius, margin)]
 
-    @property
-    def known(self) -> int:
-        """How many edge points are remembered that stand still."""
-        return self._memory.known
-
-    @property
-    def points_m(self) -> FloatArray:
-        """(m, 2) the edge points that are remembered."""
-        return self._memory.points_m
-
     def route(
         self, attempt: Attempt, effort: int, now: Now, candidates: list[Candidate], closed: Callable[[], bool]
     ) -> Generator[None, None, FlyableRoute | None]:
@@ -146,12 +136,12 @@ class LocalPlanning:
         into view would be dropped, again and again.
         """
         start, _ = now()
-        points = self._memory.points_m
+        points = self.memory.points_m
         room = self._room_m(start, points)
         keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
-        labels = self._memory.labels
+        labels = self.memory.labels
         self.work_count.add(0, TANGENT_WORK, len(points))
-        window = Window(start.pose[:2], points, labels, self._memory.cell_m, keep, self.work_count)
+        window = Window(start.pose[:2], points, labels, self.memory.cell_m, keep, self.work_count)
         begun = start
         fitted: list[tuple[float, FlyableRoute]] = []
 
@@ -190,7 +180,7 @@ class LocalPlanning:
         switching = 0.0
         if course is not None:
             self.work_count.add(4, POINT_WORK, 4 * len(candidate.nodes) * course.known)
-            if course.same_side(candidate.nodes, self._memory.points_m):
+            if course.same_side(candidate.nodes, self.memory.points_m):
                 return 0.0
             switching = SWITCH_SHARE * candidate.cost_m
         return switching + RETRACE_SHARE * self.trail.retraced_m(candidate.nodes)
@@ -231,7 +221,7 @@ class LocalPlanning:
         While this goes on the aircraft flies the turn that it is in, so that it comes by where the way begins again.
         """
         start, _ = now()
-        terrain = self._terrain(start, self._tight, self._memory.points_m)
+        terrain = self._terrain(start, self._tight, self.memory.points_m)
         goal, points = self._mission.goal_m, (terrain.points_m, terrain.keep_m)
         to_go = CostToGo(start.pose[:2], goal, self._mission.bounds_m, *points, self.work_count)
         yield from to_go.spread()
@@ -244,7 +234,7 @@ class LocalPlanning:
             return None
         path = Path(np.array([*on, *route.path.segments.tolist()]))
         # What has come in meanwhile may be in its way.
-        terrain = self._terrain(begins, self._tight, self._memory.points_m)
+        terrain = self._terrain(begins, self._tight, self.memory.points_m)
         return FlyableRoute(route.nodes, path) if terrain.admits(path) else None
 
     def beginning(self, now: Now, candidate: Candidate) -> Generator[None, None, FlyableRoute | None]:
@@ -252,7 +242,7 @@ class LocalPlanning:
         for end in range(len(candidate.nodes) - 1, 1, -1):
             start, _ = now()
             nodes = (start.pose[:2], *candidate.nodes[1:end])
-            route = self.fitted(start, self._tight, nodes, self._memory.points_m)
+            route = self.fitted(start, self._tight, nodes, self.memory.points_m)
             if route is not None:
                 return route
             yield

@@ -21,6 +21,7 @@ import math
 
 from planner.geometry.course import Course
 from planner.geometry.curves import on_loiter, place_on
+from planner.geometry.joining import lead_of
 from planner.interface import FloatArray, MapView, Mission, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.plan_checks import start_tolerance_m
@@ -32,7 +33,7 @@ from planner.rolling_window.dead_ends import GivingUp
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.rolling_search import RollingSearch, Work
 from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
-from planner.shield.certified_planner import CertifiedPlanner, lead_of
+from planner.shield.certified_planner import CertifiedPlanner
 from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import meets, room_m
 from planner.shield.intervention_log import ShieldReport

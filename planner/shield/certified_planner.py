@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from planner.geometry.joining import LEAD_S
+from planner.geometry.joining import lead_of
 from planner.interface import FloatArray, Mission, PlanRequest
 from planner.memory import ObstacleMemory
 from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start, start_of
@@ -12,11 +12,6 @@ from planner.shield.encounters import encounters
 from planner.shield.escape import Escape, Escapes, Room
 from planner.shield.evasion import Threats
 from planner.shield.intervention_log import InterventionLog, ShieldReport
-
-
-def lead_of(mission: Mission) -> float:
-    """Length (m) of the plan in effect that is flown before a new plan begins."""
-    return mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
 
 
 class CertifiedPlanner:

@@ -21,12 +21,13 @@ import numpy as np
 from planner.geometry.clearance import first_breach
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, between, on_loiter, place_on, poses_at
+from planner.geometry.joining import lead_of
 from planner.geometry.terrain import WorkCount
 from planner.interface import Mission, NoWayToBegin, Path, Plan, Planner, PlanRequest, PlanStatus, Refused
 from planner.memory import ObstacleMemory
 from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.certificate import Certified, Certifier, hold_centre
-from planner.shield.certified_planner import CertifiedPlanner, lead_of
+from planner.shield.certified_planner import CertifiedPlanner
 from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import Room, meets, room_m
 from planner.shield.refused_places import with_places

@@ -170,7 +170,7 @@ def test_a_turn_is_flown_on_to_where_a_curve_fits_the_way_out(known: Known) -> N
     local, _ = planning(known(ring[~open_]))
     attempt = local.attempts()[1]
     start = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0), 1.0 / turn_m)
-    nodes, points = [(0.0, 0.0), (turn_m, turn_m + 8.0 * wide_m)], local.points_m
+    nodes, points = [(0.0, 0.0), (turn_m, turn_m + 8.0 * wide_m)], local.memory.points_m
     assert local.fitted(start, attempt, nodes, points) is None
     route = local.fitted(start, attempt, nodes, points, turning=True)
     assert route is not None
