@@ -31,7 +31,7 @@ WIDTH_RAD = math.tau / SECTORS
 """Number of sectors of the polar histogram, and the width of one."""
 
 WINDOW_RADII, WINDOW_CLEARANCES = 12.0, 6.0
-"""The radius of the active window is so many turn radii and clearances, at most the sensor range."""
+"""Numbers of turn radii and of clearances that add up to the radius of the active window, at most the sensor range."""
 
 FREE_BELOW, BLOCKED_ABOVE = 0.05, 0.10
 """Thresholds of the magnitude of a sector: 1 is an edge at the aircraft, 0 one at the window's rim."""

@@ -1,4 +1,4 @@
-"""The course: the whole way to the goal, of which a plan in effect is the beginning."""
+"""The course, the whole way to the goal of which a plan in effect is the beginning, and routes that may become it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,14 @@ from planner.geometry.clearance import distances
 from planner.geometry.curves import Point, between
 from planner.interface import FloatArray, Path
 from planner.kernels.fans import encircled
+
+
+@dataclass(frozen=True)
+class Route:
+    """A candidate that can be flown: its track points, and the curve through them."""
+
+    nodes: tuple[Point, ...]
+    path: Path
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,13 +18,14 @@ from functools import partial
 import numpy as np
 
 from planner.geometry.clearance import first_breach
+from planner.geometry.course import Route
 from planner.geometry.curves import Pose, Segment, along, between, end_of, place_on
 from planner.geometry.joining import branch_off, lead_of, stuck
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.paper.config import ImprovedBugConfig
 from planner.paper.model import within
 from planner.paper.multi_step_search import Window, multi_step_search
-from planner.paper.route_optimisation import Route, optimise, shortest
+from planner.paper.route_optimisation import optimise, shortest
 from planner.paper.sectors import FULL_CIRCLE, fan_shaped_sectors
 
 

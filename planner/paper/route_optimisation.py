@@ -4,22 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from planner.geometry.clearance import admits
+from planner.geometry.course import Route
 from planner.geometry.curves import Limits, Point, Pose, fillet
-from planner.interface import Path
 from planner.paper.model import guide_vector, track_cost_m
 from planner.paper.multi_step_search import Track, Window
 from planner.paper.sectors import signed
-
-
-@dataclass(frozen=True)
-class Route:
-    """A candidate that can be flown: its track points, and the curve through them."""
-
-    nodes: tuple[Point, ...]
-    path: Path
 
 
 def cancel_nodes(nodes: tuple[Point, ...], before_m: Point, window: Window) -> tuple[Point, ...]:

@@ -12,18 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.geometry.course import Course
+from planner.geometry.course import Course, Route
 from planner.interface import FloatArray, Path
 from planner.rolling_window.local_planning import DOUBTFUL_SHARE, Attempt, LocalPlanning
 from planner.rolling_window.multi_step_search import Candidate
-from planner.rolling_window.route_optimisation import FlyableRoute
 from planner.shield.committed_plan import Start
 
 
 class _Found(NamedTuple):
     """A route found, with its start, the attempt that found it and the edge points it was found among."""
 
-    route: FlyableRoute
+    route: Route
     start: Start
     attempt: Attempt
     points_m: FloatArray
@@ -109,7 +108,7 @@ class AnytimeSearch:
         """Yields courses along routes, the shorter first, from where a plan would begin now."""
         for each in sorted(found, key=lambda each: each.route.path.length_m):
             start, flown = self._now()
-            route: FlyableRoute | None = each.route
+            route: Route | None = each.route
             if start is not each.start:
                 nodes = (start.pose[:2], *each.route.nodes)
                 route = self._local.fitted(start, each.attempt, nodes, each.points_m, turning=flown is None)
@@ -122,13 +121,13 @@ class AnytimeSearch:
         searched_m = min((candidate.cost_m for candidate in self.candidates), default=math.inf)
         return least_m > (1.0 + DOUBTFUL_SHARE) * searched_m
 
-    def _switches(self, route: FlyableRoute) -> bool:
+    def _switches(self, route: Route) -> bool:
         """Tells whether a route passes obstacles on another side than the course that is flown."""
         start, flown = self._now()
         nodes = (start.pose[:2], *route.nodes)
         return flown is not None and not flown.same_side(nodes, self._local.memory.points_m)
 
-    def _course(self, route: FlyableRoute, known: int, shortest: bool) -> Course:
+    def _course(self, route: Route, known: int, shortest: bool) -> Course:
         """The course along a route, after the stretch of the plan in effect up to its start."""
         path = Path(np.array([*self._now()[0].prefix, *route.path.segments.tolist()]))
         return Course(path, route.nodes, known, shortest)

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from planner.geometry.course import Course
+from planner.geometry.course import Course, Route
 from planner.geometry.curves import Limits, Point, onward_in_turn
 from planner.geometry.terrain import POINT_WORK, TANGENT_WORK, Terrain, WorkCount
 from planner.interface import FloatArray, Mission, Path
@@ -17,7 +17,7 @@ from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, search_candidates
 from planner.rolling_window.pose_search import search_poses
-from planner.rolling_window.route_optimisation import FlyableRoute, optimise
+from planner.rolling_window.route_optimisation import optimise
 from planner.rolling_window.window import Window
 from planner.shield.committed_plan import BROKEN_SHARE, Start
 from planner.shield.escape import Room
@@ -129,7 +129,7 @@ class LocalPlanning:
 
     def route(
         self, attempt: Attempt, effort: int, now: Now, candidates: list[Candidate], closed: Callable[[], bool]
-    ) -> Generator[None, None, FlyableRoute | None]:
+    ) -> Generator[None, None, Route | None]:
         """The shortest of the n best candidates, after route optimisation.
 
         What comes in meanwhile is left for the next search: else the shortest way round something that is just coming
@@ -143,7 +143,7 @@ class LocalPlanning:
         self.work_count.add(0, TANGENT_WORK, len(points))
         window = Window(start.pose[:2], points, labels, self.memory.cell_m, keep, self.work_count)
         begun = start
-        fitted: list[tuple[float, FlyableRoute]] = []
+        fitted: list[tuple[float, Route]] = []
 
         def doubtful() -> bool:
             _, course = now()
@@ -192,14 +192,14 @@ class LocalPlanning:
         nodes: Sequence[Point],
         points: FloatArray,
         turning: bool = False,
-    ) -> FlyableRoute | None:
+    ) -> Route | None:
         """The curve along track points found among (m, 2) points, from where a plan would begin now; None: none is.
 
         An aircraft that is `turning` may leave its turn later: the shortest of these curves, with the rest of the turn.
         """
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         terrain = self._terrain(start, attempt, points)
-        best: FlyableRoute | None = None
+        best: Route | None = None
         for pose, before in start.later(TURN_EXITS if turning else 1):
             least_m = sum(arc[5] for arc in before) + math.dist(pose[:2], nodes[-1])
             if best is not None and least_m >= best.path.length_m:
@@ -212,10 +212,10 @@ class LocalPlanning:
                 continue
             path = Path(np.array([*before, *route.path.segments.tolist()]))
             if best is None or path.length_m < best.path.length_m:
-                best = FlyableRoute(route.nodes, path)
+                best = Route(route.nodes, path)
         return best
 
-    def tight_route(self, now: Now) -> Generator[None, None, FlyableRoute | None]:
+    def tight_route(self, now: Now) -> Generator[None, None, Route | None]:
         """A way found by search over poses, where none through the free sectors can be flown.
 
         While this goes on the aircraft flies the turn that it is in, so that it comes by where the way begins again.
@@ -235,9 +235,9 @@ class LocalPlanning:
         path = Path(np.array([*on, *route.path.segments.tolist()]))
         # What has come in meanwhile may be in its way.
         terrain = self._terrain(begins, self._tight, self.memory.points_m)
-        return FlyableRoute(route.nodes, path) if terrain.admits(path) else None
+        return Route(route.nodes, path) if terrain.admits(path) else None
 
-    def beginning(self, now: Now, candidate: Candidate) -> Generator[None, None, FlyableRoute | None]:
+    def beginning(self, now: Now, candidate: Candidate) -> Generator[None, None, Route | None]:
         """The longest beginning of a candidate that can be flown, where all of it cannot; None where none can."""
         for end in range(len(candidate.nodes) - 1, 1, -1):
             start, _ = now()

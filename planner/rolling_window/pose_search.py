@@ -12,11 +12,11 @@ from collections.abc import Callable, Generator
 
 import numpy as np
 
+from planner.geometry.course import Route
 from planner.geometry.curves import Limits, Point, Pose, Segment, turns_onto
 from planner.geometry.terrain import Terrain
 from planner.interface import Path
 from planner.paper.model import step
-from planner.rolling_window.route_optimisation import FlyableRoute
 
 MOST_POSES = 1000
 """Most poses that a search expands before it gives up."""
@@ -32,7 +32,7 @@ def search_poses(
     limits: Limits,
     terrain: Terrain,
     to_go: Callable[[Point], float],
-) -> Generator[None, None, FlyableRoute | None]:
+) -> Generator[None, None, Route | None]:
     """The cheapest flyable route over (x, y, course), in steps of one turn radius, with a straight between turns."""
     step_m = limits.radius_m
     largest = 2.0 * math.asin(step_m / (2.0 * limits.radius_m))
@@ -71,6 +71,6 @@ def search_poses(
     return None
 
 
-def _route(segments: tuple[Segment, ...], end: Point) -> FlyableRoute:
+def _route(segments: tuple[Segment, ...], end: Point) -> Route:
     """The route along segments; its track points are their ends."""
-    return FlyableRoute((*(segment[:2] for segment in segments[1:]), end), Path(np.array(segments)))
+    return Route((*(segment[:2] for segment in segments[1:]), end), Path(np.array(segments)))

@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from planner.geometry.course import Route
 from planner.geometry.curves import Limits, Point, Pose, fillet
 from planner.geometry.terrain import POINT_WORK, Terrain
-from planner.interface import Path
 from planner.kernels.fans import shortcuts
 
 MOST_LEFT_OUT = 6
 """Most corners, from the first on, that are left out one at a time."""
-
-
-@dataclass(frozen=True)
-class FlyableRoute:
-    """A candidate that can be flown."""
-
-    nodes: tuple[Point, ...]
-    path: Path
 
 
 def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
@@ -38,7 +29,7 @@ def optimise(
     limits: Limits,
     cut_m: float,
     terrain: Terrain,
-) -> FlyableRoute | None:
+) -> Route | None:
     """The curve through the shortcuts of a track, at the minimum turn radius.
 
     All shortcuts are taken first. Where their corners leave no room for the turns, or the curve comes too near
@@ -62,5 +53,5 @@ def optimise(
     for choice, cut, longer_turn, first_radius in choices:
         path = fillet(start, choice, limits, cut, start_curvature, longer_turn, first_radius)
         if path is not None and terrain.admits(path):
-            return FlyableRoute(tuple(choice), path)
+            return Route(tuple(choice), path)
     return None

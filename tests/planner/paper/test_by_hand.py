@@ -13,12 +13,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from planner.contract import MISSION
+from planner.geometry.course import Route
 from planner.geometry.curves import Pose, sample
 from planner.interface import FloatArray, Mission, Path
 from planner.paper.config import ImprovedBugConfig
 from planner.paper.model import crosses, guide_vector, most_units, step, within
 from planner.paper.multi_step_search import Window, multi_step_search
-from planner.paper.route_optimisation import Route, cancel_nodes, flyable, shortest, turn_fits
+from planner.paper.route_optimisation import cancel_nodes, flyable, shortest, turn_fits
 from planner.paper.sectors import (
     FULL_CIRCLE,
     Sector,

@@ -12,12 +12,13 @@ import shapely
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from planner.geometry.course import Route
 from planner.geometry.curves import Limits, Point, Pose, end_of, sample
 from planner.geometry.terrain import Terrain, WorkCount
 from planner.interface import FloatArray, Path
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.pose_search import ENOUGH_RADII, search_poses
-from planner.rolling_window.route_optimisation import FlyableRoute, optimise
+from planner.rolling_window.route_optimisation import optimise
 from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]
@@ -48,7 +49,7 @@ def searched(
     goal: Point,
     points: FloatArray,
     bounds: tuple[float, float, float, float] = WIDE,
-) -> FlyableRoute | None:
+) -> Route | None:
     """What the search finds, led by the distances to go."""
     to_go = distances_to_go(start, goal, points, bounds)
     search = search_poses(start, curvature, goal, LIMITS, terrain(points, bounds), to_go)
@@ -56,7 +57,7 @@ def searched(
         try:
             next(search)
         except StopIteration as end:
-            found: FlyableRoute | None = end.value
+            found: Route | None = end.value
             return found
 
 
