@@ -84,7 +84,7 @@ def certify(
         print_json(found.plain())
     elif not quiet:
         _print(found, f"{found.subject}: {found.planner}, {found.aircraft}", folder)
-        say_view(folder / "runs" / str(run) for run in found.failing_runs)
+        say_view(map((folder / "runs").joinpath, map(str, found.failing_runs)))
     return 0 if found.verdict == "shown" else FAILED
 
 
