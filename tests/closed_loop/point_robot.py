@@ -36,7 +36,7 @@ LOOKS: Final = 40
 HIDDEN_M: Final = 0.5
 """An edge point is seen unless the line to it goes this deep through an obstacle."""
 FURTHEST: Final = 30.0
-"""It gives up after so many times the optimum."""
+"""It gives up after this many times the optimum."""
 
 
 class Seen(GivenMap):
