@@ -34,18 +34,13 @@ class AnytimeSearch:
     """One search for ways to the goal, those that are wanted most first."""
 
     def __init__(
-        self,
-        local: LocalPlanning,
-        known: int,
-        effort: int,
-        closed: Callable[[], bool],
-        widest_first: bool = False,
+        self, local: LocalPlanning, effort: int, closed: Callable[[], bool], widest_first: bool = False
     ) -> None:
         self._local, self._effort, self._closed, self._widest_first = local, effort, closed, widest_first
         self._start: Start | None = None
         self._flown: Course | None = None
         self._steps = self._searched()
-        self.known = known  # number of edge points, of what stands still, that it began with
+        self.known = local.memory.known  # number of edge points, of what stands still, that it began with
         self.done = False  # all ways have been looked for
         self.stuck: Course | None = None  # the first way that was found and could not be taken
         self.candidates: list[Candidate] = []  # looked at so far
@@ -71,18 +66,14 @@ class AnytimeSearch:
         found = False
         waiting: list[_Found] = []
         closed_m = math.inf
-        attempts = self._local.attempts()
+        attempts, memory = self._local.attempts(), self._local.memory
         if self._effort or self._widest_first:
             # In vain so far: what is closed to the narrowest way is closed to all.
             attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._widest_first)
         for i, attempt in enumerate(attempts):
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
-            before, known, points = (
-                len(self.candidates),
-                self._local.memory.known,
-                self._local.memory.points_m,
-            )
+            before, known, points = len(self.candidates), memory.known, memory.points_m
             route = yield from self._local.route(
                 attempt, self._effort, self._now, self.candidates, self._closed
             )
@@ -102,7 +93,7 @@ class AnytimeSearch:
             if route is None and self.candidates:
                 route = yield from self._local.beginning(self._now, self.candidates[0])
             if route is not None:
-                yield self._course(route, self._local.memory.known, shortest=False)
+                yield self._course(route, memory.known, shortest=False)
 
     def _courses(self, found: list[_Found]) -> Iterator[Course]:
         """Yields courses along routes, the shorter first, from where a plan would begin now."""

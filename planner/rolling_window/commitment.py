@@ -11,7 +11,6 @@ import numpy as np
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, place_on
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
-from planner.memory import ObstacleMemory
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.window import guide_vector
@@ -29,18 +28,10 @@ CONCENTRIC_SHARE = 0.05
 class Commitment:
     """Certifies courses."""
 
-    def __init__(
-        self,
-        mission: Mission,
-        memory: ObstacleMemory,
-        local: LocalPlanning,
-        least_m: float,
-        shielded: bool = True,
-    ) -> None:
+    def __init__(self, mission: Mission, local: LocalPlanning, least_m: float, shielded: bool = True) -> None:
         # A turn entered sooner than `least_m` ahead is taken only where neither the goal nor a turn about a place
         # ahead is certified: in a pocket of narrow gaps those lead on.
-        self._mission, self._memory, self._local = mission, memory, local
-        self._least_m, self._shielded = least_m, shielded
+        self._mission, self._local, self._least_m, self._shielded = mission, local, least_m, shielded
 
     def commit(
         self,
@@ -57,7 +48,7 @@ class Commitment:
             certified = self._certified(request.seen, course, cut_m)
         if certified is None:
             return None
-        goal, nodes, met = self._mission.goal_m, course.nodes, self._memory.met_m
+        goal, nodes, met = self._mission.goal_m, course.nodes, self._local.memory.met_m
         plan = Plan(
             PlanStatus.FOUND,
             explanation(request.position_m, goal, nodes),

@@ -69,11 +69,11 @@ class RollingWindow(CertifiedPlanner):
         )
         super().__init__(mission, memory, self._local.room, monitor)
         self._start_tolerance_m = start_tolerance_m(mission)
-        self._commitment = Commitment(mission, memory, self._local, lead_m + 2.0 * widest_m, shielded)
+        self._commitment = Commitment(mission, self._local, lead_m + 2.0 * widest_m, shielded)
         self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
         self._giving_up = GivingUp(mission, memory)
         parts = (self._local, self._commitment, self._monitor, self._giving_up, self._proofs.no_way)
-        self._search = RollingSearch(mission, memory, *parts)
+        self._search = RollingSearch(mission, *parts)
         self._loitered: CommittedPlan | None = None  # the plan whose turn was entered last
         self._served: tuple[object, ...] = ()  # by what the plan in effect served, as long as nothing is due
         self.state = PlanningState.ESCAPING

@@ -8,7 +8,6 @@ from enum import Enum
 from planner.geometry.course import Course
 from planner.geometry.curves import Point
 from planner.interface import Mission, PlanRequest
-from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proof
 from planner.rolling_window.commitment import Commitment
@@ -37,15 +36,14 @@ class RollingSearch:
     def __init__(
         self,
         mission: Mission,
-        memory: ObstacleMemory,
         local: LocalPlanning,
         commitment: Commitment,
         monitor: PlanMonitor,
         giving_up: GivingUp,
         no_way: Proof,
     ) -> None:
-        self._mission = mission
-        self._memory, self._local, self._commitment = memory, local, commitment
+        self._mission, self._memory = mission, local.memory
+        self._local, self._commitment = local, commitment
         self._monitor, self._giving_up, self._no_way = monitor, giving_up, no_way
         self.running: AnytimeSearch | None = None  # the search that is not done yet
         self.last: AnytimeSearch | None = None  # the one that was at work last
@@ -111,13 +109,8 @@ class RollingSearch:
     def _begun(self, position: Point) -> AnytimeSearch:
         """A new search."""
         self.gone = self._memory.cleared
-        return AnytimeSearch(
-            self._local,
-            self._memory.known,
-            self._giving_up.effort,
-            lambda: self._no_way.closed(position),
-            widest_first=self._giving_up.tried_again,
-        )
+        effort, widest_first = self._giving_up.effort, self._giving_up.tried_again
+        return AnytimeSearch(self._local, effort, lambda: self._no_way.closed(position), widest_first)
 
     def _end(self, search: AnytimeSearch, ahead: Course | None, course: Course) -> None:
         """Ends a search that has found a course."""

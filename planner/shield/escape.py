@@ -35,11 +35,9 @@ paths keep."""
 EVADING_S = 60.0
 """Certified plans are checked against threats for this long after something appeared: they assume a still world."""
 
-
 TURNING_AWAY = "no way on can be seen to be safe; turning away"
 GOES_ON = "the plan in effect goes on to its end, nearer to something than wanted"
 IN_THE_WAY = "something is in the way; turning away"
-
 
 UNSEEN_SHARE = 0.9
 """Share of the clearance that is flown straight on from the start before anything ahead has to be seen free: a sensor

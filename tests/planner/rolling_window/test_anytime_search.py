@@ -47,7 +47,7 @@ def planning(
     memory = memory or ObstacleMemory(MISSION.clearance_m)
     memory.take_in(seen)
     local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
-    return local, AnytimeSearch(local, len(memory.points_m), 0, closed)
+    return local, AnytimeSearch(local, 0, closed)
 
 
 def all_courses(thinking: AnytimeSearch, work: int, start: Callable[[], Start]) -> tuple[list[Course], int]:

@@ -82,7 +82,7 @@ def committed(
     memory = ObstacleMemory(mission.clearance_m)
     memory.take_in(seen)
     local = LocalPlanning(mission, memory, margin_m=10.0, steps=3, candidates=3)
-    commitment = Commitment(mission, memory, local, LEAST_M)
+    commitment = Commitment(mission, local, LEAST_M)
     east, north = course.path.segments[0, :2].tolist()
     start = Start((east, north), Pose(east, north, 1.0, 0.0))
     request = PlanRequest(0.0, (east, north), (1.0, 0.0), seen)
