@@ -79,6 +79,7 @@ class Stations:
         # Both rise, so that the rows about a place are found without a look at all others.
         self._furthest_m = np.maximum.accumulate(along)
         self._least_ahead_m = np.minimum.accumulate(along[::-1])[::-1]
+        self.reached_m = float(along.max(initial=-math.inf))
 
     def at_corner(self, corner: CutCorner) -> Rows:
         """(k,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
@@ -95,10 +96,6 @@ class Stations:
         passes = self._flown[_rows_at(self._furthest_m, at_m)] if len(self._flown) else near
         rows: Rows = np.union1d(near, passes)
         return rows
-
-    def come_as_far(self, corner: CutCorner) -> bool:
-        """Whether the aircraft came as far along as a corner."""
-        return bool(len(self._flown)) and bool(self._furthest_m[-1] >= corner.arc_length_m)
 
     def allowed_m(self, tolerance_m: float, corners: Iterable[CutCorner]) -> FloatArray:
         """(n,) what each row may be off the path as given: the tolerance, or what a corner about it allows."""

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from harness.analysis.metric import number
 from harness.analysis.rows import DASH
-from harness.campaign.results import IntArray, Runs
+from harness.campaign.results import Runs
 from harness.files.strict_yaml import Scalar
-from harness.flight.record import FloatArray
+from harness.flight.record import FloatArray, IntArray
 
 CONFIDENCE: Final = 0.95
 

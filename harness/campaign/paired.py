@@ -14,8 +14,7 @@ import numpy as np
 
 from harness.analysis.metric import Metric, number
 from harness.analysis.registry import METRICS
-from harness.campaign.results import IntArray
-from harness.flight.record import FloatArray
+from harness.flight.record import FloatArray, IntArray
 
 BOOTSTRAP_CONFIDENCE: Final = 0.95
 RESAMPLES: Final = 1999

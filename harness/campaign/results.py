@@ -14,10 +14,9 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.analysis.registry import METRICS as FIGURES
 from harness.files.strict_yaml import InputError
@@ -58,8 +57,6 @@ TIMES: Final = {"run": "int"} | {
     each.path.removeprefix("timing."): each.kind for each in FIGURES if each.timed
 }
 """Columns of `timings.parquet`."""
-
-IntArray: TypeAlias = NDArray[np.int64]
 
 
 def metric_cells(

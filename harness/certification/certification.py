@@ -28,10 +28,11 @@ from harness.campaign.results import RUNS
 from harness.campaign.workers import Workers, fly_jobs
 from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
 from harness.certification.days import Days, PathDays
-from harness.certification.rare import FloatArray, IntArray, Rare, subset_simulation
+from harness.certification.rare import Rare, subset_simulation
 from harness.files.input_file import InputError
 from harness.files.versions import versions
 from harness.files.whole_file import replace_text
+from harness.flight.record import FloatArray, IntArray
 from harness.run_files.run_folder import TRACK
 
 CERTIFICATE: Final = "certificate.json"

@@ -19,11 +19,10 @@ import numpy as np
 from harness.analysis.metric import Claim
 from harness.campaign.campaign_file import Base, CampaignFile, absolute_paths, is_a, validated
 from harness.campaign.flight import Job
-from harness.campaign.results import IntArray
 from harness.campaign.runs import SEED_STREAM, CampaignRuns
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, node_of
-from harness.flight.record import FloatArray
+from harness.flight.record import FloatArray, IntArray
 from harness.run.path_check import asked as path_check
 from harness.run.path_check import origin_of
 from harness.run.path_flight import PathCheck

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.certification.bounds import clopper_pearson, lognormal_bounds
+from harness.flight.record import FloatArray, IntArray
 
 RUNS: Final = 8
 """Independent runs; the bounds come from how much they differ."""
@@ -31,8 +31,6 @@ ACCEPTED, ADAPTED = 0.42, 0.7
 WIDEST: Final = 1.0
 """Estimates whose logarithms have a larger variance than this are too far apart for bounds of their mean."""
 
-FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.int64]
 Evaluate: TypeAlias = Callable[[FloatArray, IntArray], FloatArray]
 """Margins (n,) of days, above 0 where the claim holds, from their standard normal numbers (n, d) and seeds (n,)."""
 

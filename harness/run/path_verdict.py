@@ -10,11 +10,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.guidance.altitude import slewed
 from harness.analysis.breaches import CONTACT, Breach, Kept, crossings, inside_m, kept
-from harness.analysis.deviation import Stations, deviation
+from harness.analysis.deviation import Rows, Stations, deviation
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.analysis.metrics import error_figures, metrics
@@ -47,14 +46,14 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
     """The content of `metrics.json` of a path that was flown: that of any flight, and what is asked of a path."""
     track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
     corners = [replace(each, allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
-    window_m = WINDOW_RADII * limits.turn_radius_m
-    found = believed = deviation(track, way.given_m, SPACING_SHARE * tolerance, window_m)
+    line = way.given_m, SPACING_SHARE * tolerance, WINDOW_RADII * limits.turn_radius_m
+    found = believed = deviation(track, *line)
     passing = _Passing(track, np.nan_to_num(found.by_row_m), tolerance, corners)
     asked = _as_given(check.plan, passing)
     if track.has_beliefs:
         east, north = track.believed_m[:, :2].T
         as_believed = replace(track, east_m=east, north_m=north)
-        believed = deviation(as_believed, way.given_m, SPACING_SHARE * tolerance, window_m)
+        believed = deviation(as_believed, *line)
         asked = replace(asked, believed_off_m=believed.by_row_m)
     figures = metrics(flight, limits, asked)
     others = layer_contacts(track, check.scenario, check.files)
@@ -283,7 +282,7 @@ class _Passing:
         return Stations(self.track)
 
     @cached_property
-    def _within(self) -> NDArray[np.intp]:
+    def _within(self) -> Rows:
         """Rows that are within the tolerance, and the end."""
         return np.append(np.flatnonzero(self.off_m <= self.tolerance_m), len(self.track))
 
@@ -297,7 +296,7 @@ class _Passing:
         What it is off counts up to where it is within the tolerance of the path again.
         """
         about, flown, most = self.stations.at_corner(corner), None, 0.0
-        if len(about) and self.stations.come_as_far(corner):
+        if self.stations.reached_m >= corner.arc_length_m:
             back = self._within[np.searchsorted(self._within, about[-1])]
             about = np.append(about, np.arange(about[-1], back))
             off = self.track.east_m[about] - corner.east_m, self.track.north_m[about] - corner.north_m

@@ -14,12 +14,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.files import kml
 from harness.files.input_file import InputError, finite, listed, parsed_json, shown
 from harness.files.kml import Point
 from harness.files.wording import counted
+from planner.interface import BoolArray, FloatArray
 
 LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))
 """Pairs of CSV columns that hold a place in the local plane."""
@@ -45,8 +45,6 @@ MOST_BROKEN_SHARE: Final = 0.05
 DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)
 EARTH_RADIUS_M: Final = 6_371_000.0
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
-
-FloatArray = NDArray[np.float64]
 
 
 class PathAsRead(NamedTuple):
@@ -226,13 +224,13 @@ def _away_m(before: FloatArray, after: FloatArray) -> FloatArray:
     return away
 
 
-def _leaps(before: FloatArray, after: FloatArray) -> NDArray[np.bool_]:
+def _leaps(before: FloatArray, after: FloatArray) -> BoolArray:
     """(k,) whether a glider cannot get from fixes to others in the time between them."""
     elapsed = after[:, 4] - before[:, 4]
     # An altitude of 0 is none.
     rise = np.where(before[:, 2] * after[:, 2] != 0, after[:, 2] - before[:, 2], 0.0)
     fast = (_away_m(before, after) > FASTEST_MPS * elapsed) | (np.abs(rise) > STEEPEST_MPS * elapsed)
-    found: NDArray[np.bool_] = fast & (elapsed > 0.0)
+    found: BoolArray = fast & (elapsed > 0.0)
     return found
 
 

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from planner.interface import FloatArray
 
 _PAIRS_AT_ONCE = 1_000_000
 """At most this many distances between points and edges are computed together, to keep memory small."""

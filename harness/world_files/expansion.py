@@ -62,15 +62,14 @@ USED_BY: Final = {
 def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
     """Returns the keys set otherwise than by default that a file cannot use, each with the fault to raise."""
     told = {}
-    for key, used_by in USED_BY.items():
-        if contents.kind not in used_by and getattr(spec, key) != getattr(FileSpec, key):
-            others = ", ".join(dict.fromkeys(used_by))
-            told[key] = f"is of the kind {contents.kind}; {key} is used by {others} only: leave it out"
-    if contents.crs is not None:
-        given = (
-            key for key in ("shift_m", "metres_per_cell") if getattr(spec, key) != getattr(FileSpec, key)
-        )
-        told |= {key: f"has its place on earth, which {key} does not move; leave {key} out" for key in given}
+    for key in (key for key in ("shift_m", *USED_BY) if getattr(spec, key) != getattr(FileSpec, key)):
+        used_by = dict.fromkeys(USED_BY.get(key, (contents.kind,)))
+        if contents.crs is not None and key in ("shift_m", "metres_per_cell"):
+            told[key] = f"has its place on earth, which {key} does not move; leave {key} out"
+        elif contents.kind not in used_by:
+            told[key] = (
+                f"is of the kind {contents.kind}; {key} is used by {', '.join(used_by)} only: leave it out"
+            )
     return told
 
 
