@@ -150,7 +150,7 @@ def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:
 def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> FigureScene:
     from harness.report.figures import FigureScene
 
-    mission, wind = scenario.mission, scenario.environment.wind
+    mission, wind, radius_m = scenario.mission, scenario.environment.wind, _turn_radius_m(scenario, run)
     return FigureScene(
         name=scenario.name,
         bounds_m=scenario.area.bounds_m,
@@ -159,11 +159,9 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
         goal_m=mission.goal_m,
         goal_radius_m=mission.goal_radius_m,
         clearance_m=scenario.planner.clearance_m,
-        turn_radius_m=_turn_radius_m(scenario, run),
+        turn_radius_m=radius_m,
         optimum_m=optimum.points_m,
-        turning_optimum_m=turning_optimum_m(
-            optimum.points_m, mission.course_deg, _turn_radius_m(scenario, run)
-        ),
+        turning_optimum_m=turning_optimum_m(optimum.points_m, mission.course_deg, radius_m),
         wind=(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0),
         navigation_margin_m=scenario.navigation.margin_m or 0.0,
     )

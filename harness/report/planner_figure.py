@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -74,13 +73,10 @@ def _near_miss(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: i
             axes.add_patch(outline(obstacle, grown, float(now_s[0]), **style))
     plan = int(track.plan_index[row])
     planned = polylines([run.plans[plan].segments], 1e-3 * half_m) if plan >= 0 else []
-    close_up(
-        axes,
-        [(np.column_stack((track.east_m, track.north_m)), colour(index), 1.8, "-")]
-        + [(each, "black", 0.9, PLANNED_DASHES) for each in planned],
-        middle,
-        (half_m, half_m),
-    )
+    axes.plot(track.east_m / 1e3, track.north_m / 1e3, color=colour(index), lw=1.8)
+    for each in planned:
+        axes.plot(*each.T / 1e3, color="black", lw=0.9, ls=PLANNED_DASHES)
+    close_up(axes, middle, (half_m, half_m))
     axes.plot(*middle / 1e3, ls="", **NEAREST_MARK | {"mec": colour(index)})
     hit = run.outcome == "collision" and row == len(track) - 1
     what = "its collision" if hit else f"nearest: {number(float(track.clearance_m[row]))} m"
@@ -107,15 +103,8 @@ def _half_m(scene: FigureScene) -> float:
     return max(CLOSE_UP_CLEARANCES * scene.clearance_m, scene.turn_radius_m)
 
 
-def close_up(
-    axes: Axes,
-    lines: Sequence[tuple[FloatArray, str, float, Any]],
-    middle_m: FloatArray,
-    half_m: tuple[float, float],
-) -> None:
-    """Draws lines about a place, with a bar of a round length and no ticks."""
-    for points, ink, width, dashes in lines:
-        axes.plot(*points.T / 1e3, color=ink, lw=width, ls=dashes, clip_on=True)
+def close_up(axes: Axes, middle_m: FloatArray, half_m: tuple[float, float]) -> None:
+    """Shows a place enlarged, with a bar of a round length and no ticks."""
     (east, north), (wide, high) = middle_m / 1e3, np.array(half_m) / 1e3
     axes.set(xlim=(east - wide, east + wide), ylim=(north - high, north + high), aspect="equal")
     axes.set_xticks([])
