@@ -27,10 +27,10 @@ from harness.campaign.results import INDEX, METRICS, RESULTS, RUN, RUNS, TIMES, 
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import Workers, fly_jobs
 from harness.files.errors import RunFolderError
-from harness.files.folder_lock import FolderLock
+from harness.files.folder_lock import MAX_INDEX_BYTES, claim_folder
 from harness.files.input_file import read_index
 from harness.files.versions import versions
-from harness.files.whole_file import PARTIAL, append_to, replace_text, replacing
+from harness.files.whole_file import append_to, replace_text, replacing
 from harness.files.wording import counted
 from harness.scenario.kinds import PLANNER
 
@@ -39,27 +39,10 @@ JOURNAL: Final = "journal.jsonl"
 SEAL_KEY: Final = "sha256"
 """Key of a journal line under which the SHA-256 of the rest of the line stands."""
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/2"
-MAX_INDEX_BYTES: Final = 10**9
 TABLES_EVERY_S: Final = 30.0
 TABLES_SHARE: Final = 0.01
 """Tables are written at most every `TABLES_EVERY_S`, and so seldom that it takes at most this share of the time."""
 MAX_SHOWN: Final = 3
-
-
-def claim_folder(path: Path, what: str, index: str, schema: str, lock: str | None = None) -> FolderLock:
-    """Locks the folder that a command writes (`what`), with its file `lock` if named; or raises RunFolderError."""
-    if path.exists() and not path.is_dir():
-        raise RunFolderError(f"{path} is a file, not a folder for a {what}")
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        others = {each.name for each in path.iterdir() if not each.name.endswith(PARTIAL)} - {lock}
-        if others and read_index(path / index, schema, MAX_INDEX_BYTES) is None:
-            raise RunFolderError(
-                f"{path} is not empty and not a {what}: choose another folder or empty it first"
-            )
-        return FolderLock(path, lock)
-    except OSError as error:
-        raise RunFolderError(f"cannot write the {what} {path}: {error.strerror or error}") from error
 
 
 class CampaignFolder:

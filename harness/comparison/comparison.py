@@ -20,10 +20,10 @@ import numpy as np
 from harness.analysis.metric import ERROR
 from harness.analysis.rows import COMPARED, Row, to_csv
 from harness.campaign.flight import Answer, Job
-from harness.campaign.folder import claim_folder
 from harness.campaign.paired import TESTED, Duel, duels
 from harness.campaign.workers import fly_jobs, local_workers
 from harness.files.errors import RunFolderError
+from harness.files.folder_lock import claim_folder
 from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text

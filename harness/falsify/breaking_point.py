@@ -20,9 +20,9 @@ from typing import Any, Final, Literal, TypeAlias
 
 from aircraft.airframes import AircraftError
 from harness.analysis.metric import Claim, holds
-from harness.campaign.folder import claim_folder
 from harness.campaign.sampling import takes_whole_numbers
 from harness.files.errors import WriteError, sentence
+from harness.files.folder_lock import claim_folder
 from harness.files.strict_yaml import InputError, as_spelt, loc_of
 from harness.files.whole_file import replace_text
 from harness.run.scenario_flight import fly_and_measure

@@ -5,8 +5,13 @@ from __future__ import annotations
 import fcntl
 import os
 from pathlib import Path
+from typing import Final
 
 from harness.files.errors import RunFolderError
+from harness.files.input_file import read_index
+from harness.files.whole_file import PARTIAL
+
+MAX_INDEX_BYTES: Final = 10**9
 
 
 class FolderLock:
@@ -34,6 +39,24 @@ class FolderLock:
         descriptor, self._descriptor = self._descriptor, -1
         if descriptor >= 0:
             os.close(descriptor)
+
+
+def claim_folder(path: Path, what: str, index: str, schema: str, lock: str | None = None) -> FolderLock:
+    """Locks the folder that a command writes (`what`), with its file `lock` if named; or raises RunFolderError."""
+    if not str(path).isprintable():  # the libraries that write tables take names in UTF-8 only
+        raise RunFolderError(f"cannot write the {what} {str(path)!r}: its name must be printable")
+    if path.exists() and not path.is_dir():
+        raise RunFolderError(f"{path} is a file: choose another place for the {what}")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        others = {each.name for each in path.iterdir() if not each.name.endswith(PARTIAL)} - {lock}
+        if others and read_index(path / index, schema, MAX_INDEX_BYTES) is None:
+            raise RunFolderError(
+                f"{path} is not empty and not a {what}: choose another folder or empty it first"
+            )
+        return FolderLock(path, lock)
+    except OSError as error:
+        raise RunFolderError(f"cannot write the {what} {path}: {error.strerror or error}") from error
 
 
 def is_held(path: Path) -> bool:

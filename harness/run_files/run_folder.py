@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.files.errors import RunFolderError
-from harness.files.folder_lock import FolderLock
+from harness.files.folder_lock import FolderLock, claim_folder
 from harness.files.input_file import MAX_JSON_BYTES, read_index, read_text
 from harness.files.versions import FLOWN_WITH, versions
 from harness.files.whole_file import PARTIAL, replace_text, replacing
@@ -108,7 +108,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         }
         try:
             made = [each for each in (path, *path.parents) if not each.exists()]
-            lock = _claim(path)
+            lock = claim_folder(path, "run folder", MANIFEST, SCHEMA)
             with ExitStack() as undo:
                 undo.callback(_remove_made, path, made)
                 replace_text(path / MANIFEST, _json(manifest))
@@ -245,21 +245,6 @@ def _check_hash(path: Path, manifest: Mapping[str, Any]) -> None:
         raise ValueError(f"{path.name} is missing or not a file")
     if manifest.get("sha256", {}).get(path.name) not in (None, _sha256(path)):
         raise ValueError(f"{path.name} is not what was written: its sha256 is not that in {MANIFEST}")
-
-
-def _claim(path: Path) -> FolderLock:
-    """Makes `path` a folder that this process alone may write to, or raises RunFolderError."""
-    if not str(path).isprintable():  # the libraries that write tables take names in UTF-8 only
-        raise RunFolderError(f"cannot write the run folder {str(path)!r}: its name must be printable")
-    if path.exists() and not path.is_dir():
-        raise RunFolderError(f"{path} is a file, not a folder for a run")
-    path.mkdir(parents=True, exist_ok=True)
-    lock = FolderLock(path)
-    others = {entry.name for entry in path.iterdir()} - {MANIFEST + PARTIAL}
-    if others and read_index(path / MANIFEST, SCHEMA) is None:
-        lock.release()
-        raise RunFolderError(f"{path} is not empty and not a run folder: choose another folder")
-    return lock
 
 
 def _remove_made(path: Path, made: Sequence[Path]) -> None:
