@@ -23,6 +23,12 @@ SHORT = ("--set", "mission.time_limit_s=15")
 LONG = ("fly", "paper_circles", "--out", "run", "--quiet")
 
 
+def in_shell(folder: Path, script: str, *words: str) -> subprocess.CompletedProcess[str]:
+    """Runs a script in a folder, with words as its arguments."""
+    env, words = {**os.environ, "PYTHONPATH": str(ROOT)}, ("bash", "-c", script, "bash", *words)
+    return subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, timeout=120)
+
+
 @pytest.mark.flights
 @pytest.mark.parametrize(
     ("signum", "recording"),
@@ -104,15 +110,7 @@ def test_a_flight_whose_planner_hangs_can_be_broken_off_and_leaves_what_was_flow
 )
 def test_what_the_process_may_not_have_is_told_with_its_remedy(shell: str, told: str, tmp_path: Path) -> None:
     (tmp_path / "gone").mkdir()
-    done = subprocess.run(
-        ["bash", "-c", shell.format(f"{sys.executable} -m harness", forest=FOREST)],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = in_shell(tmp_path, shell.format(f"{sys.executable} -m harness", forest=FOREST))
     assert told in done.stderr
     assert len(done.stderr.splitlines()) == 1
 
@@ -173,14 +171,6 @@ def test_output_onto_a_full_disk(tmp_path: Path) -> None:
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
 def test_streams_that_are_closed(closed: str, tmp_path: Path) -> None:
     words = [sys.executable, "-m", "harness", *FLY, *SHORT, "--no-recording"]
-    done = subprocess.run(
-        ["sh", "-c", f'"$@" {closed}', "sh", *words],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    done = in_shell(tmp_path, f'"$@" {closed}', *words)
     assert (done.returncode, PROGRESS.sub("", done.stderr)) == (1, "")
     assert load_run(tmp_path / "run").manifest["complete"] is True
