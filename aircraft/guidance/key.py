@@ -6,20 +6,10 @@ from dataclasses import field
 from typing import Any
 
 
-def key(
-    default: object,
-    doc: str,
-    unit: str | None = None,
-    *,
-    minimum: float | None = None,
-    above: float | None = None,
-    maximum: float | None = None,
-) -> Any:
+def key(default: object, doc: str, unit: str | None = None, **bounds: float) -> Any:
     """A field of a frozen dataclass with the metadata that scenario files are checked with.
 
-    A default of None depends on the aircraft; `doc` says what that comes from; a switch has no unit.
+    A default of None depends on the aircraft; `doc` says what that comes from; a switch has no unit. Bounds are
+    `minimum`, `above` and `maximum`.
     """
-    metadata = {"doc": doc, "unit": unit, "minimum": minimum, "above": above, "maximum": maximum}
-    return field(
-        default=default, metadata={name: value for name, value in metadata.items() if value is not None}
-    )
+    return field(default=default, metadata={"doc": doc} | ({"unit": unit} if unit else {}) | bounds)
