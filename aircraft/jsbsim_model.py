@@ -207,7 +207,7 @@ class JsbsimModel:
             return f"the aircraft is at the ground ({altitude * FOOT_M:.1f} m above sea level)"
         if abs(alpha) > self._stall_rad:
             limit_deg = self.airframe.stall_angle_deg
-            return f"stalled: angle of attack {math.degrees(alpha):.4g} deg, limit {limit_deg:g} deg"
+            return f"stalled: angle of attack {math.degrees(alpha):.1f} deg, beyond the limit of {limit_deg:g} deg"
         return f"rolled over: roll {math.degrees(roll):.0f} deg, limit {math.degrees(MAX_ROLL_RAD):.0f} deg"
 
     def engage(self, on: bool = True) -> None:

@@ -32,7 +32,7 @@ def clopper_pearson(held: int, runs: int, confidence: float) -> tuple[float, flo
 
 
 def lognormal_bounds(estimates: NDArray[np.float64], confidence: float) -> tuple[float, float]:
-    """Lower and upper bound, each by itself, of the mean of what independent estimates above 0 are drawn from.
+    """Lower and upper bound, each by itself, of the expected value of independent estimates above 0.
 
     They are taken as lognormal: Cox's interval of such a mean with Student's quantile (Olsson, Journal of Statistics
     Education 13, 2005).
@@ -46,7 +46,7 @@ def lognormal_bounds(estimates: NDArray[np.float64], confidence: float) -> tuple
 
 
 def sequential_bounds(held: int, runs: int, confidence: float) -> tuple[float, float]:
-    """The same, valid at every number of runs at once."""
+    """Bounds as those of `clopper_pearson`, but valid at every number of runs at once."""
     if not runs:
         return 0.0, 1.0
     failed, wanted = runs - held, math.log(1.0 / (1.0 - confidence))
