@@ -332,19 +332,9 @@ def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
 def test_a_failing_day_is_flown_again_by_the_command_of_its_manifest(tmp_path: Path) -> None:
     path = tmp_path / "line.csv"
     path.write_text("x_m,y_m\n0,0\n1500,0\n")
-    run = [
-        "check",
-        str(path),
-        "--aircraft",
-        "aerosonde",
-        "--conditions",
-        "typical",
-        "--altitude-m",
-        "700",
-        "--seed",
-        "9",
-    ]
-    run += ["--tolerance-m", "0.01", "--set", "aircraft.autopilot.bank_limit_deg=40", "--quiet"]
+    run = ["check", str(path), "--aircraft", "aerosonde", "--conditions", "typical", "--quiet"]
+    run += ["--altitude-m", "700", "--seed", "9"]
+    run += ["--tolerance-m", "0.01", "--set", "aircraft.autopilot.bank_limit_deg=40"]
     assert main([*run, "--days", "1", "--out", str(tmp_path / "run")]) == 1
     (day,) = (tmp_path / "run" / "days" / "runs").iterdir()
     (command,) = json.loads((day / "manifest.json").read_text())["command"]
