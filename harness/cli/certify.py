@@ -127,11 +127,7 @@ def _fly(
     from harness.campaign.workers import local_workers
     from harness.certification.certification import certify as fly_days
 
-    with (
-        resumable(folder, INDEX),
-        local_workers(at_a_time(workers)) as flyers,
-        step_bar(silent) as bar,
-    ):
+    with resumable(folder, INDEX), local_workers(at_a_time(workers)) as flyers, step_bar(silent) as bar:
 
         def report(tally: Tally) -> None:
             bar(tally.runs, len(days), f"held on {tally.held} of {tally.runs} days")

@@ -77,13 +77,7 @@ def falsify(
             bar(done, of, told)
 
         found = search(
-            loaded,
-            varied,
-            folder,
-            claim=claim,
-            conditions=runs,
-            tolerance=tolerance,
-            progress=report,
+            loaded, varied, folder, claim=claim, conditions=runs, tolerance=tolerance, progress=report
         )
     if as_json:
         print_json(found.plain())

@@ -179,8 +179,7 @@ class MovingObstacles:
     def _step(self, scan: RangeScan, hits: IntArray) -> FloatArray:
         """(k,) distances (m) up to which neighbouring returns belong to one face, at the range of each."""
         step = np.maximum(
-            NO_STEP * self._clearance + 6.0 * self._noise,
-            SLANT * scan.spacing_rad * scan.ranges_m[hits],
+            NO_STEP * self._clearance + 6.0 * self._noise, SLANT * scan.spacing_rad * scan.ranges_m[hits]
         )
         return np.minimum(step, self._apart)
 

@@ -17,17 +17,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.compiled import (
-    BOOL,
-    COUNT,
-    COUNTS_OUT,
-    FLOAT,
-    FLOATS,
-    FLOATS_OUT,
-    PLACES,
-    PLACES_OUT,
-    compiled,
-)
+from planner.compiled import BOOL, COUNT, COUNTS_OUT, FLOAT, FLOATS, FLOATS_OUT, PLACES, PLACES_OUT, compiled
 from planner.interface import ComplexArray, FloatArray, IntArray
 
 Beams = tuple[float, float, float, float, float]

@@ -102,12 +102,7 @@ def site(
 
 
 def _in_area(
-    files: _Files,
-    bounds: Box,
-    notes: list[str],
-    altitude_m: float,
-    craft: Craft,
-    places: FloatArray | None,
+    files: _Files, bounds: Box, notes: list[str], altitude_m: float, craft: Craft, places: FloatArray | None
 ) -> Site:
     """Returns a site in one area; an InputError gives the numbers that say why there is none."""
     if files.place is None:
