@@ -66,10 +66,9 @@ def _panel(axes: Any, numbers: FloatArray, values: FloatArray, reached: Any, dot
     least, most = float(known.min()), float(known.max())
     low, high = np.percentile(known, (1, 99)) if len(known) >= PERCENTILE_RUNS else (least, most)
     # The axis ends at a percentile on a side where values lie beyond it by more than what is between the two.
-    low, high = (
-        low if 0.0 < high - low < low - least else least,
-        high if 0.0 < high - low < most - high else most,
-    )
+    between = high - low
+    low = low if 0.0 < between < low - least else least
+    high = high if 0.0 < between < most - high else most
     if is_outlying := least < low or high < most:
         axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
     within = (values >= low) & (values <= high)

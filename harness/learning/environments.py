@@ -102,10 +102,8 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         self._scans = ScanKeeper()
         self._loop: SteppedLoop | None = None
         self._seeded, self._to_go_m = False, math.nan
-        scan, state = (
-            spaces.Box(0.0, 1.0, (self._beams,), np.float32),
-            spaces.Box(STATE_LOW, STATE_HIGH, dtype=np.float32),
-        )
+        scan = spaces.Box(0.0, 1.0, (self._beams,), np.float32)
+        state = spaces.Box(STATE_LOW, STATE_HIGH, dtype=np.float32)
         observed: Any = spaces.Dict({"scan": scan, "state": state})
         self.observation_space = observed
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)

@@ -34,10 +34,8 @@ def outside_assumptions(scenario: Scenario) -> tuple[str, ...]:
     """
     if not any(each.velocity_mps not in (None, (0.0, 0.0)) for each in scenario.obstacles):
         return ()  # no world is made of many buildings that stand
-    fastest, range_m = (
-        min(FASTEST_MPS, FASTEST_SHARE * scenario.aircraft.airspeed_mps),
-        scenario.sensor.range_m,
-    )
+    fastest = min(FASTEST_MPS, FASTEST_SHARE * scenario.aircraft.airspeed_mps)
+    range_m = scenario.sensor.range_m
     found = []
     for number, each in enumerate(World.from_scenario(scenario).obstacles):
         speed = math.hypot(*each.velocity_mps)

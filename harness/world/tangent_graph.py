@@ -164,12 +164,7 @@ class TangentScene:
         direction = bearing[apart] - np.arcsin(np.clip(shift / distance[apart], -1.0, 1.0))
         leaves, arrives = direction - side * math.pi / 2, direction - sides * math.pi / 2
         touching = self.in_cone(disc, leaves) & self.in_cone(others, arrives)
-        others, sides, leaves, arrives = (
-            others[touching],
-            sides[touching],
-            leaves[touching],
-            arrives[touching],
-        )
+        others, sides, leaves, arrives = (each[touching] for each in (others, sides, leaves, arrives))
         begin, end = self.contacts(np.full(len(others), disc), leaves), self.contacts(others, arrives)
         free = self.free_segments(begin, end)
         begin, end = begin[free], end[free]

@@ -91,9 +91,8 @@ def rounded(run: Sequence[Vertex], flying: Flying) -> FlyBy:
     """Returns lines and arcs through waypoints, not all in one place."""
     points = np.array([(vertex.place.real, vertex.place.imag) for vertex in run])
     speeds = [vertex.airspeed_mps for vertex in run]
-    wide, least = (
-        np.array([of(each) for each in speeds]) for of in (flying.turn_radius_m, flying.least_radius_m)
-    )
+    wide = np.array([flying.turn_radius_m(each) for each in speeds])
+    least = np.array([flying.least_radius_m(each) for each in speeds])
     free = np.array([min(flying.free_cut_m, vertex.acceptance_m or math.inf) for vertex in run])
     limits = np.array([corner_limit_m(vertex.acceptance_m, flying.corner_m) for vertex in run])
     wind = flying.wind_mps / np.array(speeds, dtype=np.complex128)
