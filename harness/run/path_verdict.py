@@ -88,6 +88,7 @@ def _told(
     row = int((passing.off_m / np.maximum(asked.allowed_m, 1e-9)).argmax())
     worst_m, most_m = float(passing.off_m[row]), float(asked.allowed_m[row])
     line, speed = _given_line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
+    corners = [passing.of(corner) for corner in passing.corners]
     return {
         "ok": False,
         "verdict": "",
@@ -107,9 +108,9 @@ def _told(
             "altitude": float(np.abs(track.up_m - asked.altitude_m).max()) / limits.max_altitude_error_m,
             "bank": _bank_used(check, flight, limits, asked),
         },
-        "corner_m_that_would_do": _sufficient_m(passing),
+        "corner_m_that_would_do": _sufficient_m(passing, corners),
         "given": dataclasses.asdict(smoothness(polyline_profile(line, speed), speed)),
-        "corners": [passing.of(corner) for corner in passing.corners],
+        "corners": corners,
         "fences": [fence.plain() for fence in given.fences.every],
         "items": [dataclasses.asdict(item) for item in given.mission.items] if given.mission else [],
         "notes": [*given.notes, *plan.notes],
@@ -207,9 +208,8 @@ def _deviation_told(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
     return faults
 
 
-def _sufficient_m(passing: _Passing) -> float | None:
+def _sufficient_m(passing: _Passing, reached: Sequence[Mapping[str, Any]]) -> float | None:
     """The limit at all corners that would have been kept, rounded up to 1 m; None where none would, or no other."""
-    reached = [passing.of(corner) for corner in passing.corners]
     if all(each["kept"] for each in reached) or any(each["flown_cut_m"] is None for each in reached):
         return None
     limit_m = 0.0
