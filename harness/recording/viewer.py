@@ -73,15 +73,13 @@ def open_viewer(
     """
     if len(run_dirs) == 1:
         run_dirs = [_overlay_of(run_dirs[0])]
-    for each in run_dirs:
-        if each.suffix.lower() != ENDING:
-            recording_of(each)
-        elif not each.is_file():
+    for each in (each for each in run_dirs if each.suffix.lower() == ENDING):
+        if not each.is_file():
             raise InputError(f"{each}: no such file")
-        elif len(run_dirs) > 1:
+        if len(run_dirs) > 1:
             raise InputError(f"{each}: a recording is opened alone; run folders are overlaid")
+    recordings = [each if each.suffix.lower() == ENDING else recording_of(each) for each in run_dirs]
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
-        recordings = [each if each.suffix.lower() == ENDING else recording_of(each) for each in run_dirs]
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
