@@ -80,14 +80,13 @@ def preview_update(
     rows: FloatArray,
     gains: Any,
     memory: Any,
-    east_m: float,
-    north_m: float,
-    velocity_east_mps: float,
-    velocity_north_mps: float,
+    place_m: tuple[float, float],
+    velocity_mps: tuple[float, float],
     heading_rad: float,
     airspeed_mps: float,
 ) -> tuple[float, float, float, bool, bool]:
     """The law of `aircraft.guidance.preview`, from one update to the next: what `GuidanceOutput` consists of."""
+    (east_m, north_m), (velocity_east_mps, velocity_north_mps) = place_m, velocity_mps
     has, kept = gains[0], memory[0]
     row, along_m, cross, tangent_east, tangent_north = nearest_on_route(
         rows, kept.row, kept.along_m, east_m, north_m

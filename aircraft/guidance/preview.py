@@ -71,8 +71,8 @@ class PreviewLaw:
         if first:
             from aircraft import kernels
 
-            arrays = self._rows, self._gains, self._memory
-            self._update = kernels.for_types_of(kernels.preview_update, *arrays, *[math.nan] * 6)
+            types = self._rows, self._gains, self._memory, (math.nan, math.nan), (math.nan, math.nan)
+            self._update = kernels.for_types_of(kernels.preview_update, *types, math.nan, math.nan)
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Decides the roll command for the next update interval."""
@@ -82,10 +82,8 @@ class PreviewLaw:
             self._rows,
             self._gains,
             self._memory,
-            state.east_m,
-            state.north_m,
-            state.velocity_east_mps,
-            state.velocity_north_mps,
+            (state.east_m, state.north_m),
+            (state.velocity_east_mps, state.velocity_north_mps),
             state.heading_rad,
             state.airspeed_mps,
         )

@@ -1,9 +1,8 @@
 """Obstacles as seen from a track point: where their fans end, and how far lines lead past their edge points.
 
 Metres, ENU. `places`, `first` and `circles` are all edge points by squares, `planner.kernels.buckets.Buckets`. `own`
-are those of one obstacle, (3, m): east, north and the distance to be kept from each. Its cells, of a `side`, are
-`first`, `counts`, `one` and `other`: `planner.kernels.buckets.Cells`. A ray begins at (east, north), along (ux, uy).
-Compiled: see `planner.kernels`.
+are those of one obstacle, (3, m): east, north and the distance to be kept from each. Its `cells`, of a `side`, are
+`planner.kernels.buckets.Cells`. A ray begins at (east, north), along (ux, uy). Compiled: see `planner.kernels`.
 """
 
 from __future__ import annotations
@@ -12,8 +11,12 @@ import math
 
 import numpy as np
 
-from planner.compiled import BOOLS_OUT, COUNT, COUNTS, COUNTS_OUT, FLOAT, FLOATS_OUT, ROWS, compiled
+from planner.compiled import BOOLS_OUT, COUNT, COUNTS, COUNTS_OUT, FLOAT, FLOATS_OUT, POINT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
+from planner.kernels.buckets import Buckets, Cells
+
+BUCKETS, CELLS = f"Tuple(({ROWS}, {COUNTS}, {ROWS}))", f"UniTuple({COUNTS}, 4)"
+RAY = "UniTuple(float64, 4)"
 
 EDGE_OFF_RAD = 1e-7
 """Edges are turned this much into the free sector, clear of rounding errors."""
@@ -79,20 +82,18 @@ def _sift_down(key: FloatArray, value: FloatArray, place: int, count: int) -> No
         place = child
 
 
-@compiled(ROWS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, inner=True)
+@compiled(ROWS, CELLS, FLOAT, RAY, FLOAT, FLOAT, inner=True)
 def hugged(
     own: FloatArray,
-    first: IntArray,
-    counts: IntArray,
+    cells: Cells,
     side: float,
-    east: float,
-    north: float,
-    ux: float,
-    uy: float,
+    ray: tuple[float, float, float, float],
     outer: float,
     touch: float,
 ) -> float:
     """Distance along a ray that touches an obstacle at which it is `outer` away from the obstacle again; 0: never."""
+    first, counts, _, _ = cells
+    east, north, ux, uy = ray
     begin, end, count = np.empty(own.shape[1]), np.empty(own.shape[1]), 0
     within = outer + 1.5 * side  # points of one cell lie no further apart than its diagonal
     for cell in range(len(first)):
@@ -120,25 +121,16 @@ def hugged(
     return furthest
 
 
-@compiled(ROWS, COUNT, COUNTS, COUNTS, COUNTS, COUNTS, COUNTS_OUT, BOOLS_OUT, inner=True)
-def _find_ends(
-    tangents: FloatArray,
-    row: int,
-    first: IntArray,
-    counts: IntArray,
-    one: IntArray,
-    other: IntArray,
-    outmost: IntArray,
-    ends: BoolArray,
-) -> None:
+@compiled(ROWS, COUNT, CELLS, COUNTS_OUT, BOOLS_OUT, inner=True)
+def _find_ends(tangents: FloatArray, row: int, cells: Cells, outmost: IntArray, ends: BoolArray) -> None:
     """Writes the outmost point of each cell, and whether the fan ends there, on the left (row 0) or the right (2).
 
     `tangents` are (4, m) unit vectors: those on the left of the points, then those on the right.
     """
-    side, cells = 1.0 - row, len(first)
-    east, north = np.empty(cells), np.empty(cells)
+    side, (first, counts, one, other) = 1.0 - row, cells
+    east, north = np.empty(len(first)), np.empty(len(first))
     # Written without branches, which depend on numbers that no processor foresees.
-    for cell in range(cells):
+    for cell in range(len(first)):
         begin = furthest = first[cell]
         ux, uy, most = tangents[row, begin], tangents[row + 1, begin], 0.0
         for j in range(begin + 1, begin + counts[cell]):
@@ -158,20 +150,14 @@ def _find_ends(
         ends[b] &= not beyond < 0.0
 
 
-@compiled(ROWS, COUNTS, ROWS, COUNTS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(BUCKETS, COUNTS, ROWS, CELLS, FLOAT, POINT, FLOAT)
 def fan_edges(
-    places: FloatArray,
-    block: IntArray,
-    circles: FloatArray,
+    buckets: Buckets,
     labels: IntArray,
     own: FloatArray,
-    first: IntArray,
-    counts: IntArray,
-    one: IntArray,
-    other: IntArray,
+    cells: Cells,
     side: float,
-    east: float,
-    north: float,
+    origin: tuple[float, float],
     outer: float,
 ) -> tuple[FloatArray, IntArray, int]:
     """Finds the tangents to the ends of an obstacle's fan that are free up to the touch, and what hides the others.
@@ -182,7 +168,8 @@ def fan_edges(
         (h,) the obstacles that hide a tangent, or close it right behind the place where it touches;
         how many tangents were looked along.
     """
-    cells, count = len(first), 0
+    (places, block, circles), (east, north) = buckets, origin
+    many, count = len(cells[0]), 0
     tangents = np.empty((4, own.shape[1]))
     for j in range(own.shape[1]):
         # The direction towards a point, turned to its tangents; from too near they lead square past it.
@@ -192,12 +179,12 @@ def fan_edges(
         sin = 1.0 / math.sqrt(away2) if away2 <= keep * keep else keep / away2
         tangents[0, j], tangents[1, j] = dx * cos - dy * sin, dy * cos + dx * sin
         tangents[2, j], tangents[3, j] = dx * cos + dy * sin, dy * cos - dx * sin
-    outmost, ends = np.empty(cells, dtype=np.intp), np.empty(cells, dtype=np.bool_)
-    edges, hiding, hides, looked = np.empty((2 * cells, 6)), np.empty(2 * cells, dtype=np.intp), 0, 0
+    outmost, ends = np.empty(many, dtype=np.intp), np.empty(many, dtype=np.bool_)
+    edges, hiding, hides, looked = np.empty((2 * many, 6)), np.empty(2 * many, dtype=np.intp), 0, 0
     for row in range(0, 4, 2):
         hand = 1.0 - row
-        _find_ends(tangents, row, first, counts, one, other, outmost, ends)
-        for cell in range(cells):
+        _find_ends(tangents, row, cells, outmost, ends)
+        for cell in range(many):
             if not ends[cell]:
                 continue
             j = outmost[cell]
@@ -213,7 +200,7 @@ def fan_edges(
             if clear >= touch:
                 edges[count, 0], edges[count, 1], edges[count, 2] = towards, aside, touch
                 edges[count, 3], edges[count, 4] = clear, hand
-                edges[count, 5] = hugged(own, first, counts, side, east, north, towards, aside, outer, touch)
+                edges[count, 5] = hugged(own, cells, side, (east, north, towards, aside), outer, touch)
                 count += 1
             if clear < touch + places[2, met] and not (hides and hiding[hides - 1] == labels[met]):
                 hiding[hides] = labels[met]
@@ -221,21 +208,20 @@ def fan_edges(
     return edges[:count], hiding[:hides], looked
 
 
-@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, COUNT)
+@compiled(ROWS, COUNTS, ROWS, POINT, POINT, COUNT)
 def entered(
     places: FloatArray,
     first: IntArray,
     circles: FloatArray,
-    ax: float,
-    ay: float,
-    bx: float,
-    by: float,
+    a: tuple[float, float],
+    b: tuple[float, float],
     most: int,
 ) -> tuple[FloatArray, IntArray]:
     """The discs about points by squares that the line from a to b enters: distances from a, and their indices.
 
     A disc that holds `a` counts only when the line leads deeper into it. At most `most` discs are returned.
     """
+    (ax, ay), (bx, by) = a, b
     most = min(most, len(places[0]))
     entry, which, count = np.empty(most), np.empty(most, dtype=np.intp), 0
     length = math.hypot(bx - ax, by - ay)
@@ -275,7 +261,7 @@ def shortcuts(
         while there > here + 1:
             a, b = nodes[here], nodes[there]
             lines += 1
-            if not len(entered(places, first, circles, a[0], a[1], b[0], b[1], 1)[1]):
+            if not len(entered(places, first, circles, (a[0], a[1]), (b[0], b[1]), 1)[1]):
                 break
             there -= 1
         here = there

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, FLOATS, FLOATS_OUT, ROWS, compiled
+from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, FLOATS, FLOATS_OUT, POINT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
 CORNER_LEVELS = (2, 4)
@@ -12,20 +12,19 @@ CORNER_LEVELS = (2, 4)
 between the true length of a way and 0.92 of it."""
 
 
-@compiled(BOOLS_OUT, ROWS, FLOATS, FLOAT, FLOAT, FLOAT, COUNT, COUNT, rare=True)
+@compiled(BOOLS_OUT, ROWS, FLOATS, POINT, FLOAT, COUNT, COUNT, rare=True)
 def close_cells(
     open_: BoolArray,
     points: FloatArray,
     keep: FloatArray,
-    west: float,
-    south: float,
+    corner: tuple[float, float],
     cell: float,
     columns: int,
     rows: int,
 ) -> None:
-    """Closes the cells that lie wholly within the distance `keep` of one of the points."""
+    """Closes cells of the grid from its south-west corner that lie wholly within the distance `keep` of a point."""
     for i in range(len(points)):
-        x, y, within = points[i, 0] - west, points[i, 1] - south, keep[i] - math.sqrt(0.5) * cell
+        x, y, within = points[i, 0] - corner[0], points[i, 1] - corner[1], keep[i] - math.sqrt(0.5) * cell
         if within <= 0.0:
             continue
         for column in range(max(int((x - within) / cell), 0), min(int((x + within) / cell) + 1, columns - 2)):

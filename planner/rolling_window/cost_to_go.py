@@ -69,10 +69,10 @@ class CostToGo:
         open_ = grid.ravel()
         width = 2 * int(float(self._keep.max(initial=0.0)) / self._cell) + 3
         some = max(PAIRS_AT_ONCE // width**2, 1)
-        west, south = self._low.tolist()
+        corner: Point = tuple(self._low.tolist())
         for i in range(0, len(self._points), some):
             points, keep = self._points[i : i + some], self._keep[i : i + some]
-            close_cells(open_, points, keep, west, south, self._cell, self._columns, self._rows)
+            close_cells(open_, points, keep, corner, self._cell, self._columns, self._rows)
             self._work_count.add(1, CLOSED_WORK, len(points) * width**2)
             yield
         goal = self._index(self._goal)

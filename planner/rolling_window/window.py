@@ -86,7 +86,7 @@ class Window:
         """Where the line to the goal comes too near to edge points, m from the origin, and the obstacle of each."""
         blocked, labels = self._buckets
         self.work_count.add(1, POINT_WORK, len(labels))
-        entry, which = entered(*blocked, *origin, *goal, len(labels))
+        entry, which = entered(*blocked, origin, goal, len(labels))
         return entry, labels[which]
 
     def nearest_obstacles(self, most: int) -> list[int]:
@@ -110,7 +110,7 @@ class Window:
         while pending:
             obstacle = pending.pop()
             own, squares = self._obstacle(obstacle)
-            found, hiding, looked = fan_edges(*blocked, labels, own, *squares, self.cell_m, *origin, outer_m)
+            found, hiding, looked = fan_edges(blocked, labels, own, squares, self.cell_m, origin, outer_m)
             self.work_count.add(1, TANGENT_WORK, len(own[0]))
             self.work_count.add(0, POINT_WORK, looked * len(labels))
             self.work_count.add(0, HUG_WORK, len(found) * len(own[0]))

@@ -70,7 +70,7 @@ def test_the_law_decides_as_its_source(seed: int, monkeypatch: pytest.MonkeyPatc
     compiled = decided()
     update = source("preview_update")
 
-    def by_source(rows: Any, gains: Any, memory: Any, *numbers: float) -> Any:
+    def by_source(rows: Any, gains: Any, memory: Any, *numbers: Any) -> Any:
         return update(rows, gains.view(np.recarray), memory.view(np.recarray), *numbers)
 
     monkeypatch.setattr(kernels, "for_types_of", lambda function, *_: by_source)

@@ -73,7 +73,7 @@ def test_a_line_enters_what_it_enters_among_all_points(seed: int, count: int, le
     rng = np.random.default_rng(seed)
     points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
     whole, parts = bucketed(points, keep, 20_000.0), bucketed(points, keep, 500.0)
-    line = 100.0, -50.0, 100.0 + length, -50.0
+    line = (100.0, -50.0), (100.0 + length, -50.0)
     found = [
         dict(zip(order[which].tolist(), entry.tolist(), strict=True))
         for order, squares in (whole, parts)
