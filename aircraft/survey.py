@@ -53,10 +53,10 @@ REVERSAL_BANKS_DEG = (30.0, -30.0, 15.0, 0.0)
 WELL_TRACKED_S = 0.01
 """An autopilot tracks a weave well if its cross-track error is at most the distance flown in this time."""
 PACES = (1.0, 0.7, 0.5, 0.35)
-"""Paces are shares of the feedback of `aircraft.autopilot.gains`; the survey tries them in this order."""
-LAST_PACE = 0.25
-"""Pace for an aircraft that no other pace holds."""
-CLIMB_PACES = (*PACES, LAST_PACE, 0.18, 0.12)
+"""Paces are shares of the feedback in roll and yaw of `aircraft.autopilot.gains`, tried in this order."""
+FALLBACK_PACE = 0.25
+"""Pace that is tried only for an aircraft that none of `PACES` holds."""
+CLIMB_PACES = (*PACES, FALLBACK_PACE, 0.18, 0.12)
 """Paces of the climb and altitude loops on a late state, tried in this order."""
 LEAST_TURN_SHARE = 0.5
 """An aircraft that turns at less than this share of a coordinated turn's rate is not flown by its bank."""
@@ -90,8 +90,8 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
     try:
         at = linearised(trimmed(files, cruise))
         pitch_paces = _pitch_paces(at, _servo_lag_s(files, "elevator"), files.latency_s)
-        for pace in (*PACES, LAST_PACE):
-            if pace == LAST_PACE and best is not None:
+        for pace in (*PACES, FALLBACK_PACE):
+            if pace == FALLBACK_PACE and best is not None:
                 break
             found = _at_pace(entry, files, cruise, at, pace, *pitch_paces)
             if isinstance(found, str):

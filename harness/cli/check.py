@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 PATH: Final = "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints)."
 WORLD: Final = "A scenario that gives obstacles, bounds, environment, seed, altitude."
-ALTITUDE: Final = "Altitude above sea level. Default: the file's, else 300."
+ALTITUDE: Final = "One altitude above sea level throughout. Default: the file's, else WORLD's, else 300."
 LEVEL: Final = "Largest distance from the altitude. Default: 10 m."
 TOLERANCE: Final = "Largest distance from the path. Default: a tenth of C, or 10 m without C."
 ACCEPTED: Final = "at waypoints of a mission the acceptance radius in the file, else 90 m."

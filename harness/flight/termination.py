@@ -34,7 +34,7 @@ class Termination(Protocol):
         ...
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
-        """Returns how the flight ends at a true state, also for a `fault`; None while it goes on."""
+        """Returns how a flight ends at a true state or by lost control (`fault`: how); None while it goes on."""
         ...
 
 

@@ -20,8 +20,9 @@ from harness.scenario.validation import KeyFault
 MAX_OBSTACLES: Final = 10_000
 """A forest that is asked for more trunks is refused."""
 TRIES: Final = 100
-AT_ONCE: Final = 10
-"""Number of places that are tried at a time."""
+"""Random places that are tried for a copse before it is left out."""
+TRIES_AT_ONCE: Final = 10
+"""Of a copse's `TRIES`, how many are drawn at a time; the first free one is taken."""
 Place = tuple[float, float]
 
 
@@ -83,8 +84,8 @@ class Forest(Section):
         for radius in reach_m:
             discs = taken[:placed]
             found.append(None)
-            for _ in range(TRIES // AT_ONCE):
-                tries = rng.random((AT_ONCE, 2)) * self.size_m
+            for _ in range(TRIES // TRIES_AT_ONCE):
+                tries = rng.random((TRIES_AT_ONCE, 2)) * self.size_m
                 away_2 = ((tries[:, None] - discs[:, :2]) ** 2).sum(axis=2)
                 free = (away_2 >= (discs[:, 2] + radius) ** 2).all(axis=1)
                 if free.any():

@@ -11,7 +11,7 @@ from pydantic import Field, Strict, model_validator
 from harness.scenario.sections import DERIVED, Interval, Section, Share
 from harness.scenario.validation import KeyFault
 
-MAX_ERROR_M: Final = 10_000.0
+MAX_ERROR_M: Final = 10_000.0  # of a sigma of position or altitude, and of a position's bias either way
 Error = Annotated[float, Field(ge=0, le=MAX_ERROR_M)]
 Offset = Annotated[float, Field(ge=-MAX_ERROR_M, le=MAX_ERROR_M)]
 

@@ -198,7 +198,7 @@ def _limit_told(flies: Callable[[float], bool], bad: float) -> str:
 
 
 def _is_as_surveyed(deviation: DeviationSpec | None, mass_kg: float) -> bool:
-    """Whether what is flown deviates so little from its model that the survey of this tells of level flight."""
+    """Whether the deviations are so small that the survey of the model tells of level flight too."""
     most = {"centre_of_gravity_m": NEAR_SHIFT * mass_kg ** (1.0 / 3.0)}
     return all(abs(each or 0.0) <= most.get(name, NEAR_SHARE) for name, each in deviation or ())
 

@@ -66,7 +66,7 @@ class Mppi(Replanner):
         self._begins_m = 0.0
 
     def replanned(self, request: PlanRequest, start: Start) -> Plan:
-        """The rollout of the controls, optimised anew."""
+        """A path by the mean of the sampled controls, optimised anew; a turn to hold in where it is blocked."""
         mission, pose = self.mission, start.pose
         lead_m = sum(row[5] for row in start.before)
         self._move_on(request.arc_length_m + lead_m - self._begins_m if start.before else math.inf)

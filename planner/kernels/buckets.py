@@ -12,8 +12,8 @@ import numpy as np
 from planner.compiled import COUNT, COUNTS, FLOAT, FLOATS, ROWS, compiled
 from planner.interface import FloatArray, IntArray
 
-MOST_BUCKETS = 4096
-"""Most squares over the whole area; over a large area they are made larger."""
+TARGET_BUCKETS = 4096
+"""Squares are widened so that the extent of the points has at most about twice this number of them."""
 
 Cells = tuple[IntArray, IntArray, IntArray, IntArray]
 """(c,) where each square begins among gathered points; (c,) how many it has; (p,) twice: squares that touch each other,
@@ -98,7 +98,7 @@ def _in_squares(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntA
     if not count:
         west = south = east = north = 0.0
     east, north = east - west, north - south
-    side = max(side, (east + north) / MOST_BUCKETS, math.sqrt(east * north / MOST_BUCKETS))
+    side = max(side, (east + north) / TARGET_BUCKETS, math.sqrt(east * north / TARGET_BUCKETS))
     width = int(north / side) + 1
     begins = np.zeros((int(east / side) + 1) * width + 1, dtype=np.intp)
     key = np.empty(count, dtype=np.intp)

@@ -94,9 +94,9 @@ class Escapes:
         self._began_hidden = False  # the first turn led behind something: nothing was certain of it
 
     def threats(self, request: PlanRequest) -> Threats | None:
-        """All that stands or moves near the aircraft while something moves or has just appeared; None otherwise."""
+        """What stands near the aircraft and all that moves, while something moves or has just appeared; else None."""
         appeared = request.time_s - request.seen.last_contradiction_s < EVADING_S
-        return self._near(request) if appeared or len(request.seen.moving) > 0 else None
+        return self._threats(request) if appeared or len(request.seen.moving) > 0 else None
 
     def at_start(self, request: PlanRequest, threats: Threats | None, lead_m: float) -> Escape:
         """A turn before the first plan, where what is ahead was seen to be free at all.
@@ -195,7 +195,7 @@ class Escapes:
         if certain and not self._began_hidden:
             raise CertificateBroken(request.time_s)
         ways = ways or list(rolled_out(prefix, self._room.limits))
-        return self._clearest(request, threats or self._near(request), left, ways)
+        return self._clearest(request, threats or self._threats(request), left, ways)
 
     def _left_from(
         self,
@@ -249,8 +249,8 @@ class Escapes:
         """Terrain of a share of the distance kept from what stands; refused places do not count."""
         return self._room.terrain(share * self._room.path_keeps_m, standing=True)
 
-    def _near(self, request: PlanRequest) -> Threats:
-        """The threats near the aircraft."""
+    def _threats(self, request: PlanRequest) -> Threats:
+        """What was seen to stand near the aircraft, and all that moves; refused places are left out."""
         return Threats.about(request, self._memory.genuine_m, self._mission)
 
     @staticmethod

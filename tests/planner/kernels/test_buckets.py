@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.kernels.buckets import MOST_BUCKETS, bucketed, cells_of
+from planner.kernels.buckets import TARGET_BUCKETS, bucketed, cells_of
 from planner.kernels.fans import entered, first_met
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -50,7 +50,7 @@ def test_circles_hold_what_is_kept_from_their_points(seed: int, count: int, side
     about = np.repeat(circles, np.diff(first), axis=1)
     away = np.hypot(*(held[:2] - about[:2]))
     assert (away + held[2] <= about[2] + 1e-9).all()
-    assert len(circles.T) <= 2 * MOST_BUCKETS
+    assert len(circles.T) <= 2 * TARGET_BUCKETS
 
 
 @given(seed=SEEDS, count=st.integers(0, 200), bearing=st.floats(-math.pi, math.pi))
