@@ -22,7 +22,7 @@ from harness.analysis.registry import METRICS as FIGURES
 from harness.files.strict_yaml import InputError
 from harness.flight.record import FloatArray
 from harness.run_files.run_folder import RECORDING
-from harness.scenario.kinds import own_words
+from harness.scenario.kinds import source_words
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -80,7 +80,7 @@ def time_cells(metrics: Mapping[str, Any]) -> dict[str, Any]:
 def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:
     """Returns the command line that flies a run again; it names a planner or a law that is code of one's own."""
     words = ["wayproof", "fly", "--from", str(results), "--run", str(run)]
-    return shlex.join([*words, *own_words(planner, law)])
+    return shlex.join([*words, *source_words(planner, law)])
 
 
 def table(

@@ -111,12 +111,12 @@ def _words(
     differs: Sequence[tuple[str, str]], given: Given, replaced: Sequence[tuple[str, str]]
 ) -> list[str]:
     """The options of a check with which a day is flown again: its own, its law, the keys replaced."""
-    from harness.scenario.kinds import own_words
+    from harness.scenario.kinds import source_words
 
     words = [word for name, value in differs for word in (f"--{name.replace('_', '-')}", value)]
     own = ("aircraft.model", *(["guidance.kind"] if sources(given.guidance) else []))
     words += [word for key, value in replaced if key not in own for word in ("--set", f"{key}={value}")]
-    return [*own_words(None, given.guidance), *words]
+    return [*source_words(None, given.guidance), *words]
 
 
 def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def falsify(
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
     from harness.falsify.breaking_point import FALSIFIED, INDEX, vary_of
     from harness.falsify.breaking_point import falsify as search
-    from harness.scenario.kinds import own_words
+    from harness.scenario.kinds import source_words
 
     ranges = [range_of(text) for text in vary]
 
@@ -84,7 +84,7 @@ def falsify(
     elif not quiet:
         print_table(f"{found.scenario}: {found.planner}, {found.aircraft}", breaking_rows(found))
         if found.found is not None:
-            words = ["wayproof", "fly", str(folder / FALSIFIED), *own_words(given.planner, given.guidance)]
+            words = ["wayproof", "fly", str(folder / FALSIFIED), *source_words(given.planner, given.guidance)]
             say(f"again: {shlex.join(words)}")
         say(last_line(found))
     return 0

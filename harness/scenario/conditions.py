@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from aircraft.airframe import Airframe
 
 CONDITIONS_STREAM, DEVIATION_STREAM = 4, 5
-"""Streams, of those that derive from the scenario's seed, that a day and the aircraft's deviations are drawn from."""
+"""Numbers of the random streams, derived from the scenario's seed, that draw a day and the aircraft's deviations."""
 MOST_SIGMAS: Final = 3.0
-"""What is drawn from a normal distribution is at most so many sigma from its mean."""
+"""Numbers drawn from a normal distribution are clipped to this many standard deviations from its mean."""
 WIND_FROM_M: Final = 10.0
-"""Height over ground at which winds are measured (WMO)."""
+"""The wind of a day has its speed at this height over ground, the WMO's for measuring wind."""
 CHANGE_EVERY_S, CHANGES = 300.0, 24
-"""The wind has another speed and direction every five minutes, for two hours; then it stays."""
+"""The wind of a day changes its speed and direction this often, and this many times; then it stays."""
 GUST_LENGTH_M: Final = 100.0
 """Length of a discrete vertical gust: twice a gradient distance of 50 m, amid the 9 to 107 m of CS 25.341."""
 
@@ -36,22 +36,22 @@ class Day(NamedTuple):
     """The figures of one kind of day."""
 
     wind_mps: float | tuple[float, float]
-    """Mean of the wind speed 10 m over ground, Rayleigh distributed, or the ends of a uniform one."""
+    """Wind speed 10 m over ground: the mean of its Rayleigh distribution, or the ends of its uniform one."""
     most_wind: float
     """The wind at the mission's altitude is at most this share of the airspeed."""
     speed_change: float
-    """1 sigma of the wind's changes of speed, as a share."""
+    """Standard deviation of the wind's later speeds, as a share of its first."""
     direction_change_deg: float
-    """1 sigma of its changes of direction."""
+    """Standard deviation of the wind's later directions from its first."""
     turbulence: Literal["light", "moderate"]
     vertical_gust_mps: float
     vertical_gust_every_s: float
     navigation: dict[str, Any]
-    """Keys of a satellite receiver with a barometer, and the age of its state."""
+    """Keys of `navigation`, for a satellite receiver with a barometer."""
     servos: dict[str, float]
-    """Of all surfaces and the throttle."""
+    """Keys of `aircraft.actuators`, for every surface and the throttle."""
     uncertainty: dict[str, float]
-    """1 sigma of each deviation; that of the centre of gravity over the cube root of the mass (m/kg^1/3)."""
+    """Keys of `uncertainty`; the centre of gravity's is over the cube root of the mass (m/kg^1/3)."""
 
 
 # fmt: off
@@ -87,7 +87,7 @@ DAYS: Final = {
 
 
 def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
-    """The scenario with the servos of its day, where neither it nor the card of its aircraft (`frame`) names any."""
+    """Adds the servos of its day to a scenario, where neither it nor the card of its aircraft (`frame`) names any."""
     day = DAYS.get(keys.conditions)
     if day is None or keys.aircraft.actuators is not None or frame.files.actuators:
         return keys
@@ -96,7 +96,7 @@ def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
 
 
 def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
-    """The scenario, airspeed known, with navigation, air and deviations of its day, as far as it leaves them out."""
+    """Fills in navigation, air and deviations of its day where a scenario leaves them out; its airspeed is known."""
     day = DAYS.get(keys.conditions)
     if day is not None:
         air = _air(keys, day, _stream(keys, CONDITIONS_STREAM))
@@ -108,7 +108,7 @@ def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
 
 
 def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
-    """The air: what is drawn is drawn whether or not the file has it, so that one key changes nothing else."""
+    """Fills in wind, turbulence and gusts of the day; what is drawn does not depend on which of them the file gives."""
     airspeed_mps, every_s = keys.aircraft.airspeed_mps, day.vertical_gust_every_s
     most_mps = day.most_wind * airspeed_mps / profile_share(keys.mission.altitude_m, WIND_FROM_M)
     if isinstance(day.wind_mps, tuple):
@@ -136,7 +136,7 @@ def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
 
 
 def _navigation(keys: ScenarioKeys, day: Day) -> Navigation:
-    """The navigation: all of it where the file names no kind, else its latency alone."""
+    """Fills in the day's navigation where the file names no kind, else its latency alone; `perfect` stays as it is."""
     given = keys.navigation
     named = {name: getattr(given, name) for name in given.model_fields_set}
     if "kind" not in named:
@@ -155,7 +155,7 @@ def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float)
 def _deviation(
     given: DeviationSpec | None, uncertainty: UncertaintySpec | None, rng: _Draws
 ) -> DeviationSpec | None:
-    """What is drawn for one flight where the scenario names nothing itself."""
+    """Draws the deviations of one flight that the scenario does not give, of standard deviations `uncertainty`."""
     names = list(DeviationSpec.model_fields)
     if uncertainty is None:
         return given and given.filled(**dict.fromkeys(names, 0.0))
@@ -199,7 +199,7 @@ def _clipped(rng: _Draws, shape: int | tuple[int, int]) -> list[Any]:
 
 
 def told(scenario: ScenarioKeys) -> str:
-    """What kind of day a scenario is flown on, with its air and navigation, for the first lines of a summary."""
+    """Describes the kind of day that a scenario is flown on, its air and its navigation, in a line of a summary."""
     air, navigation, deviation = scenario.environment, scenario.navigation, scenario.aircraft.deviation
     wind = air.wind or Wind()
     blows = f"wind {wind.speed_mps:.3g} m/s from {wind.from_deg:.0f} deg"

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 Spacing = Annotated[float, Field(gt=0, le=MAX_COORDINATE_M)]
 
-STEP_M = 0.1
-"""Heights are kept to this, and coarser where they span more than 6.5 km."""
+HEIGHT_STEP_M = 0.1
+"""Heights of the ground are rounded to this, or coarser where they span more than 6.5 km."""
 
 
 class GroundSpec(Section):
@@ -32,7 +32,7 @@ class GroundSpec(Section):
     """Nodes from west to east."""
     lowest_m: Annotated[float, Field(ge=-12_000, le=9000)]
     """Height of the number 0, above mean sea level."""
-    step_m: Annotated[float, Field(gt=0, le=10)] = STEP_M
+    step_m: Annotated[float, Field(gt=0, le=10)] = HEIGHT_STEP_M
     """Height from a number to the next."""
     heights: Annotated[str, Field(min_length=1)]
     """Heights: base64 of zlib of 16-bit little-endian steps from the west, row by row from the south; 65535: none."""
@@ -43,7 +43,7 @@ class GroundSpec(Section):
         return self
 
     def field(self) -> HeightField:
-        """The heights; a ValueError says that the text does not hold them."""
+        """Unpacks the heights; raises a ValueError if the text does not hold them."""
         from harness.world_files.height_field import HeightField, unpacked
 
         heights_m = unpacked(self.heights, self.rows, self.columns, self.lowest_m, self.step_m)
@@ -57,7 +57,7 @@ class GroundSpec(Section):
         from harness.world_files.height_field import packed
 
         (rows, columns), lowest_m = field.heights_m.shape, float(np.floor(np.nanmin(field.heights_m)))
-        step_m = max(STEP_M, float(np.nanmax(field.heights_m) - lowest_m) / 60_000)
+        step_m = max(HEIGHT_STEP_M, float(np.nanmax(field.heights_m) - lowest_m) / 60_000)
         nodes = {"corner_m": field.corner_m, "spacing_m": field.spacing_m, "rows": rows, "columns": columns}
         heights = packed(field.heights_m, lowest_m, step_m)
         return cls.model_construct(**nodes, lowest_m=lowest_m, step_m=step_m, heights=heights)

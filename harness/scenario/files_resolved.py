@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[ScenarioKeys, Sequence[str]]:
-    """A scenario whose files are made into obstacles and ground, and what messages call each obstacle."""
+    """Makes the files of a scenario into obstacles and ground; returns it, and each obstacle's name in messages."""
     at = [index for index, each in enumerate(keys.obstacles) if each.file is not None]
     if not at:
         return keys, [f"obstacles[{index}]" for index in range(len(keys.obstacles))]
@@ -54,7 +54,7 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
 
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:
-    """What the key `file` asks for: beside the scenario file, or from here; `package:path` in an installed package."""
+    """Makes a FileSpec of a key `file`: beside the scenario file, or from here; `package:path` in an installed one."""
     from harness.world_files.expansion import FileSpec
 
     keys = {name: getattr(file, name) for name in WorldFile.model_fields if name != "path"}
@@ -65,7 +65,7 @@ def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:
 
 
 def file_beside(text: str, folder: Path | None) -> Path | None:
-    """The file that lies so from a folder; None where there is none."""
+    """The file that a path names as seen from a folder; None where there is no folder or no such file."""
     with suppress(OSError, RuntimeError):  # too long, or the home of nobody
         if folder and (beside := folder / Path(text).expanduser()).exists():
             return beside
@@ -73,7 +73,7 @@ def file_beside(text: str, folder: Path | None) -> Path | None:
 
 
 def _parts(source: Source, active_s: Interval | None) -> list[Obstacle]:
-    """What a file has, as obstacles: of each polygon its outline and then its holes, no corner twice."""
+    """Makes an obstacle of each polygon of a file: its outline and its holes, no corner twice."""
     import numpy as np
     import shapely
 

@@ -19,10 +19,8 @@ from harness.scenario.validation import KeyFault
 
 MAX_OBSTACLES: Final = 10_000
 """A forest that is asked for more trunks is refused."""
-TRIES: Final = 100
-"""Random places that are tried for a copse before it is left out."""
-TRIES_AT_ONCE: Final = 10
-"""Of a copse's `TRIES`, how many are drawn at a time; the first free one is taken."""
+TRIES, TRIES_AT_ONCE = 100, 10
+"""A copse is tried at this many places before it is left out, and at this many of them at once."""
 Place = tuple[float, float]
 
 
@@ -56,18 +54,18 @@ class Forest(Section):
         if min(self.size_m) < 4 * self.room_m:
             told = f"is {list(self.size_m)} m with room_m {self.room_m:g}"
             raise ValueError(f"{told}; each side must be at least 4 x room_m")
-        asked = self.number * self.trunks[1]
-        if asked > MAX_OBSTACLES:
-            raise ValueError(f"asks for {asked} obstacles; must be at most {MAX_OBSTACLES}")
+        trunks = self.number * self.trunks[1]
+        if trunks > MAX_OBSTACLES:
+            raise ValueError(f"asks for {trunks} obstacles; must be at most {MAX_OBSTACLES}")
         return self
 
     @property
     def number(self) -> int:
-        """How many copses are asked for."""
+        """Number of copses of the density in the area, some of which may find no place."""
         return round(self.density_1pkm2 * self.size_m[0] * self.size_m[1] / 1e6)
 
     def copse(self, rng: np.random.Generator) -> list[tuple[Place, float]]:
-        """Middles and radii of trunks about (0, 0): the first there, the others overlapping it."""
+        """Draws a copse: middle and radius (m) of each trunk, the first at (0, 0), the others overlapping it."""
         radii = rng.uniform(*self.radius_m, rng.integers(*self.trunks, endpoint=True)).tolist()
         angles = rng.uniform(0.0, math.tau, len(radii)).tolist()
         away = [0.0, *(radii[0] * share for share in rng.uniform(0.3, 0.9, len(radii) - 1).tolist())]
@@ -76,7 +74,7 @@ class Forest(Section):
     def places(
         self, reach_m: list[float], ends_m: tuple[Place, Place], rng: np.random.Generator
     ) -> list[Place | None]:
-        """A middle for each copse that reaches so far about it, None for one without a place."""
+        """Draws a middle for each copse, which reaches `reach_m` about it; None for one that finds no place."""
         taken = np.empty((len(reach_m) + 2, 3))  # east, north, what is kept from it
         taken[:2] = [(*end, self.room_m) for end in ends_m]
         found: list[Place | None] = []
@@ -110,14 +108,14 @@ class WorldSpec(Section):
     @model_validator(mode="before")
     @classmethod
     def _circles_are_a_forest(cls, keys: Any) -> Any:
-        """Refuses the generator that former versions had with what makes the same worlds."""
+        """Refuses the generator `circles` of former versions, and tells the forest that makes the same worlds."""
         if isinstance(keys, dict) and "circles" in keys:
             raise KeyFault(("circles",), "is no generator; write forest with trunks: [1, 1] in its place")
         return keys
 
 
 def generated(spec: WorldSpec, seed: int) -> dict[Loc, Any]:
-    """Area, obstacles, start and goal of the world of a seed, by their keys; `spec.seed` goes before."""
+    """Draws a world: area, obstacles, start and goal, by their keys. `spec.seed`, if given, is used for `seed`."""
     rng, forest = np.random.default_rng(seed if spec.seed is None else spec.seed), spec.forest
     copses = [forest.copse(rng) for _ in range(forest.number)]
     reach_m = [max(math.hypot(*at) + radius for at, radius in copse) for copse in copses]

@@ -26,7 +26,7 @@ from harness.scenario.sections import (
 from harness.scenario.validation import NAME_PATTERN, KeyFault
 
 NORMALS: Final = (51, 8)
-"""Standard normal numbers that a day's air is drawn from, and the deviations of its aircraft."""
+"""Counts of the standard normal numbers from which a day's air and the deviations of its aircraft are drawn."""
 
 
 class TrackabilitySpec(Section):
@@ -42,16 +42,16 @@ class TrackabilitySpec(Section):
     """Load factor, averaged over 1 s. Default: 2.1 + 24000 / (weight in lb + 10000), at most 3.8 (14 CFR 23.337)."""
 
 
-RATES_HZ: Final = (STEP_RATE_HZ, 120)
-"""The step rates that are taken where none is given, the first that the sensor's rate divides."""
-SLOWEST_HZ: Final = 30
-"""The Aerosonde's track on 14 turns is then 0.07 m from that with 480 steps a second."""
+DEFAULT_RATES_HZ: Final = (STEP_RATE_HZ, 120)
+"""Where no step rate is given, the first of these is taken that the sensor's rate divides."""
+LEAST_RATE_HZ: Final = 30
+"""Least step rate: with it the Aerosonde's track on 14 turns is 0.07 m from that with 480 steps a second."""
 
 
 class Simulation(Section):
     """How finely the flight is integrated."""
 
-    rate_hz: Annotated[int, Field(ge=SLOWEST_HZ, le=1200)] = DERIVED
+    rate_hz: Annotated[int, Field(ge=LEAST_RATE_HZ, le=1200)] = DERIVED
     """Integration steps a simulated second, a multiple of 10. Default: 60, or 120 where sensor.rate_hz needs that."""
 
     @field_validator("rate_hz")
@@ -112,13 +112,13 @@ class ScenarioKeys(Section):
     """What a leg may be off before it counts as not trackable."""
 
     def updated(self, **sections: Any) -> ScenarioKeys:
-        """The same with some sections replaced."""
+        """Returns a copy with some sections replaced."""
         return self.model_copy(update=sections)
 
 
 def step_rate_hz(given_hz: int | None, sensor: Sensor) -> int:
-    """The step rate of a flight, where the scenario gives it or not; a KeyFault if the sensor's does not divide it."""
-    rates = RATES_HZ if given_hz is None else (given_hz,)
+    """Returns the step rate of a flight, given or chosen; raises a KeyFault if the sensor's does not divide it."""
+    rates = DEFAULT_RATES_HZ if given_hz is None else (given_hz,)
     for rate_hz in rates:
         steps = rate_hz / sensor.rate_hz
         if steps > 0.5 and abs(steps - round(steps)) <= 1e-9 * steps:

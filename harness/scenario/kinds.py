@@ -27,7 +27,7 @@ PLUGIN_REMEDY = "mend or uninstall that distribution"
 
 
 class PluginError(ImportError):
-    """What another distribution adds cannot be loaded; the message says which, why, and what to do."""
+    """A planner or law of another distribution cannot be loaded; the message says which, why, and what to do."""
 
 
 @dataclass(eq=False)
@@ -46,8 +46,8 @@ class LoopPart:
     registered: dict[str, Any] = field(default_factory=dict)
     """The kinds that this process, and no other, knows by name."""
 
-    def outside(self) -> dict[str, tuple[Any, str | None]]:
-        """Kinds of other distributions, with name and version of these; a PluginError says which cannot be had."""
+    def plugins(self) -> dict[str, tuple[Any, str | None]]:
+        """Loads the kinds of other distributions: kind and owner (distribution, version) by name; or a PluginError."""
         found: dict[str, tuple[Any, str | None]] = {}
         for point in _entry_points(entry_points, self.group, tuple(sys.path)):
             owner = f"{point.dist.name} {point.dist.version}" if point.dist else None
@@ -67,7 +67,7 @@ class LoopPart:
     def installed(self) -> dict[str, Any]:
         """The kinds that every process finds, by name, built-in ones first."""
         built_in = {kind.kind: kind for kind in self.built_in}
-        return {**built_in, **{name: kind for name, (kind, _) in self.outside().items()}, **built_in}
+        return {**built_in, **{name: kind for name, (kind, _) in self.plugins().items()}, **built_in}
 
     def known(self) -> dict[str, Any]:
         """All kinds by name: the installed ones, and those that this process has registered."""
@@ -82,12 +82,12 @@ class LoopPart:
     def distribution_of(self, name: str) -> str | None:
         """Name and version of the other distribution that a kind comes from; None for any other kind."""
         built_in = any(kind.kind == name for kind in self.built_in)
-        return None if built_in else self.outside().get(name, (None, None))[1]
+        return None if built_in else self.plugins().get(name, (None, None))[1]
 
 
 @cache
 def _entry_points(find: Callable[..., EntryPoints], group: str, path: tuple[str, ...]) -> EntryPoints:
-    """Entry points of other distributions; to look for them takes as long as all else of reading a scenario."""
+    """Finds entry points of other distributions, once: it takes as long as all else of reading a scenario."""
     return find(group=group)
 
 
@@ -123,8 +123,8 @@ def is_source(name: str) -> bool:
     return ":" in name
 
 
-def own_words(planner: str | None, law: str | None) -> list[str]:
-    """Words of a command that name a planner and a guidance law that no file may name."""
+def source_words(planner: str | None, law: str | None) -> list[str]:
+    """Returns the options of a command that name a planner and a law, where these are FILE.py:NAME or MODULE:NAME."""
     parts = {"--planner": planner, "--guidance": law}
     return [word for option, name in parts.items() if name and is_source(name) for word in (option, name)]
 
@@ -158,13 +158,13 @@ def registered_source(source: str, part: LoopPart = PLANNER) -> str:
 
 
 def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
-    """What was given, as the registry of its part has it; a ValueError says why it cannot be used."""
+    """Makes a kind of a class, a function or an object; a kind is returned as it is. Raises ValueError if none fits."""
     if isinstance(given, PlannerKind | GuidanceKind) and type(given) is part.kind:
         return given
     made: Callable[[Any, Any], Any] = lambda _keys, _told: given  # noqa: E731
-    if isinstance(given, type) or (callable(given) and not _is_part(given, part)):
+    if isinstance(given, type) or (callable(given) and not _has_methods(given, part)):
         made = _factory_of(given, part)
-    elif not _is_part(given, part):
+    elif not _has_methods(given, part):
         wanted = f"a kind, a class, a function or an object with the method {' and '.join(part.methods)}"
         raise ValueError(f"a {part.noun} must be {wanted}; this is a {type(given).__name__}")
     summary = (inspect.getdoc(given) or f"a {part.noun} given in Python").splitlines()[0]
@@ -173,10 +173,10 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
 
 
 _same_kind_of = lru_cache(maxsize=64)(kind_of)
-"""The same kind for the same object: what was measured of it holds on."""
+"""Does as `kind_of`, but returns the same kind for the same object: what was measured of it stays known."""
 
 
-def _is_part(given: object, part: LoopPart) -> bool:
+def _has_methods(given: object, part: LoopPart) -> bool:
     return all(callable(getattr(given, each.partition("(")[0], None)) for each in part.methods)
 
 
@@ -187,7 +187,7 @@ def _name_of(given: Any) -> str:
 
 
 def _factory_of(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], Any]:
-    """Calls what was given with what it may know, where it takes that; else with nothing."""
+    """Returns a function that makes the part: it calls `given` with the mission or limits, if that takes them."""
     try:
         parameters = inspect.signature(given).parameters
     except (TypeError, ValueError):  # made in C: it does not say
@@ -201,7 +201,7 @@ def _factory_of(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any
     def make(_keys: Any, told: Any) -> Any:
         keys = {part.factory_parameter: told} if part.factory_parameter in parameters and not needed else {}
         made = given(told) if needed else given(**keys)
-        if not _is_part(made, part):
+        if not _has_methods(made, part):
             lacks = f"which has no method {' and '.join(part.methods)}"
             raise TypeError(f"{_name_of(given)} makes a {type(made).__name__}, {lacks}")
         return made
@@ -210,13 +210,13 @@ def _factory_of(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any
 
 
 def _imported(place: str, source: str) -> Any:
-    """The module that a place names: a file, beside which lies what it imports, or a module by its name."""
+    """Imports a .py file, or a module by its name; a ValueError, in which it is `source`, says why it cannot be."""
     path = Path(place)
     if path.suffix == ".py" and not path.is_file():
         raise ValueError(f"{place}: no such file; give FILE.py:NAME")
     try:
         with redirect_stdout(sys.stderr):
-            return _executed(path.resolve()) if path.suffix == ".py" else importlib.import_module(place)
+            return _module_of_file(path.resolve()) if path.suffix == ".py" else importlib.import_module(place)
     except (Exception, SystemExit) as error:
         if isinstance(error, ModuleNotFoundError) and error.name in (place, place.partition(".")[0]):
             told = f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME"
@@ -225,8 +225,8 @@ def _imported(place: str, source: str) -> Any:
         raise ValueError(f"{place} cannot be imported: {told}") from error
 
 
-def _executed(path: Path) -> Any:
-    """The module of a source file."""
+def _module_of_file(path: Path) -> Any:
+    """Runs a source file and returns its module; appends the file's folder to `sys.path`."""
     name = f"given_{path.stem}"  # a name of its own: the file may be called planner.py
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
@@ -243,6 +243,6 @@ def _executed(path: Path) -> Any:
 
 
 def _is_own(value: object, module: str) -> bool:
-    """Whether a module's class or function was made there."""
+    """Whether a value found in a module is a class or function defined there, or a kind."""
     made_there = callable(value) and getattr(value, "__module__", None) == module
     return made_there or isinstance(value, PlannerKind | GuidanceKind)

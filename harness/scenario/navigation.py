@@ -121,7 +121,7 @@ class Navigation(Section):
 def planning_margin_m(
     navigation: Navigation, speed_mps: float, time_limit_s: float, clearance_m: float, turn_radius_m: float
 ) -> float:
-    """What clearance must have on top, so that the true aircraft keeps it where the believed one does (m).
+    """Returns the margin (m) that the clearance needs on top, so that the true aircraft keeps it, not the believed one.
 
     `MARGIN_SIGMAS` of the position error, its bias, what is flown at `speed_mps`, wind included, while the state grows
     old, and the drift of the longest outage, up to `time_limit_s`. The map drifts as the aircraft does: what stands in

@@ -57,7 +57,7 @@ class Polygon(Section):
 
 
 def _ring(points: Sequence[Point], name: str = "") -> Ring:
-    """A ring without repeated vertices, its first one not given again at the end; `name` begins its fault."""
+    """Drops vertices that repeat the one before, or at the end the first; `name` begins the fault of a bad ring."""
     import shapely
 
     ring = tuple(point for index, point in enumerate(points) if not index or point != points[index - 1])
@@ -150,5 +150,5 @@ class Obstacle(Section):
 
     @property
     def fixed(self) -> bool:
-        """Whether it is there, and at the same place, at every time."""
+        """Whether the obstacle stands at one place for the whole flight."""
         return self.active_s is None and self.velocity_mps in (None, (0.0, 0.0))

@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     from planner.interface import Mission, Planner
 
 SURVEY_BYTES: Final = 11_000
-"""To survey an aircraft takes about as long as to compile this much byte code, the guidance law's included."""
+"""Surveying an aircraft takes about as long as compiling this many bytes of byte code, the law's included."""
 
 
 @cache
-def _prepare(model: str) -> None:
-    """Has the planners compiled while an aircraft is surveyed that has not been before, as on a new machine."""
+def _begin_compiling(model: str) -> None:
+    """Begins to compile the planners, which goes on beside a survey, if the aircraft has not been surveyed before."""
     from aircraft.airframes import AircraftError, is_surveyed
 
     try:
@@ -60,7 +60,7 @@ def airframe_of(spec: AircraftSpec) -> Airframe:
     from aircraft.airframe import DERIVED, AutopilotKeys
     from aircraft.airframes import airframe
 
-    _prepare(spec.model)
+    _begin_compiling(spec.model)
     servos, autopilot = spec.actuators, DERIVED
     if spec.autopilot is not None:
         own = spec.autopilot.model_dump()
@@ -72,7 +72,7 @@ def airframe_of(spec: AircraftSpec) -> Airframe:
 
 
 def flown_airframe(spec: AircraftSpec) -> Airframe:
-    """The same, with a model that deviates from what figures, limits and gains are of."""
+    """Returns the airframe that is flown: its model has the deviations, its figures, limits and gains have not."""
     from aircraft.deviation import Deviation
 
     frame = airframe_of(spec)
@@ -83,7 +83,7 @@ def flown_airframe(spec: AircraftSpec) -> Airframe:
 
 
 def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
-    """What guidance may ask of an aircraft that flies at its airspeed."""
+    """Returns the limits of guidance for an aircraft at the airspeed of its section."""
     return airframe_of(aircraft).guidance_limits(aircraft.airspeed_mps)
 
 
@@ -103,7 +103,7 @@ def _code_of_others(fault: Callable[[str], Exception]) -> Iterator[None]:
 
 
 def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False) -> PlannerSpec:
-    """The planner's section, complete; that of a run folder (`as_flown`) need not be here."""
+    """Checks the planner's section and fills in defaults; that of a run folder (`as_flown`) need not be known here."""
     if as_flown and spec.kind not in planner_kinds():
         return spec
     kind = _named("planner", spec, planner_kinds())
@@ -113,7 +113,7 @@ def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False
 
 
 def resolved_guidance(spec: GuidanceSpec, aircraft: AircraftSpec, as_flown: bool = False) -> GuidanceSpec:
-    """The same of the guidance section, for an aircraft whose airspeed is filled in."""
+    """Checks the guidance section and fills in its defaults; the aircraft's airspeed must be filled in."""
     if as_flown and spec.kind not in guidance_kinds():
         return spec
     kind = _named("guidance", spec, guidance_kinds())
@@ -148,7 +148,7 @@ def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
 
 
 def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
-    """How the law tracks with the aircraft, flown unless that is known; None: as the aircraft's survey says."""
+    """Returns how the law tracks with the aircraft, flown once to learn it; None: as the aircraft's survey says."""
     from aircraft.airframes import AircraftError
     from aircraft.law_cards import law_card
 
@@ -175,7 +175,7 @@ def _kind_and_config(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
 
 
 def _named(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKind:
-    """The kind that a section names."""
+    """Looks up the kind that a section names; raises a KeyFault if there is none."""
     if spec.kind in kinds:
         return kinds[spec.kind]
     known = ", ".join(kind for kind in kinds if not is_source(kind))
@@ -187,7 +187,7 @@ def _named(section: str, spec: PartSpec, kinds: Mapping[str, AnyKind]) -> AnyKin
 
 
 def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[str, Any]:
-    """The own keys of a kind, checked and every default filled in from what the part may be told."""
+    """Checks the own keys of a kind and fills in their defaults; `told` is the mission or the guidance limits."""
     known = [field.name for field in fields(kind.config)]
     for name in spec.own:
         if name not in known:
@@ -214,7 +214,7 @@ _BOUNDS = (("ge", "minimum"), ("le", "maximum"), ("gt", "above"))
 
 @cache
 def _keys_section(kind: Kind) -> type[Section]:
-    """The own keys of a kind as a section."""
+    """Makes a pydantic section of the own keys of a kind."""
     hints = get_type_hints(kind.config)
     keys: dict[str, Any] = {}
     for each in fields(kind.config):
@@ -227,7 +227,7 @@ def _keys_section(kind: Kind) -> type[Section]:
 
 
 def with_own_keys(schema: dict[str, Any]) -> dict[str, Any]:
-    """The JSON Schema of a scenario with a choice for each kind of planner and of guidance law, its own keys in it."""
+    """Adds to a scenario's JSON Schema a choice for each kind of planner and guidance law, with its own keys."""
     for name, spec, part in (("planner", "PlannerSpec", PLANNER), ("guidance", "GuidanceSpec", GUIDANCE)):
         shared = schema["$defs"].pop(spec)
         choices = [_choice(shared, kind) for kind in part.installed().values()]

@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from aircraft.model_files import ModelFiles
     from planner.interface import Mission
 
-LEAST_CLEARANCE: Final = 0.02
-"""Share of the turn radius that planners keep from obstacles at the least, where less is wanted."""
+LEAST_CLEARANCE_RADII: Final = 0.02
+"""Planners keep at least this share of the turn radius from obstacles, also where less is wanted."""
 MAX_WIND_FRACTION: Final = 0.9
 """Wind from this fraction of the airspeed on is refused: against it an aircraft makes hardly any way."""
 
 
 def performance_of(scenario: ScenarioKeys) -> Performance:
-    """What the aircraft can do at its airspeed under its guidance, in its wind and gusts; a KeyFault says why not."""
+    """Returns what the aircraft can do at its airspeed under its law, in its wind and gusts, or raises a KeyFault."""
     from aircraft.airframes import AircraftError
     from aircraft.envelope import performance
 
@@ -56,16 +56,16 @@ def wind_mps_of(scenario: ScenarioKeys) -> float:
 
 
 def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -> Mission:
-    """What a planner is told before the flight; what the aircraft can do is looked up unless it is given.
+    """Returns what a planner is told before the flight; `performance` is looked up unless it is given.
 
     The clearance is `planner.clearance_m` and, on top, the margin for the error of the believed position. It is no less
-    than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size.
+    than `LEAST_CLEARANCE_RADII` of the turn radius: maps and searches have cells of its size.
     """
     from planner.interface import Mission
 
     performance = performance or performance_of(scenario)
     margin_m, radius_m = scenario.navigation.margin_m or 0.0, performance.turn_radius_m
-    clearance_m = max(scenario.planner.clearance_m + margin_m, LEAST_CLEARANCE * radius_m)
+    clearance_m = max(scenario.planner.clearance_m + margin_m, LEAST_CLEARANCE_RADII * radius_m)
     return Mission(
         goal_m=scenario.mission.goal_m,
         goal_radius_m=scenario.mission.goal_radius_m,
@@ -85,7 +85,7 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
 
 
 def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: float) -> Bounds:
-    """The area's bounds moved in by a margin, but not past start and goal, and by the tracking error.
+    """Moves the area's bounds in by a margin, but not past start and goal, and by the tracking error.
 
     The latter is not kept from sides to which start or goal is nearer than `near_m`.
     """
@@ -102,21 +102,21 @@ def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: f
 
 
 INSIDE_M: Final = 1e-3
-"""A flight begins no nearer to the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
-SURVEYED_M: Final = 300.0
+"""A flight begins this far inside the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
+SURVEY_ALTITUDE_M: Final = 300.0
 """Altitude above the sea at which an aircraft's range of airspeeds is measured."""
-NEAR_M: Final = (50.0, 1000.0)
-MIDDLE: Final = 1.05
-"""Between the altitudes `NEAR_M` it need not be trimmed at an airspeed that is by this factor within the range measured
-at `SURVEYED_M`: the density of the air differs by 7 % at most."""
-NEAR_SHARE, NEAR_SHIFT = 0.25, 0.01
-"""Nor if its deviations are at most these: shares, and the shift over the cube root of the mass (m/kg^1/3)."""
-STEP_M: Final = 50.0
-"""The highest altitude of level flight is told to this."""
+PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)
+PROVEN_FACTOR: Final = 1.05
+"""The survey proves level flight between these altitudes at airspeeds that are by this factor within its range: the
+density of the air differs by 7 % at most."""
+PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01
+"""It does so for deviations up to these: shares, and the shift over the cube root of the mass (m/kg^1/3)."""
+ALTITUDE_STEP_M: Final = 50.0
+"""A limit of the altitude of level flight is told as a multiple of this."""
 
 
 def start_conditions(scenario: ScenarioKeys) -> StartConditions:
-    """Where and how a flight begins: a hair inside the area where its start lies on the boundary."""
+    """Returns where and how a flight begins: a hair inside the area if its start lies on the boundary."""
     mission, (xmin, ymin, xmax, ymax) = scenario.mission, scenario.area.bounds_m
     east, north = mission.start_m
     if xmin <= east <= xmax and ymin <= north <= ymax:
@@ -128,9 +128,9 @@ def start_conditions(scenario: ScenarioKeys) -> StartConditions:
 
 
 def steady_wind_mps(scenario: ScenarioKeys) -> tuple[float, float]:
-    """East and north of the wind at time 0, at the height at which it is measured."""
+    """Components (east, north) of the wind at time 0, at the height at which it is measured."""
     wind = scenario.environment.wind
-    return _towards(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0)
+    return _wind_components(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0)
 
 
 def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
@@ -143,14 +143,14 @@ def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
         turbulence=air.turbulence.model if air.turbulence and air.gusts else None,
         intensity=air.gusts,
         seed=seed,
-        changes=tuple((time_s, *_towards(speed, degrees)) for time_s, speed, degrees in changes),
+        changes=tuple((time_s, *_wind_components(speed, degrees)) for time_s, speed, degrees in changes),
         measured_at_m=wind.measured_at_m if wind else None,
         vertical_gusts=VerticalGusts(**dict(vertical)) if vertical else None,
     )
 
 
-def _towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
-    """East and north of a wind that blows from a direction."""
+def _wind_components(speed_mps: float, from_deg: float) -> tuple[float, float]:
+    """Components (east, north) of a wind that blows from a direction."""
     blows = math.radians(from_deg) + math.pi
     return speed_mps * math.sin(blows), speed_mps * math.cos(blows)
 
@@ -166,48 +166,48 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
         heading_rad = start.heading_rad(Atmosphere(*wind))
         frame = flown_airframe(scenario.aircraft)
         slowest, fastest = frame.airspeed_range_mps
-        near = NEAR_M[0] <= start.altitude_m <= NEAR_M[1]
+        near = PROVEN_ALTITUDES_M[0] <= start.altitude_m <= PROVEN_ALTITUDES_M[1]
         near = near and _is_as_surveyed(scenario.aircraft.deviation, frame.mass_kg)
-        if near and MIDDLE * slowest <= start.airspeed_mps <= fastest / MIDDLE:
+        if near and PROVEN_FACTOR * slowest <= start.airspeed_mps <= fastest / PROVEN_FACTOR:
             return
-        fault = _fault(frame.files, place, start, heading_rad)
+        fault = _trim_fault(frame.files, place, start, heading_rad)
     except (AircraftError, ValueError) as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
     if fault is None:
         return
 
     def flies(altitude_m: float, files: ModelFiles = frame.files) -> bool:
-        return _fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
+        return _trim_fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
 
     if scenario.aircraft.deviation and flies(start.altitude_m, airframe_of(scenario.aircraft).files):
         raise KeyFault(("aircraft", "deviation"), f"must be smaller: {fault}")
-    if not flies(SURVEYED_M):
+    if not flies(SURVEY_ALTITUDE_M):
         raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
-    told = _limit_told(flies, start.altitude_m)
+    told = _altitude_limit(flies, start.altitude_m)
     raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {told}: {fault}")
 
 
-def _limit_told(flies: Callable[[float], bool], bad: float) -> str:
-    """What an altitude must be, by bisection between that of the survey and one at which it cannot be flown."""
-    good = SURVEYED_M
-    while abs(good - bad) > STEP_M:
+def _altitude_limit(flies: Callable[[float], bool], bad: float) -> str:
+    """Finds the limit of altitudes by bisection from the survey's to a bad one; says "at most" or "at least" it."""
+    good = SURVEY_ALTITUDE_M
+    while abs(good - bad) > ALTITUDE_STEP_M:
         middle = 0.5 * (good + bad)
         good, bad = (middle, bad) if flies(middle) else (good, middle)
-    steps = math.floor(good / STEP_M) if bad > good else math.ceil(good / STEP_M)
-    return f"{'at most' if bad > good else 'at least'} {STEP_M * steps:g}"
+    steps = math.floor(good / ALTITUDE_STEP_M) if bad > good else math.ceil(good / ALTITUDE_STEP_M)
+    return f"{'at most' if bad > good else 'at least'} {ALTITUDE_STEP_M * steps:g}"
 
 
 def _is_as_surveyed(deviation: DeviationSpec | None, mass_kg: float) -> bool:
-    """Whether the deviations are so small that the survey of the model tells of level flight too."""
-    most = {"centre_of_gravity_m": NEAR_SHIFT * mass_kg ** (1.0 / 3.0)}
-    return all(abs(each or 0.0) <= most.get(name, NEAR_SHARE) for name, each in deviation or ())
+    """Whether the deviations are so small that the survey of the model without them proves level flight."""
+    most = {"centre_of_gravity_m": PROVEN_SHIFT * mass_kg ** (1.0 / 3.0)}
+    return all(abs(each or 0.0) <= most.get(name, PROVEN_SHARE) for name, each in deviation or ())
 
 
 @lru_cache(maxsize=512)
-def _fault(
+def _trim_fault(
     files: ModelFiles, place: tuple[float, float], start: StartConditions, heading_rad: float
 ) -> str | None:
-    """Why there is no level flight; None where there is."""
+    """Returns why the aircraft cannot be trimmed in level flight; None if it can."""
     from aircraft.jsbsim_loading import load, trim
     from aircraft.model_files import TrimError
 

@@ -22,7 +22,7 @@ from harness.scenario.navigation import planning_margin_m
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.parts import airframe_of, limits_of, resolved_guidance, resolved_planner
 from harness.scenario.performance import (
-    LEAST_CLEARANCE,
+    LEAST_CLEARANCE_RADII,
     check_level_flight,
     mission_of,
     performance_of,
@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 POUND_KG: Final = 0.45359237
 
 TOLERANCE_M: Final = 10.0
-"""What a flight may be off in altitude, and off its path where no clearance is written (m)."""
+"""A flight may be this far off in altitude, and off its path where no clearance is written."""
 
 
 def resolve(
     keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
 ) -> ScenarioKeys:
-    """The same flight, every default filled in, every file of obstacles expanded; arguments as `validated` has them."""
+    """Fills in every default of a scenario and expands its files of obstacles; arguments as `validated` has them."""
     sensor = keys.sensor
     simulation = keys.simulation.filled(rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
     mission = _ends_in_plane(keys.mission, keys.area)
@@ -76,7 +76,7 @@ def resolve(
     sensor = sensor.filled(
         range_m=_rounded_up(10 * radius_m, 100),
         beam_deg=sensor.field_of_view_deg / sensor.rays,
-        least_width_m=max(clearance_m, LEAST_CLEARANCE * radius_m),
+        least_width_m=max(clearance_m, LEAST_CLEARANCE_RADII * radius_m),
     )
     fastest_mps = aircraft.airspeed_mps + wind_mps
     margin_m = planning_margin_m(keys.navigation, fastest_mps, mission.time_limit_s, clearance_m, radius_m)
@@ -104,7 +104,7 @@ def resolve(
 
 
 def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
-    """A mission whose start and goal are in metres, to a millimetre where they were given in degrees."""
+    """Returns a mission with start and goal in metres, to a millimetre where they were given in degrees."""
     from aircraft.frames import LocalPlane
 
     plane, given = LocalPlane(area.origin.latitude_deg, area.origin.longitude_deg), {}
@@ -116,7 +116,7 @@ def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
 
 
 def model_or_folder(model: str, folder: Path | None) -> str:
-    """The aircraft's name, or the absolute path of its folder: beside the scenario file, or from here."""
+    """Returns the name of a known aircraft as it is, or the absolute path of its folder, sought from `folder` first."""
     from aircraft.airframes import aircraft_names
 
     if "/" not in model and model in aircraft_names():
@@ -129,7 +129,7 @@ def model_or_folder(model: str, folder: Path | None) -> str:
 
 
 def _airframe(spec: AircraftSpec) -> Airframe:
-    """The airframe of a scenario; where there is none, the fault is of the key without which there is one."""
+    """Returns the airframe; if there is none, a KeyFault names the key without which there would be one."""
     from aircraft.airframes import AircraftError
 
     try:
@@ -149,7 +149,7 @@ def _rounded_up(value: float, step: int) -> float:
 PLANE_REACH_M: Final = 400_000.0
 """Up to this distance from any origin within 85 degrees of the equator the local plane is right to 0.9 m (`pyproj`)."""
 COURSE_STEP_DEG: Final = 5
-"""Step in which places on an arc, and courses, are tested."""
+"""Step in which courses, and places on an arc, are tested for a start that leads out of the area."""
 ROUNDING_M: Final = 1e-3
 """A place outside of the area by at most this counts as inside."""
 
@@ -231,7 +231,7 @@ def check_start_leads_in(area: Area, mission: MissionSpec, turn_radius_m: float)
 
 
 def _stays_inside(area: Area, start: Point, course_deg: float, radius_m: float) -> bool:
-    """Whether a turn to one side, or none, stays in the area until two radii straight ahead are inside."""
+    """Whether a turn to some side, or none, stays in the area up to where two radii straight ahead are inside."""
     xmin, ymin, xmax, ymax = area.bounds_m
     turned = np.radians(np.arange(0, 361, COURSE_STEP_DEG))
     for side in (1.0, -1.0):  # to the right, to the left

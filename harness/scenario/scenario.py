@@ -26,7 +26,7 @@ from harness.scenario.shipped import scenario_path
 from harness.scenario.validation import KeyFaults
 
 OWN_KEYS: Final[Mapping[Loc, Any]] = {("planner", "kind"): PlannerSpec, ("guidance", "kind"): GuidanceSpec}
-"""Kinds whose own keys stand in a section, and the section's type, which has the keys of all kinds."""
+"""Keys that name a kind with own keys in its section, and the section's type, which has the keys of all kinds."""
 
 
 def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
@@ -56,7 +56,7 @@ class Given(NamedTuple):
 
 
 def changed(given: Given, keys: Mapping[str, Any]) -> Node:
-    """The keys that a scenario was given, and no default, with some changed; None takes a key away."""
+    """Returns the keys that a scenario was given, without defaults, with some changed; None takes a key away."""
     if not isinstance(keys, Mapping) or not all(isinstance(name, str) for name in keys):
         raise InputError('with_: must be given a mapping of key paths, such as {"planner.clearance_m": 60}')
     plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}
@@ -68,7 +68,7 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
 
 
 def _plain(value: Any) -> Any:
-    """What somebody gives in Python, as YAML has it."""
+    """Turns a value given in Python (section, numpy, path, mapping) into the plain value that YAML would give."""
     if isinstance(value, Section):
         return value.model_dump(by_alias=True, exclude_none=True, exclude_unset=True)
     if isinstance(value, np.generic | np.ndarray):
@@ -135,13 +135,13 @@ def dump_scenario(scenario: Scenario) -> str:
 
 
 def packed(scenario: Scenario) -> bytes:
-    """A complete scenario in few bytes, to be kept or sent; to make it again takes a millisecond."""
+    """Compresses a complete scenario, to be kept or sent; `unpacked` takes a millisecond."""
     return zlib.compress(scenario.model_dump_json(by_alias=True).encode(), level=1)
 
 
-def unpacked(kept: bytes) -> Scenario:
-    """What `packed` was given."""
-    return scenario_from(json.loads(zlib.decompress(kept)))
+def unpacked(compressed: bytes) -> Scenario:
+    """Restores the scenario that `packed` compressed."""
+    return scenario_from(json.loads(zlib.decompress(compressed)))
 
 
 def scenario_schema() -> dict[str, Any]:
@@ -153,7 +153,7 @@ def scenario_schema() -> dict[str, Any]:
 def validated(
     root: Node, source: str, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
 ) -> Scenario:
-    """A scenario from what was read, every default filled in; an InputError calls it `source`.
+    """Makes a scenario of the keys of a file, every default filled in; an InputError calls it `source`.
 
     The folder of an aircraft, and files of obstacles, are sought in `folder` first. With `ends_checked` start and goal
     must keep the clearance from obstacles and lie in the area. One of a run folder (`as_flown`) is complete: a planner
@@ -168,7 +168,7 @@ def validated(
 def scenario_from(
     plain: Any, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
 ) -> Scenario:
-    """The same from plain values, as YAML has them; KeyFaults say why they are no scenario."""
+    """Does as `validated` with plain values, as YAML gives them; KeyFaults say why they are no scenario."""
     try:
         keys = ScenarioKeys.model_validate(plain)
     except ValidationError as error:

@@ -15,10 +15,10 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator, mode
 
 from harness.scenario.validation import KeyFault
 
-MAX_COORDINATE_M: Final = 1e6
-ALTITUDES_M: Final = (5, 20_000)
+MAX_COORDINATE_M, ALTITUDES_M = 1e6, (5, 20_000)
+"""Largest coordinate or length in a scenario, and the range of altitudes of a mission."""
 SHIELDED: Final = "+shield"
-"""What a planner's name ends with that is flown with the shield."""
+"""Ending of the name of a planner that is flown with the shield."""
 DERIVED: Final[Any] = None
 """The default of a key that follows from others, as its docstring says; `resolving.resolve` fills it in."""
 
@@ -29,7 +29,7 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     def filled(self, **defaults: Any) -> Self:
-        """The same with those keys filled in that the file leaves out."""
+        """Returns a copy with those of the keys filled in that the file leaves out."""
         return self.model_copy(update={k: value for k, value in defaults.items() if getattr(self, k) is None})
 
     @classmethod
@@ -181,9 +181,9 @@ class AutopilotSpec(Section):
 
 
 MOST_SHARE: Final = 0.5
-"""A deviation that is a share is no larger, drawn or given."""
+"""Largest deviation that is a share of a figure of the model, drawn or given."""
 MOST_SHIFT_M: Final = 10.0
-"""The centre of gravity lies no further from that of the model."""
+"""Largest shift of the centre of gravity from that of the model."""
 Deviation = Annotated[float, Field(ge=-MOST_SHARE, le=MOST_SHARE)]
 
 

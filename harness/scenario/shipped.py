@@ -25,15 +25,15 @@ def shipped_campaigns() -> dict[str, Path]:
 
 def campaign_path(text: str) -> Path:
     """The file that a command's CAMPAIGN means: a path, or the name or path of a shipped campaign."""
-    return _named(text, shipped_campaigns(), Path("scenarios/campaigns"), "a campaign file")
+    return _path_or_shipped(text, shipped_campaigns(), Path("scenarios/campaigns"), "a campaign file")
 
 
 def scenario_path(text: str) -> Path:
     """The file that a command's SCENARIO means: a path, or the name of a shipped scenario or world."""
-    return _named(text, shipped_scenarios(), Path("scenarios"), "a scenario file")
+    return _path_or_shipped(text, shipped_scenarios(), Path("scenarios"), "a scenario file")
 
 
-def _named(text: str, shipped: dict[str, Path], folder: Path, what: str) -> Path:
+def _path_or_shipped(text: str, shipped: dict[str, Path], folder: Path, what: str) -> Path:
     path, wanted = Path(text), f"give {what} or one of {', '.join(shipped)}"
     try:
         if path.is_file():
@@ -51,7 +51,7 @@ def _named(text: str, shipped: dict[str, Path], folder: Path, what: str) -> Path
 
 
 def summary(path: Path) -> str:
-    """What a scenario is for: the first line of the comment it begins with, the one for editors left out."""
+    """Returns what a scenario is for: the first line of the comment it begins with, the one for editors left out."""
     with path.open(encoding="utf-8") as file:
         return (
             next(line for line in file if not line.startswith("# yaml-language-server:"))
@@ -61,6 +61,6 @@ def summary(path: Path) -> str:
 
 
 def _folder() -> Path:
-    """In a wheel it lies in this package, in a checkout beside it."""
+    """Folder of the shipped scenarios: in a wheel in this package, in a checkout beside it."""
     here = Path(__file__).parents[1]
     return here / "scenarios" if (here / "scenarios").is_dir() else here.parent / "scenarios"

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 MAX_FAULTS: Final = 2
-"""Lines of an error."""
+"""An error on a file has at most this many lines."""
 MOST_WHOLE: Final = 2**53
-"""Beyond this a number is not read as a whole one."""
+"""Whole numbers are at most this: a float has each of them up to there."""
 NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"
 """Pattern of a name that a folder may be called after."""
 
@@ -42,7 +42,7 @@ _SENTENCES: Final = {
 
 
 class KeyFaults(ValueError):
-    """What is wrong with the keys of a file: key and sentence of `every` fault."""
+    """Faults of the keys of a file: `every` has the key and the sentence of each."""
 
     def __init__(self, every: Sequence[tuple[Loc, str]]) -> None:
         super().__init__("; ".join(said for _, said in every))
@@ -50,7 +50,7 @@ class KeyFaults(ValueError):
 
     @classmethod
     def of(cls, error: ValidationError, model: type[BaseModel]) -> KeyFaults:
-        """What pydantic says of values that should have been a model."""
+        """Turns pydantic's errors on the keys of a `model` into faults."""
         every = error.errors(include_url=False)
         missing = [each for each in every if each["type"] == "missing"]
         short = {each["loc"][:-1]: each for each in missing if isinstance(each["loc"][-1], int)}
@@ -69,7 +69,7 @@ class KeyFaults(ValueError):
         return cls(found)
 
     def in_file(self, root: Node, source: str) -> InputError:
-        """The same with file, line and key, at most `MAX_FAULTS` lines."""
+        """Makes an error of the faults, with file, line and key, of at most `MAX_FAULTS` lines."""
         lines = [fault_line(source, root.line_of(loc), loc, said) for loc, said in self.every]
         return in_lines(lines, source)
 
@@ -123,14 +123,14 @@ def _sentence(details: ErrorDetails, known: tuple[str, ...]) -> str:
 
 
 def unknown_key(name: str, known: tuple[str, ...]) -> str:
-    """Sentence on a key that does not exist."""
+    """Returns the sentence on a key that does not exist, with the known one that is nearest."""
     close = difflib.get_close_matches(name, known, n=1)
     meant = f"did you mean {close[0]}? " if close else ""
     return f"unknown key; {meant}known here: {', '.join(known)}"
 
 
 def shown(value: Any) -> str:
-    """A value as a sentence may show it: its kind where that helps, never longer than a line."""
+    """Returns a value as a sentence shows it: lists and mappings by their kind, long texts cut."""
     if value is None:
         return "empty"
     if isinstance(value, bool):
