@@ -37,13 +37,13 @@ def compare(
     from harness.comparison.comparison import fly_and_compare
     from harness.scenario.kinds import GUIDANCE, PLANNER, is_source
 
-    loaded = _loaded(scenarios)
+    loaded = _scenarios_of(scenarios)
     told = [each.name for each in loaded]
-    kinds = _named(planners, PLANNER, "planners")
+    kinds = _kinds_of(planners, PLANNER, "planners")
     parts = [{"planner.kind": kind} for kind in kinds]
     command = f"wayproof.compare({told}, {kinds})"
     if guidance is not None:
-        laws = _named(guidance, GUIDANCE, "guidance")
+        laws = _kinds_of(guidance, GUIDANCE, "guidance")
         parts = [{**part, "guidance.kind": law} for part in parts for law in laws]
         command = f"wayproof.compare({told}, {kinds}, guidance={laws})"
     with as_input_errors():
@@ -58,13 +58,13 @@ def compare(
     return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
 
 
-def _loaded(scenarios: Scenario | str | Path | Sequence[Scenario | str | Path]) -> list[Scenario]:
+def _scenarios_of(scenarios: Scenario | str | Path | Sequence[Scenario | str | Path]) -> list[Scenario]:
     given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     return [each if isinstance(each, Scenario) else load_scenario(each) for each in given]
 
 
-def _named(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
-    """The kinds that names mean; those given as FILE.py:NAME or MODULE:NAME are imported."""
+def _kinds_of(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
+    """Returns the kinds of planners or laws by name; FILE.py:NAME or MODULE:NAME is imported."""
     from harness.scenario.kinds import registered
 
     if isinstance(names, str) or not names or not all(isinstance(each, str) for each in names):

@@ -21,10 +21,10 @@ from harness.scenario.validation import KeyFault
 if TYPE_CHECKING:
     from harness.flight.observer import Progress
 
-NEEDED: Final = (
+REQUIRED_FIGURES: Final = (
     *("outcome", "reason", "flown_length_m", "cross_track_m", "trackable", "trackability", "digest"),
 )
-"""Figures of every run."""
+"""Figures that every run has; a run folder without one of them was written by another version."""
 
 
 @contextmanager
@@ -95,7 +95,7 @@ def given_parts(scenario: Scenario | str | Path, planner: object, guidance: obje
 
 
 def flown_into(out: str | Path | None, scenario: Scenario, fly_to: Callable[[Path], object]) -> FlightResult:
-    """What a flight leaves in a run folder, or in one that is there as long as the result."""
+    """Flies (`fly_to`) into the folder `out`, or a temporary one that lives as long as the result it returns."""
     scratch = TemporaryDirectory(prefix="wayproof-run-") if out is None else None
     folder = Path(scratch.name if scratch else out or "")
     with as_input_errors():
@@ -109,7 +109,7 @@ def load_run(folder: str | Path) -> FlightResult:
 
     with as_input_errors():
         run = run_folder.load_run(Path(folder))
-    missing = [name for name in NEEDED if name not in run.metrics]
+    missing = [name for name in REQUIRED_FIGURES if name not in run.metrics]
     if missing:
         raise InputError(
             f"{run.folder / run_folder.METRICS}: {missing[0]}: is missing; another version of wayproof flew this run, "
@@ -120,7 +120,7 @@ def load_run(folder: str | Path) -> FlightResult:
 
 
 def in_python(what: str) -> str:
-    """The command of a manifest, for what was done in Python: what was called, and from where."""
+    """Returns the command of a manifest for a call in Python: the call `what`, and the script it came from."""
     main = sys.modules.get("__main__")
     script = getattr(main, "__file__", None)
     if "ipykernel" in sys.modules and script is not None and "ipykernel" in str(script):

@@ -21,7 +21,7 @@ class Figures(dict[str, Any]):
     """A mapping of `metrics.json`, read only: `run.metrics.cross_track_m.p95`, `run.metrics.check.corners[0].kept`."""
 
     def __init__(self, content: Mapping[str, Any]) -> None:
-        super().__init__({name: _viewed(value) for name, value in content.items()})
+        super().__init__({name: _as_figures(value) for name, value in content.items()})
 
     def __getattr__(self, name: str) -> Any:
         if name not in self:
@@ -61,7 +61,7 @@ class Metrics(Figures):
         return None if name in OPTIONAL and name not in self else super().__getattr__(name)
 
 
-def _viewed(value: Any) -> Any:
+def _as_figures(value: Any) -> Any:
     if isinstance(value, dict):
         return Figures(value)
-    return tuple(map(_viewed, value)) if isinstance(value, list | tuple) else value
+    return tuple(map(_as_figures, value)) if isinstance(value, list | tuple) else value

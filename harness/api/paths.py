@@ -62,7 +62,7 @@ def check(
     given = [(key, json.dumps(value)) for key, value in keys.items() if value is not None]
     file = Path(path) if isinstance(path, str | Path) else None
     with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as kept:
-        world = _world(scenario, Path(kept))
+        world = _world_file(scenario, Path(kept))
         if file is not None:
             points = read_path(file, altitude_m is not None, origin_of(world))
         else:
@@ -113,8 +113,8 @@ def replay(
         )
 
 
-def _world(scenario: Scenario | str | Path | None, folder: Path) -> Path | None:
-    """The file of a scenario."""
+def _world_file(scenario: Scenario | str | Path | None, folder: Path) -> Path | None:
+    """Returns the file of a scenario; an object is written into `folder`."""
     if scenario is None:
         return None
     if not isinstance(scenario, Scenario):

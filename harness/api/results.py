@@ -55,7 +55,7 @@ class FlightResult:
 
     @property
     def reason(self) -> str:
-        """The same as a sentence."""
+        """How it ended, as a sentence."""
         return str(self.metrics.reason)
 
     @property
@@ -96,7 +96,7 @@ class FlightResult:
 
     @property
     def pilot(self) -> str:
-        """The planner's kind; for a checked path the word that stands for it."""
+        """The planner's kind, with its shield if that is unusual; `given` for a checked path."""
         from harness.run_files.given_path import GIVEN
 
         return GIVEN if self.metrics.check is not None else self.scenario.planner.label
@@ -138,7 +138,7 @@ class CampaignResult:
 
     @cached_property
     def summary(self) -> Summary:
-        """Its answers: goals reached with intervals, lengths, clearances, by any two varied keys; the worst runs."""
+        """Its summary: goals reached with intervals, lengths, clearances, by any two varied keys; the worst runs."""
         from harness.campaign.summary import summarise
 
         return summarise(self.folder)

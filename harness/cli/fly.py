@@ -21,7 +21,7 @@ from harness.files.input_file import InputError
 
 if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
-    from harness.watching.watched_flight import Onlookers
+    from harness.watching.watched_flight import Viewing
 
 FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
 """Exit status of `fly` by outcome; FAILED for any other."""
@@ -58,8 +58,8 @@ def fly(
     loaded, digest = _asked(scenario, results, run, given.keys)
     origin = [] if results is None else [("from", str(results.resolve())), ("run", str(run))]
     folder = out or _default_folder(loaded, told_apart([*given.keys, *origin]))
-    with _viewer(web, speed) if live else nullcontext((None, lambda: None)) as (onlookers, wait):
-        metrics = _fly(loaded, folder, onlookers, recording=not no_recording, silent=quiet)
+    with _viewer(web, speed) if live else nullcontext((None, lambda: None)) as (viewing, wait):
+        metrics = _fly(loaded, folder, viewing, recording=not no_recording, silent=quiet)
         otherwise = bool(digest) and metrics["digest"] != digest
         if otherwise:
             say(
@@ -109,18 +109,18 @@ def _default_folder(scenario: Scenario, apart: str) -> Path:
 
 
 def _fly(
-    scenario: Scenario, folder: Path, onlookers: Onlookers | None, *, recording: bool, silent: bool
+    scenario: Scenario, folder: Path, viewing: Viewing | None, *, recording: bool, silent: bool
 ) -> dict[str, Any]:
     """Flies into a folder, with progress on standard error."""
     from harness.run.scenario_flight import fly_to_folder
 
     straight_m = math.dist(scenario.mission.start_m, scenario.mission.goal_m)
     with flying_into(folder, straight_m, silent) as report:
-        if onlookers is None:
+        if viewing is None:
             return fly_to_folder(scenario, folder, recording, report)
         from harness.watching.watched_flight import fly_watched
 
-        return fly_watched(scenario, folder, recording, report, onlookers)
+        return fly_watched(scenario, folder, recording, report, viewing)
 
 
 def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
@@ -142,13 +142,13 @@ def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_
 
 
 @contextmanager
-def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Onlookers, Callable[[], None]]]:
-    """Opens a viewer for the length of the block; gives its onlookers, and a function that waits for its end.
+def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Viewing, Callable[[], None]]]:
+    """Opens a viewer for the length of the block; yields a `Viewing`, and a function that waits for its end.
 
     An InputError says that there is no screen for it.
     """
     from harness.recording.viewer import ViewerError, empty_viewer
-    from harness.watching.watched_flight import Onlookers
+    from harness.watching.watched_flight import Viewing
 
     gone = "wayproof: the viewer has gone; the flight goes on"
     try:
@@ -160,6 +160,6 @@ def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Onlookers, Callabl
                 with suppress(KeyboardInterrupt):
                     process.wait()
 
-            yield Onlookers(url, speed, lambda: say(gone, err=True)), wait
+            yield Viewing(url, speed, lambda: say(gone, err=True)), wait
     except ViewerError as error:
         raise InputError(f"wayproof: {error}") from error

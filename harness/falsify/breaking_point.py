@@ -44,7 +44,7 @@ Values: TypeAlias = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Vary:
-    """A key varied from its mild end to its hard one; values between are rounded to so many places before a flight."""
+    """A key varied from its mild end to its hard one; values between are rounded to `decimals` places."""
 
     key: str
     mild: float
@@ -66,8 +66,8 @@ class Search:
 
     Args:
         at: the condition at a displacement; equal ones are tried once.
-        judge: whether a condition fails.
-        most: how many may be tried, at least 2.
+        judge: tells whether a condition fails.
+        most: conditions to try at most, at least 2.
         tolerance: the displacement is narrowed down to this, above 0 and below 1.
     """
 
@@ -76,12 +76,12 @@ class Search:
     ) -> None:
         self._at, self._judge, self._most, self._tolerance = at, judge, most, tolerance
         self._failed: dict[Values, bool] = {}
-        self.steps = self._affordable()
+        self.steps = self._affordable_steps()
         self.settled = True
         """Whether the conditions sufficed to narrow the answer down."""
         self.passes: float | None = None
         self.fails: float | None = None
-        """The greatest displacement known to pass below the least that is known to fail."""
+        """`passes` is the greatest displacement known to pass below `fails`, the least known to fail."""
 
     def run(self) -> Search:
         """Scans in equal steps from the mild end, and halves the step at whose end a condition fails."""
@@ -91,10 +91,10 @@ class Search:
                 break
             self.passes = step / self.steps
         if self.fails is not None and self.passes is not None:
-            self._halve(self.passes, self.fails)
+            self._bisect(self.passes, self.fails)
         return self
 
-    def _halve(self, passes: float, fails: float) -> None:
+    def _bisect(self, passes: float, fails: float) -> None:
         while fails - passes > self._tolerance:
             middle = 0.5 * (passes + fails)
             if self._at(middle) in (self._at(passes), self._at(fails)):
@@ -105,7 +105,7 @@ class Search:
             passes, fails = (passes, middle) if self._fails(middle) else (middle, fails)
         self.passes, self.fails = passes, fails
 
-    def _affordable(self) -> int:
+    def _affordable_steps(self) -> int:
         """The most equal steps of the scan for which the conditions suffice, the bisection of one step included."""
         most = min(self._most - 1, math.ceil(1.0 / self._tolerance))
         halved = {steps: math.ceil(-math.log2(steps * self._tolerance)) for steps in range(1, most + 1)}
@@ -129,7 +129,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Breaking:
-    """What was found. A flight fails where the claim does not hold of it; `steps`, `settled`: those of `Search`."""
+    """The result of a search, with its terms. A flight of which the claim does not hold fails; see also `Search`."""
 
     scenario: str
     planner: str
@@ -143,7 +143,7 @@ class Breaking:
     settled: bool
     verdict: Literal["found", "not_found", "fails_at_the_mild_end"]
     displacement: float | None
-    """How far the mildest failure is on the way from the mild end (0) to the hard one (1)."""
+    """Displacement of the mildest failure, from the mild end (0) to the hard one (1); None: nothing failed."""
     found: Trial | None
     passes: Values | None
     """The hardest condition below it that passed."""
@@ -158,15 +158,15 @@ class Breaking:
 def vary_of(
     load: Load, given: Sequence[tuple[str, float, float]], fixed: Sequence[str] = (), tolerance: float = 0.01
 ) -> tuple[Vary, ...]:
-    """The keys to vary, once nine conditions from end to end have been found to be scenarios; or an InputError.
+    """Returns the keys to vary, having checked that nine conditions from end to end are scenarios; or an InputError.
 
     `given`: key path, mild end and hard end of each; `fixed`: keys that are given a value.
     `tolerance`: values are flown rounded to a hundredth of this share of a range, so that what is printed was flown.
     """
-    valued = [_spelt("--set", each) for each in fixed]
+    valued = [_key_of("--set", each) for each in fixed]
     ranges: dict[str, tuple[float, float]] = {}
     for name, mild, hard in given:
-        key = _spelt("--vary", name)
+        key = _key_of("--vary", name)
         faults = {
             "a seed is no condition; --seed gives another": key == "seed",
             "is given twice; give one range": key in ranges,
@@ -196,7 +196,7 @@ def scenario_at(load: Load, vary: Sequence[Vary], values: Values) -> Scenario:
     return load([(each.key, number_text(value)) for each, value in zip(vary, values, strict=True)])
 
 
-def _spelt(option: str, key: str) -> str:
+def _key_of(option: str, key: str) -> str:
     try:
         return as_spelt(key)
     except ValueError as error:
@@ -224,7 +224,7 @@ def falsify(
     tolerance: float = 0.01,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Breaking:
-    """Searches, and writes the folder; `progress` is told after each flight how many of how many, and its end.
+    """Searches, and writes the folder; `progress` is called after each flight: its number, of how many, how it ended.
 
     An InputError: a condition is no scenario, or cannot be flown; the folder is as it was. A RunFolderError: the folder
     holds something else, or another process writes to it. A WriteError: it cannot be written.

@@ -1,1 +1,1 @@
-"""Looks on while a flight is flown: paced by the wall clock, in the rerun viewer, in a MAVLink ground station."""
+"""Shows a flight in the rerun viewer while it is flown, no faster than a given speed."""

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from harness.recording.blueprint import Scene
 
 HAND_OVER_S: Final = 0.1
-"""Wall time after which what has been flown is handed over: half of what is promised."""
+"""Wall time after which rows, scans and plans are handed over: half of the 0.2 s that `LiveLog` promises."""
 
 
 class LiveLog(Observer):
     """Sends a flight to a viewer that is running, at least five times a second of wall time; `begin` comes first.
 
-    Nothing that becomes of the viewer, whose `url` is as rerun+http://127.0.0.1:9876/proxy, reaches the flight.
+    `url` is the viewer's address, as rerun+http://127.0.0.1:9876/proxy. A viewer that fails does not stop the flight.
     """
 
     def __init__(self, relay: RelayProcess, url: str) -> None:
@@ -38,31 +38,31 @@ class LiveLog(Observer):
         self._handed_s = 0.0
 
     def begin(self, loop: Loop, scene: Scene, identity: str) -> None:
-        """Shows the world before a flight, whose parts are not yet flown, under the identity of a recording."""
+        """Shows the world before the flight of a loop, under the identity of a recording."""
         self._moving = lambda: tuple(loop.seen.moving)
         self._track = TrackLog(loop.world.clearance, [self.on_rows], ground=loop.world.ground_heights)
         self._relay.begin(Opening(self._url, scene, identity))
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Keeps a scan until it is handed over."""
-        self._keep("on_scan", scan, state, moving=self._moving())
+        self._keep_call("on_scan", scan, state, moving=self._moving())
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        """Keeps a plan until it is handed over, with the picture of how it came about."""
+        """Keeps a plan, its picture drawn at once, until it is handed over."""
         picture = accepted.plan.picture
-        drawn = None if picture is None else partial(_same, picture())
-        self._keep("on_plan", replace(accepted, plan=replace(accepted.plan, picture=drawn)), state)
+        drawn = None if picture is None else partial(_identity, picture())
+        self._keep_call("on_plan", replace(accepted, plan=replace(accepted.plan, picture=drawn)), state)
 
     def on_event(self, time_s: float, text: str) -> None:
         """Keeps an event until it is handed over."""
-        self._keep("on_event", time_s, text)
+        self._keep_call("on_event", time_s, text)
 
     def on_rows(self, rows: Track) -> None:
-        """Keeps the rows since the last time: blocks of the flight's own are too far apart."""
-        self._keep("on_block", rows)
+        """Keeps the rows of the track since the last hand-over; the flight's own blocks come too seldom."""
+        self._keep_call("on_block", rows)
 
     def on_row(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
-        """Takes a row of the track; hands over what there is, when it is time."""
+        """Adds a row of the track, and hands over what is kept when it is time."""
         assert self._track is not None
         self._track.add(state, steering, plan_index)
         now = time.monotonic()
@@ -73,10 +73,10 @@ class LiveLog(Observer):
     def close(self, metrics: Mapping[str, Any], run: Mapping[str, Any]) -> None:
         """Shows the content of `metrics.json` and the typed figures of the run."""
         self._hand_over()
-        self._keep("close", dict(metrics), dict(run))
+        self._keep_call("close", dict(metrics), dict(run))
         self._hand_over()
 
-    def _keep(self, method: str, *arguments: Any, moving: tuple[Any, ...] = ()) -> None:
+    def _keep_call(self, method: str, *arguments: Any, moving: tuple[Any, ...] = ()) -> None:
         if not self._relay.given_up:
             self._calls.append(Call(method, arguments, moving))
 
@@ -88,5 +88,5 @@ class LiveLog(Observer):
             self._relay.hand_over(calls)
 
 
-def _same(value: Any) -> Any:
+def _identity(value: Any) -> Any:
     return value

@@ -1,4 +1,4 @@
-"""The process between a flight and the viewer that follows it: whatever becomes of the viewer, the flight goes on.
+"""The process between a flight and its viewer: the flight goes on whatever the viewer does.
 
 rerun waits for a viewer that does not take what it is sent, at the latest when the process ends, and all of Python
 waits with it. So that happens in a process of its own, which can be ended.
@@ -18,16 +18,16 @@ from typing import Any, Final, NamedTuple
 
 from harness.files.spawning import without_main
 
-GONE: Final = 3
-"""Exit status: the viewer has gone."""
-READY_S: Final = 60.0
-"""Wall time within which the process is up; it imports rerun."""
-LAST_S: Final = 10.0
-"""Wall time that the viewer has for what is left when the flight is over."""
+VIEWER_GONE: Final = 3
+"""Exit status of the process if the viewer, or the flight, has gone."""
+START_TIMEOUT_S: Final = 60.0
+"""Wall time that a flight waits for the process to start; it imports rerun."""
+END_TIMEOUT_S: Final = 10.0
+"""Wall time that the process has to send the rest when the flight is over."""
 
 
 class Opening(NamedTuple):
-    """What is told first."""
+    """The first message to the process: the viewer's address, the scene, the identity of the recording."""
 
     url: str
     scene: Any
@@ -35,18 +35,18 @@ class Opening(NamedTuple):
 
 
 class Call(NamedTuple):
-    """A call of the recording's, and what it takes."""
+    """A call of a method of `RerunLog` with its arguments, which the process makes."""
 
     method: str
     arguments: tuple[Any, ...]
     moving: tuple[Any, ...] = ()
-    """What the map takes to move at a scan."""
+    """Obstacles that the map takes to be moving at a scan."""
 
 
 def show(pipe: Connection) -> None:
-    """Sends a flight to a viewer until the pipe is closed, which gives an `Opening`, and then lists of `Call`.
+    """Sends a flight to a viewer: reads an `Opening` from the pipe, then lists of `Call` until it is closed.
 
-    The viewer has each list before the next is read; an answer of one byte says so.
+    Writes one byte to the pipe when the viewer has a list; then the next is read.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.dup2(2, 1)
@@ -69,25 +69,25 @@ def show(pipe: Connection) -> None:
         if log is not None:
             log.end()
     except OSError:  # the viewer has gone, or the flight
-        os._exit(GONE)
+        os._exit(VIEWER_GONE)
 
 
 class RelayProcess:
-    """The process, and a thread that waits for it: who hands something over never does. `end` must be called.
+    """The process, and a thread that waits for it, so that the flight never does. `end` must be called.
 
-    `gone` is told once if the viewer goes away before the end.
+    `gone` is called once if the viewer goes away before the end.
     """
 
     def __init__(self, gone: Callable[[], None] = lambda: None) -> None:
         self._tell_gone = gone
         self.given_up = False
-        """Nothing more needs to be handed over: the viewer has gone."""
+        """Whether the viewer has gone, so that nothing more needs to be handed over."""
         self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._process: Any = None
         self._sender: threading.Thread | None = None
 
     def begin(self, opening: Opening) -> None:
-        """Begins; returns when the viewer has what it shows before the flight, or has gone."""
+        """Starts the process; returns when the viewer shows the scene, or has gone."""
         spawn = multiprocessing.get_context("spawn")
         ours, theirs = spawn.Pipe()
         with without_main():
@@ -98,19 +98,19 @@ class RelayProcess:
         self._sender = threading.Thread(target=self._send, args=(ours, ready), daemon=True)
         self._sender.start()
         self._waiting.put(bytes(ForkingPickler.dumps(opening)))
-        ready.wait(READY_S)
+        ready.wait(START_TIMEOUT_S)
 
     def hand_over(self, calls: Sequence[Call]) -> None:
-        """Has some calls made, some time soon."""
+        """Queues calls, which the process makes one after another."""
         if not self.given_up:
             self._waiting.put(bytes(ForkingPickler.dumps(list(calls))))
 
     def end(self) -> None:
-        """Waits for what has been handed over, not for long; the viewer stays open."""
+        """Waits at most `END_TIMEOUT_S` for the calls handed over, and ends the process; the viewer stays open."""
         if self._sender is None:
             return
         self._waiting.put(None)
-        self._sender.join(LAST_S)
+        self._sender.join(END_TIMEOUT_S)
         self._process.join(1.0)
         if self._process.is_alive():
             self._process.kill()
@@ -118,7 +118,7 @@ class RelayProcess:
         self._sender = None
 
     def _send(self, pipe: Any, ready: threading.Event) -> None:
-        """Hands on what waits, in a thread."""
+        """Sends what is queued through the pipe, in a thread."""
         try:
             while (message := self._waiting.get()) is not None:
                 pipe.send_bytes(message)

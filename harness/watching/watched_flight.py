@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
@@ -18,13 +18,12 @@ from harness.scenario.scenario import Scenario, dump_scenario
 from harness.watching.live import LiveLog
 from harness.watching.relay import RelayProcess
 
-_CAUGHT_UP_S: Final = 1.0
-_NAP_S: Final = 0.05
-"""Waits are cut into pieces of this length, between which Python takes signals."""
+_MOST_BEHIND_S, _NAP_S = 1.0, 0.05
+"""A late flight catches up at most this much; waits are cut into naps, between which Python takes signals."""
 
 
 class Pace(Observer):
-    """Holds a flight back to a speed (simulated over wall time). One that has fallen behind catches up by a second."""
+    """Holds a flight back to a speed (simulated over wall time). A late one catches up by at most a second."""
 
     def __init__(self, speed: float) -> None:
         self._speed, self._flown_s = speed, 0.0
@@ -35,27 +34,27 @@ class Pace(Observer):
         now = time.monotonic()
         if self._due_s is None:
             self._due_s, self._flown_s = now, state.time_s
-        self._due_s = max(self._due_s + (state.time_s - self._flown_s) / self._speed, now - _CAUGHT_UP_S)
+        self._due_s = max(self._due_s + (state.time_s - self._flown_s) / self._speed, now - _MOST_BEHIND_S)
         self._flown_s = state.time_s
         while (left_s := self._due_s - time.monotonic()) > 0.0:
             time.sleep(min(left_s, _NAP_S))
 
 
 @dataclass(frozen=True)
-class Onlookers:
-    """Who looks on."""
+class Viewing:
+    """How a flight is shown while it is flown."""
 
     viewer: str  # address of a rerun viewer that is running, as rerun+http://127.0.0.1:9876/proxy
     speed: float | None = None  # simulated seconds a second that are not exceeded; None: as fast as it goes
-    viewer_gone: Callable[[], None] = lambda: None  # is told if the viewer goes away before the end
+    viewer_gone: Callable[[], None] = lambda: None  # called if the viewer goes away before the end
 
 
 def fly_watched(
-    scenario: Scenario, out: Path, recording: bool, progress: Progress | None, onlookers: Onlookers
+    scenario: Scenario, out: Path, recording: bool, progress: Progress | None, viewing: Viewing
 ) -> dict[str, Any]:
-    """The same as `fly_to_folder`, and with the same result and errors, whoever looks on."""
-    relay = RelayProcess(onlookers.viewer_gone)
-    live = LiveLog(relay, onlookers.viewer)
+    """Flies as `fly_to_folder` does, with the same result and errors, and shows the flight meanwhile."""
+    relay = RelayProcess(viewing.viewer_gone)
+    live = LiveLog(relay, viewing.viewer)
 
     def make(scenario: Scenario) -> Loop:
         loop = make_loop(scenario)
@@ -63,7 +62,7 @@ def fly_watched(
         live.begin(loop, scene, f"{scene.name}, live")
         return loop
 
-    paced = [] if onlookers.speed is None else [Pace(onlookers.speed)]
+    paced = [] if viewing.speed is None else [Pace(viewing.speed)]
     try:
         figures = fly_to_folder(scenario, out, recording, progress, make=make, watching=[live, *paced])
         live.close(figures, run_properties(scenario, figures))

@@ -35,7 +35,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """All of them, for completion."""
+    """The public names, for completion."""
     from wayproof.rooms import own_packages
 
     return sorted(own_packages().__all__)

@@ -26,7 +26,7 @@ from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop,
 from harness.watching import live
 from harness.watching.live import LiveLog
 from harness.watching.relay import Call, Opening, RelayProcess
-from harness.watching.watched_flight import Onlookers, fly_watched
+from harness.watching.watched_flight import Viewing, fly_watched
 from tests.closed_loop.small import small_world as world
 from tests.point_mass import PointMass
 
@@ -79,7 +79,7 @@ def test_the_flight_is_the_same_whether_a_viewer_follows_or_is_killed(
     scenario = world(TREE, **NEAR)
     alone = fly_to_folder(scenario, tmp_path / "alone", recording=False)
     told: list[str] = []
-    asked = Onlookers(f"rerun+http://{address}/proxy", viewer_gone=lambda: told.append("gone"))
+    asked = Viewing(f"rerun+http://{address}/proxy", viewer_gone=lambda: told.append("gone"))
     followed = fly_watched(scenario, tmp_path / "followed", True, None, asked)
     assert followed["digest"] == alone["digest"]
     assert (tmp_path / "followed" / "flight.rrd").stat().st_size > 10_000
@@ -87,7 +87,7 @@ def test_the_flight_is_the_same_whether_a_viewer_follows_or_is_killed(
     killed_at = KillsAt(process, 20.0)
     monkeypatch.setattr("harness.watching.watched_flight.Pace", lambda speed: killed_at)
     killed = fly_watched(
-        scenario, tmp_path / "killed", True, None, Onlookers(asked.viewer, 1.0, asked.viewer_gone)
+        scenario, tmp_path / "killed", True, None, Viewing(asked.viewer, 1.0, asked.viewer_gone)
     )
     assert process.poll() is not None
     assert killed["digest"] == alone["digest"]
