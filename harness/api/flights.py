@@ -68,7 +68,7 @@ def fly(
         WriteError: the run could not be written to its end.
     """
     from harness.flight.closed_loop import fly as fly_loop
-    from harness.run.scenario_flight import fly_to_folder, make_loop
+    from harness.run.scenario_flight import RunNames, fly_to_folder, make_loop
 
     flown = given_parts(scenario, planner, guidance)
     if out is None and not recording:
@@ -77,7 +77,7 @@ def fly(
     called = f"fly({flown.name!r}, planner={flown.planner.kind!r}, guidance={flown.guidance.kind!r})"
     command = in_python(f"wayproof.{called}")
     return flown_into(
-        out, flown, lambda folder: fly_to_folder(flown, folder, recording, progress, command=command)
+        out, flown, lambda folder: fly_to_folder(flown, folder, recording, progress, named=RunNames(command))
     )
 
 

@@ -131,18 +131,11 @@ def _fly_to_folder(job: Job, scenario: Scenario) -> dict[str, Any]:
         from harness.run.path_check import fly_check
 
         return fly_check(job.path, job.folder, recording, command=again)
-    from harness.run.scenario_flight import fly_to_folder
+    from harness.run.scenario_flight import RunNames, fly_to_folder
 
     try:
-        return fly_to_folder(
-            scenario,
-            job.folder,
-            recording=recording,
-            thin=job.recordings == "thin",
-            identity=job.identity or None,
-            varied=job.varied,
-            command=again,
-        )
+        named = RunNames(again, job.identity or None, job.varied, job.recordings == "thin")
+        return fly_to_folder(scenario, job.folder, recording, named=named)
     finally:
         # What is free goes to the system, where C's library is glibc: a process that records keeps growing otherwise.
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)

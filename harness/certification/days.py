@@ -12,7 +12,7 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -56,14 +56,14 @@ class Days(CampaignRuns):
         seed: int,
         most: int,
         sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
-        band: bool = False,
-        rare: bool = False,
+        purpose: Literal["counted", "band", "rare"] = "counted",
     ) -> None:
         """Makes at most so many days of a scenario, or raises InputError; nothing is flown.
 
-        `vary`: what is drawn, as `random` of a campaign file; `band`: whether `band.json` is made of all days' tracks;
-        `rare`: whether the days are not drawn as they come, but given one after another (`give`).
+        `vary`: what is drawn, as `random` of a campaign file. `band.json` is made of the tracks of all days of a band;
+        rare ones are not drawn as they come, but given one after another (`give`).
         """
+        rare, band = purpose == "rare", purpose == "band"
         if rare and claim == "reached":
             raise InputError("wayproof: --rare needs a margin: --claim no-contact, trackable or as-given")
         if rare and most < LEAST_RARE:

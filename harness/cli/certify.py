@@ -75,7 +75,8 @@ def certify(
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
     place = None if world is None else scenario_path(world)
     most = runs or MOST_RUNS[rare]
-    days = days_of(subject, given.keys, drawn, claim, place, most=most, sources=given.sources, rare=rare)
+    terms_of_days = {"most": most, "sources": given.sources, "purpose": "rare" if rare else "counted"}
+    days = days_of(subject, given.keys, drawn, claim, place, **terms_of_days)
     days.check()
     apart = told_apart([*given.keys, *((key, str(each)) for key, each in drawn.items())], named=())
     folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{'-rare' * rare}{apart}"

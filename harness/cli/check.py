@@ -102,7 +102,7 @@ def check(
 
         content = f"{path.read_bytes().hex()} {differs} {replaced} {world and world.read_text()}"
         again = ["wayproof", "check", str(path), "--aircraft", aircraft, *_words(differs, given, replaced)]
-        drawn = PathDays(on_day, content, again, {}, claim="as-given", most=days, band=True)
+        drawn = PathDays(on_day, content, again, {}, claim="as-given", most=days, purpose="band")
         fly_path_days(drawn, folder, silent=quiet or as_json)
     return 0 if metrics["check"]["ok"] else FAILED
 

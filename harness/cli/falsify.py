@@ -52,7 +52,7 @@ def falsify(
     """
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
-    from harness.falsify.breaking_point import FALSIFIED, INDEX, vary_of
+    from harness.falsify.breaking_point import FALSIFIED, INDEX, Effort, vary_of
     from harness.falsify.breaking_point import falsify as search
     from harness.scenario.kinds import source_words
 
@@ -76,9 +76,7 @@ def falsify(
             ended.append(done)
             bar(done, of, told)
 
-        found = search(
-            loaded, varied, folder, claim=claim, conditions=runs, tolerance=tolerance, progress=report
-        )
+        found = search(loaded, varied, folder, claim=claim, effort=Effort(runs, tolerance), progress=report)
     if as_json:
         print_json(found.plain())
     elif not quiet:

@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from aircraft.airframes import AircraftError
 from harness.analysis.metric import Claim, holds
@@ -61,20 +61,25 @@ class Vary:
         )
 
 
+class Effort(NamedTuple):
+    """How many conditions may be tried, at least 2, and to what share of each range, in (0, 1), the answer is found."""
+
+    conditions: int = 40
+    tolerance: float = 0.01
+
+
 class Search:
     """Looks for the least displacement that fails, from 0 (mild) to 1 (hard).
 
     Args:
         at: the condition at a displacement; equal ones are tried once.
         judge: tells whether a condition fails.
-        most: conditions to try at most, at least 2.
-        tolerance: the displacement is narrowed down to this, above 0 and below 1.
     """
 
     def __init__(
-        self, at: Callable[[float], Values], judge: Callable[[Values], bool], most: int, tolerance: float
+        self, at: Callable[[float], Values], judge: Callable[[Values], bool], effort: Effort
     ) -> None:
-        self._at, self._judge, self._most, self._tolerance = at, judge, most, tolerance
+        self._at, self._judge, (self._most, self._tolerance) = at, judge, effort
         self._failed: dict[Values, bool] = {}
         self.steps = self._affordable_steps()
         self.settled = True
@@ -220,8 +225,7 @@ def falsify(
     *,
     flown: Callable[[Scenario], Mapping[str, Any]] = fly_and_measure,
     claim: Claim = "reached",
-    conditions: int = 40,
-    tolerance: float = 0.01,
+    effort: Effort = Effort(),
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Breaking:
     """Searches, and writes the folder; `progress` is called after each flight: its number, of how many, how it ended.
@@ -243,10 +247,10 @@ def falsify(
         trials[values] = trial = Trial(values, not holds(claim, figures), kept)
         if progress is not None:
             told = ", ".join(f"{value:.4g}" for value in values)
-            progress(len(trials), conditions, f"{told}: {figures['outcome']}")
+            progress(len(trials), effort.conditions, f"{told}: {figures['outcome']}")
         return trial.failed
 
-    search = Search(partial(condition, vary), judge, conditions, tolerance)
+    search = Search(partial(condition, vary), judge, effort)
     base = scenario_at(load, vary, condition(vary, 0.0))
     made = [each for each in (out, *out.parents) if not each.exists()]
     lock = claim_folder(out, "search", INDEX, SCHEMA)
@@ -260,7 +264,7 @@ def falsify(
             base.seed,
             claim,
             tuple(vary),
-            tolerance,
+            effort.tolerance,
             len(trials),
             search.steps,
             search.settled,

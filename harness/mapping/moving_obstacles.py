@@ -302,7 +302,7 @@ class MovingObstacles:
             some = self._earlier.of_it(track, places, scan)
         own_hits, own = hits[some], places[some]
         laid = register(
-            track.at(scan.time_s), own_hits, own, scan, gate, self._apart, stiff, NEAR_SIGMAS * self._noise
+            track.at(scan.time_s), (own_hits, own), scan, gate, self._apart, stiff, NEAR_SIGMAS * self._noise
         )
         if laid is None:
             return np.zeros(0, dtype=np.intp)

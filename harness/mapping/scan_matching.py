@@ -110,15 +110,14 @@ def ends_of(scan: RangeScan, first_ray: int, last_ray: int, apart_m: float) -> E
 
 def register(
     outline: Outline,
-    hits: IntArray,
-    places: ComplexArray,
+    returns: tuple[IntArray, ComplexArray],
     scan: RangeScan,
     gate_m: float,
     apart_m: float,
     stiff: float = STIFF,
     near_m: float = 0.0,
 ) -> Registration | None:
-    """Matches an outline, where it is expected, to the returns of a scan: (n,) rays `hits`, at (n,) places.
+    """Matches an outline, where it is expected, to some `returns` of a scan: (n,) rays `hits`, at (n,) places.
 
     Returns further from the outline than `gate_m` are not its; those within `near_m` may be in every round, since they
     err that much. Beyond an end, rays go on, and end `apart_m` away or further. `stiff` is the share of the weight of
@@ -127,6 +126,7 @@ def register(
     Returns:
         None where too few of the returns are near, or it would be laid further away than the gate.
     """
+    hits, places = returns
     near = _about(outline.points, places, gate_m)
     if min(len(near), len(outline.points)) < FEWEST:
         return None

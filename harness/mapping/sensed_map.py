@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,18 +21,26 @@ NOISY_SHARE = 0.1
 """Ranges that err by more than this share of the clearance go to a `ReflectionMap`, and moving obstacles to medians."""
 
 
+class ScanErrors(NamedTuple):
+    """How scans err: 1 sigma of their ranges as the sensor's maker states it, and of how far their poses shift returns.
+
+    `lost` is the share of the returns that get lost or are false, `false_returns` whether ranges are known to be
+    returned where nothing is. What moves less than the poses shift it is not told to move.
+    """
+
+    noise_m: float = 0.0
+    false_returns: bool = False
+    lost: float = 0.0
+    pose_error_m: float = 0.0
+
+
 class SensedMap:
     """The planner's only source of knowledge about obstacles (`planner.interface.MapView`).
 
     Args:
         bounds_m: xmin, ymin, xmax, ymax of the area.
         clearance_m: wanted distance from obstacles.
-        noise_m: standard deviation of ranges, as the sensor's maker states it.
-        false_returns: the sensor is known to return ranges where nothing is.
-        lost: share of the returns that get lost or are false, likewise.
         least_width_m: as `harness.mapping.free_space.FreeSpace` has it.
-        pose_error_m: standard deviation of how far returns are shifted from one look at an obstacle to a later one,
-            because the poses of the scans are not known exactly. What moves less is not told to move.
     """
 
     def __init__(
@@ -39,18 +48,12 @@ class SensedMap:
         bounds_m: tuple[float, float, float, float],
         clearance_m: float,
         range_m: float,
-        *,
-        noise_m: float = 0.0,
-        false_returns: bool = False,
-        lost: float = 0.0,
+        errors: ScanErrors = ScanErrors(),
         least_width_m: float | None = None,
-        pose_error_m: float = 0.0,
     ) -> None:
-        self._area = bounds_m, clearance_m, range_m
-        self._noise, self._false_returns = noise_m, false_returns
-        self._lost, self._least_width = lost, least_width_m
-        self._pose_error, self._shifted = pose_error_m, math.hypot(noise_m, pose_error_m)
-        self._clearance, self._noisy = clearance_m, noise_m > NOISY_SHARE * clearance_m
+        self._area, self._errors, self._least_width = (bounds_m, clearance_m, range_m), errors, least_width_m
+        self._shifted = math.hypot(errors.noise_m, errors.pose_error_m)
+        self._clearance, self._noisy = clearance_m, errors.noise_m > NOISY_SHARE * clearance_m
         self._begin(revision=0)
         self.moving: tuple[MovingEdges, ...] = ()
         """What is known to move; its edges are not among the others."""
@@ -63,19 +66,20 @@ class SensedMap:
 
     def _begin(self, revision: int) -> None:
         """Empties the map."""
-        self._free = FreeSpace(*self._area, self._noise, self._lost, self._least_width)
+        noise_m, false_returns, lost, pose_error_m = self._errors
+        self._free = FreeSpace(*self._area, noise_m, lost, self._least_width)
         self._edges: EdgePoints
         if self._noisy:
-            self._edges = edges = ReflectionMap(*self._area, self._noise, revision)
+            self._edges = edges = ReflectionMap(*self._area, noise_m, revision)
             self._moving = MovingObstacles(
                 self._clearance,
-                max(MEDIAN_ERROR_SHARE * self._noise, self._pose_error),
+                max(MEDIAN_ERROR_SHARE * noise_m, pose_error_m),
                 is_free=self._free.surrounds,
                 stands=edges.stands,
             )
         else:
-            self._edges = ObstacleMap(*self._area, self._false_returns, revision, self._pose_error > 0.0)
-            self._moving = MovingObstacles(self._clearance, self._shifted, self._false_returns)
+            self._edges = ObstacleMap(*self._area, false_returns, revision, pose_error_m > 0.0)
+            self._moving = MovingObstacles(self._clearance, self._shifted, false_returns)
 
     def start_over(self, time_s: float) -> None:
         """Forgets everything because the believed position has jumped, so that all that was entered lies elsewhere."""

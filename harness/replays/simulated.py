@@ -20,7 +20,7 @@ from harness.replays.flown import FlownFlight
 from harness.replays.mission import FlownMission
 from harness.replays.wind import FittedWind
 from harness.run.path_flight import GivenPath
-from harness.run.scenario_flight import fly_to_folder, make_loop
+from harness.run.scenario_flight import FlownAs, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import Scenario, scenario_of
 from planner.interface import Path as PlannedPath
@@ -160,7 +160,7 @@ def fly_anew(scenario: Scenario, asked: Asked, laps: int, folder: Path) -> dict[
         planner = GivenPath(points, PlannedPath(segments))
         return replace(loop, sensor=None, planner=planner, termination=ends[-1])
 
-    fly_to_folder(scenario, folder, recording=False, make=make, pilot="replay")
+    fly_to_folder(scenario, folder, recording=False, make=make, flown=FlownAs("replay"))
     track = load_run(folder).track
     columns = {name: np.asarray(getattr(track, name), dtype=np.float64) for name in SIMULATED_COLUMNS}
     columns["leg"] = np.searchsorted(ends[0].switches_s, columns["time_s"] + 1e-6).astype(np.float64)

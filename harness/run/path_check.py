@@ -17,7 +17,14 @@ from harness.files.strict_yaml import COMMAND_LINE, Loc, Node, node_of
 from harness.flight.observer import Progress
 from harness.run.path_flight import PathCheck, fly_along, planned
 from harness.run.path_verdict import measured
-from harness.run.scenario_flight import flight_limits, fly_to_folder, jsbsim_aircraft, make_loop
+from harness.run.scenario_flight import (
+    FlownAs,
+    RunNames,
+    flight_limits,
+    fly_to_folder,
+    jsbsim_aircraft,
+    make_loop,
+)
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
 from harness.run_files.path_files import PathAsGiven
 from harness.scenario.environment import GroundSpec
@@ -190,9 +197,11 @@ def fly_check(
         recording,
         progress,
         make=make,
-        pilot=GIVEN,
-        flown_by=partial(fly_along, check.plan),
-        measured_by=partial(measured, check),
-        command=command,
-        profile=None if profile.level else profile.altitudes,
+        named=RunNames(command),
+        flown=FlownAs(
+            GIVEN,
+            partial(fly_along, check.plan),
+            partial(measured, check),
+            None if profile.level else profile.altitudes,
+        ),
     )

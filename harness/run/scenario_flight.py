@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from harness.flight.navigation import Navigator, pose_error_m
 from harness.flight.observer import Caution, Observer, Progress
 from harness.flight.record import AcceptedPlan, Flight, Track
 from harness.flight.termination import MissionEnd
-from harness.mapping.sensed_map import SensedMap
+from harness.mapping.sensed_map import ScanErrors, SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
 from harness.scenario.parts import airframe_of, flown_airframe, law_of, planner_of
@@ -58,11 +58,13 @@ def make_loop(
             mission.bounds_m,
             mission.clearance_m,
             mission.sensor_range_m,
-            noise_m=scenario.sensor.range_noise_m,
-            false_returns=scenario.sensor.false_return > 0.0,
-            lost=1.0 - (1.0 - scenario.sensor.dropout) * (1.0 - scenario.sensor.false_return),
-            least_width_m=scenario.sensor.least_width_m,
-            pose_error_m=pose_error_m(scenario.navigation, mission.sensor_range_m),
+            ScanErrors(
+                scenario.sensor.range_noise_m,
+                scenario.sensor.false_return > 0.0,
+                1.0 - (1.0 - scenario.sensor.dropout) * (1.0 - scenario.sensor.false_return),
+                pose_error_m(scenario.navigation, mission.sensor_range_m),
+            ),
+            scenario.sensor.least_width_m,
         ),
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
@@ -135,6 +137,32 @@ def fly_and_measure(scenario: Scenario) -> dict[str, Any]:
     return metrics(fly(make_loop(scenario)), flight_limits(scenario))
 
 
+class RunNames(NamedTuple):
+    """What a run folder says of itself.
+
+    The manifest says that `command` was called, by default the command line. A recording is called `identity`, by
+    default its name with a hash of all settings and versions, and names the keys that a campaign `varied`; a `thin` one
+    has no more than track, plans and obstacles.
+    """
+
+    command: str | None = None
+    identity: str | None = None
+    varied: Mapping[str, str | float | int | bool] | None = None
+    thin: bool = False
+
+
+class FlownAs(NamedTuple):
+    """How a flight is flown to its end and measured; a `pilot` is named in place of the planner's kind.
+
+    `profile` gives the altitudes to be held at arc lengths along a path, in place of the mission's.
+    """
+
+    pilot: str | None = None
+    flown_by: Callable[[Loop, Sequence[Observer], Progress | None], Flight] = fly
+    measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics
+    profile: Callable[[FloatArray], FloatArray] | None = None
+
+
 def fly_to_folder(
     scenario: Scenario,
     out: Path,
@@ -143,50 +171,41 @@ def fly_to_folder(
     *,
     make: Callable[[Scenario], Loop] = make_loop,
     watching: Sequence[Observer] = (),
-    pilot: str | None = None,
-    identity: str | None = None,
-    varied: Mapping[str, str | float | int | bool] | None = None,
-    thin: bool = False,
-    flown_by: Callable[[Loop, Sequence[Observer], Progress | None], Flight] = fly,
-    measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics,
-    command: str | None = None,
-    profile: Callable[[FloatArray], FloatArray] | None = None,
+    named: RunNames = RunNames(),
+    flown: FlownAs = FlownAs(),
 ) -> dict[str, Any]:
     """Flies a complete scenario into a run folder and returns the content of its `metrics.json`.
 
-    `make` makes the parts of the flight, `flown_by` flies them to an end, `measured_by` gives the figures, `watching`
-    are further observers. The manifest says that `command` was called, by default the command line. A recording is
-    called `identity`, by default its name with a hash of all settings and versions; it names the `pilot` in place of
-    the planner's kind, and the keys that a campaign `varied`; a `thin` one has no more than track, plans and obstacles.
-    `profile` gives the altitudes to be held at arc lengths along a path, in place of the mission's.
+    `make` makes the parts of the flight, `watching` are further observers.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
         RunFolderError: the folder holds something else or cannot be written.
         WriteError: it could not be written to the end, a full disk perhaps.
     """
-    loop = make(scenario)
-    text = dump_scenario(scenario)
+    loop, text, pilot = make(scenario), dump_scenario(scenario), flown.pilot
     try:
         with ExitStack() as stack:
-            told = [command or shlex.join(sys.argv)]
+            told = [named.command or shlex.join(sys.argv)]
             sources = [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
             radius_m = loop.mission.turn_radius_m
             folder = stack.enter_context(RunFolder.create(out, text, told, sources, radius_m))
             so_far, observers = _FlownSoFar(), [*watching]
-            scene = replace(scene_of(scenario, loop, text, pilot), profile=profile) if recording else None
-            log = None if scene is None else _recording(scene, loop, folder, identity, thin)
+            scene = (
+                replace(scene_of(scenario, loop, text, pilot), profile=flown.profile) if recording else None
+            )
+            log = None if scene is None else _recording(scene, loop, folder, named)
             if log is not None:
                 stack.callback(log.end)
                 observers.append(log)
             try:
-                flight = flown_by(loop, [so_far, *observers], progress)
+                flight = flown.flown_by(loop, [so_far, *observers], progress)
             except KeyboardInterrupt:
                 so_far.leave_in(folder)
                 raise
-            figures = measured_by(flight, flight_limits(scenario, planned=pilot is None))
+            figures = flown.measured_by(flight, flight_limits(scenario, planned=pilot is None))
             if log is not None:
-                log.close(figures, run_properties(scenario, figures), varied)
+                log.close(figures, run_properties(scenario, figures), named.varied)
             folder.log_events(so_far.events)
             folder.finish(flight.track, flight.plans, figures)
     except OSError as error:
@@ -222,12 +241,12 @@ class _FlownSoFar(Observer):
             folder.leave(Track.joined(self._blocks), self._plans)
 
 
-def _recording(scene: Scene, loop: Loop, folder: RunFolder, identity: str | None, thin: bool) -> Any:
+def _recording(scene: Scene, loop: Loop, folder: RunFolder, named: RunNames) -> Any:
     from harness.recording.log import RerunLog
 
     settings = hashlib.sha256(f"{scene.scenario_yaml}{versions()}".encode()).hexdigest()
-    identity = identity or f"{scene.name} ({settings[:8]})"
-    return RerunLog(folder.recording_path, scene, identity, lambda: loop.seen.moving, thin)
+    identity = named.identity or f"{scene.name} ({settings[:8]})"
+    return RerunLog(folder.recording_path, scene, identity, lambda: loop.seen.moving, named.thin)
 
 
 def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None) -> Scene:

@@ -15,7 +15,7 @@ from planner.geometry.terrain import POINT_WORK, TANGENT_WORK, Terrain, WorkCoun
 from planner.interface import FloatArray, Mission, Path
 from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
-from planner.rolling_window.multi_step_search import Candidate, search_candidates
+from planner.rolling_window.multi_step_search import Candidate, Width, search_candidates
 from planner.rolling_window.pose_search import search_poses
 from planner.rolling_window.route_optimisation import optimise
 from planner.rolling_window.window import Window
@@ -297,13 +297,10 @@ class LocalPlanning:
             window,
             self._mission.goal_m,
             self._mission.bounds_m,
-            steps=self._steps * widening,
-            keep_best=self._candidates * widening,
-            outer_m=attempt.distance_m + max(attempt.margin_m, SEARCH_SHARE * attempt.margin_m + self._hug_m),
-            most_tracks=MOST_TRACKS * widening,
-            around=around,
-            wide=widening > 1,
-            to_go=to_go,
+            Width(self._steps * widening, self._candidates * widening, MOST_TRACKS * widening, widening > 1),
+            attempt.distance_m + max(attempt.margin_m, SEARCH_SHARE * attempt.margin_m + self._hug_m),
+            around,
+            to_go,
         ):
             yield candidate
             found += candidate is not None

@@ -12,6 +12,7 @@ import heapq
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,17 +53,25 @@ class Candidate:
         return [] if self.last is None else [self.last.obstacle]
 
 
+class Width(NamedTuple):
+    """How many steps deep a search goes, how many candidates it keeps at every step, and track points it looks at.
+
+    A `wide` one also takes steps back, and looks at all that lies towards the goal.
+    """
+
+    steps: int
+    keep_best: int
+    most_tracks: int
+    wide: bool = False
+
+
 def search_candidates(
     window: Window,
     goal: Point,
     bounds_m: tuple[float, float, float, float],
-    *,
-    steps: int,
-    keep_best: int,
+    width: Width,
     outer_m: float,
-    most_tracks: int,
     around: Iterable[int] = (),
-    wide: bool = False,
     to_go: CostToGo | None = None,
 ) -> Iterator[Candidate | None]:
     """Candidates from the centre of the window to the goal, cheapest first, as far as they are asked for.
@@ -71,7 +80,7 @@ def search_candidates(
         Candidates that see the goal from their last track point but one; none where n candidates at every one
         of N steps were not enough. None after each step looked at.
     """
-    start = window.center_m
+    start, (steps, keep_best, most_tracks, wide) = window.center_m, width
     _, _, straight = guide_vector(start, goal)
     queue = [(straight if to_go is None else to_go(start), 0, 0, Candidate((start,), 0.0, straight))]
     apart_m = APART_SHARE * outer_m if not wide else _wide_apart_m(window, outer_m)

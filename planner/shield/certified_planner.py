@@ -9,7 +9,7 @@ from planner.interface import FloatArray, Mission, PlanRequest
 from planner.memory import ObstacleMemory
 from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start, start_of
 from planner.shield.encounters import encounters
-from planner.shield.escape import Escape, Escapes, Room
+from planner.shield.escape import Escape, Escapes, PlanInEffect, Room
 from planner.shield.evasion import Threats
 from planner.shield.intervention_log import InterventionLog, ShieldReport
 
@@ -70,16 +70,9 @@ class CertifiedPlanner:
         if effective is None:
             escape = self._escapes.at_start(request, self._threats, self._lead_m)
         else:
-            escape = self._escapes.from_plan(
-                request,
-                self._threats,
-                effective,
-                here_m,
-                until_m=min(monitor.cut_m, effective.loiter_entry_m),
-                prefix=self._start(request, here_m, to_m).prefix,
-                certain=certain,
-                nearer=nearer,
-            )
+            until_m = min(monitor.cut_m, effective.loiter_entry_m)
+            left = PlanInEffect(effective, here_m, until_m, self._start(request, here_m, to_m).prefix)
+            escape = self._escapes.from_plan(request, self._threats, left, certain=certain, nearer=nearer)
         monitor.broken = escape.broken
         monitor.proposed = escape.committed or monitor.proposed
         return escape

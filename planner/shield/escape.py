@@ -148,26 +148,23 @@ class Escapes:
         self,
         request: PlanRequest,
         threats: Threats | None,
-        committed: CommittedPlan,
-        here: float,
+        effective: PlanInEffect,
         *,
-        until_m: float,
-        prefix: Sequence[Segment],
         certain: bool,
         nearer: CommittedPlan | None = None,
     ) -> Escape:
         """A turn that only keeps away from what is known, or a way that evades what moves or has appeared.
 
-        The plan in effect can be flown from `here` to `until_m` (arc lengths); of it `prefix` is flown in any case.
         `certain`: nothing has changed so far, nor been taken back by the sensor. `nearer` is a certified plan that
         would come nearer than wanted to what moves or has appeared.
 
         Raises:
             CertificateBroken: there is no room for a turn, though all is certain.
         """
+        committed, here, _, prefix = effective
         left = left_of(committed, here, self._mission)
         ways: list[Path] = []  # made when they are first asked for: most plans in effect will do
-        path, from_m, to_m = self._left_from(request, committed, here, until_m, prefix)
+        path, from_m, to_m = self._left_from(request, effective)
 
         def options(terrain: Terrain) -> Iterator[_Option]:
             if nearer is not None:
@@ -197,15 +194,9 @@ class Escapes:
         ways = ways or list(rolled_out(prefix, self._room.limits))
         return self._clearest(request, threats or self._threats(request), left, ways)
 
-    def _left_from(
-        self,
-        request: PlanRequest,
-        committed: CommittedPlan,
-        here: float,
-        until_m: float,
-        prefix: Sequence[Segment],
-    ) -> tuple[Path, float, float]:
+    def _left_from(self, request: PlanRequest, effective: PlanInEffect) -> tuple[Path, float, float]:
         """The path to leave for a turn, between two arc lengths; `prefix` if the aircraft is off the plan in effect."""
+        committed, here, until_m, prefix = effective
         off_m = math.dist(place_on(committed.path, here)[0][:2], request.position_m)
         if off_m > start_tolerance_m(self._mission):  # as after a jump of the believed position
             return Path(np.array(prefix)), 0.0, sum(segment[5] for segment in prefix)
@@ -260,6 +251,15 @@ class Escapes:
         plan = Plan(PlanStatus.FOUND, reason, waypoints, path)
         course = Course(path, (request.position_m,), 0, shortest=False, to_goal=False)
         return Escape(plan, CommittedPlan(plan, path, course, path.length_m - float(path.segments[-1, 5])))
+
+
+class PlanInEffect(NamedTuple):
+    """A plan that can be flown from `here` to `until_m` (arc lengths); of it `prefix` is flown in any case."""
+
+    committed: CommittedPlan
+    here: float
+    until_m: float
+    prefix: Sequence[Segment]
 
 
 def room_m(path: Path, threats: Threats | None, least_m: float = -math.inf, later: float = DISCOUNT) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.falsify.breaking_point import Breaking, falsify, vary_of
+from harness.falsify.breaking_point import Breaking, Effort, falsify, vary_of
 from harness.scenario.scenario import Scenario, load_scenario
 
 SCENARIO = """
@@ -29,7 +29,8 @@ def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Break
         return load_scenario(file, replaced)
 
     out = other.pop("out", file.parent / "out")
-    return falsify(load, vary_of(load, ranges, (), other.get("tolerance", 0.01)), out, **other)
+    effort = Effort(other.pop("conditions", 40), other.pop("tolerance", 0.01))
+    return falsify(load, vary_of(load, ranges, (), effort.tolerance), out, effort=effort, **other)
 
 
 def stand_in(outcome: str = "reached", /, **other: Any) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.mapping.scan import RangeScan
-from harness.mapping.sensed_map import SensedMap
+from harness.mapping.sensed_map import ScanErrors, SensedMap
 from harness.world.obstacle import Circle, Obstacle
 from harness.world.world import World
 from tests.examples import examples
@@ -35,7 +35,7 @@ START = (3000.0, 1500.0)
 
 
 def empty_world(noise_m: float = 0.0, false_returns: bool = False) -> SensedMap:
-    return SensedMap(BOUNDS, CLEARANCE, RANGE, noise_m=noise_m, false_returns=false_returns)
+    return SensedMap(BOUNDS, CLEARANCE, RANGE, ScanErrors(noise_m, false_returns))
 
 
 def fed(scans: Iterable[RangeScan]) -> SensedMap:
@@ -180,7 +180,7 @@ def test_whatever_a_bad_sensor_returns_is_taken_in(
         *(Circle((300.0 + 700.0 * i, 1700.0 + 170.0 * (i % 3)), 50.0) for i in range(8)),
     )
     eye = sensor(world, range_noise_m=noise_m, false_return=false_return, dropout=0.1, rays=360)
-    seen = SensedMap(BOUNDS, clearance_m, RANGE, noise_m=noise_m, false_returns=True)
+    seen = SensedMap(BOUNDS, clearance_m, RANGE, ScanErrors(noise_m, false_returns=True))
     for scan in flight(eye, seconds, START, turn_rad_s=0.02):
         seen.update(scan)
         for each in seen.moving:
@@ -193,7 +193,7 @@ def test_walls_that_are_seen_from_a_shifted_pose_stay_one_and_their_gap_opens_ag
     """The error of the pose goes to and fro by 15 m and 0.6 degrees; in the last minute it is gone."""
     west, east = block(2000.0, 2600.0, 2920.0, 2700.0), block(3080.0, 2600.0, 4000.0, 2700.0)
     world, shift_m = world_of(west, east), 15.0
-    seen = SensedMap(BOUNDS, CLEARANCE, RANGE, pose_error_m=0.5 * shift_m)
+    seen = SensedMap(BOUNDS, CLEARANCE, RANGE, ScanErrors(pose_error_m=0.5 * shift_m))
     numbers, narrowest_m = [], math.inf
     for scan in flight(sensor(world), 300.0, (3000.0, 1300.0), speed=4.0):
         wrong = 1.0 if scan.time_s < 240.0 else 0.0

@@ -17,7 +17,7 @@ from planner.geometry.terrain import WorkCount
 from planner.interface import FloatArray
 from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
-from planner.rolling_window.multi_step_search import Candidate, search_candidates
+from planner.rolling_window.multi_step_search import Candidate, Width, search_candidates
 from planner.rolling_window.window import Window
 from tests.examples import examples
 from tests.planner.rolling_window.test_rolling_window import seen_at_once
@@ -46,18 +46,8 @@ def tracks_in(
     to_go: CostToGo | None = None,
 ) -> list[Candidate]:
     """The first dozen tracks, after a look at what is promised of each."""
-    found = search_candidates(
-        window,
-        goal,
-        bounds,
-        steps=steps,
-        keep_best=keep_best,
-        outer_m=OUTER,
-        most_tracks=1200,
-        around=around,
-        wide=wide,
-        to_go=to_go,
-    )
+    width = Width(steps, keep_best, 1200, wide)
+    found = search_candidates(window, goal, bounds, width, OUTER, around, to_go)
     tracks = list(islice((track for track in found if track is not None), 12))
     points = shapely.points(window.points_m)
     for track in tracks:
