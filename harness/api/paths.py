@@ -50,7 +50,7 @@ def check(
     path, values as YAML. `out` is the run folder to write, if any; `recording`: for rerun. An InputError says that
     path, scenario, aircraft or folder cannot be used; nothing was flown.
     """
-    from harness.run.path_check import asked, fly_check, origin_of
+    from harness.run.path_check import fly_check, origin_of, prepare_check
     from harness.run_files.path_files import given_points, read_path
 
     keys: dict[str, Any] = {
@@ -67,7 +67,7 @@ def check(
             points = read_path(file, altitude_m is not None, origin_of(world))
         else:
             points = given_points(cast("Points", path))
-        check = asked(
+        check = prepare_check(
             points, [*given, *(settings or {}).items()], world=world, altitude_m=altitude_m, corner_m=corner_m
         )
         command = in_python(f"wayproof.check({'points' if file is None else str(path)!r}, {aircraft!r})")

@@ -24,14 +24,14 @@ from harness.scenario.validation import NAME_PATTERN, KeyFault, KeyFaults, shown
 SCHEMA: Final = "wayproof/campaign/1"
 MAX_RUNS: Final = 1_000_000
 
-OTHERWISE: Final[dict[Loc, str]] = {
+GIVEN_ELSEWHERE: Final[dict[Loc, str]] = {
     ("schema",): "leave it out",
     ("name",): "leave it out",
     ("seed",): "every case gets a seed of its own, from the campaign's",
     ("planner", "kind"): "name planners under `planners`",
     ("aircraft", "model"): "name aircraft under `aircraft`",
 }
-"""Keys of a scenario that a campaign gives in another way."""
+"""Keys of a scenario that a campaign must not replace, and what to write in place of that."""
 
 Values = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 
@@ -97,7 +97,7 @@ class Campaign(Section):
             loc = strict_yaml.loc_of(where[1])
         except ValueError as error:
             raise KeyFault(where, str(error)) from error
-        for other, way in OTHERWISE.items():
+        for other, way in GIVEN_ELSEWHERE.items():
             if other[: len(loc)] == loc:
                 raise KeyFault(where, f"cannot be given here; {way}")
         for other, named in taken.items():
@@ -153,7 +153,7 @@ class CampaignFile:
     bases: tuple[Base, ...]
 
     def plain(self) -> dict[str, Any]:
-        """All of it as JSON has it: enough to fly every run again, without a file."""
+        """Returns the content as JSON has it: enough to fly every run again, without a file."""
         return {
             "campaign": self.root.plain(),
             "scenarios": [{"file": base.file, "keys": base.root.plain()} for base in self.bases],
@@ -161,7 +161,7 @@ class CampaignFile:
 
     @classmethod
     def from_plain(cls, plain: dict[str, Any], source: str) -> CampaignFile:
-        """What `plain` gave; an InputError where it is something else."""
+        """Restores the file from what `plain` returned; an InputError if it is something else."""
         try:
             root = node_of(plain["campaign"], 1)
             given = [(Path(each["file"]).name, dict(each["keys"])) for each in plain["scenarios"]]
@@ -262,7 +262,7 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
 
 
 def absolute_paths(node: Node, folder: Path, keys: str = "") -> Node:
-    """The keys of a scenario or a campaign with absolute paths of aircraft and of files among the obstacles."""
+    """Makes the paths of aircraft and of obstacles' files absolute in the keys of a scenario or a campaign."""
     value = node.value
     if isinstance(value, tuple):
         return Node(tuple(absolute_paths(each, folder, keys) for each in value), node.line)

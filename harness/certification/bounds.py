@@ -22,7 +22,7 @@ Verdict: TypeAlias = Literal["shown", "refuted", "undecided"]
 
 
 def clopper_pearson(held: int, runs: int, confidence: float) -> tuple[float, float]:
-    """Lower and upper bound, each by itself, of the probability of what held in so many of a fixed number of runs."""
+    """Lower and upper bound, each by itself, of the probability of what `held` in a number of runs fixed beforehand."""
     from scipy import special
 
     doubt = 1.0 - confidence
@@ -65,7 +65,7 @@ def sequential_bounds(held: int, runs: int, confidence: float) -> tuple[float, f
 
 
 def verdict(held: int, runs: int, probability: float, confidence: float) -> Verdict:
-    """What the runs so far say of the claim that something holds with at least `probability`, over all looks."""
+    """Judges the claim that something holds with at least `probability` by the runs so far; valid at every look."""
     rate, failed, wanted = 1.0 - probability, runs - held, math.log(1.0 / (1.0 - confidence))
     if _evidence(rate, failed, runs, above=False) >= wanted:
         return "shown"

@@ -39,11 +39,11 @@ CERTIFICATE: Final = "certificate.json"
 SCHEMA: Final = "wayproof/certificate/1"
 SECTIONS: Final = ("environment", "navigation", "uncertainty", "sensor", "aircraft")
 """Sections of a scenario whose numbers may differ between days without being varied by name: conditions draw them."""
-MOST_RUNS: Final = (1000, 10_000)
-"""Days to fly at most if nothing is said: by counting, and by subset simulation."""
-KEPT: Final = 20
-"""This many of the days that fail in a subset simulation keep a run folder: thousands may fail."""
-CONFIDENCE: Final = 0.95
+DEFAULT_RUNS: Final = (1000, 10_000)
+"""Default of the largest number of days to fly: by counting, and by subset simulation."""
+MOST_FOLDERS: Final = 20
+"""A subset simulation keeps the run folders of at most this many days that fail: thousands may fail."""
+DEFAULT_CONFIDENCE: Final = 0.95
 
 
 @dataclass(frozen=True)
@@ -104,16 +104,16 @@ class Certificate:
     """The result of a subset simulation; the days were then drawn near failure, and `held` is no frequency."""
 
     def plain(self) -> dict[str, Any]:
-        """The content of `certificate.json`."""
+        """Returns the content of `certificate.json`."""
         return {"schema": SCHEMA, **asdict(self)}
 
 
 @dataclass(frozen=True)
 class Terms:
-    """What is to be shown: the claim holds on at least a share of the days (None: nothing), at this confidence."""
+    """What is claimed: the claim holds on at least this share of the days (None: no share), at this confidence."""
 
     probability: float | None = None
-    confidence: float = CONFIDENCE
+    confidence: float = DEFAULT_CONFIDENCE
 
     def __post_init__(self) -> None:
         """Raises `InputError` if one is not between 0 and 1."""
@@ -125,7 +125,7 @@ class Terms:
 class Tally:
     """Days in the order of their numbers, as far as they are over without a gap, or up to the day that decided.
 
-    Of `runs` days that count, the claim `held` on so many; `decided` is whether they show or refute it.
+    `runs` days count, on `held` of which the claim held; `decided` tells whether they show or refute it.
     """
 
     def __init__(self, terms: Terms) -> None:
@@ -153,7 +153,7 @@ def certify(
     resume: bool = False,
     progress: Callable[[Tally], None] | None = None,
 ) -> Certificate:
-    """Flies days and writes the folder; with `resume` goes on with what it has of these days, or of fewer.
+    """Flies days and writes the folder; with `resume` keeps the days that the folder has, and flies the others.
 
     A RunFolderError: it holds something else, or days without `resume`; an OSError: disk or workers give out.
     """
@@ -173,23 +173,23 @@ def certify(
                 raise OSError(told_left(left))
 
         if days.rare:
-            rare = _simulated(days, folder, fly, terms.confidence)
+            rare = _simulate(days, folder, fly, terms.confidence)
         else:
             fly()
         folder.write_tables(tally.runs)
         certificate = _certificate(days, folder, tally, terms)
         if rare is not None:
-            certificate = replace(certificate, rare=rare, **_rarely(rare, terms.probability))
+            certificate = replace(certificate, rare=rare, **_rare_verdict(rare, terms.probability))
         if days.band and not (out / BAND).exists():
             kept = (out / RUNS / str(run) for run in range(tally.runs))
             write_band(out, [each for each in kept if (each / TRACK).is_file()])
-        _keep(days, out, certificate.failing_runs, workers)
+        _keep_failing(days, out, certificate.failing_runs, workers)
         content = json.dumps(certificate.plain(), indent=2, allow_nan=False) + "\n"
         replace_text(out / CERTIFICATE, content)
     return certificate
 
 
-def _simulated(days: Days, folder: CampaignFolder, fly: Callable[[range], None], confidence: float) -> Rare:
+def _simulate(days: Days, folder: CampaignFolder, fly: Callable[[range], None], confidence: float) -> Rare:
     def margins(normals: FloatArray, seeds: IntArray) -> FloatArray:
         fly(numbers := days.give(normals, seeds))
         cells = [folder.over[run].row.get("margin", 0.0) for run in numbers]
@@ -198,18 +198,18 @@ def _simulated(days: Days, folder: CampaignFolder, fly: Callable[[range], None],
     return subset_simulation(margins, days.normals, len(days), days.campaign.seed, confidence)
 
 
-def _keep(days: Days, out: Path, failing: Sequence[int], workers: Workers) -> None:
+def _keep_failing(days: Days, out: Path, failing: Sequence[int], workers: Workers) -> None:
     """Keeps the run folders of failing days; after a subset simulation some of them are flown again for that."""
     if days.rare:
-        missing = (run for run in failing[:KEPT] if not (out / RUNS / str(run)).exists())
+        missing = (run for run in failing[:MOST_FOLDERS] if not (out / RUNS / str(run)).exists())
         fly_jobs((replace(days.job(run, out), recordings="all") for run in missing), workers, lambda *_: None)
     for each in (out / RUNS).glob("*"):  # of days that were flown ahead of the day that decided
         if each.name.isdecimal() and int(each.name) not in failing:
             shutil.rmtree(each, ignore_errors=True)
 
 
-def _rarely(rare: Rare, claimed: float | None) -> dict[str, Any]:
-    """The verdict, bounds and method of a subset simulation, which is looked at once, at its end."""
+def _rare_verdict(rare: Rare, claimed: float | None) -> dict[str, Any]:
+    """Returns the verdict, bounds and method of a subset simulation, which is looked at once, at its end."""
     low, high = 1.0 - rare.failure_upper, 1.0 - rare.failure_lower
     said = "undecided" if claimed is None or claimed <= high else "refuted"
     said = "shown" if claimed is not None and claimed <= low else said
@@ -226,7 +226,7 @@ def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms)
         held=tally.held,
         confidence=terms.confidence,
         probability=terms.probability,
-        **_sure(tally, terms, folder.grown),
+        **_counted_verdict(tally, terms, folder.grown),
         most_runs=len(days),
         subject=days.campaign.name,
         planner="given" if isinstance(days, PathDays) else first.planner.label,
@@ -249,8 +249,8 @@ def _explained(days: Days, over: Sequence[tuple[int, Answer]]) -> tuple[Explaine
     return explained(np.array([not each.held for _, each in flew]), quantities)
 
 
-def _sure(tally: Tally, terms: Terms, grown: bool) -> dict[str, Any]:
-    """Verdict, bounds and method of a certificate."""
+def _counted_verdict(tally: Tally, terms: Terms, grown: bool) -> dict[str, Any]:
+    """Returns the verdict, bounds and method of a certificate by counting."""
     counted, said = (tally.held, tally.runs), "undecided"
     # Who raises the number of days knows what came out: it was not fixed beforehand.
     if terms.probability is None and not grown:
@@ -266,7 +266,7 @@ def _sure(tally: Tally, terms: Terms, grown: bool) -> dict[str, Any]:
 
 
 def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
-    """Rows of days that failed, by outcome and cause, the most frequent first."""
+    """Groups the rows of days that failed by outcome and cause, the most frequent first."""
     alike: dict[tuple[str, str], list[int]] = {}
     for row in rows:
         flown = row.get("trackability.causes") or row.get("check.verdict") or ""
@@ -277,7 +277,7 @@ def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
 
 
 def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]) -> tuple[Explained, ...]:
-    """The quantities that explain most of the failures first; nothing where none or all failed.
+    """Ranks the quantities by how much of the failures they explain; returns none where none or all failed.
 
     The share is epsilon squared (Kelley, Proceedings of the National Academy of Sciences 21, 1935): the correlation
     ratio of failing (n,) over the groups of a quantity (n,), less what one without influence would show.
@@ -299,7 +299,7 @@ def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]
 
 
 def differing(days: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """The numbers and names that are not the same on all days, by key path, of each day's plain scenario."""
+    """Finds the keys of plain scenarios that differ between days; returns their values, one a day, by key path."""
     flat = [dict(leaf for name in SECTIONS for leaf in _leaves(day.get(name), name)) for day in days]
     columns = {
         key: [each.get(key) for each in flat] for key in dict.fromkeys(key for each in flat for key in each)

@@ -23,8 +23,7 @@ from harness.campaign.runs import SEED_STREAM, CampaignRuns
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, node_of
 from harness.flight.record import FloatArray, IntArray
-from harness.run.path_check import asked as path_check
-from harness.run.path_check import origin_of
+from harness.run.path_check import origin_of, prepare_check
 from harness.run.path_flight import PathCheck
 from harness.run_files.path_files import read_path
 from harness.scenario.keys import NORMALS
@@ -34,18 +33,18 @@ from harness.scenario.shipped import scenario_path, shipped_scenarios
 
 DEFAULT_AIRCRAFT: Final = "aerosonde"
 DEFAULT_SEED: Final = 1
-AS_MEANT: Final = ("uncertainty", json.dumps(dict.fromkeys(UncertaintySpec.model_fields, 0.0)))
-FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
+NO_DEVIATIONS: Final = ("uncertainty", json.dumps(dict.fromkeys(UncertaintySpec.model_fields, 0.0)))
+DRAW_FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
 
-LEAST_RARE: Final = 500
-"""Fewest days of a subset simulation, whose independent runs then begin with 15."""
+LEAST_RARE_DAYS: Final = 500
+"""Fewest days of a subset simulation: each independent run then begins with 15."""
 
 Settings = Sequence[tuple[str, str]]
 Vary = Mapping[str, Mapping[str, Any]]
 
 
 class Days(CampaignRuns):
-    """The days of a scenario."""
+    """The days of a scenario: a campaign in which every run has its own seed and its own draw of what varies."""
 
     def __init__(
         self,
@@ -58,7 +57,7 @@ class Days(CampaignRuns):
         sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
         purpose: Literal["counted", "band", "rare"] = "counted",
     ) -> None:
-        """Makes at most so many days of a scenario, or raises InputError; nothing is flown.
+        """Prepares at most `most` days of a scenario, or raises InputError; nothing is flown.
 
         `vary`: what is drawn, as `random` of a campaign file. `band.json` is made of the tracks of all days of a band;
         rare ones are not drawn as they come, but given one after another (`give`).
@@ -66,8 +65,8 @@ class Days(CampaignRuns):
         rare, band = purpose == "rare", purpose == "band"
         if rare and claim == "reached":
             raise InputError("wayproof: --rare needs a margin: --claim no-contact, trackable or as-given")
-        if rare and most < LEAST_RARE:
-            raise InputError(f"wayproof: --rare needs at least --runs {LEAST_RARE}; 10,000 do for 1e-4")
+        if rare and most < LEAST_RARE_DAYS:
+            raise InputError(f"wayproof: --rare needs at least --runs {LEAST_RARE_DAYS}; 10,000 do for 1e-4")
         plain = {
             "schema": "wayproof/campaign/1",
             "name": base.name,
@@ -116,14 +115,14 @@ class Days(CampaignRuns):
         return [("normals", json.dumps(self._given[number][0][len(self.vary) :]))]
 
     def scenario(self, number: int, overrides: Settings = ()) -> Scenario:
-        """The scenario of day `number`; with its aircraft as it is meant to be where the one drawn cannot fly level."""
+        """Makes the scenario of day `number`; its aircraft has no deviations where the one drawn cannot fly level."""
         try:
             return self._drawn_scenario(number, overrides)
         except InputError as error:
             _, is_deviation, why = str(error).partition("must be smaller: ")
             if not is_deviation:
                 raise
-            found = self._drawn_scenario(number, [*overrides, AS_MEANT])
+            found = self._drawn_scenario(number, [*overrides, NO_DEVIATIONS])
             self.grounded[number] = why.rpartition(" (")[0]
             return found
 
@@ -150,9 +149,9 @@ class PathDays(Days):
         vary: Vary,
         **terms: Any,
     ) -> None:
-        """Makes the days; nothing is flown. `terms` are those of `Days`, but for the root seed: the scenario's.
+        """Prepares the days; nothing is flown. `terms` are those of `Days`; the root seed is the scenario's.
 
-        `ask`: puts together what the path is flown with, some keys of its scenario replaced.
+        `ask`: prepares the check of the path, with some keys of its scenario replaced.
         `content`: all that the path consists of, as text; a change of it makes other days.
         `command`: words of the command that flies the path, without those that differ between days.
         """
@@ -174,7 +173,7 @@ class PathDays(Days):
         self._fixed = scenario.normals is not None
 
     def _settings(self, number: int) -> list[tuple[str, str]]:
-        """The keys that day `number` replaces, and their values as YAML."""
+        """Returns the keys that day `number` replaces, and their values as YAML."""
         day = self.cells(number)
         return [*((key, json.dumps(day[key])) for key in ("seed", *self.varied)), *self._normals(number)]
 
@@ -190,7 +189,7 @@ class PathDays(Days):
         return job if job.cannot_fly else replace(job, path=self._ask(self._settings(number)))
 
     def again(self, number: int, folder: Path) -> str:
-        """The command that flies day `number` again."""
+        """Returns the command that flies day `number` again."""
         words = [word for pair in self._settings(number) for word in ("--set", "=".join(pair))]
         return shlex.join([*self._command, *words])
 
@@ -200,7 +199,7 @@ class PathDays(Days):
 
 
 def distributions(vary: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Varied quantities by key path, as a campaign file has them under `random`, of texts KEY=DRAW; or a ValueError."""
+    """Parses texts KEY=DRAW into distributions by key path, as `random` of a campaign file; or a ValueError."""
     found: dict[str, dict[str, Any]] = {}
     for each in vary:
         name, _, draw = each.partition("=")
@@ -212,8 +211,8 @@ def distributions(vary: Sequence[str]) -> dict[str, dict[str, Any]]:
 
 
 def _distribution(key: str, text: str) -> dict[str, Any]:
-    """The distribution that a text means."""
-    fault = f"{f'{key}={text}'[:60]!r} is not {FORMS}"
+    """Parses the DRAW of a key; the ValueError of a bad one tells the forms that there are."""
+    fault = f"{f'{key}={text}'[:60]!r} is not {DRAW_FORMS}"
     if not key or not text:
         raise ValueError(fault)
     for sign in (":", "~"):
@@ -237,7 +236,7 @@ def _value(part: str) -> Any:
 
 
 def is_path(subject: str) -> bool:
-    """Whether what a person named is a given path, and not a scenario or the name of one."""
+    """Whether a command's argument is the file of a path, and not a scenario or the name of one."""
     if subject in shipped_scenarios() or Path(subject).suffix in (".yaml", ".yml", ""):
         return False
     return not is_a("scenario", Path(subject))
@@ -246,7 +245,7 @@ def is_path(subject: str) -> bool:
 def days_of(
     subject: str, settings: Settings, vary: Vary, claim: Claim | None, world: Path | None, **terms: Any
 ) -> Days:
-    """The days of a scenario (its file or shipped name) or of a given path, not checked yet; or an InputError.
+    """Prepares the days of a scenario (file or shipped name) or of a given path, not checked yet; or an InputError.
 
     `settings`: keys of the scenario to replace, as `load_scenario` takes them; `claim`: by default `reached`, of a path
     `as-given`; `world`: of a path, a scenario file with obstacles, bounds and air; `terms`: as `Days` takes them.
@@ -281,7 +280,7 @@ def _path_days(
     name = (re.sub(r"[^a-z0-9._-]+", "-", file.stem.lower()).strip("-.") or "path")[:100]
 
     def ask(replaced: Settings) -> PathCheck:
-        return path_check(
+        return prepare_check(
             path, [("aircraft.model", json.dumps(model)), *others, *replaced], world=world, name=name
         )
 

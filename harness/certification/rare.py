@@ -24,12 +24,12 @@ RUNS: Final = 8
 CHAIN: Final = 5
 """Days of a chain, with that which it begins at: a level is the quantile 1 / CHAIN of the pilot's margins."""
 PILOT_LEAST, PILOT_SHARE, PILOT_MOST = 50, 0.02, 0.25
-"""The pilot has at least so many days at a level, else this share of all, and ends with this share of them."""
+"""The pilot begins with this many days, or this share of all if that is more, and ends having used this share."""
 ACCEPTED, ADAPTED = 0.42, 0.7
-"""The pilot adapts the length of the moves until this share stays below the level, and how fast it does so."""
+"""The pilot adapts the length of the moves so that this share stays below the level, with this gain."""
 
-WIDEST: Final = 1.0
-"""Estimates whose logarithms have a larger variance than this are too far apart for bounds of their mean."""
+MOST_LOG_VARIANCE: Final = 1.0
+"""If the logarithms of the estimates have a larger variance than this, their mean has no useful bounds."""
 
 Evaluate: TypeAlias = Callable[[FloatArray, IntArray], FloatArray]
 """Margins (n,) of days, above 0 where the claim holds, from their standard normal numbers (n, d) and seeds (n,)."""
@@ -39,8 +39,8 @@ Evaluate: TypeAlias = Callable[[FloatArray, IntArray], FloatArray]
 class Rare:
     """The probability that a day fails: an unbiased estimate, and bounds of it, each by itself at some confidence.
 
-    `levels`: of the margin, falling. `plain_runs`: days drawn as they come, of which so many failed. `estimates`: of
-    each independent run, 0 where it met no failure. `method`: how the bounds were derived.
+    `levels`: of the margin, falling. `plain_runs`: days drawn as they come, `plain_failures` of which failed.
+    `estimates`: of each independent run, 0 if it met no failure. `method`: how the bounds were derived.
     """
 
     failure_probability: float
@@ -56,8 +56,8 @@ class Rare:
 def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, confidence: float) -> Rare:
     """Estimates how often the margin of a day is not above 0, with at most `most` evaluations.
 
-    A day consists of so many standard normal numbers, and the seed of all that it draws at random in flight. `seed` is
-    that of the simulation: which days are evaluated, and in which order, depends on it and on the margins alone.
+    A day consists of `normals` standard normal numbers, and the seed of its random streams in flight. `seed` is that of
+    the simulation: which days are evaluated, and in which order, depends on it and on the margins alone.
     """
     sampler = _Sampler(evaluate, np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,))))
     levels, lengths, plain, used = sampler.pilot(normals, most)
@@ -70,7 +70,7 @@ def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, co
         days, weights = sampler.multiplied(kept, level, length)[0], weights * share / CHAIN
     estimates = np.bincount(days["run"][days["margin"] <= 0.0], minlength=RUNS) * weights
     mean = float(estimates.mean()) if levels else failed / count
-    if levels and estimates.all() and np.log(estimates).var(ddof=1) < WIDEST:
+    if levels and estimates.all() and np.log(estimates).var(ddof=1) < MOST_LOG_VARIANCE:
         low, high = lognormal_bounds(estimates, confidence)
         method = f"subset simulation, {RUNS} independent runs with fixed levels, their estimates taken as lognormal"
     else:
@@ -91,7 +91,7 @@ class _Sampler:
     rng: np.random.Generator
 
     def first(self, number: int, normals: int, runs: int = 1) -> Any:
-        """So many days of every run, as they come."""
+        """Draws and evaluates `number` days of each run, as they come."""
         kinds = [("normals", float, (normals,)), ("seed", np.int64), ("margin", float), ("run", np.int64)]
         days = np.zeros(number * runs, kinds)
         days["normals"] = self.rng.standard_normal((len(days), normals))
@@ -101,7 +101,7 @@ class _Sampler:
         return days
 
     def pilot(self, normals: int, most: int) -> tuple[list[float], list[float], FloatArray, int]:
-        """Levels, the length of the moves at each, the margins of days drawn as they come, and all days used."""
+        """Returns levels, the length of moves at each, margins of the days drawn as they come, and the days used."""
         days = self.first(max(PILOT_LEAST, int(PILOT_SHARE * most)), normals)
         plain, kept, length = days["margin"], len(days) // CHAIN, 0.5
         used, levels, lengths = len(plain), [np.inf], [length]
@@ -118,7 +118,7 @@ class _Sampler:
         return levels[known], lengths[known], plain, used
 
     def thinned(self, days: Any, most: int) -> tuple[Any, FloatArray]:
-        """At most so many days of each run, and how many days one of them stands for then.
+        """Picks at most `most` days of each run; returns them, and how many days each of a run stands for (RUNS,).
 
         They lie at equal steps in the order of their margins, each as likely as the others (systematic sampling).
         """
@@ -130,7 +130,7 @@ class _Sampler:
         return days[np.lexsort((days["margin"], days["run"]))][taken], step
 
     def multiplied(self, days: Any, level: float, length: float, adapted: float = 0.0) -> tuple[Any, float]:
-        """The chains that begin at days below a level, and the length of the next move.
+        """Moves days below a level along Markov chains; returns the days of all chains, and the next move's length.
 
         A move takes the normal numbers a part of the way to new ones (preconditioned Crank-Nicolson: Cotter, Roberts,
         Stuart and White, Statistical Science 28, 2013), and draws the seed anew in one of two cases.

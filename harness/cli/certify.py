@@ -20,30 +20,30 @@ if TYPE_CHECKING:
     from harness.certification.days import Days
     from harness.certification.rare import Rare
 
-SHOWN: Final = 5
-"""Ways to fail, and quantities that explain failures, that are printed; the file has all."""
+MOST_SHOWN: Final = 5
+"""The terminal shows at most this many ways to fail, and quantities that explain failures; the file has all."""
 LEAST_SHARE: Final = 0.01
-"""A quantity that explains less is not printed."""
-STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
+"""A quantity is printed if it explains at least this share of the failures."""
+VERDICT_STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
 
-CLAIM: Final = "reached (default), no-contact, trackable; as-given (default of a path)."
-PROBABILITY: Final = "Claim that it holds on this share of the days; stops once that is decided."
-RARE: Final = "Subset simulation, for failures on less than one day in 1,000; not of reached."
-VARY: Final = "LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."
+CLAIM_HELP: Final = "reached (default), no-contact, trackable; as-given (default of a path)."
+PROBABILITY_HELP: Final = "Claim that it holds on this share of the days; stops once that is decided."
+RARE_HELP: Final = "Subset simulation, for failures on less than one day in 1,000; not of reached."
+VARY_HELP: Final = "LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."
 
 
 @replacing("planner", "aircraft", "guidance", "conditions", "wind", "turbulence", "seed", "settings")
 def certify(
     subject: Annotated[str, argument("SCENARIO|PATH", "A scenario, or a path that `wayproof check` takes.")],
     given: Given = NOTHING,
-    claim: Annotated[Claim | None, option("CLAIM", CLAIM)] = None,
-    probability: Annotated[Number, option("P", PROBABILITY)] = None,
+    claim: Annotated[Claim | None, option("CLAIM", CLAIM_HELP)] = None,
+    probability: Annotated[Number, option("P", PROBABILITY_HELP)] = None,
     confidence: Annotated[float, option("C", "Of each bound.")] = 0.95,
-    rare: Annotated[bool, flag("--rare", RARE)] = False,
+    rare: Annotated[bool, flag("--rare", RARE_HELP)] = False,
     runs: Annotated[
         Count, option("N", "Days at most. Default: 1000, --rare 10000, at least 500.", min=1)
     ] = None,
-    vary: Annotated[list[str] | None, option("KEY=DRAW", VARY)] = None,
+    vary: Annotated[list[str] | None, option("KEY=DRAW", VARY_HELP)] = None,
     world: Annotated[Text, option("WORLD", "Of a path: obstacles, bounds, air.", "--scenario")] = None,
     workers: Workers = None,
     out: Out = None,
@@ -65,7 +65,7 @@ def certify(
     1 refuted or undecided
     2 bad input or usage, nothing flown
     """
-    from harness.certification.certification import MOST_RUNS, Terms
+    from harness.certification.certification import DEFAULT_RUNS, Terms
     from harness.certification.days import DEFAULT_AIRCRAFT, days_of, is_path
     from harness.scenario.shipped import scenario_path
 
@@ -74,7 +74,7 @@ def certify(
     if is_path(subject) and not any(key == "aircraft.model" for key, _ in given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
     place = None if world is None else scenario_path(world)
-    most = runs or MOST_RUNS[rare]
+    most = runs or DEFAULT_RUNS[rare]
     terms_of_days = {"most": most, "sources": given.sources, "purpose": "rare" if rare else "counted"}
     days = days_of(subject, given.keys, drawn, claim, place, **terms_of_days)
     days.check()
@@ -90,7 +90,7 @@ def certify(
 
 
 def _drawn(vary: Sequence[str]) -> Mapping[str, Any]:
-    """What varies from day to day, by key."""
+    """Parses --vary: the distribution of each key that is drawn every day."""
     from harness.certification.days import distributions
 
     try:
@@ -142,30 +142,30 @@ def _print(found: Certificate, title: str, folder: Path) -> None:
 
 
 def certificate_rows(certificate: Certificate) -> dict[str, str]:
-    """Name and value of each row."""
+    """Returns the rows of a certificate's table: text by name."""
     sure = f"{certificate.confidence:.4g}"
     rows: dict[str, str] = {"claim": certificate.claim}
     if certificate.conditions:
         rows["conditions"] = plain(certificate.conditions)
     rows |= {
         "held": f"on {certificate.held} of {certificate.runs} days",
-        "probability": f"at least {share(certificate.probability_lower)}, at most "
-        f"{share(certificate.probability_upper, up=True)} (each bound at confidence {sure})",
+        "probability": f"at least {share_text(certificate.probability_lower)}, at most "
+        f"{share_text(certificate.probability_upper, up=True)} (each bound at confidence {sure})",
         "bounds": certificate.method,
     }
     if certificate.rare is not None:
         rows |= _rare_rows(certificate.rare, rows["held"])
     claimed = certificate.probability
     asked = "" if claimed is None else f": holds on at least {claimed:.6g} of the days"
-    rows["verdict"] = f"[{STYLE[certificate.verdict]}]{certificate.verdict}[/]{asked}"
-    for number, each in enumerate(certificate.failures[:SHOWN]):
+    rows["verdict"] = f"[{VERDICT_STYLE[certificate.verdict]}]{certificate.verdict}[/]{asked}"
+    for number, each in enumerate(certificate.failures[:MOST_SHOWN]):
         cause = f", {plain(each.cause)}" if each.cause else ""
         runs = ", ".join(map(str, each.runs)) + (", ..." if each.count > len(each.runs) else "")
         rows["failed" if not number else f"failed {number + 1}"] = (
             f"{each.outcome}{cause}: {each.count} (run {runs})"
         )
     told = [each for each in certificate.explained if each.share >= LEAST_SHARE]
-    for quantity in told[:SHOWN]:
+    for quantity in told[:MOST_SHOWN]:
         worst = f"most at {plain(quantity.worst)}: {quantity.failed} of {quantity.runs}"
         rows[plain(quantity.key)] = f"explains {100 * quantity.share:.0f} % of the failures; {worst}"
     return rows
@@ -178,7 +178,7 @@ def _rare_rows(rare: Rare, held: str) -> dict[str, str]:
     return told | ({"held": f"{held}, drawn near failure", "levels": f"{levels} (margin)"} if levels else {})
 
 
-def share(value: float, up: bool = False) -> str:
-    """A probability, rounded outwards: never more than is known."""
+def share_text(value: float, up: bool = False) -> str:
+    """Returns a bound of a probability as text, rounded down, or `up`: it claims no more than is known."""
     scaled = value * 1e5
     return f"{(math.ceil(scaled) if up else math.floor(scaled)) / 1e5:.5f}"

@@ -60,7 +60,7 @@ def check(
     1 flown, but not as given
     2 bad input or usage, nothing flown
     """
-    from harness.run.path_check import asked, origin_of
+    from harness.run.path_check import origin_of, prepare_check
     from harness.run_files.path_files import read_path
     from harness.scenario.shipped import scenario_path
 
@@ -77,7 +77,7 @@ def check(
     points = read_path(path, altitude_m is not None, origin_of(world))
 
     def on_day(day: Sequence[tuple[str, str]]) -> PathCheck:
-        return asked(
+        return prepare_check(
             points,
             [*replaced, *day],
             world=world,
@@ -110,7 +110,7 @@ def check(
 def _words(
     differs: Sequence[tuple[str, str]], given: Given, replaced: Sequence[tuple[str, str]]
 ) -> list[str]:
-    """The options of a check with which a day is flown again: its own, its law, the keys replaced."""
+    """Returns the options of a check with which a day is flown again: its own, its law, the keys replaced."""
     from harness.scenario.kinds import source_words
 
     words = [word for name, value in differs for word in (f"--{name.replace('_', '-')}", value)]
@@ -131,7 +131,7 @@ def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> di
 
 
 def _print_verdict(title: str, check: PathCheck, metrics: dict[str, Any], folder: Path) -> None:
-    """The table of a path, its verdict and its conditions first."""
+    """Prints the table of a checked path, its verdict and its conditions first."""
     from harness.scenario.conditions import told
 
     scenario = check.scenario

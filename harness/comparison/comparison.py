@@ -106,7 +106,7 @@ def fly_and_compare(
 
 
 def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
-    """The flights; an InputError where two have one name, or a scenario is called as a file of the comparison."""
+    """Makes the flights; an InputError if two have one name, or a scenario is called as a file of the comparison."""
     by_law = len({each.guidance.kind for each in scenarios}) > 1
     flights: dict[Path, _Flight] = {}
     for number, each in enumerate(scenarios):
@@ -127,7 +127,7 @@ def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
 
 
 def _fly(flights: Sequence[_Flight], workers: int, progress: Callable[[str], None] | None) -> dict[int, str]:
-    """Flies all; returns why, by the number of the flight, where one did not come to an end."""
+    """Flies all flights; returns why a flight did not come to an end, by its number."""
     crashes: dict[int, str] = {}
 
     def over(number: int, answer: Answer | None) -> None:
@@ -147,7 +147,7 @@ def _fly(flights: Sequence[_Flight], workers: int, progress: Callable[[str], Non
 def _written(
     flights: Sequence[_Flight], crashes: Mapping[int, str], out: Path, begun: Comparison
 ) -> Comparison:
-    """Writes everything that is made of the run folders."""
+    """Writes overlays, table, report and index of the run folders, and returns the finished comparison."""
     by_name: dict[str, list[_Flight]] = {}
     for flight in flights:
         by_name.setdefault(flight.scenario.name, []).append(flight)

@@ -1,4 +1,4 @@
-"""A given path and what it is flown with: the scenario about it, what is asked of it, and the flight."""
+"""The check of a given path: the scenario that it is flown in, the limits, and the flight."""
 
 from __future__ import annotations
 
@@ -37,29 +37,29 @@ if TYPE_CHECKING:
 
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: this length, and this share of its span."""
-OF_THE_WORLD: Final = (
+WORLD_SECTIONS: Final = (
     *("seed", "area", "obstacles", "ground", "sources"),
     *("environment", "conditions", "uncertainty", "normals"),
 )
-"""Sections that a check takes from a scenario that it flies a path in; mission, aircraft and sensor are its own."""
-KEYS_OF_THE_WORLD: Final = (
+"""Sections that a check takes from the scenario in which it flies a path; mission, aircraft and sensor are its own."""
+WORLD_KEYS: Final = (
     *(("mission", "altitude_m"), ("planner", "clearance_m")),
     *(("trackability", "cross_track_m"), ("trackability", "altitude_m")),
 )
-"""Single keys that it takes from there too: the altitude, and what sets the limits."""
-UNUSED: Final = re.compile(r"planner\.(?!clearance_m$)|mission\.(?!altitude_m$|goal_radius_m$)")
-"""Begin of keys in whose place the path stands: who plans, start, goal, and until when."""
+"""Single keys that a check takes from that scenario: the altitude, and the keys from which its limits follow."""
+UNUSED_KEYS: Final = re.compile(r"planner\.(?!clearance_m$)|mission\.(?!altitude_m$|goal_radius_m$)")
+"""Keys that have no effect on a given path begin so: the planner, start and goal, the time limit."""
 
 
 def origin_of(world: FilePath | None) -> tuple[float, float] | None:
-    """Latitude and longitude of a world's origin; None where it does not say. An InputError says it is no scenario."""
+    """Reads latitude and longitude of a world's origin; None if it gives none. An InputError says it is no scenario."""
     area = None if world is None else load_scenario(world).area
     if area is None or "origin" not in area.model_fields_set:
         return None
     return area.origin.latitude_deg, area.origin.longitude_deg
 
 
-def asked(
+def prepare_check(
     given: PathAsGiven,
     settings: Sequence[tuple[str, str]] = (),
     *,
@@ -68,7 +68,7 @@ def asked(
     corner_m: float | None = None,
     name: str = "path",
 ) -> PathCheck:
-    """Puts together what a path is flown with; an InputError names the key that cannot be.
+    """Prepares the check of a path; an InputError names the key that cannot be used.
 
     `settings` are keys of a scenario, by key path, and values as YAML, `aircraft.model` among them. `world` is a
     scenario file with obstacles, area, air, altitude, clearance and seed; without it nothing is there. The altitude is
@@ -76,12 +76,12 @@ def asked(
     """
     _refuse_unused(settings)
     keys = {("name",): name, **_own_keys(given, world, altitude_m)}
-    base, folder = _of_the_world(world), None if world is None else world.parent
+    base, folder = _world_root(world), None if world is None else world.parent
 
     def validly(root: Node) -> Scenario:
         return validated(root, "command line" if world is None else str(world), folder, ends_checked=False)
 
-    root = overridden(_with(base, {**_mission_about(given.points_m, base), **keys}), settings)
+    root = overridden(_with_keys(base, {**_mission_about(given.points_m, base), **keys}), settings)
     scenario = validly(root)
     field = None if scenario.ground is None else scenario.ground.field()
     plan = planned(given, scenario, altitude_m, None if field is None else field.at, corner_m)
@@ -91,7 +91,9 @@ def asked(
         east, north = plan.way.segments[0, 2:4].tolist()
         keys["mission", "course_deg"] = math.degrees(math.atan2(east, north)) % 360.0
         keys["mission", "altitude_m"] = float(plan.profile.altitude_m[0])
-        root = overridden(_with(base, {**_mission_about(plan.way.given_m[:, :2], base), **keys}), settings)
+        root = overridden(
+            _with_keys(base, {**_mission_about(plan.way.given_m[:, :2], base), **keys}), settings
+        )
         if not plan.profile.level:
             root, files = _without_files(root, folder, scenario.ground)
         scenario = validly(root)
@@ -100,12 +102,12 @@ def asked(
 
 
 def _refuse_unused(settings: Sequence[tuple[str, str]]) -> None:
-    for key in [key.strip() for key, _ in settings if UNUSED.match(key.strip())]:
+    for key in [key.strip() for key, _ in settings if UNUSED_KEYS.match(key.strip())]:
         raise InputError(f"command line: {key}: has no effect on a given path; leave it out")
 
 
 def _own_keys(given: PathAsGiven, world: FilePath | None, altitude_m: float | None) -> dict[Loc, Any]:
-    """Keys that a path has, wherever it is flown."""
+    """Returns the keys of a scenario that a path gives itself: altitude, origin."""
     keys: dict[Loc, Any] = {("schema",): "wayproof/scenario/1"}
     if altitude_m is not None:
         keys["mission", "altitude_m"] = altitude_m
@@ -119,28 +121,28 @@ def _own_keys(given: PathAsGiven, world: FilePath | None, altitude_m: float | No
     return keys
 
 
-def _of_the_world(world: FilePath | None) -> Node:
-    """What is taken from the world."""
+def _world_root(world: FilePath | None) -> Node:
+    """Reads the keys of the world's scenario that a check takes over."""
     if world is None:
         return Node({}, COMMAND_LINE)
     root = strict_yaml.read(world)
     validated(root, str(world), world.parent)  # its faults are told as those of a scenario
     assert isinstance(root.value, dict)
-    base = Node({key: node for key, node in root.value.items() if key in OF_THE_WORLD}, root.line)
-    for loc in KEYS_OF_THE_WORLD:
+    base = Node({key: node for key, node in root.value.items() if key in WORLD_SECTIONS}, root.line)
+    for loc in WORLD_KEYS:
         written = root.at(loc)
         base = base if written is None else with_key(base, loc, written)
     return base
 
 
-def _with(root: Node, keys: Mapping[Loc, Any]) -> Node:
+def _with_keys(root: Node, keys: Mapping[Loc, Any]) -> Node:
     for loc, value in keys.items():
         root = with_key(root, loc, node_of(value, COMMAND_LINE))
     return root
 
 
 def _mission_about(points_m: FloatArray, base: Node) -> dict[Loc, Any]:
-    """Keys of a mission from the start of a path (n, 2) to its end, or to where it is furthest from there.
+    """Returns the keys of a mission from the start of a path (n, 2) to its end, or its point furthest from there.
 
     Start and goal may lie anywhere, in an obstacle too: that is then what the flight finds.
     """
@@ -166,9 +168,9 @@ def _mission_about(points_m: FloatArray, base: Node) -> dict[Loc, Any]:
 def _without_files(
     root: Node, folder: FilePath | None, ground: GroundSpec | None
 ) -> tuple[Node, tuple[FileSpec, ...]]:
-    """Keys without the files among the obstacles, for a path that is not flown at one altitude; and those files."""
+    """Takes the files out of the obstacles, for a path of several altitudes; returns the keys left, and the files."""
     if ground is not None:
-        root = _with(root, {("ground",): ground.model_dump()})
+        root = _with_keys(root, {("ground",): ground.model_dump()})
     listed = root.at(("obstacles",))
     every = listed.value if listed is not None and isinstance(listed.value, tuple) else ()
     files = [file for each in every if (file := each.at(("file",))) is not None]

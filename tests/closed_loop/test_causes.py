@@ -15,7 +15,7 @@ import pytest
 from harness.analysis.metrics import metrics
 from harness.flight.closed_loop import fly
 from harness.flight.record import FloatArray
-from harness.run.path_check import asked, fly_check
+from harness.run.path_check import fly_check, prepare_check
 from harness.run.scenario_flight import flight_limits, make_loop
 from harness.run_files.path_files import given_points
 from harness.scenario.scenario import Scenario
@@ -57,7 +57,7 @@ def check() -> Check:
         points: FloatArray, model: str = "aerosonde", corner_m: float | None = None, **keys: float
     ) -> dict[str, Any]:
         settings = [(name.replace("__", "."), str(value)) for name, value in keys.items()]
-        check = asked(given_points(points), [("aircraft.model", model), *settings], corner_m=corner_m)
+        check = prepare_check(given_points(points), [("aircraft.model", model), *settings], corner_m=corner_m)
         return fly_check(check)
 
     return fly_it

@@ -21,7 +21,7 @@ from harness.campaign.campaign_file import CampaignFile, load_campaign
 from harness.campaign.runs import CampaignRuns
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
-from harness.run.path_check import asked
+from harness.run.path_check import prepare_check
 from harness.run_files.path_files import read_path
 from harness.scenario.scenario import dump_scenario, load_scenario, parse_scenario
 from tests.faults.hostile import (
@@ -112,7 +112,7 @@ def read_campaign(path: Path) -> None:
 def read_given_path(path: Path) -> None:
     """Reads a path and makes of it what `check` flies."""
     given = read_path(path, any_altitude=True)
-    check = asked(given)
+    check = prepare_check(given)
     assert len(check.plan.way.segments) >= 1
 
 

@@ -73,7 +73,7 @@ def test_where_no_day_fails_the_bound_is_that_of_counting_and_says_how_near_it_c
 def test_days_of_a_path_are_the_same_for_any_number_of_workers_and_after_an_interruption(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(harness.certification.days, "LEAST_RARE", 100)
+    monkeypatch.setattr(harness.certification.days, "LEAST_RARE_DAYS", 100)
     monkeypatch.setattr(harness.certification.rare, "PILOT_LEAST", 20)
     monkeypatch.setattr(harness.certification.rare, "PILOT_MOST", 0.3)
     (tmp_path / "path.csv").write_text("east_m,north_m\n0,0\n300,0\n")
