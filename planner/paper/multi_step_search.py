@@ -15,6 +15,7 @@ from planner.paper.sectors import (
     clip,
     distance_left_m,
     fan_shaped_sectors,
+    off_guide,
     refine,
     select,
     signed,
@@ -123,28 +124,29 @@ def directions(
         if window.free(here, (x, y)):
             yield units
             return
-    for part in select(sectors_at(window, track, most_rad), guide_rad, config.sectors):
+    for part in select(sectors_at(window, track, guide_rad, most_rad), guide_rad, config.sectors):
         direction = refine(part, guide_m, guide_rad, step_m, math.radians(config.refinement_deg))
         units_in = whole_units(part, direction, course, unit_rad)
         assert units_in is not None
         yield units_in
 
 
-def sectors_at(window: Window, track: Track, most_rad: float) -> list[Sector]:
+def sectors_at(window: Window, track: Track, guide_rad: float, most_rad: float) -> list[Sector]:
     """Section 3.2, (1): the parts of free sectors at the end of a track that a step can turn to by a whole Delta.
 
-    Where all directions meet something in the window, only obstacles count that a step, or a turn at R after it, can
-    meet; the paper is silent on that.
+    Where every direction meets something in the window or leads away from the goal, only obstacles count that a step,
+    or a turn at R after it, can meet; the paper is silent on that.
     """
     here, course, config = track.nodes[-1], track.course_rad, window.config
     near_m = config.resolved_step_m + window.mission.turn_radius_m + window.keep_m
+    parts: list[Sector] = []
     for reach_m in (math.inf, near_m):
         free = fan_shaped_sectors(within(window.points_m, here, reach_m), window.keep_m, here)
         parts = [part for sector in free for part in clip(sector, course, most_rad)]
         parts = [part for part in parts if whole_units(part, course, course, config.unit_rad) is not None]
-        if parts:
-            return parts
-    return []
+        if any(off_guide(part, guide_rad) <= 0.5 * math.pi for part in parts):
+            break
+    return parts
 
 
 def along_guide(window: Window, here: Point, guide_m: float, guide_rad: float) -> Point:
