@@ -130,7 +130,7 @@ def _put_servo(system: ElementTree.Element, control: str, actuator: NormActuator
 
 
 def _delay_readings(system: ElementTree.Element, latency_s: float, steps: int) -> None:
-    """Has the autopilot read its attitude, airspeed, height and climb rate `latency_s`, so many `steps`, late.
+    """Has the autopilot read its attitude, airspeed, height and climb rate late, by `latency_s`, which are `steps`.
 
     Gyros are not late: the old attitude is carried on to now at their present rate.
     """

@@ -67,9 +67,9 @@ ERROR_LEVEL = 4
 """JSBSim's LogLevel::ERROR."""
 HARMLESS_ERROR = "No filename given."
 """JSBSim logs this as an error of every model."""
-_SILENCE = _Silence()
-"""The only logger. It is kept for ever, since JSBSim drops its own reference to it without Python's lock when a thread
-ends."""
+_LOGGER = _Silence()
+"""JSBSim's only logger. It is kept for ever, since JSBSim drops its own reference to it without Python's lock when a
+thread ends."""
 
 
 def node(fdm: Any, path: str) -> Any:
@@ -82,8 +82,8 @@ def node(fdm: Any, path: str) -> Any:
 
 def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
     """A fresh jsbsim.FGFDMExec with the model and the autopilot; AircraftError if it cannot be loaded."""
-    jsbsim.set_logger(_SILENCE)
-    _SILENCE.errors.clear()
+    jsbsim.set_logger(_LOGGER)
+    _LOGGER.errors.clear()
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_debug_level(0)
     # Before the model: its filters and integrators take their step when they are loaded.
@@ -99,7 +99,7 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
         reason = " ".join(str(error).split())
         raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from error
     if not loaded:
-        said = "; ".join(_SILENCE.errors)
+        said = "; ".join(_LOGGER.errors)
         raise AircraftError(f"{files.name}: JSBSim refuses the model{said and f': {said}'}")
     _check_properties(fdm, files)
     fdm.disable_output()
@@ -141,7 +141,7 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
         fdm[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
     fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
     fault = _trim(fdm, FULL_TRIM)
-    if fault == "" and RUDDER_NEEDED in "; ".join(_SILENCE.errors):
+    if fault == "" and RUDDER_NEEDED in "; ".join(_LOGGER.errors):
         fault = _trim(fdm, LONGITUDINAL_TRIM)
     if fault:
         raise AircraftError(f"{name}: the model cannot be started: {fault}")
@@ -157,7 +157,7 @@ def _trim(fdm: Any, mode: int) -> str | None:
 
     No exception of JSBSim's leaves this function: one that outlives its model ends the process.
     """
-    _SILENCE.errors.clear()
+    _LOGGER.errors.clear()
     try:
         fdm.run_ic()
         fdm["propulsion/set-running"] = -1.0
@@ -183,7 +183,7 @@ def _why_not_trimmed(fdm: Any) -> str:
         )
         if not any(running):
             return "none of its engines runs after JSBSim's propulsion/set-running"
-    return "; ".join(_SILENCE.errors) or "JSBSim finds no trim"
+    return "; ".join(_LOGGER.errors) or "JSBSim finds no trim"
 
 
 def trimmed(files: ModelFiles, airspeed_mps: float) -> Any:

@@ -21,7 +21,7 @@ from pathlib import Path, PurePath
 from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation
 
-OWN = Path(__file__).parent
+OWN_FOLDER = Path(__file__).parent
 MAX_FILES = 1000
 """Most files and folders in the folder of a model."""
 MAX_BYTES = 5_000_000
@@ -63,9 +63,9 @@ class ModelFiles:
         sha = hashlib.sha256(version("jsbsim").encode())
         sha.update(repr(self.actuators).encode() if self.actuators else b"")
         sha.update(repr(self.latency_s).encode() if self.latency_s else b"")
-        known = (self.model.parent, OWN, _wheel())
+        known = (self.model.parent, OWN_FOLDER, _wheel())
         shared = {each for each in (self.engines, self.systems) if not any(map(each.is_relative_to, known))}
-        for folder in (self.model.parent, OWN, *sorted(shared)):
+        for folder in (self.model.parent, OWN_FOLDER, *sorted(shared)):
             for path in sorted(each for each in folder.rglob("*") if each.is_file() and each.suffix != ".md"):
                 place = path.relative_to(folder)
                 if not any(part.startswith((".", "__")) for part in place.parts):
@@ -82,7 +82,7 @@ def model_files(name: str) -> ModelFiles:
     wheel = _wheel()
     folder = None
     with suppress(OSError, RuntimeError):  # too long, not allowed, or the home of nobody
-        for home in (OWN, wheel / "aircraft") if Path(name).name == name else ():
+        for home in (OWN_FOLDER, wheel / "aircraft") if Path(name).name == name else ():
             main = home / name / f"{name}.xml"
             if main.is_file():
                 return _with_engines(main, wheel)

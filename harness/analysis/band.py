@@ -13,7 +13,7 @@ from harness.files.input_file import read_index
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 
-BAND: Final = "band.json"
+BAND_FILE: Final = "band.json"
 SCHEMA: Final = "wayproof/band/1"
 BAND_SHARE: Final = 0.95
 STATIONS, STEP_M = 400, 5.0
@@ -60,12 +60,12 @@ def write_band(folder: Path, runs: Sequence[Path]) -> None:
     left, right = band_of([track for track in tracks if np.isfinite(track[:, 0]).any()])
     edges = {"left_m": left.tolist(), "right_m": right.tolist()}
     told = {"schema": SCHEMA, "share": BAND_SHARE, "days": len(runs), **edges}
-    replace_text(folder / BAND, json.dumps(told, allow_nan=False) + "\n")
+    replace_text(folder / BAND_FILE, json.dumps(told, allow_nan=False) + "\n")
 
 
 def read_band(folder: Path) -> tuple[int, FloatArray, FloatArray] | None:
     """Number of days, left and right edge, from the folder of some days; None where there is no band."""
-    told = read_index(folder / BAND, SCHEMA)
+    told = read_index(folder / BAND_FILE, SCHEMA)
     if told is None:
         return None
     return int(told["days"]), np.array(told["left_m"]), np.array(told["right_m"])

@@ -64,7 +64,7 @@ class Kept:
         return tuple(each for each in self.breaches if each.kind not in CONTACTS)
 
 
-def kept(
+def compared(
     track: Track,
     world: World,
     fences: Fences,

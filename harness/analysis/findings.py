@@ -63,14 +63,14 @@ def is_past_end(track: Track, plans: Sequence[AcceptedPlan], limits: FlightLimit
 
 
 def bank_reversals_per_min(track: Track) -> float:
-    """How often a minute the bank command goes from `BANKED_DEG` on one side to as much on the other."""
+    """Counts how often the bank command goes from `BANKED_DEG` on one side to as much on the other, per minute."""
     side = np.sign(track.roll_command_deg)[np.abs(track.roll_command_deg) >= BANKED_DEG]
     minutes = float(track.time_s[-1] - track.time_s[0]) / 60.0
     return float(np.count_nonzero(np.diff(side))) / minutes if minutes > 0.0 else 0.0
 
 
 def contradictions_s(track: Track, plans: Sequence[AcceptedPlan]) -> list[float]:
-    """Times (s) at which a plan took effect that soon leads to the other side of the course flown than the last."""
+    """Times (s) at which a plan took effect that, `AHEAD_S` on, leads to the other side of the course than the last."""
     index = track.plan_index
     times = []
     for row in (np.flatnonzero(np.diff(index) > 0) + 1).tolist():

@@ -93,13 +93,13 @@ def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand
     row = np.clip(np.searchsorted(passed, at, side="right") - 1, 0, len(lead) - 1)
     at = np.append(at, at[-1])
     bend = np.append(bend, turn_onto_first_plan_1pm(lead, plans, window))
-    return _over(force, bend, at, np.append(row, 0), np.radians(lead.course_deg))
+    return _demand_at(force, bend, at, np.append(row, 0), np.radians(lead.course_deg))
 
 
-def _over(
+def _demand_at(
     force: InForce, bend: FloatArray, at_m: FloatArray, row: FloatArray, course_rad: FloatArray
 ) -> Demand:
-    """The demand of curvatures at places along a plan, each with the row of the track that belongs to it."""
+    """Returns the demand of curvatures (1/m) at places along a plan, each with the row of the track that is there."""
     speed, wind, course = force.commanded_mps[row], force.wind_mps[row], course_rad[row]
     along = wind[:, 0] * np.sin(course) + wind[:, 1] * np.cos(course)
     across = wind[:, 0] * np.cos(course) - wind[:, 1] * np.sin(course)

@@ -44,7 +44,7 @@ def _smooth(figure: str, title: str, unit: str, short: tuple[str, str], factor: 
     ]  # fmt: skip
 
 
-_SMOOTH_FOR_PEOPLE: Final = ("heading_change_deg", "bending_energy_1pm")
+_SMOOTHNESS_SHOWN: Final = ("heading_change_deg", "bending_energy_1pm")
 HINTS: Final[Mapping[str, str]] = {
     "total_system_error_p95_m": "distance of the true position from the path, as planned or as given",
     "flight_technical_error_p95_m": "distance of the believed position from the path",
@@ -103,7 +103,7 @@ _METRICS: Final = (
     *_smooth("heading_change_deg", "heading change", "°", ("turn °", "flown °")),
     *_smooth("bending_energy_1pm", "bending energy", "1/km", ("bend", "bend fl."), 1e3),
     *(Metric(f"{of}_{each.name}", path=f"smoothness.{of}.{each.name}", worse="more") for of in ("planned", "flown")
-           for each in fields(Smoothness) if each.name not in _SMOOTH_FOR_PEOPLE),
+           for each in fields(Smoothness) if each.name not in _SMOOTHNESS_SHOWN),
     *(Metric(f"planner_{of}_ms", f"planner time {of}", "ms", f"{of} ms", f"compute_ms.{of}", worse="more", timed=True,
            recorded=True, heading="planner max, ms" if of == "max" else "") for of in ("p50", "p99", "max")),
     Metric("wall_s", path="timing.wall_s", timed=True),

@@ -63,7 +63,7 @@ def envelope_card(
         if report is not None:
             report(done, len(speeds), f"{frame.name} at {speed:g} m/s")
         title = f"{frame.name}-envelope-{CARD_FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
-        pages.append(cached(title, digest, partial(_page, frame, speed, winds), dict))
+        pages.append(cached(title, digest, partial(_measured_at, frame, speed, winds), dict))
     limits = frame.guidance_limits()
     return {
         "aircraft": frame.name,
@@ -77,7 +77,7 @@ def envelope_card(
     }
 
 
-def _page(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, Any]:
+def _measured_at(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, Any]:
     from aircraft.trials import roll_in_s
 
     banks = (*(bank for bank in BANKS_DEG if bank < frame.bank_limit_deg), frame.bank_limit_deg)

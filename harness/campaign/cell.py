@@ -162,7 +162,7 @@ BINS: Final = 4
 NOT_SET: Final = "not set"
 DIRECTION_ENDS: Final = ("from_deg", "course_deg", "heading_deg")
 """Keys that end so hold directions, of which 359 degrees is beside 0."""
-SECTORS: Final = tuple(
+COMPASS_SECTORS: Final = tuple(
     f"{name}, {low:g} to {low + 90:g}" for name, low in zip("NESW", (-45, 45, 135, 225), strict=True)
 )
 
@@ -201,7 +201,7 @@ def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
     numbers = np.array([np.nan if value is None else value for value in values], dtype=np.float64)
     missing = np.isnan(numbers)
     if key.endswith(DIRECTION_ENDS):
-        labels, edges = SECTORS, ()
+        labels, edges = COMPASS_SECTORS, ()
         index = np.floor(np.nan_to_num((numbers + 45.0) % 360.0) / 90.0)
     else:
         limits = np.unique(np.quantile(numbers[~missing], np.linspace(0.0, 1.0, BINS + 1)))

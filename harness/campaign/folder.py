@@ -42,7 +42,7 @@ FOLDER_SCHEMA: Final = "wayproof/campaign-folder/2"
 TABLES_EVERY_S: Final = 30.0
 TABLES_SHARE: Final = 0.01
 """Tables are written at most every `TABLES_EVERY_S`, and so seldom that it takes at most this share of the time."""
-MAX_SHOWN: Final = 3
+MAX_CHANGES: Final = 3
 
 
 class CampaignFolder:
@@ -147,9 +147,9 @@ class CampaignFolder:
                 shorter = (textwrap.shorten(each, 60, placeholder="...") for each in texts)
                 told.append("{} was {}, is {}".format(name, *shorter))
         if told:
-            more = "; and more" if len(told) > MAX_SHOWN else ""
+            more = "; and more" if len(told) > MAX_CHANGES else ""
             raise RunFolderError(
-                f"{self.path} is of another campaign: {'; '.join(told[:MAX_SHOWN])}{more}; change it back or choose "
+                f"{self.path} is of another campaign: {'; '.join(told[:MAX_CHANGES])}{more}; change it back or choose "
                 "another folder"
             )
         return grows or bool(before["grown"])

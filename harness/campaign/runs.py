@@ -112,7 +112,7 @@ class CampaignRuns:
             for name, each in drawn.items()
         ]
         with suppress(InputError, KeyFaults):  # the check of the runs tells of their faults
-            scenario = scenario_from(self._root(0, middle)[0].plain())
+            scenario = scenario_from(self._keys_of_run(0, middle)[0].plain())
             whole = (name for name in drawn if takes_whole_numbers(scenario, loc_of(name)))
             return [name for name in whole if drawn[name].is_whole]
         return []
@@ -140,7 +140,7 @@ class CampaignRuns:
         """Returns the scenario of run `number`, keys replaced as by `load_scenario`; an InputError names its fault."""
         if number in self._made and not overrides:
             return unpacked(self._made[number])
-        root, changes = self._root(number, self._drawn(self._place(number).case))
+        root, changes = self._keys_of_run(number, self._drawn(self._place(number).case))
         root = overridden(root, overrides)
         try:
             return scenario_from(root.plain())
@@ -148,8 +148,8 @@ class CampaignRuns:
             lines = [self._fault(number, root, changes, *fault) for fault in error.every]
             raise in_lines(lines, self.file.source) from error
 
-    def _root(self, number: int, drawn: Sequence[_Change]) -> tuple[Node, list[_Change]]:
-        """Returns the keys of a run's scenario, and the changes that were made to them, in order."""
+    def _keys_of_run(self, number: int, drawn: Sequence[_Change]) -> tuple[Node, list[_Change]]:
+        """Returns the keys of a run's scenario, `drawn` ones and all others of the campaign in, and these changes."""
         place, root = self._place(number), self.file.bases[self._place(number).base].root
         seed = Node(self._seed(place.case), self.file.root.line_of(("seed",)))
         changes = [

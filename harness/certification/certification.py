@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.analysis.band import BAND, write_band
+from harness.analysis.band import BAND_FILE, write_band
 from harness.analysis.metric import Claim
 from harness.campaign.cell import grouped
 from harness.campaign.flight import Answer
@@ -180,7 +180,7 @@ def certify(
         certificate = _certificate(days, folder, tally, terms)
         if rare is not None:
             certificate = replace(certificate, rare=rare, **_rare_verdict(rare, terms.probability))
-        if days.band and not (out / BAND).exists():
+        if days.band and not (out / BAND_FILE).exists():
             kept = (out / RUNS / str(run) for run in range(tally.runs))
             write_band(out, [each for each in kept if (each / TRACK).is_file()])
         _keep_failing(days, out, certificate.failing_runs, workers)

@@ -1,4 +1,4 @@
-"""Observers, which look on while a flight is flown."""
+"""Observers, which are told what happens while a flight is flown."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from typing import Final
 
 ENDING_SIGNALS: Final = (signal.SIGTERM, signal.SIGHUP)
 HELD_SIGNALS: Final = (signal.SIGINT, *ENDING_SIGNALS)
-AGAIN_S: Final = 2.0
+REPEAT_S: Final = 2.0
 
 
 @contextmanager
@@ -24,7 +24,7 @@ def taken_as_interrupt() -> Iterator[list[int]]:
     """Lets SIGTERM and SIGHUP raise KeyboardInterrupt in the block; gives the list of those that came.
 
     A signal that somebody has made to be ignored (`nohup`) or handles already is left as it is; outside the
-    main thread, where Python takes no signals, all are. One that comes again within `AGAIN_S` (`timeout` sends to the
+    main thread, where Python takes no signals, all are. One that comes again within `REPEAT_S` (`timeout` sends to the
     process and to its group) is the same: it does not end the cleaning up.
     """
     came: list[int] = []
@@ -32,7 +32,7 @@ def taken_as_interrupt() -> Iterator[list[int]]:
 
     def end(number: int, frame: FrameType | None) -> None:
         nonlocal first_s
-        if time.monotonic() - first_s < AGAIN_S:
+        if time.monotonic() - first_s < REPEAT_S:
             return
         first_s = time.monotonic()
         came.append(number)
@@ -54,7 +54,7 @@ def held_back() -> Iterator[Callable[[], None]]:
     """Holds back signals that Python handles until the block calls for them, or ends.
 
     A handler runs, and raises, wherever the process is; numba, in its first calls, makes another error or a crash of
-    what is raised there. A block that has not called `AGAIN_S` after the signal may never call, as one with a planner
+    what is raised there. A block that has not called `REPEAT_S` after the signal may never call, as one with a planner
     that hangs: then the signal is let through wherever the block is. Machine code that hangs is not interrupted: Python
     takes signals between two of its own instructions. Outside the main thread, where Python takes no signals, nothing
     is held.
@@ -67,11 +67,11 @@ def held_back() -> Iterator[Callable[[], None]]:
         nonlocal first_s
         first_s = min(first_s, time.monotonic())
         held.append(number)
-        if time.monotonic() - first_s >= AGAIN_S:
+        if time.monotonic() - first_s >= REPEAT_S:
             let_through()
         elif not timers:
             # A signal itself, not `interrupt_main`: it wakes a planner that sleeps or waits.
-            timers.append(threading.Timer(AGAIN_S, signal.pthread_kill, (main_thread, number)))
+            timers.append(threading.Timer(REPEAT_S, signal.pthread_kill, (main_thread, number)))
             timers[0].daemon = True
             timers[0].start()
 

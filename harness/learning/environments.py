@@ -38,7 +38,7 @@ Action = NDArray[Any]
 Floats = NDArray[np.float32]
 
 DEFAULT_BEAMS: Final = 72
-"""An observation has at most so many beams where nobody says how many."""
+"""Default of the largest number of beams of an observation."""
 BAD_OUTCOMES: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)
 STATE: Final = (
     "goal distance over the diagonal of the area",

@@ -21,7 +21,7 @@ from planner.interface import BoolArray, FloatArray
 NARROWEST_RAD = 1e-3
 """The space that an obstacle hides is known in steps of bearing no finer than this."""
 MISSED_CHANCE = 1e-2
-"""If returns get lost, a cell is free after so many looks that all miss an obstacle with at most this probability."""
+"""If returns get lost, a cell is free once the scans through it all miss an obstacle with at most this probability."""
 MOST_LOOKS = 255
 """If a cell would need more scans than this, no space is ever seen to be free."""
 MORE_BEAMS = 3

@@ -139,7 +139,7 @@ class MovingObstacles:
             if scan.nearest_m < math.inf:
                 self._look_at_free(scan, moving, self._is_free)
         elif self._earlier.due(scan.time_s):
-            now = Look(scan.kept(), *self._returns(scan))
+            now = Look(scan.computed(), *self._returns(scan))
             self._look(now, moving)
             self._earlier.keep(now)
         return moving

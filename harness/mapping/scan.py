@@ -116,7 +116,7 @@ class RangeScan:
         pose = {"east_m": east_m, "north_m": north_m, "heading_rad": heading_rad, "start_rad": start_rad}
         return RangeScan(**{**values, **pose})
 
-    def kept(self) -> RangeScan:
+    def computed(self) -> RangeScan:
         """Returns itself with all ranges computed, so that it no longer refers to the world."""
         _ = self.ranges_m
         return self

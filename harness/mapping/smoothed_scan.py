@@ -40,7 +40,7 @@ def smoothed(scan: RangeScan, width_m: float) -> RangeScan:
     for half, (further, nearer) in zip(HALF_WIDTHS[1:], pairwise(reach_m[1:]), strict=True):
         rays = ((rough <= further) & (rough > nearer)).nonzero()[0]
         ranges[rays] = _medians(ring, rays, half)
-    return replace(scan.kept(), ranges_m=ranges)
+    return replace(scan.computed(), ranges_m=ranges)
 
 
 def _medians(ring: FloatArray, rays: IntArray, half: int) -> FloatArray:

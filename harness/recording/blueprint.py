@@ -58,7 +58,7 @@ BACKGROUND: Colour = (17, 19, 24)
 BOUNDS: Colour = (128, 134, 146)
 OUTLINE: Colour = (104, 112, 128)
 OBSTACLE: Colour = (112, 120, 138)
-EDGE: Colour = (214, 218, 226)
+EDGE_POINTS: Colour = (214, 218, 226)
 MOVING: Colour = (176, 116, 92)
 """Moving and timed obstacles are filled in MOVING and outlined in MOVING_OUTLINE."""
 MOVES: Colour = (255, 150, 96)

@@ -27,7 +27,7 @@ AIRCRAFT_SHARE = 0.022
 """Wing span of the drawn aircraft as a share of the area, as its true size could not be seen."""
 
 STYLES: Final[tuple[tuple[str, Any, look.Colour | None, float, float | None], ...]] = (
-    (f"{look.PLAN}/{look.SENSED}", rr.Points2D, look.EDGE, 1.25, 12),
+    (f"{look.PLAN}/{look.SENSED}", rr.Points2D, look.EDGE_POINTS, 1.25, 12),
     (f"{look.PLAN}/window", rr.LineStrips2D, look.WINDOW, 0.75, 22),
     (f"{look.PLAN}/sectors", rr.LineStrips2D, look.SECTOR, 0.75, 23),
     (f"{look.PLAN}/{look.MET}", rr.Points2D, look.MET_DOTS, 1.0, 24),
@@ -39,7 +39,7 @@ STYLES: Final[tuple[tuple[str, Any, look.Colour | None, float, float | None], ..
     (f"{look.PLAN}/chosen", rr.LineStrips2D, look.CHOSEN, 1.5, 40),
     (f"{look.PLAN}/waypoints", rr.Points2D, look.CHOSEN, 3.5, 41),
     (f"{look.PLAN}/{look.FLOWN}", rr.LineStrips2D, None, 1.25, 50),
-    (f"{look.WORLD}/{look.SENSED}", rr.LineStrips3D, look.EDGE, 0.75, None),
+    (f"{look.WORLD}/{look.SENSED}", rr.LineStrips3D, look.EDGE_POINTS, 0.75, None),
     (f"{look.WORLD}/chosen", rr.LineStrips3D, look.CHOSEN, 1.25, None),
     (f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D, None, 1.25, None),
 )

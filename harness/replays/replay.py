@@ -17,7 +17,7 @@ from harness.flight.record import FloatArray
 from harness.replays.flown import TABLES, FlownFlight, read_flown
 from harness.replays.measures import Replay, Side, compared, legs_of, rows_of
 from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, read_mission
-from harness.replays.simulated import Asked, fly_anew, scenario_for
+from harness.replays.simulated import Task, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows
 
 INDEX, RECORDING, SCHEMA = "replay.json", "flight.rrd", "wayproof/replay/1"
@@ -54,15 +54,15 @@ def replay(
     flown_mission, flight, notes = _read(log, mission)
     wind = fit_wind(flight)
     winds = fit_windows(flight, wind)
-    asked = _asked(flight, flown_mission, winds or [wind], wind)
-    scenario = scenario_for(asked, aircraft, overrides)
-    flown, laps = _flown(asked)
+    task = _task_of(flight, flown_mission, winds or [wind], wind)
+    scenario = scenario_for(task, aircraft, overrides)
+    flown, laps = _flown(task)
     out.mkdir(parents=True, exist_ok=True)
     replace_text(out / INDEX, json.dumps({"schema": SCHEMA, "complete": False}) + "\n")
-    columns = fly_anew(scenario, asked, laps, out / SIMULATED)
+    columns = fly_anew(scenario, task, laps, out / SIMULATED)
     corners_m, legs = flown_mission.corners_m, columns["leg"]
     ended = bool(legs[-1] >= laps * len(corners_m))
-    numbers = flown.laps[0] + _laps(legs, asked)
+    numbers = flown.laps[0] + _laps(legs, task)
     simulated = Side(columns, corners_m, legs, numbers, scenario.mission.altitude_m, ended)
     told = {
         "schema": SCHEMA,
@@ -72,7 +72,7 @@ def replay(
         "guidance": dict(scenario.guidance),
         "wind": wind.told(),
         "wind_windows": [{"time_s": each.time_s, **each.told()} for each in winds],
-        "airspeed_mps": asked.airspeed_mps,
+        "airspeed_mps": task.airspeed_mps,
         "latency_s": scenario.navigation.latency_s,
         **compared(flown, simulated),
         "notes": [*notes, *flight.notes],
@@ -96,7 +96,7 @@ def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, l
     return found, read_flown(log, plane), notes
 
 
-def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Asked:
+def _task_of(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Task:
     """Finds where the simulated flight begins, and its airspeed and height."""
     airspeed, commanded, corners = flight.airspeed_mps, mission.airspeed_mps, mission.corners_m
     if airspeed is None:
@@ -114,15 +114,15 @@ def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], 
     else:  # the corner after the nearest
         away = np.hypot(*(corners - (flight["east_m"][0], flight["north_m"][0])).T)
         first = (int(away.argmin()) + 1) % len(corners)
-    return Asked(flight, mission, first, winds, commanded, height_m)
+    return Task(flight, mission, first, winds, commanded, height_m)
 
 
-def _flown(asked: Asked) -> tuple[Side, int]:
+def _flown(task: Task) -> tuple[Side, int]:
     """Returns the flown flight ready to be measured, and its number of laps."""
-    flight, mission = asked.flight, asked.mission
+    flight, mission = task.flight, task.mission
     columns = dict(flight.columns)
-    legs = legs_of(columns, mission.corners_m, asked.first, mission.acceptance_m)
-    laps = columns["lap"] if "lap" in columns else 1.0 + _laps(legs, asked)
+    legs = legs_of(columns, mission.corners_m, task.first, mission.acceptance_m)
+    laps = columns["lap"] if "lap" in columns else 1.0 + _laps(legs, task)
     # The log ends where a lap does: as near to corner 0, in two rows, as counts as reached or as the laps before ended.
     step_s = float(np.diff(flight["time_s"])[-1])
     step_m = float(np.hypot(flight["ve_mps"][-1], flight["vn_mps"][-1])) * step_s
@@ -133,13 +133,13 @@ def _flown(asked: Asked) -> tuple[Side, int]:
     columns["time_s"] = columns["time_s"] - columns["time_s"][0]
     if flight.airspeed_mps is not None:
         columns["airspeed_mps"] = flight.airspeed_mps
-    return Side(columns, mission.corners_m, legs, laps, asked.height_m, ended), int(laps[-1] - laps[0]) + 1
+    return Side(columns, mission.corners_m, legs, laps, task.height_m, ended), int(laps[-1] - laps[0]) + 1
 
 
-def _laps(legs: FloatArray, asked: Asked) -> FloatArray:
+def _laps(legs: FloatArray, task: Task) -> FloatArray:
     """(n,) number of laps begun after the first; each begins when corner 0 is reached."""
-    corners = len(asked.mission.corners_m)
-    laps: FloatArray = np.floor((legs + (asked.first - 1) % corners) / corners)
+    corners = len(task.mission.corners_m)
+    laps: FloatArray = np.floor((legs + (task.first - 1) % corners) / corners)
     return laps
 
 

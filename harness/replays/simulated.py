@@ -48,8 +48,8 @@ SIMULATED_COLUMNS: Final = ("time_s", "east_m", "north_m", "up_m", "roll_deg", "
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """The flight that is to be flown anew."""
+class Task:
+    """A flown flight and its mission, as the simulated aircraft is to fly it."""
 
     flight: FlownFlight
     mission: FlownMission
@@ -86,16 +86,16 @@ class LapsEnd:
         return None
 
 
-def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
     """Returns the flight as a scenario, some keys of it replaced; `InputError` if the aircraft cannot fly it."""
-    flight, mission, origin = asked.flight, asked.mission, asked.mission.origin
+    flight, mission, origin = task.flight, task.mission, task.mission.origin
     places = np.vstack((np.column_stack((flight["east_m"], flight["north_m"])), mission.corners_m))
     bounds = (*(places.min(axis=0) - AREA_MARGIN_M).tolist(), *(places.max(axis=0) + AREA_MARGIN_M).tolist())
-    start, goal = places[0], mission.corners_m[asked.first]
+    start, goal = places[0], mission.corners_m[task.first]
     far = max(float(np.hypot(*(goal - start))), 2.0)
-    altitude_m = asked.height_m + (origin.altitude_m if origin else 0.0)
-    changes = [[wind.time_s, wind.speed_mps, wind.from_deg] for wind in asked.winds if wind.time_s > 0.0]
-    wind = {"speed_mps": asked.winds[0].speed_mps, "from_deg": asked.winds[0].from_deg, "changes": changes}
+    altitude_m = task.height_m + (origin.altitude_m if origin else 0.0)
+    changes = [[wind.time_s, wind.speed_mps, wind.from_deg] for wind in task.winds if wind.time_s > 0.0]
+    wind = {"speed_mps": task.winds[0].speed_mps, "from_deg": task.winds[0].from_deg, "changes": changes}
     keys: dict[str, Any] = {
         "schema": "wayproof/scenario/1",
         "name": "replay",
@@ -110,7 +110,7 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
         },
         "aircraft": {
             "model": aircraft,
-            "airspeed_mps": asked.airspeed_mps,
+            "airspeed_mps": task.airspeed_mps,
             "autopilot": {"state_latency_s": 0.0},
         },
         "guidance": {"kind": DEFAULT_LAW, "follow": "waypoints"},
@@ -131,7 +131,7 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
     return scenario
 
 
-def fly_anew(scenario: Scenario, asked: Asked, laps: int, folder: Path) -> dict[str, FloatArray]:
+def fly_anew(scenario: Scenario, task: Task, laps: int, folder: Path) -> dict[str, FloatArray]:
     """Flies the laps into a run folder; returns `SIMULATED_COLUMNS` of the track, and the number of the leg as `leg`.
 
     From where the log begins through the corners, and half way on: the end of the route is no corner.
@@ -140,9 +140,9 @@ def fly_anew(scenario: Scenario, asked: Asked, laps: int, folder: Path) -> dict[
         AircraftError: the aircraft cannot be loaded or trimmed.
         RunFolderError: the folder holds something else or cannot be written.
     """
-    corners = asked.mission.corners_m
-    order = (asked.first + np.arange(laps * len(corners))) % len(corners)
-    start = np.array((asked.flight["east_m"][0], asked.flight["north_m"][0]))
+    corners = task.mission.corners_m
+    order = (task.first + np.arange(laps * len(corners))) % len(corners)
+    start = np.array((task.flight["east_m"][0], task.flight["north_m"][0]))
     beyond = 0.5 * (corners[order[-1]] + corners[(order[-1] + 1) % len(corners)])
     points = np.vstack((start, corners[order], beyond))
     ways = np.diff(points, axis=0)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from aircraft.guidance.altitude import slewed
-from harness.analysis.breaches import CONTACT, Breach, Kept, crossings, inside_m, kept
+from harness.analysis.breaches import CONTACT, Breach, Kept, compared, crossings, inside_m
 from harness.analysis.deviation import Rows, Stations, deviation
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
@@ -35,11 +35,11 @@ WINDOW_RADII: Final = 4.0
 LEAST_LAYER_M: Final = 10.0
 """Depth of a layer: what of a part reaches into it, and into the vertical clearance about it, is solid all through."""
 MOST_ALTITUDE_LAYERS: Final = 40
-"""The altitudes of a flight are cut into at most so many layers; where these do not suffice, into deeper ones."""
+"""The altitudes of a flight are cut into at most this many layers; if these do not suffice, into deeper ones."""
 WIDER, MOST_WIDER = 1.05, 3.0
-"""The limit is made larger by this factor where it does not hold far enough, up to so many times what is needed."""
+"""A limit that does not hold far enough is made larger by the first factor, up to the second times the need."""
 MOST_LIMITS_TRIED: Final = 50
-"""A corner limit that would be kept is looked for in so many steps; each makes it, and what it holds for, larger."""
+"""A corner limit that would be kept is looked for in at most this many steps, each of which makes it larger."""
 
 
 def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str, Any]:
@@ -57,7 +57,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         asked = replace(asked, believed_off_m=believed.by_row_m)
     figures = metrics(flight, limits, asked)
     others = layer_contacts(track, check.scenario, check.files)
-    seen = kept(track, World.from_scenario(check.scenario), check.given.fences, check.bounded, others)
+    seen = compared(track, World.from_scenario(check.scenario), check.given.fences, check.bounded, others)
     if seen.contacts and flight.outcome is not Outcome.COLLISION:
         first = seen.contacts[0]
         figures["outcome"] = Outcome.COLLISION.value
@@ -126,7 +126,7 @@ def verdict(
     ended = [] if figures["outcome"] in ("reached", "collision") else [str(figures["reason"])]
     share = told["limit_used"]["altitude"]
     high = [f"{high_m:.3g} m off in altitude where {high_m / share:.3g} m are allowed"] if share > 1.0 else []
-    alone = not (touched or ended or high) and _at_speed(figures["trackability"], limits)
+    alone = not (touched or ended or high) and _speed_and_load_held(figures["trackability"], limits)
     faults = [
         *touched,
         *([tallied(bad, "legs")] if bad else []),
@@ -181,7 +181,7 @@ def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, asked: As
     return demand(flight.track.part(*flown), flight.plans, force).windy
 
 
-def _at_speed(legs: Sequence[Mapping[str, Any]], limits: FlightLimits) -> bool:
+def _speed_and_load_held(legs: Sequence[Mapping[str, Any]], limits: FlightLimits) -> bool:
     """Whether load factor and mean airspeed error stayed within their limits on every leg."""
     return all(
         leg["max_load_factor"] <= limits.max_load_factor

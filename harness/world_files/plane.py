@@ -18,7 +18,7 @@ from pyproj.exceptions import CRSError
 from harness.files.input_file import InputError
 from harness.world_files.parts import WGS84, FloatArray
 
-TURN_DEG: Final = 360.0
+CIRCLE_DEG: Final = 360.0
 METRES: Final = ("m", "metre", "meter", "metres", "meters", "degree")
 """Names of the metre as a unit of heights; a crs in degrees that says nothing of heights counts as metres too."""
 
@@ -53,7 +53,7 @@ class Mapping:
             return east - self.shift_m[0], north - self.shift_m[1]
         x, y = (np.asarray(each) for each in self._transformer.transform(east, north, direction="INVERSE"))
         if in_degrees(self.crs):
-            x = x + TURN_DEG * np.round((about_x - x) / TURN_DEG)
+            x = x + CIRCLE_DEG * np.round((about_x - x) / CIRCLE_DEG)
         return np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
 
     def geometries(self, shapes: Any) -> Any:
@@ -93,7 +93,7 @@ def _pyproj_crs(name: str) -> Any:
 def short_way(longitudes_deg: FloatArray) -> FloatArray:
     """Adds whole turns to longitudes to bring each nearest to the first; a file goes on across the antimeridian."""
     from_first = longitudes_deg - longitudes_deg[:1]
-    nearest: FloatArray = longitudes_deg - TURN_DEG * np.round(from_first / TURN_DEG)
+    nearest: FloatArray = longitudes_deg - CIRCLE_DEG * np.round(from_first / CIRCLE_DEG)
     return nearest
 
 

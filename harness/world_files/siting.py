@@ -25,7 +25,7 @@ from harness.world_files.expansion import (
 )
 from harness.world_files.free_room import ROOM_RADII, WAY_RADII, FreeRoom, ends, free_room
 from harness.world_files.parts import WGS84, Box, Contents, FloatArray
-from harness.world_files.plane import TURN_DEG, Mapping, Place, geodetic, short_way
+from harness.world_files.plane import CIRCLE_DEG, Mapping, Place, geodetic, short_way
 from harness.world_files.solids import placed_cells
 
 ANY_PLACE: Final = Place(47.0, 8.0)
@@ -159,7 +159,7 @@ def _origin(contents: Sequence[Contents], given: FloatArray | None) -> Place:
 
 
 def _rounded_place(latitude_deg: float, longitude_deg: float) -> Place:
-    return Place(round(latitude_deg, 5), round(math.remainder(longitude_deg, TURN_DEG), 5))
+    return Place(round(latitude_deg, 5), round(math.remainder(longitude_deg, CIRCLE_DEG), 5))
 
 
 def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tuple[_Files, Box, list[str]]]:

@@ -79,7 +79,7 @@ class Steerer(Replanner):
         """The direction to fly, rad counter-clockwise from east, among (m, 2) edge points; None if none is free."""
 
     def picture(self, request: PlanRequest) -> PlanPicture:
-        """The picture of a plan: guide vector and length of the path."""
+        """The picture of a plan: the line from the aircraft to the goal, and the look distance."""
         return PlanPicture(np.array([request.position_m, self.mission.goal_m]), self.look_m)
 
     def replanned(self, request: PlanRequest, start: Start) -> Plan:

@@ -109,7 +109,7 @@ class TangentBug(Walker[TangentBugState]):
         return self.mission.sensor_range_m / LOOKS_PER_RANGE
 
     def prefers(self, new: tuple[WalkLeg[TangentBugState], ...], left_m: float) -> bool:
-        """A change of behaviour, a straight way to the boundary, or a shorter or a free way to the goal."""
+        """Whether a new walk is better: a long straight to a boundary, or a way to the goal that is shorter or free."""
         state = new[0].state
         if isinstance(state, BoundaryFollowing):
             return not state.on_boundary and length_of(new[0].way) > self.look_again_m()

@@ -63,7 +63,7 @@ class VfhPlus(Steerer):
         return self._best(pose, self._masked)
 
     def picture(self, request: PlanRequest) -> PlanPicture:
-        """The guide vector, the window, and the free sectors."""
+        """The line to the goal, the look distance, and the sectors that are not masked."""
         edges = self._bearings[~self._masked, None] + 0.5 * WIDTH_RAD * np.array((-1.0, 1.0))
         sectors = np.stack((np.cos(edges), np.sin(edges)), axis=2).reshape(-1, 4)
         return replace(super().picture(request), sectors=sectors)

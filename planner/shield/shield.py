@@ -248,7 +248,7 @@ class Shield(CertifiedPlanner):
         return Plan(PlanStatus.NO_PATH, f"stuck in the turn since {self._log.since_s:.0f} s: {why}")
 
     def _show_refused(self, request: PlanRequest) -> None:
-        """After every full holding turn, adds the place refused last to the planner's map as an edge point."""
+        """After a full holding turn, adds the place refused last to the edges the planner sees, if not near."""
         mission, here = self._mission, request.position_m
         turn_s = math.tau * self._room.holds.radius_m / mission.speed_mps
         if self._refused is None or request.time_s < max(self._log.since_s, self._shown_s) + turn_s:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from aircraft.airframes import AircraftError, airframe
-from aircraft.model_files import OWN
+from aircraft.model_files import OWN_FOLDER
 
 RUDDER = r'      <aerosurface_scale name="rudder">.*?</aerosurface_scale>\n'
 BY_RUDDER = r"\s*<product><value>-?[0-9.]+</value><property>fcs/rudder-pos-rad</property></product>"
@@ -20,7 +20,7 @@ BY_RUDDER = r"\s*<product><value>-?[0-9.]+</value><property>fcs/rudder-pos-rad</
 def aerosonde_with(folder: Path, change: tuple[str, str] = ("", ""), without: str = "") -> Path:
     """A folder with the aerosonde's model under another name, a pattern of its XML replaced, a file left out."""
     made = folder / "mine"
-    shutil.copytree(OWN / "aerosonde", made)
+    shutil.copytree(OWN_FOLDER / "aerosonde", made)
     text = (made / "aerosonde.xml").read_text().replace('name="aerosonde"', 'name="mine"')
     (made / "aerosonde.xml").unlink()
     (made / "mine.xml").write_text(re.sub(*change, text, flags=re.DOTALL) if change[0] else text)

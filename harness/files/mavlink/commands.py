@@ -58,7 +58,7 @@ HOME_CIRCLE: Final = 5005
 CIRCLES: Final = {5003: True, 5004: False, HOME_CIRCLE: True}
 """Commands for a circular fence: True to stay inside of, False outside; the first parameter is the radius."""
 RALLY_POINT: Final = 5100
-APART: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
+NO_MISSION_COMMANDS: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
 """Commands of items that are no part of a mission."""
 PX4: Final = 12
 """`firmwareType` of a plan with which the aircraft has to be inside of one inclusion fence; else inside of all."""

@@ -17,7 +17,7 @@ from harness.run_files.given_path import SHORTEST_M, FloatArray, Row
 Pose = tuple[complex, complex]
 """A place and a direction."""
 
-ROUNDING: Final = 1e-9
+SHARE_ROUNDING: Final = 1e-9
 ON_CIRCLE_M: Final = 0.01
 """A place no further than this from a circle lies on it."""
 
@@ -32,7 +32,7 @@ class Circle(NamedTuple):
     def joined_from(self, place: complex) -> complex | None:
         """Returns the point where a straight line from a place touches it in flight direction; None from inside."""
         away = abs(place - self.center)
-        if away <= self.radius_m * (1.0 + ROUNDING):
+        if away <= self.radius_m * (1.0 + SHARE_ROUNDING):
             return None
         # Seen from the centre, the place and the point of touch are this far apart.
         angle = math.acos(self.radius_m / away)
@@ -97,7 +97,7 @@ def _onto(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[Row] | N
     needed = abs(circle.radius_m - turn_m) if turn == circle.side else circle.radius_m + turn_m
     hub = begin + 1j * turn * turn_m * ahead - circle.center
     along = hub.real * ahead.real + hub.imag * ahead.imag
-    reach = needed * (1.0 + ROUNDING) + SHORTEST_M
+    reach = needed * (1.0 + SHARE_ROUNDING) + SHORTEST_M
     square = along * along - (abs(hub) ** 2 - reach * reach)
     on = 0.0 if abs(hub) >= reach else -along + math.sqrt(max(square, 0.0))
     start = begin + on * ahead

@@ -70,7 +70,7 @@ def read_waypoints(text: str, source: str) -> Program:
     notes: list[str] = []
     items = _numbered(wpl_items(text, source), notes)
     home = _home_item(items, notes)
-    flown = [item for item in items if item.command not in commands.APART]
+    flown = [item for item in items if item.command not in commands.NO_MISSION_COMMANDS]
     rally = sum(item.command == commands.RALLY_POINT for item in items)
     if not flown and items:
         held = f"{counted(len(items) - rally, 'fence item')} and {counted(rally, 'rally point')}"

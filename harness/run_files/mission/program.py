@@ -129,12 +129,12 @@ class _Run:
         self._taken: dict[int, int] = {}  # how often each jump has been taken
         self._airspeed_mps: float | None = None
         self._closing = False  # an endless jump back was taken: the flight ends at the next step
-        self._over = False
+        self._has_ended = False
 
     def go(self) -> None:
         """Goes through the mission to its end."""
         at, idle = 0, 0
-        while at < len(self.items) and not self._over:
+        while at < len(self.items) and not self._has_ended:
             item, before = self.items[at], len(self.steps)
             if item.command == commands.JUMP:
                 at = self._jump(item, at)
@@ -216,7 +216,7 @@ class _Run:
         ends = item.command in (commands.LOITER_UNLIMITED, commands.RETURN_TO_LAUNCH, *commands.LANDINGS)
         if step is None:
             self._tell(item, NOT_FLOWN, why)
-            self._over = ends and item.command != commands.LOITER_UNLIMITED
+            self._has_ended = ends and item.command != commands.LOITER_UNLIMITED
             return
         if item.frame == MISSION and step.height_m is not None:
             why += "; " if why else ""
@@ -224,7 +224,7 @@ class _Run:
         self._tell(item, FLOWN, why)
         self.steps.append(replace(step, airspeed_mps=self._airspeed_mps))
         self._airspeed_mps = None
-        self._over = self._closing or ends
+        self._has_ended = self._closing or ends
 
     def _step(self, item: Item, **more: Any) -> MissionStep:
         """Makes a step to an item's place; as with ArduPilot, zeros mean the present place, then 0 that altitude."""

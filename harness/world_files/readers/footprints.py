@@ -14,7 +14,7 @@ from pyproj import Geod
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files.parts import Contents, FloatArray
-from harness.world_files.plane import TURN_DEG, in_degrees
+from harness.world_files.plane import CIRCLE_DEG, in_degrees
 
 CIRCLE_POINTS: Final = 96
 """A circle becomes a polygon round it with this many corners, whose area is 0.04 % larger."""
@@ -36,10 +36,10 @@ def finished(contents: Contents) -> Contents:
     bounds = shapely.bounds(shapes)
     if in_degrees(contents.crs):
         _check_degrees(bounds)
-        wide = bounds[:, 2] - bounds[:, 0] > TURN_DEG / 2
-        turned = shapely.transform(shapes[wide], lambda p: np.column_stack((p[:, 0] % TURN_DEG, p[:, 1])))
+        wide = bounds[:, 2] - bounds[:, 0] > CIRCLE_DEG / 2
+        turned = shapely.transform(shapes[wide], lambda p: np.column_stack((p[:, 0] % CIRCLE_DEG, p[:, 1])))
         west, _, east, _ = shapely.bounds(turned).T
-        narrower = (east - west < TURN_DEG / 2) & (shapely.area(turned) > 0.0)
+        narrower = (east - west < CIRCLE_DEG / 2) & (shapely.area(turned) > 0.0)
         shapes[wide] = np.where(narrower, turned, shapes[wide])
     if not np.isfinite(bounds[~shapely.is_empty(shapes)]).all():
         raise InputError("has a position that is not finite")
@@ -59,7 +59,7 @@ def finished(contents: Contents) -> Contents:
 
 
 def _check_degrees(bounds: FloatArray) -> None:
-    off = (np.abs(bounds) > (TURN_DEG, 90.0, TURN_DEG, 90.0)).any(axis=1)
+    off = (np.abs(bounds) > (CIRCLE_DEG, 90.0, CIRCLE_DEG, 90.0)).any(axis=1)
     if off.any():
         x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
         raise InputError(f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs")
@@ -70,7 +70,7 @@ def circle(center: Place, radius_m: float) -> Any:
     if not 0.0 < radius_m <= LARGEST_M:
         raise InputError(f"has a circle of radius {radius_m:g} m; must be above 0 and at most {LARGEST_M:g}")
     away_m = radius_m / math.cos(math.pi / CIRCLE_POINTS)
-    azimuths = np.arange(0.0, TURN_DEG, TURN_DEG / CIRCLE_POINTS)
+    azimuths = np.arange(0.0, CIRCLE_DEG, CIRCLE_DEG / CIRCLE_POINTS)
     return shapely.Polygon(_around(center, azimuths, np.full(CIRCLE_POINTS, away_m)))
 
 
@@ -85,7 +85,7 @@ def arc(
     center: Place, from_deg: float, to_deg: float, distance_m: tuple[float, float], clockwise: bool
 ) -> list[Place]:
     """Returns places along an arc between two azimuths, one a degree; the distance goes evenly from first to second."""
-    sweep = (to_deg - from_deg) % TURN_DEG if clockwise else -((from_deg - to_deg) % TURN_DEG)
+    sweep = (to_deg - from_deg) % CIRCLE_DEG if clockwise else -((from_deg - to_deg) % CIRCLE_DEG)
     count = max(int(abs(sweep)), 1) + 1
     return _around(center, from_deg + np.linspace(0.0, sweep, count), np.linspace(*distance_m, count))
 
@@ -100,13 +100,13 @@ def corridor(line: Sequence[Place], width_m: float) -> Any:
     """Returns the polygon of all places within half of `width_m` of a line."""
     (east, north), stretch = line[0], math.cos(math.radians(line[0][1]))
     # The short way from the first place of the line.
-    plane = [((math.remainder(x - east, TURN_DEG)) * stretch, y - north) for x, y in line]
+    plane = [((math.remainder(x - east, CIRCLE_DEG)) * stretch, y - north) for x, y in line]
     grown = shapely.LineString(plane).buffer(width_m / 2.0 / 111_200.0, quad_segs=16)
     return shapely.transform(grown, lambda p: np.column_stack((p[:, 0] / stretch + east, p[:, 1] + north)))
 
 
 def on_earth(longitude: float, latitude: float) -> Place:
     """Returns the place; raises InputError if it is not on earth."""
-    if not (abs(longitude) <= TURN_DEG and abs(latitude) <= 90.0):
+    if not (abs(longitude) <= CIRCLE_DEG and abs(latitude) <= 90.0):
         raise InputError(f"has a place at {latitude:g}, {longitude:g}; must be degrees, WGS84")
     return longitude, latitude
