@@ -93,7 +93,6 @@ def report(
     run: Annotated[Path, argument("RUN_DIR", "The folder of a complete run, or of a campaign.")],
     by: Annotated[list[str] | None, option("KEY[,KEY]", BY_HELP)] = None,
     table: Annotated[Literal["latex", "csv"] | None, option("FORMAT", FORMAT_HELP, "--format")] = None,
-    out: Annotated[Path | None, option("FILE", "Of --format: a file in place of standard output.")] = None,
 ) -> int:
     """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
 
@@ -109,8 +108,6 @@ def report(
     from harness.files.strict_yaml import as_spelt
     from harness.report.run_report import write_report
 
-    if out is not None and table is None:
-        raise typer.BadParameter("goes with --format", param_hint="--out")
     if by and not (run / RESULTS).is_file():
         raise typer.BadParameter(
             f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
@@ -120,7 +117,7 @@ def report(
     except ValueError as error:
         raise InputError(f"command line: --by: {error}") from error
     if table is not None:
-        _print_table(run, keys, table, out)
+        _print_table(run, keys, table)
     elif (run / RESULTS).is_file():
         summary = summarise(run, keys)
         page = write_summary(summary, run)
@@ -147,26 +144,20 @@ def _need_run(folder: Path) -> None:
         )
 
 
-def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str, out: Path | None) -> None:
-    """Prints or writes the table of a campaign or a comparison for a paper."""
+def _print_table(folder: Path, keys: Sequence[Sequence[str]] | None, table: str) -> None:
+    """Prints the table of a campaign or a comparison for a paper."""
     from harness.analysis import rows as compared
     from harness.campaign import cell
     from harness.campaign.results import RESULTS
     from harness.campaign.summary import rows_for_paper, summarise
     from harness.comparison.comparison import read_rows
-    from harness.files.whole_file import replace_text
 
     if (folder / RESULTS).is_file():
         heads, lines, told = *rows_for_paper(summarise(folder, keys)), cell.legend()
     else:
         heads, lines, told = compared.rows_for_paper(read_rows(folder))
     text = compared.csv_table([heads, *lines]) if table == "csv" else compared.latex(heads, lines, told)
-    if out is None:
-        say(text.removesuffix("\n"))
-        return
-    with written(out):
-        replace_text(out, text)
-    say(f"table: {out}")
+    say(text.removesuffix("\n"))
 
 
 @replacing("guidance", "settings")

@@ -20,7 +20,6 @@ from harness.bench.tracking import (
     LIMIT_FACTORS,
     TURNS,
     Case,
-    Tracking,
     bench_tracking,
     course,
     fly_course,
@@ -93,14 +92,6 @@ def test_courses_are_joined_and_turn_as_they_should(seed: int) -> None:
     assert not np.array_equal(course(seed + 1, 100.0).segments, route.segments)
 
 
-def test_limits_are_for_every_figure() -> None:
-    limits = Tracking(1.0, 2.0, 3.0, 0.0)
-    assert limits.within(limits)
-    for name in vars(limits):
-        assert not replace(limits, **{name: 10.0}).within(limits)
-    assert limits.times(2.0) == Tracking(2.0, 4.0, 6.0, 0.001)
-
-
 def test_the_table_names_what_is_not_kept(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,15 +107,6 @@ def test_the_table_names_what_is_not_kept(
     assert max(map(len, shown)) <= 80
     assert sum("not kept" in line for line in shown) == 1
     assert math.isfinite(result["cases"][0]["altitude_p95_m"])
-
-
-def test_an_aircraft_of_which_nothing_is_promised_has_no_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    from harness.bench import tracking
-
-    monkeypatch.setattr(tracking, "CASES", (CALM,))
-    (case,) = bench_tracking("J3Cub", 1)["cases"]
-    assert (case["limits"], case["kept"]) == (None, None)
-    assert case["cross_track_max_m"] < 2.0
 
 
 def test_other_laws_are_flown_and_promise_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

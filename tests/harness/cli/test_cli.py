@@ -318,14 +318,6 @@ def test_runs_that_differ_in_settings_have_folders_of_their_own(pilot: Pilot, tm
     assert folder("--set", "sensor.rays=90", "--out", str(tmp_path)) == str(tmp_path)
 
 
-def test_fly_passes_its_options_on(pilot: Pilot) -> None:
-    options = ["--seed", "9", "--set", "sensor.rays=90", "--set", "mission.goal_m=[81e3, 7e4]"]
-    assert main(["fly", "paper_circles", *options, "--out", "here", "--no-recording", "--quiet"]) == 0
-    ((flown, out, recording),) = pilot.asked
-    assert (flown.seed, flown.sensor.rays, flown.mission.goal_m) == (9, 90, (81e3, 70e3))
-    assert (out, recording) == (Path("here"), False)
-
-
 @pytest.mark.parametrize("complete", [None, True, False])
 def test_an_interrupted_flight_exits_130_and_tells_of_the_folder_as_it_is(
     complete: bool | None,
