@@ -3,42 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
 import typer
 
-from harness.cli.command_line import FAILED, load, print_json
-from harness.cli.options import AircraftArgument, AircraftOption, Count, Json, Text, argument, option
-from harness.cli.replacing import kind_of
+from harness.cli.command_line import load, print_json
+from harness.cli.options import AircraftArgument, Json, argument, option
 from harness.cli.terminal import legible, print_table, progress_bar, step_bar
-
-SCENARIO_HELP: Final = "A file or shipped name; or the word tracking."
 
 
 def bench(
-    scenario: Annotated[str, argument("SCENARIO", SCENARIO_HELP, show_default=True)] = "paper_circles",
-    aircraft: AircraftOption = None,
-    seeds: Annotated[Count, option("N", "With tracking: courses in each air. Default: 20.", min=1)] = None,
-    guidance: Annotated[Text, option("KIND", "With tracking: the guidance law. Default: preview.")] = None,
+    scenario: Annotated[
+        str, argument("SCENARIO", "A file or shipped name.", show_default=True)
+    ] = "paper_circles",
     as_json: Json = False,
 ) -> int:
     """Measures the time of the closed loop on this machine over that of bare JSBSim, block by block.
 
     It flies the scenario up to 21 times, which takes some minutes for a long one.
 
-    `bench tracking` measures the largest errors of an aircraft on random courses of 14 turns in calm air, wind and
-    turbulence; its exit status is 1 if one is above its limit.
-
     For example: wayproof bench aerosonde_forest --json
     """
-    if scenario == "tracking":
-        return _bench_tracking(aircraft or "aerosonde", seeds or 20, as_json, guidance or "preview")
-    if guidance or aircraft or seeds:
-        raise typer.BadParameter("--aircraft, --seeds and --guidance go with `bench tracking`")
-    loaded = load(scenario)
     from harness.bench.costs import bench as measure
 
+    loaded = load(scenario)
     with progress_bar(math.dist(loaded.mission.start_m, loaded.mission.goal_m)) as report:
         result = measure(loaded, report)
     if as_json:
@@ -46,26 +35,6 @@ def bench(
     else:
         print_table(f"bench of {loaded.name}", bench_rows(result))
     return 0
-
-
-def _bench_tracking(name: str, seeds: int, as_json: bool, guidance: str) -> int:
-    """Prints the table of tracking errors of an aircraft; returns the exit status."""
-    from harness.bench.tracking import bench_tracking
-    from harness.scenario.kinds import guidance_kinds
-
-    guidance = kind_of(guidance, "guidance")
-    if guidance not in guidance_kinds():
-        known = ", ".join(sorted(guidance_kinds()))
-        raise typer.BadParameter(f"there is no guidance law {guidance!r}; known are: {known}")
-    with step_bar() as report:
-        result = bench_tracking(name, seeds, report, guidance)
-    if as_json:
-        print_json(result)
-    else:
-        flown = f"{result['aircraft']} under {guidance} at {result['airspeed_mps']:g} m/s"
-        columns, rows = tracking_rows(result)
-        print_table(f"{flown}, worst of {seeds} courses a case", rows, columns)
-    return FAILED if any(row["kept"] is False for row in result["cases"]) else 0
 
 
 def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
@@ -80,21 +49,6 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
         ),
     }
     return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
-
-
-def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequence[str]]]:
-    """Returns headings and rows of the table of `bench tracking`; limits stand behind the figures."""
-    figures = ("cross_track_p95_m", "cross_track_max_m", "altitude_p95_m")
-    rows: list[Sequence[str]] = []
-    for case in result["cases"]:
-        limits = case["limits"]
-        if case["lost"]:
-            rows.append((case["case"], *("-" for _ in figures), "-", "[bold red]control is lost[/]"))
-            continue
-        cells = [f"{case[name]:.3f}" + (f" <= {limits[name]:.2g}" if limits else "") for name in figures]
-        verdict = {True: "kept", False: "[bold red]not kept[/]", None: "-"}[case["kept"]]
-        rows.append((case["case"], *cells, f"{case['bank_saturation']:.1%}", verdict))
-    return ("air", "cross-track p95", "max m", "altitude p95", "saturated", "limits"), rows
 
 
 AIRSPEEDS_HELP: Final = "True airspeed; can be repeated. Default: cruise."

@@ -22,12 +22,12 @@ from aircraft.airframes import AircraftError, airframe
 from aircraft.envelope import performance
 from aircraft.law_cards import law_card
 from harness.analysis.metrics import metrics
-from harness.bench.tracking import CASES
 from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
 from harness.run.scenario_flight import flight_limits, make_loop
 from harness.scenario.kinds import guidance_kinds
 from harness.scenario.scenario import Scenario, scenario_of
+from tests.closed_loop.courses_table import CASES
 from tests.closed_loop.tables import line, upper
 
 LAWS: Final = ("preview", "npfg", "l1", "vector_field", "pure_pursuit", "bearing")

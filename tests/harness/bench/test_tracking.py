@@ -5,28 +5,23 @@ The limits are those that a user is promised; what is flown is about half of eac
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from aircraft.airframes import aircraft_names, airframe
 from aircraft.envelope import performance
 from aircraft.start import Atmosphere
-from harness.bench.tracking import (
+from harness.bench.tracking import TURNS, course, fly_course
+from tests.closed_loop import courses_table
+from tests.closed_loop.courses_table import (
     ALTITUDE_NOT_HELD,
     CASES,
     LIMIT_FACTORS,
-    TURNS,
     Case,
-    bench_tracking,
-    course,
-    fly_course,
+    times,
     tracked,
+    within,
 )
-from harness.cli.bench import tracking_rows
-from harness.cli.terminal import print_table
 from tests.routes import route_point
 
 CALM = CASES[0]
@@ -37,15 +32,15 @@ MEASURED = ("aerosonde", "c172p", "T38")
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
 def test_the_aerosonde_keeps_what_is_promised(case: Case) -> None:
     flown = tracked("aerosonde", case, [1])
-    assert flown.within(case.limits), flown
+    assert within(flown, case.limits), flown
 
 
 @pytest.mark.flights
 @pytest.mark.parametrize("name", [name for name in LIMIT_FACTORS if name != "aerosonde"])
 def test_others_keep_their_multiple_of_it(name: str) -> None:
-    limits = CASES[1].limits.times(LIMIT_FACTORS[name])
+    limits = times(CASES[1].limits, LIMIT_FACTORS[name])
     flown = tracked(name, CASES[1], [1])
-    assert flown.within(limits), flown
+    assert within(flown, limits), flown
 
 
 @pytest.mark.slow
@@ -56,7 +51,7 @@ def test_courses_of_every_verified_aircraft(name: str) -> None:
         if (name, case.intensity) in ALTITUDE_NOT_HELD:
             continue
         flown = tracked(name, case, range(1, 21 if name in MEASURED else 3))
-        assert flown.within(case.limits.times(LIMIT_FACTORS[name])), (case.name, flown)
+        assert within(flown, times(case.limits, LIMIT_FACTORS[name])), (case.name, flown)
 
 
 @pytest.mark.flights
@@ -75,7 +70,7 @@ def test_a_turn_that_is_too_tight_is_not_tracked() -> None:
     frame = airframe("aerosonde")
     tight = fly_course(frame, 25.0, Atmosphere(), course(1, 0.5 * performance(frame, 25.0).turn_radius_m))
     assert tight.bank_saturation > 0.1
-    assert not tight.within(CALM.limits)
+    assert not within(tight, CALM.limits)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -92,47 +87,20 @@ def test_courses_are_joined_and_turn_as_they_should(seed: int) -> None:
     assert not np.array_equal(course(seed + 1, 100.0).segments, route.segments)
 
 
-def test_the_table_names_what_is_not_kept(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from harness.bench import tracking
-
-    strict = replace(CALM, limits=CALM.limits.times(0.01))
-    monkeypatch.setattr(tracking, "CASES", (CALM, strict))
-    result = bench_tracking("aerosonde", 1)
-    assert [case["kept"] for case in result["cases"]] == [True, False]
-    columns, rows = tracking_rows(result)
-    print_table("title", rows, columns)
-    shown = capsys.readouterr().out.splitlines()
-    assert max(map(len, shown)) <= 80
-    assert sum("not kept" in line for line in shown) == 1
-    assert math.isfinite(result["cases"][0]["altitude_p95_m"])
-
-
-def test_other_laws_are_flown_and_promise_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harness.bench.tracking.CASES", CASES[:1])
-    (ours,), (theirs,) = (
-        bench_tracking("aerosonde", 1, guidance=kind)["cases"] for kind in ("preview", "l1")
-    )
-    assert ours["limits"] is not None
-    assert theirs["limits"] is theirs["kept"] is None
-    assert theirs["cross_track_p95_m"] > 5.0 * ours["cross_track_p95_m"]
+def test_other_laws_are_flown() -> None:
+    ours, theirs = (tracked("aerosonde", CALM, [1], guidance=kind) for kind in ("preview", "l1"))
+    assert theirs.cross_track_p95_m > 5.0 * ours.cross_track_p95_m
 
 
 def test_an_aircraft_that_is_lost_is_a_row_of_the_table(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("harness.bench.tracking.CASES", (replace(CASES[5], name="storm"),))
-
     def lost(*_: object) -> None:
         raise ArithmeticError("c172p: control is lost after 9 s: stalled")
 
-    monkeypatch.setattr("harness.bench.tracking.fly_course", lost)
-    result = bench_tracking("c172p", 1)
-    (case,) = result["cases"]
-    assert case["kept"] is False
-    assert case["cross_track_max_m"] is None
-    assert "control is lost after" in case["lost"]
-    columns, rows = tracking_rows(result)
-    print_table("title", rows, columns)
-    assert "control is lost" in capsys.readouterr().out
+    monkeypatch.setattr(courses_table, "CASES", CASES[5:])
+    monkeypatch.setattr(courses_table, "fly_course", lost)
+    courses_table.main("c172p", "preview", "1")
+    assert capsys.readouterr().out.endswith(
+        "| severe, wind 30 % | c172p: control is lost after 9 s: stalled |\n"
+    )

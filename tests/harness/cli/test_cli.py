@@ -141,9 +141,6 @@ print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
         ("view no-such-run", "no-such-run"),
         ("report no-such-run", "no-such-run: no such folder; give a run folder"),
         ("bench nowhere.yaml", "nowhere.yaml: no such file"),
-        ("bench paper_circles --seeds 3", "--aircraft, --seeds and --guidance go with `bench tracking`"),
-        ("bench tracking --aircraft kite", "unknown aircraft 'kite'"),
-        ("bench tracking --guidance kite", "there is no guidance law 'kite'; known are: bearing, l1"),
         ("fly forest_planners", "this is a campaign: use `wayproof sweep forest_planners`"),
         (f"fly {CAMPAIGN}", f"this is a campaign: use `wayproof sweep {CAMPAIGN}`"),
     ],
@@ -240,16 +237,6 @@ def test_schema_prints_the_json_schema(capsys: pytest.CaptureFixture[str]) -> No
     printed = json.loads(capsys.readouterr().out)
     assert printed == scenario.scenario_schema()
     assert printed["$defs"]["Sensor"]["properties"]["range_m"]["exclusiveMinimum"] == 0
-
-
-@pytest.mark.flights
-def test_bench_tracking_prints_figures_and_limits(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bench", "tracking", "--seeds", "1", "--json"]) == 0
-    result = json.loads(capsys.readouterr().out)
-    assert (result["aircraft"], result["seeds"], len(result["cases"])) == ("aerosonde", 1, 6)
-    calm = result["cases"][0]
-    assert 0.0 < calm["cross_track_p95_m"] < calm["cross_track_max_m"] <= calm["limits"]["cross_track_max_m"]
-    assert all(case["kept"] for case in result["cases"])
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
