@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+
+import numpy as np
 
 from aircraft.actuators import CONTROLS
 from aircraft.airframe import Airframe
@@ -11,7 +13,7 @@ from aircraft.frames import LocalPlane, PatchedPlane
 from aircraft.interface import FOOT_M, STEP_RATE_HZ, AircraftState
 from aircraft.jsbsim_loading import load, node, trim
 from aircraft.model_files import AircraftError
-from aircraft.start import TURBULENCE_W20_FPS, Atmosphere, DrydenGusts, StartConditions, VerticalGusts
+from aircraft.start import TURBULENCE_W20_FPS, Atmosphere, DrydenGusts, StartConditions
 
 STATE_PROPERTIES = (
     "position/lat-geod-rad",  # geodetic; lat-gc is up to 21 km off
@@ -51,6 +53,8 @@ STEEPEST_SINK_SHARE = 0.3
 """Where energy is short, the autopilot lets the aircraft sink by at most this share of its airspeed."""
 SETTLING_STEP_S = 1e-9
 """Duration of the steps that replace what the integrators remember."""
+AIR_STEPS = 600
+"""The wind is worked out for this many steps at once."""
 TERRAIN_BELOW_FT = 10.0 / FOOT_M
 """The flight model's ground is at least so far below the aircraft, so that its wheels do not touch it: contact is
 judged by the true world."""
@@ -90,7 +94,7 @@ class JsbsimModel:
         self._ground, self._terrain_ft = ground, 0.0
         height_m = start.altitude_m - self._ground_m(start.east_m, start.north_m)
         try:
-            heading_rad = start.heading_rad(Atmosphere(*atmosphere.wind_at(0.0, height_m)))
+            heading_rad = start.heading_rad(Atmosphere(*atmosphere.start_wind(height_m)))
         except ValueError as error:
             raise AircraftError(f"{frame.name}: {error}") from None
         self._stall_rad = math.radians(frame.stall_angle_deg)
@@ -98,11 +102,10 @@ class JsbsimModel:
         convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
         """Cosine and sine of the meridian convergence where the state was last read."""
-        self._vertical_gusts: VerticalGusts | None = None
         self._turbulence: DrydenGusts | None = None  # over true ground
-        self._windy = atmosphere.wind_mps > 0.0
-        self._air = None if atmosphere.steady else atmosphere
-        self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
+        self._windy, self._atmosphere = atmosphere.wind_mps > 0.0, atmosphere
+        self._air: list[list[float]] = []  # east, north and up of the wind (m/s), by step
+        self._air_from = 0  # the step that it begins with
         self._place = (start.east_m, start.north_m, start.altitude_m / FOOT_M)
 
         fdm = self._fdm = load(frame.files, step_rate_hz)
@@ -173,15 +176,18 @@ class JsbsimModel:
         airspeed(airspeed_mps / FOOT_M)
         if self._ground is not None:
             self._place_ground()
-        if self._windy and self._turbulence is None:
+        if self._windy and not self._gusty:
             self._apply_wind()
 
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
         run = self._fdm.run
-        if self._vertical_gusts or self._turbulence:
-            for _ in range(steps):
-                self._apply_wind()
+        if self._gusty:
+            write_east, write_north, write_down = self._write_wind
+            for east_fps, north_fps, down_fps in self._winds(steps):
+                write_east(east_fps)
+                write_north(north_fps)
+                write_down(down_fps)
                 run()
                 self._step += 1
             return
@@ -241,7 +247,7 @@ class JsbsimModel:
         The engine must not be started again: that would put the propeller to the speed of full throttle.
         """
         fdm = self._fdm
-        east_fps, north_fps = self._wind_true()
+        east_fps, north_fps, _ = next(self._winds(1))
         attitude = fdm["attitude/theta-rad"], fdm["attitude/phi-rad"], fdm["attitude/psi-rad"]
         north, east, down = (fdm[f"velocities/v-{axis}-fps"] for axis in ("north", "east", "down"))
         fdm["ic/theta-rad"], fdm["ic/phi-rad"], fdm["ic/psi-true-rad"] = attitude
@@ -256,34 +262,41 @@ class JsbsimModel:
             self._fdm.run()
         self._fdm.set_dt(1.0 / self.step_rate_hz)
 
-    def _wind_true(self) -> tuple[float, float]:
-        """The wind towards true east and north where the aircraft is now, ft/s."""
-        east, north = self._wind
-        if self._air is not None:
-            height_m = (self._place[2] - self._terrain_ft) * FOOT_M
-            east, north = self._air.wind_at(self._step / self.step_rate_hz, height_m)
-            east, north = east / FOOT_M, north / FOOT_M
-        return east * self._cosine + north * self._sine, north * self._cosine - east * self._sine
+    @property
+    def _gusty(self) -> bool:
+        """Whether the wind is another at every step."""
+        return self._turbulence is not None or self._atmosphere.vertical_gusts is not None
+
+    def _winds(self, steps: int) -> Iterator[tuple[float, float, float]]:
+        """The wind at each of the next steps, taken before it: towards true east and north, and down, ft/s."""
+        first = self._step - self._air_from
+        if first + steps > len(self._air):
+            time_s = np.arange(self._step, self._step + max(steps, AIR_STEPS)) / self.step_rate_hz
+            self._air, self._air_from, first = self._atmosphere.winds(time_s).tolist(), self._step, 0
+        height_m = (self._place[2] - self._terrain_ft) * FOOT_M
+        share, cosine, sine = self._atmosphere.share_at(height_m), self._cosine, self._sine
+        for east_mps, north_mps, up_mps in self._air[first : first + steps]:
+            east, north = share * east_mps / FOOT_M, share * north_mps / FOOT_M
+            wind = east * cosine + north * sine, north * cosine - east * sine, 0.0 - up_mps / FOOT_M
+            yield wind if self._turbulence is None else self._stirred(*wind, self._turbulence, height_m)
+
+    def _stirred(
+        self, east_fps: float, north_fps: float, down_fps: float, turbulence: DrydenGusts, height_m: float
+    ) -> tuple[float, float, float]:
+        """Adds the turbulence of the next step to a wind."""
+        heading, airspeed_fps = self._read[6](), self._read[9]()
+        gusts = turbulence.step(height_m, airspeed_fps * FOOT_M, 1.0 / self.step_rate_hz)
+        ahead, right, down = (gust / FOOT_M for gust in gusts)
+        return (
+            east_fps + (ahead * math.sin(heading) + right * math.cos(heading)),
+            north_fps + (ahead * math.cos(heading) - right * math.sin(heading)),
+            down_fps + down,
+        )
 
     def _apply_wind(self) -> None:
-        """Writes the present wind, with gusts and turbulence, to JSBSim: towards true east and north, and down."""
-        write_east, write_north, write_down = self._write_wind
-        east_fps, north_fps = self._wind_true()
-        down_fps = 0.0
-        if self._vertical_gusts is not None:
-            down_fps -= self._vertical_gusts.up_mps(self._step / self.step_rate_hz) / FOOT_M
-        if self._turbulence is not None:
-            height_m = (self._place[2] - self._terrain_ft) * FOOT_M
-            heading, airspeed_fps = self._read[6](), self._read[9]()
-            gusts = self._turbulence.step(height_m, airspeed_fps * FOOT_M, 1.0 / self.step_rate_hz)
-            ahead, right, down = (gust / FOOT_M for gust in gusts)
-            east_fps += ahead * math.sin(heading) + right * math.cos(heading)
-            north_fps += ahead * math.cos(heading) - right * math.sin(heading)
-            down_fps += down
-        write_east(east_fps)
-        write_north(north_fps)
-        if self._vertical_gusts is not None or self._turbulence is not None:
-            write_down(down_fps)
+        """Writes the present wind to JSBSim, which has no vertical one where there are no gusts."""
+        for write, speed_fps in zip(self._write_wind[:2], next(self._winds(1)), strict=False):
+            write(speed_fps)
 
     def _ground_m(self, east_m: float, north_m: float) -> float:
         """Height of the ground (m) at a place; where it is unknown, the last known one."""
@@ -298,7 +311,6 @@ class JsbsimModel:
 
     def _start_gusts(self, atmosphere: Atmosphere) -> None:
         """Starts discrete gusts and turbulence after MIL-F-8785C; over the sea the turbulence is JSBSim's own."""
-        self._vertical_gusts = atmosphere.vertical_gusts
         model, intensity = atmosphere.turbulence, atmosphere.intensity
         if model is None or intensity is None:
             return

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import functools
 import math
-from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
 
-from aircraft.interface import FOOT_M
+from aircraft.interface import FOOT_M, FloatArray
 
 TURBULENCE_W20_FPS = {"light": 25.0, "moderate": 50.0, "severe": 75.0}
 """Wind at 20 ft of MIL-F-8785C: 15, 30 and 45 knots."""
@@ -24,13 +23,14 @@ class VerticalGusts:
     every_s: float  # from the beginning of one to that of the next
     start_s: float = 0.0  # when the first begins, upwards
 
-    def up_mps(self, time_s: float) -> float:
-        """Speed (m/s) at which the air rises at a time."""
-        number, since_s = divmod(time_s - self.start_s, self.every_s)
-        if number < 0 or since_s >= self.duration_s:
-            return 0.0
-        sign = -1.0 if number % 2 else 1.0
-        return sign * self.speed_mps * (0.5 - 0.5 * math.cos(math.tau * since_s / self.duration_s))
+    def up_mps(self, time_s: FloatArray) -> FloatArray:
+        """(n,) speeds (m/s) at which the air rises at n times."""
+        number, since_s = np.divmod(time_s - self.start_s, self.every_s)
+        gusty = (number >= 0) & (since_s < self.duration_s)
+        rise = [0.5 - 0.5 * math.cos(math.tau * each / self.duration_s) for each in since_s[gusty].tolist()]
+        up_mps = np.zeros(len(time_s))
+        up_mps[gusty] = np.where(number[gusty] % 2, -1.0, 1.0) * self.speed_mps * rise
+        return up_mps
 
 
 DRYDEN_HEIGHTS_FT = (10.0, 1000.0)
@@ -104,34 +104,29 @@ class Atmosphere:
     vertical_gusts: VerticalGusts | None = None
 
     @property
-    def steady(self) -> bool:
-        """Whether the wind is the same at all times and heights, turbulence aside."""
-        return not self.changes and self.measured_at_m is None
-
-    @functools.cached_property
-    def _changes_s(self) -> list[float]:
-        return [time_s for time_s, _, _ in self.changes]
-
-    @property
     def wind_mps(self) -> float:
         """Largest speed of the wind at any time, at the height that it was measured at."""
         winds = [(self.wind_east_mps, self.wind_north_mps), *(row[1:] for row in self.changes)]
         return max(math.hypot(*wind) for wind in winds)
 
-    def wind_at(self, time_s: float, height_m: float) -> tuple[float, float]:
-        """East and north of the wind (m/s) at a time and a height over ground, turbulence left out."""
-        index = bisect_right(self._changes_s, time_s)  # of the first change that is not over
-        before_s, east, north = (
-            self.changes[index - 1] if index else (0.0, self.wind_east_mps, self.wind_north_mps)
-        )
-        if index < len(self.changes):
-            after_s, east_after, north_after = self.changes[index]
-            share = (time_s - before_s) / (after_s - before_s)
-            east, north = east + share * (east_after - east), north + share * (north_after - north)
-        if self.measured_at_m is None:
-            return east, north
-        share = profile_share(height_m, self.measured_at_m)
-        return share * east, share * north
+    def winds(self, time_s: FloatArray) -> FloatArray:
+        """(n, 3) wind east, north and up (m/s) at n times where it was measured, turbulence left out."""
+        legs = np.array([(0.0, self.wind_east_mps, self.wind_north_mps), *self.changes, (math.inf, 0.0, 0.0)])
+        before = legs[:-1, 0].searchsorted(time_s, side="right") - 1
+        legs[-1, 1:] = legs[-2, 1:]
+        (before_s, *old), (after_s, *new) = legs[before].T, legs[before + 1].T
+        share = (time_s - before_s) / (after_s - before_s)
+        up = np.zeros(len(time_s)) if self.vertical_gusts is None else self.vertical_gusts.up_mps(time_s)
+        return np.column_stack([*(a + share * (b - a) for a, b in zip(old, new, strict=True)), up])
+
+    def share_at(self, height_m: float) -> float:
+        """Speed of the wind at a height over ground over that where it was measured."""
+        return 1.0 if self.measured_at_m is None else profile_share(height_m, self.measured_at_m)
+
+    def start_wind(self, height_m: float) -> tuple[float, float]:
+        """East and north of the wind (m/s) at time 0 and a height over ground, turbulence left out."""
+        share = self.share_at(height_m)
+        return share * self.wind_east_mps, share * self.wind_north_mps
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     start, origin = start_conditions(scenario), scenario.area.origin
     place = origin.latitude_deg, origin.longitude_deg
     try:
-        wind = air_of(scenario).wind_at(0.0, scenario.mission.altitude_m)
+        wind = air_of(scenario).start_wind(scenario.mission.altitude_m)
         heading_rad = start.heading_rad(Atmosphere(*wind))
         frame = flown_airframe(scenario.aircraft)
         slowest, fastest = frame.airspeed_range_mps
