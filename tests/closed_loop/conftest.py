@@ -5,9 +5,8 @@ from collections.abc import Callable
 import pytest
 
 from harness.scenario.kinds import PLANNER
-from planner.interface import Mission, Plan, PlanRequest
-from planner.registry import PlannerKind
 from planner.rolling_window.config import RollingWindowConfig
+from wayproof import Mission, Plan, PlannerKind, PlanRequest
 
 Answer = Callable[[Mission, PlanRequest], Plan]
 

@@ -18,17 +18,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from aircraft.airframe import Airframe
-from aircraft.airframes import AircraftError, airframe
+from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from aircraft.law_cards import law_card
 from harness.analysis.metrics import metrics
-from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
 from harness.run.scenario_flight import flight_limits, make_loop
 from harness.scenario.kinds import guidance_kinds
-from harness.scenario.scenario import Scenario, scenario_of
+from harness.scenario.scenario import scenario_of
 from tests.closed_loop.courses_table import CASES
 from tests.closed_loop.tables import line, upper
+from wayproof import AircraftError, InputError, Scenario
 
 LAWS: Final = ("preview", "npfg", "l1", "vector_field", "pure_pursuit", "bearing")
 AIRS: Final = {case.name: case for case in CASES if case.limits}

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+from wayproof import Mission, Path, Plan, PlanRequest, PlanStatus
 
 
 class Straight:

@@ -25,7 +25,8 @@ from planner.baselines.grown import GrownObstacles, cross
 from planner.baselines.polyline import length_of, piece
 from planner.contract import GivenMap
 from planner.geometry.curves import Point
-from planner.interface import FloatArray, Mission
+from planner.interface import FloatArray
+from wayproof import Mission
 
 SIMPLER_SHARE: Final = 0.03
 """Outlines at the clearance are simplified by a fifth of this share of it."""

@@ -22,10 +22,10 @@ from shapely import LineString, Point, Polygon, box
 
 import wayproof
 from harness.scenario.kinds import planner_kinds
-from planner.interface import Mission, Plan, Planner, PlanRequest
 from planner.shield.shield import Shield
 from tests.closed_loop.hostile import HOSTILE
 from tests.closed_loop.tables import fill, head, line, upper
+from wayproof import Mission, Plan, Planner, PlanRequest
 
 KINDS: Final = ("improved_bug", "tangent_bug", "bug2", "bug1", "vfh_plus", "bendy_ruler", "mppi")
 OWN: Final = "rolling_window"

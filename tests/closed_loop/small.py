@@ -8,8 +8,9 @@ from harness.files.strict_yaml import dump
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario, parse_scenario
 from tests.point_mass import PointMass
+from tests.scenarios import scenario_of
+from wayproof import Scenario
 
 
 def small_world(*obstacles: dict[str, Any], **sections: dict[str, Any]) -> Scenario:
@@ -26,7 +27,7 @@ def small_world(*obstacles: dict[str, Any], **sections: dict[str, Any]) -> Scena
     }
     for name, keys in sections.items():
         plain[name] = {**plain.get(name, {}), **keys}
-    return parse_scenario(dump(plain))
+    return scenario_of(dump(plain))
 
 
 def flown_by_point_mass(scenario: Scenario) -> Flight:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from harness.analysis.metrics import metrics
-from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
 from harness.run.scenario_flight import flight_limits, make_loop
 from harness.scenario.performance import performance_of
-from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario
+from tests.scenarios import scenario_of
+from wayproof import InputError, Scenario, dump_scenario
 
 TEXT = """\
 schema: wayproof/scenario/1
@@ -23,13 +23,13 @@ SERVO = "aircraft: {actuators: {lag_s: 0.05, rate_limit_degps: 600, deadband_deg
 
 
 def scenario(aircraft: str = "") -> Scenario:
-    return parse_scenario(TEXT + aircraft)
+    return scenario_of(TEXT + aircraft)
 
 
 @pytest.mark.flights
 def test_servos_are_flown_and_planning_knows_of_them() -> None:
     plain, real = scenario(), scenario(SERVO)
-    assert parse_scenario(dump_scenario(real)) == real
+    assert scenario_of(dump_scenario(real)) == real
     slow = plain.with_({"aircraft.actuators": {"lag_s": 0.3}})
     assert performance_of(slow).tracking_error_m > performance_of(plain).tracking_error_m
     flight = fly(make_loop(real))

@@ -13,7 +13,8 @@ import pytest
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight
 from harness.run.scenario_flight import fly_to_folder, make_loop
-from harness.scenario.scenario import Scenario, scenario_of
+from harness.scenario.scenario import scenario_of
+from wayproof import Scenario
 
 REFEREE = Path(__file__).parents[3] / "shared" / "tools" / "referee.py"
 

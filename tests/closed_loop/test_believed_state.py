@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from aircraft.guidance.progress import RouteProgress
-from aircraft.interface import AircraftState, Route
 from harness.flight.closed_loop import fly
 from harness.flight.navigation import StateEstimator
 from harness.flight.record import Flight, Outcome
 from harness.run.scenario_flight import make_loop
-from planner.interface import Plan, PlanRequest
 from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
+from wayproof import AircraftState, Plan, PlanRequest, Route
 
 EAST_M, NORTH_M, UP_M, AIRSPEED_MPS = 30.0, -40.0, 7.0, 2.0
 TREE = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}

@@ -18,10 +18,9 @@ from harness.flight.record import FloatArray
 from harness.run.path_check import fly_check, prepare_check
 from harness.run.scenario_flight import flight_limits, make_loop
 from harness.run_files.path_files import given_points
-from harness.scenario.scenario import Scenario
-from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from tests.closed_loop.cause_table import confusion, table
 from tests.closed_loop.small import small_world
+from wayproof import Mission, Path, Plan, PlanRequest, PlanStatus, Scenario
 
 Check = Callable[..., dict[str, Any]]
 Install = Callable[[Callable[[Mission, PlanRequest], Plan]], None]

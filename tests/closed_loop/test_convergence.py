@@ -24,10 +24,11 @@ from harness.flight.closed_loop import fly
 from harness.flight.record import FloatArray, Outcome
 from harness.run.scenario_flight import make_loop
 from harness.scenario.performance import mission_of
-from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario
 from tests.closed_loop.worlds_table import SHARED, judged
 from tests.longer import longer
 from tests.point_mass import PointMass
+from tests.scenarios import scenario_of
+from wayproof import Scenario, dump_scenario
 
 SIDE_M, CLEARANCE_M, THICK_M = 5000.0, 40.0, 30.0
 GOAL_RADIUS_M, APART_M = 60.0, 2000.0
@@ -246,7 +247,7 @@ def reachable(start: Place, goal: Place, obstacles: Obstacles, radius_m: float) 
     return None if for_a_point.distance(shapely.Point(goal)) <= GOAL_RADIUS_M else False
 
 
-def scenario_of(seed: int, family: str, start: Place, goal: Place, obstacles: Obstacles) -> Scenario:
+def scenario_about(seed: int, family: str, start: Place, goal: Place, obstacles: Obstacles) -> Scenario:
     plain = {
         "schema": "wayproof/scenario/1",
         "name": f"{family.replace('_', '-')}-{seed}",
@@ -262,14 +263,14 @@ def scenario_of(seed: int, family: str, start: Place, goal: Place, obstacles: Ob
         "sensor": {"range_m": 1000.0, "rays": 360, "rate_hz": 1.0},
         "planner": {"kind": "rolling_window", "clearance_m": CLEARANCE_M},
     }
-    return parse_scenario(dump(plain))
+    return scenario_of(dump(plain))
 
 
 def drawn(seed: int) -> Drawn:
     """The world of a seed: families take turns, and in each of them both verdicts."""
     rng = np.random.default_rng(seed)
     family = list(FAMILIES)[seed % len(FAMILIES)]
-    radius = mission_of(scenario_of(seed, family, (0.0, 0.0), (SIDE_M, SIDE_M), [])).turn_radius_m
+    radius = mission_of(scenario_about(seed, family, (0.0, 0.0), (SIDE_M, SIDE_M), [])).turn_radius_m
     wanted = seed // len(FAMILIES) % 3 != 1
     for _ in range(300):
         start, goal = (tuple(each) for each in rng.uniform(0.0, SIDE_M, (2, 2)).round(1).tolist())
@@ -277,7 +278,7 @@ def drawn(seed: int) -> Drawn:
             continue
         obstacles = FAMILIES[family](rng, start, goal)
         if reachable(start, goal, obstacles, radius) is wanted:
-            return Drawn(scenario_of(seed, family, start, goal, obstacles), family, wanted)
+            return Drawn(scenario_about(seed, family, start, goal, obstacles), family, wanted)
     raise AssertionError(f"no world of the family {family} with verdict {wanted}")
 
 

@@ -12,9 +12,9 @@ from harness.flight.closed_loop import fly
 from harness.flight.record import Outcome
 from harness.run.scenario_flight import make_loop
 from harness.scenario.performance import mission_of
-from harness.scenario.scenario import Scenario
 from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
+from wayproof import Scenario
 
 INNER_M = (1500.0, 4500.0)
 BENT_M = [(50.0, 50.0), (INNER_M[0], 50.0), INNER_M, (5950.0, INNER_M[1]), (5950.0, 5950.0), (50.0, 5950.0)]

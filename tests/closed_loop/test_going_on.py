@@ -11,9 +11,9 @@ from harness.flight.closed_loop import fly
 from harness.flight.observer import Observer
 from harness.flight.record import Flight, Outcome
 from harness.run.scenario_flight import make_loop
-from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
+from wayproof import Mission, Path, Plan, PlanRequest, PlanStatus
 
 Install = Callable[[Callable[[Mission, PlanRequest], Plan]], None]
 

@@ -13,10 +13,9 @@ import pyarrow.parquet as pq
 import pytest
 import shapely
 
-from aircraft.guidance.interface import GuidanceOutput
-from aircraft.interface import AircraftState, Route
 from harness.run.scenario_flight import fly_to_folder, make_loop
-from harness.scenario.scenario import parse_scenario
+from tests.scenarios import scenario_of
+from wayproof import AircraftState, GuidanceOutput, Route
 
 TEXT = """\
 schema: wayproof/scenario/1
@@ -63,7 +62,7 @@ FINE = GuidanceOutput(0.0, 0.0, 0.0, False, False)
 )
 def test_ends_as_lost_control(law: dict[str, Any], after: int, said: str, tmp_path: Path) -> None:
     figures = fly_to_folder(
-        parse_scenario(TEXT),
+        scenario_of(TEXT),
         tmp_path / "run",
         recording=True,
         make=lambda scenario: replace(make_loop(scenario), guidance=Broken(**law, after=after)),
@@ -78,7 +77,7 @@ def test_a_law_that_says_it_is_on_its_route_is_measured_beside_it(tmp_path: Path
     """It flies straight on at 20 degrees, where each plan turns north to the goal."""
     far = FINE._replace(arc_length_m=9e5)
     figures = fly_to_folder(
-        parse_scenario(TEXT.replace("goal_m:", "course_deg: 20, goal_m:")),
+        scenario_of(TEXT.replace("goal_m:", "course_deg: 20, goal_m:")),
         tmp_path / "run",
         recording=False,
         make=lambda scenario: replace(make_loop(scenario), guidance=Broken(after=1, then=far)),

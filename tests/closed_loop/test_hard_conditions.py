@@ -26,9 +26,10 @@ import pytest
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight, Outcome
 from harness.run.scenario_flight import fly_to_folder, make_loop
-from harness.scenario.scenario import Scenario, scenario_of
+from harness.scenario.scenario import scenario_of
 from tests.closed_loop.tables import fill, head, line, upper
 from tests.closed_loop.worlds_table import SHARED, referee_faults
+from wayproof import Scenario
 
 WORLDS = SHARED / "worlds"
 FAMILIES = ("circles_mid", "paper_like", "faster_forest", "barn")

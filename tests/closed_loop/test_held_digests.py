@@ -14,8 +14,8 @@ import pytest
 from harness.flight.closed_loop import fly
 from harness.flight.record import digest
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
+from wayproof import load_scenario
 
 HELD = {
     "aerosonde_forest": "0ca7df4598c874b63c63a47fe7b8b7b381107b7092acc205e886d632502b5ffc",

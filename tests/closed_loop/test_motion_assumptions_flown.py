@@ -11,8 +11,9 @@ import pytest
 from harness.flight.closed_loop import fly
 from harness.flight.record import Outcome
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario, scenario_of
+from harness.scenario.scenario import scenario_of
 from harness.world.motion_assumptions import outside_assumptions
+from wayproof import Scenario
 
 
 def wall(seed: int, width_share: float = 0.99) -> Scenario:

@@ -11,7 +11,6 @@ import pytest
 import rerun as rr
 
 from aircraft.guidance.progress import RouteProgress
-from aircraft.interface import AircraftState, Route
 from harness.analysis.metrics import metrics
 from harness.cli.flight_rows import flight_rows
 from harness.flight.closed_loop import Loop, fly
@@ -20,10 +19,10 @@ from harness.flight.observer import Caution, Observer
 from harness.flight.record import BELIEVED_FIELDS, TRACK_FIELDS, Flight, Outcome, digest
 from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run, tables
-from harness.scenario.scenario import Scenario, parse_scenario
-from planner.interface import Plan, PlanRequest
 from tests.closed_loop.small import small_world
 from tests.point_mass import PointMass
+from tests.scenarios import scenario_of
+from wayproof import AircraftState, Plan, PlanRequest, Route, Scenario
 
 TREE = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}
 GNSS = {"kind": "gnss", "outages_s": [[40.0, 100.0]]}
@@ -194,7 +193,7 @@ def test_run_folder_and_recording_have_truth_and_belief(
     assert digest(run.track) == digest(flight.track) == figures["digest"]
     for name in BELIEVED_FIELDS:
         np.testing.assert_array_equal(getattr(run.track, name), getattr(flight.track, name))
-    again = flown(parse_scenario(run.scenario_yaml))
+    again = flown(scenario_of(run.scenario_yaml))
     assert digest(again.track) == digest(flight.track)
     assert "navigation margin that was planned" in flight_rows(figures)["total system error"]
     assert "  navigation error" in flight_rows(figures)

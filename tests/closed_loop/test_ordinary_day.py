@@ -15,8 +15,8 @@ from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from aircraft.start import Atmosphere
 from harness.bench.tracking import course, fly_course
-from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from tests.closed_loop.test_hard_conditions import hard
+from wayproof import Mission, Path, Plan, PlanRequest, PlanStatus
 
 CAMPAIGNS = FilePath(__file__).parents[2] / "scenarios" / "campaigns"
 CTU = FilePath(__file__).parents[3] / "shared" / "worlds" / "ctu_dubins" / "ctu-dubins-dense-14.json"

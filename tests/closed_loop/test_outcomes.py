@@ -13,14 +13,12 @@ import numpy as np
 import pytest
 
 from aircraft.guidance.interface import UPDATE_RATE_HZ
-from aircraft.interface import AircraftState
 from aircraft.start import Atmosphere, StartConditions
 from harness.cli.app import main
 from harness.run import scenario_flight as run
-from harness.scenario.scenario import Scenario, dump_scenario
-from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from tests.closed_loop.small import flown_by_point_mass, small_world
 from tests.point_mass import PointMass
+from wayproof import AircraftState, Mission, Path, Plan, PlanRequest, PlanStatus, Scenario, dump_scenario
 
 Answer = Callable[[Mission, PlanRequest], Plan]
 Install = Callable[[Answer], None]

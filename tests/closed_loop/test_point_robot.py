@@ -7,8 +7,8 @@ import math
 import pytest
 import shapely
 
-from planner.interface import Mission
 from tests.closed_loop.point_robot import walked_m
+from wayproof import Mission
 
 START, GOAL, CLEARANCE_M, GOAL_RADIUS_M = (3000.0, 5000.0), (17_000.0, 5000.0), 200.0, 100.0
 

@@ -15,21 +15,19 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 
-from aircraft.interface import AircraftState
 from harness.cli.app import main
 from harness.flight.closed_loop import fly
 from harness.flight.observer import Observer
 from harness.flight.record import AcceptedPlan, Flight, Outcome
 from harness.flight.termination import MissionEnd
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario, dump_scenario
 from harness.world.world import World
 from planner.geometry.clearance import distances
 from planner.geometry.curves import on_loiter, pose_at, sample
-from planner.interface import Path
 from tests.closed_loop.small import small_world
 from tests.closed_loop.test_convergence import BLUR, CLEARANCE_M, drawn
 from tests.point_mass import PointMass
+from wayproof import AircraftState, Path, Scenario, dump_scenario
 
 
 class Invariant(Observer):

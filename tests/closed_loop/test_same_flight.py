@@ -13,13 +13,12 @@ import pytest
 
 from harness.flight.closed_loop import ClosedLoop, fly
 from harness.run.scenario_flight import fly_to_folder, make_loop
-from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
-from planner.interface import PlanRequest
 from planner.rolling_window.planner import RollingWindow
 from tests.closed_loop.small import small_world
 from tests.longer import longer
 from tests.point_mass import PointMass
+from wayproof import PlanRequest, load_scenario
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import wayproof
-from planner.interface import Path
 from planner.shield import shield as shield_module
 from planner.shield.certificate import Certified, Certifier
 from tests.closed_loop import shield_table
 from tests.closed_loop.hostile import HOSTILE, Kinked, NotANumber, Outwards, Raising, Straight, Teleporting
+from wayproof import Path
 
 WORLD = {
     "area.bounds_m": [0, 0, 5000, 3000],

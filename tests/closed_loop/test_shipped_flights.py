@@ -12,9 +12,10 @@ import pytest
 
 from harness.run.scenario_flight import fly_to_folder
 from harness.run_files.run_folder import Run, load_run
-from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
 from harness.scenario.shipped import scenario_path
 from tests.longer import longer
+from tests.scenarios import scenario_of
+from wayproof import Scenario, load_scenario
 
 TOOLS = Path(__file__).parents[2].parent / "shared" / "tools"
 OPTIMUM_M = 94_318.0
@@ -85,7 +86,7 @@ def test_the_papers_world_is_flown_as_promised(flown: Flown) -> None:
 @pytest.mark.flights
 def test_the_papers_world_is_near_its_optimum(flown: Flown, tmp_path: Path) -> None:
     run = flown("paper_circles")
-    optimum = optimum_m(parse_scenario(run.scenario_yaml), tmp_path)
+    optimum = optimum_m(scenario_of(run.scenario_yaml), tmp_path)
     assert optimum == pytest.approx(OPTIMUM_M, abs=1.0)
     assert run.metrics["flown_length_m"] <= 1.03 * optimum
 
@@ -116,7 +117,7 @@ def test_is_reached_with_the_clearance(
     name: str, share_of_clearance: float, cross_track_p95_m: float, flown: Flown
 ) -> None:
     run = flown(name)
-    wanted_m = parse_scenario(run.scenario_yaml).planner.clearance_m
+    wanted_m = scenario_of(run.scenario_yaml).planner.clearance_m
     assert run.metrics["outcome"] == "reached", run.metrics["reason"]
     assert run.metrics["min_clearance_m"] >= share_of_clearance * wanted_m
     assert run.metrics["cross_track_m"]["p95"] <= cross_track_p95_m

@@ -18,7 +18,8 @@ import pytest
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight, Outcome
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario, scenario_of
+from harness.scenario.scenario import scenario_of
+from wayproof import Scenario
 
 POLES_M = (0.01, 0.05, 0.3, 1.0)
 THICK_M = (0.01, 0.02, 0.1, 0.3, 1.0, 3.0)

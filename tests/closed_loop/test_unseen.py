@@ -15,8 +15,8 @@ from harness.run.scenario_flight import make_loop
 from harness.scenario.kinds import planner_kinds
 from harness.world.obstacle import Obstacle
 from harness.world.world import World
-from planner.interface import Mission, Plan, PlanRequest
 from tests.closed_loop.small import flown_by_point_mass, small_world
+from wayproof import Mission, Plan, PlanRequest
 
 RANGE_M = 1500.0
 TRUTH = "clearance_m"

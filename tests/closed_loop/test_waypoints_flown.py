@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from aircraft.guidance.waypoints import WaypointLaw
-from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
 from harness.run.scenario_flight import make_loop
 from harness.scenario.performance import performance_of
-from harness.scenario.scenario import dump_scenario, parse_scenario
+from tests.scenarios import scenario_of
+from wayproof import InputError, dump_scenario
 
 TEXT = """\
 schema: wayproof/scenario/1
@@ -23,9 +23,9 @@ sensor: {range_m: 2500, rays: 180}
 
 
 def test_a_mission_is_flown_round_an_obstacle() -> None:
-    plan = parse_scenario(TEXT)
-    mission = parse_scenario(TEXT + "guidance: {kind: l1, follow: waypoints}\n")
-    assert parse_scenario(dump_scenario(mission)) == mission
+    plan = scenario_of(TEXT)
+    mission = scenario_of(TEXT + "guidance: {kind: l1, follow: waypoints}\n")
+    assert scenario_of(dump_scenario(mission)) == mission
     assert performance_of(mission).tracking_error_m > performance_of(plan).tracking_error_m + 5.0
     loop = make_loop(mission)
     assert isinstance(loop.guidance, WaypointLaw)
@@ -46,5 +46,5 @@ def test_a_mission_is_flown_round_an_obstacle() -> None:
 )
 def test_what_is_no_way_to_follow_is_refused(key: str, said: str) -> None:
     with pytest.raises(InputError) as refused:
-        parse_scenario(TEXT + f"guidance: {{{key}}}\n")
+        scenario_of(TEXT + f"guidance: {{{key}}}\n")
     assert said in str(refused.value)

@@ -14,9 +14,9 @@ import pytest
 from harness.flight.record import Outcome
 from harness.run.scenario_flight import fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run
-from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from tests.closed_loop.small import flown_by_point_mass, small_world
 from tests.point_mass import PointMass
+from wayproof import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 
 Install = Callable[[Callable[[Mission, PlanRequest], Any]], None]
 Fails = Callable[[Callable[[Mission, PlanRequest], Any]], str]

@@ -20,9 +20,9 @@ from typing import Any, Final
 import numpy as np
 
 from harness.run.scenario_flight import fly_to_folder
-from harness.scenario.scenario import load_scenario
 from tests.closed_loop.point_robot import over_the_optimum
 from tests.closed_loop.tables import head, line
+from wayproof import load_scenario
 
 SHARED: Final = Path(__file__).parents[3] / "shared"
 FAMILIES: Final[dict[str, tuple[str, ...]]] = {

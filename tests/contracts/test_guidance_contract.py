@@ -25,10 +25,11 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw, GuidanceLimits, GuidanceOutput
+from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
 from aircraft.guidance.registry import BUILT_IN, GuidanceKind
-from aircraft.interface import GRAVITY_MPS2, AircraftState, Route
+from aircraft.interface import GRAVITY_MPS2
 from aircraft.route import arc_point
+from wayproof import AircraftState, GuidanceLimits, GuidanceOutput, Route
 
 README = Path(__file__).parents[2] / "aircraft" / "README.md"
 LIMITS = GuidanceLimits(25.0, 32.0, math.radians(45.0), math.radians(60.0), 0.25, 0.05, 1.4)

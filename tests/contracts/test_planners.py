@@ -16,8 +16,7 @@ from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
 from planner.contract import AHEAD, MISSION, START, PlannerContract, bits, make
 from planner.geometry.curves import on_loiter, pose_at
-from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
-from planner.registry import PlannerKind
+from wayproof import Mission, Path, Plan, PlannerKind, PlanRequest, PlanStatus
 
 KINDS = planner_kinds()
 """As they are before any test registers a kind of its own."""

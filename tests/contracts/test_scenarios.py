@@ -10,8 +10,10 @@ import pytest
 import yaml
 
 from harness.cli.app import main
-from harness.scenario.scenario import Scenario, dump_scenario, load_scenario, parse_scenario, scenario_schema
+from harness.scenario.scenario import scenario_schema
 from harness.scenario.shipped import scenario_path, shipped_scenarios, summary
+from tests.scenarios import scenario_of
+from wayproof import Scenario, dump_scenario, load_scenario
 
 SHIPPED = shipped_scenarios()
 Point = tuple[float, float]
@@ -45,7 +47,7 @@ def test_is_named_after_its_file_and_says_what_it_is_for(name: str) -> None:
 def test_its_dump_is_the_same_scenario(name: str) -> None:
     scenario = load_scenario(SHIPPED[name])
     text = dump_scenario(scenario)
-    assert parse_scenario(text) == scenario
+    assert scenario_of(text) == scenario
     # Other programs read the dump as YAML 1.1.
     plain: dict[str, Any] = yaml.safe_load(text)
     assert plain["mission"]["goal_m"] == list(scenario.mission.goal_m)

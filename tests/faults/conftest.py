@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from harness.run.scenario_flight import fly_to_folder
-from harness.scenario.scenario import load_scenario
+from wayproof import load_scenario
 
 FOREST = Path(__file__).parents[2] / "scenarios" / "aerosonde_forest.yaml"
 

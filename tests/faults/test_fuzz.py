@@ -20,10 +20,8 @@ from hypothesis import strategies as st
 from harness.campaign.campaign_file import CampaignFile, load_campaign
 from harness.campaign.runs import CampaignRuns
 from harness.files import strict_yaml
-from harness.files.input_file import InputError
 from harness.run.path_check import prepare_check
 from harness.run_files.path_files import read_path
-from harness.scenario.scenario import dump_scenario, load_scenario, parse_scenario
 from tests.faults.hostile import (
     CAMPAIGN_SNIPPETS,
     CELLS,
@@ -38,6 +36,8 @@ from tests.faults.hostile import (
     spoilt_bytes,
 )
 from tests.longer import longer
+from tests.scenarios import scenario_of
+from wayproof import InputError, dump_scenario, load_scenario
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 LONGEST_S = 15.0
@@ -96,7 +96,7 @@ WAYPOINTS = [
 def read_scenario(path: Path) -> None:
     """Loads a scenario; one that is taken is the same when it is written out and read again."""
     taken = load_scenario(path)
-    assert parse_scenario(dump_scenario(taken)) == taken
+    assert scenario_of(dump_scenario(taken)) == taken
 
 
 def read_campaign(path: Path) -> None:
@@ -106,7 +106,7 @@ def read_campaign(path: Path) -> None:
     assert (len(taken), taken.varied) == (len(again), again.varied)
     for number in sorted({0, len(taken) - 1}):
         assert taken.cells(number) == again.cells(number)
-        assert parse_scenario(dump_scenario(taken.scenario(number))) == again.scenario(number)
+        assert scenario_of(dump_scenario(taken.scenario(number))) == again.scenario(number)
 
 
 def read_given_path(path: Path) -> None:

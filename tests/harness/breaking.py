@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.falsify.breaking_point import Breaking, Effort, falsify, vary_of
-from harness.scenario.scenario import Scenario, load_scenario
+from wayproof import Scenario, load_scenario
 
 SCENARIO = """
 schema: wayproof/scenario/1

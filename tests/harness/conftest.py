@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from harness.flight.record import AcceptedPlan, FloatArray, Track
-from planner.interface import Path, Plan, PlanPicture, PlanStatus
 from tests.harness.breaking import SCENARIO
 from tests.page import NoBrowserError, browser
+from wayproof import Path, Plan, PlanPicture, PlanStatus
 
 MakeTrack = Callable[..., Track]
 MakePlan = Callable[..., AcceptedPlan]

@@ -12,8 +12,8 @@ import pytest
 
 import wayproof
 from harness.cli.app import main
-from planner.interface import Path as PlannedPath
-from planner.interface import Plan, PlanRequest, PlanStatus
+from wayproof import Path as PlannedPath
+from wayproof import Plan, PlanRequest, PlanStatus
 
 KEPT = Plan(PlanStatus.KEPT, "it is kept")
 

@@ -11,9 +11,9 @@ import pytest
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import error_figures, metrics, percentiles
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
-from planner.interface import Path
 from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
+from wayproof import Path
 
 STRAIGHT = make_plan([(0.0, 0.0, 0.0, 1.0, 0.0, 5000.0)])
 LIMITS = FlightLimits(300.0, 200.0, math.radians(45), turn_radius_m=110.0, max_cross_track_m=20.0)

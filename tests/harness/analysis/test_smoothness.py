@@ -17,9 +17,9 @@ from harness.analysis.smoothness import (
     stations_in_effect,
 )
 from harness.flight.record import AcceptedPlan
-from planner.interface import Path, Plan, PlanStatus
 from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
+from wayproof import Path, Plan, PlanStatus
 
 
 def profile(*pieces: tuple[float, float]) -> Profile:

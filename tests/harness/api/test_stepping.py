@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 import wayproof
-from aircraft.interface import AircraftState
 from harness.flight.observer import Observer
 from harness.flight.record import AcceptedPlan
 from harness.mapping.scan import RangeScan
 from tests.harness.api.worlds import Beeline, small
-from wayproof import Path, Plan, PlanRequest, PlanStatus
+from wayproof import AircraftState, Path, Plan, PlanRequest, PlanStatus
 
 
 def flown(flight: wayproof.SteppedFlight) -> wayproof.FlightResult:

@@ -7,6 +7,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 import wayproof
+from tests.scenarios import scenario_of
 from wayproof import Mission, Path, Plan, PlanRequest, PlanStatus
 
 SCENARIO = """
@@ -54,9 +55,7 @@ class Beeline:
 
 
 def small() -> wayproof.Scenario:
-    from harness.scenario.scenario import parse_scenario
-
-    return parse_scenario(SCENARIO)
+    return scenario_of(SCENARIO)
 
 
 def source_file(folder: FilePath) -> FilePath:

@@ -16,7 +16,8 @@ from harness.cli.bench import bench_rows
 from harness.flight.closed_loop import fly
 from harness.flight.record import digest
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario, parse_scenario
+from tests.scenarios import scenario_of
+from wayproof import Scenario
 
 SHORT = """\
 schema: wayproof/scenario/1
@@ -33,7 +34,7 @@ BLOCKS = {"dynamics", "guidance", "sensor", "map", "planner", "record", "loop", 
 
 
 def scenario() -> Scenario:
-    return parse_scenario(SHORT)
+    return scenario_of(SHORT)
 
 
 @pytest.mark.flights

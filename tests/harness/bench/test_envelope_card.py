@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 
 from aircraft import trials
-from aircraft.airframes import AircraftError, airframe
+from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from harness.bench import envelope_card as module
 from harness.bench.envelope_card import envelope_card, flown_turn, tightest
 from harness.cli.app import main
+from wayproof import AircraftError
 
 
 @pytest.fixture

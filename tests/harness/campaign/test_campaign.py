@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from harness.campaign.campaign_file import CampaignFile, campaign_schema, is_a, load_campaign
 from harness.campaign.runs import CampaignRuns
 from harness.cli.app import main
-from harness.files.strict_yaml import InputError
-from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import shipped_campaigns, shipped_scenarios
+from wayproof import InputError, load_scenario
 
 ROOT = Path(__file__).parents[3]
 SCENARIO = """\

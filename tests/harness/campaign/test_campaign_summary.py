@@ -25,10 +25,10 @@ from harness.campaign.results import sealed
 from harness.campaign.summary import PAGE, SUMMARY_JSON, Summary, summarise, write_summary
 from harness.cli.app import main
 from harness.cli.sweep import print_summary
-from harness.files.strict_yaml import InputError
 from harness.files.wording import printable
 from tests.examples import examples
 from tests.page import shown
+from wayproof import InputError
 
 SCHEMA = pa.schema(
     [(name, pa.int64()) for name in ("run", "case", "seed")]

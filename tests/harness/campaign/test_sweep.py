@@ -27,7 +27,7 @@ from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import local_workers
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
-from harness.scenario.scenario import load_scenario
+from wayproof import load_scenario
 
 ROOT = Path(__file__).parents[3]
 SCENARIO = """\

@@ -13,10 +13,9 @@ import pytest
 from rerun.chunk import RrdReader
 
 from harness.cli.app import main
-from harness.files.input_file import InputError
 from harness.run_files.run_folder import load_run
-from harness.scenario.scenario import parse_scenario
-from wayproof import check
+from tests.scenarios import scenario_of
+from wayproof import InputError, check
 
 STRIP = "x_m,y_m\n0,0\n0,2000\n60,2000\n60,0\n"
 """Two corners 60 m apart: too tight for an Aerosonde."""
@@ -66,7 +65,7 @@ def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
         assert f"<td>{corner['flown_cut_m']:.0f}</td><td>{corner['allowed_cut_m']:.0f}</td>" in page
     assert page.index(told["verdict"]) < page.index("at the end of the path")
     assert "for a planner to fly" in page
-    scenario = parse_scenario(run.scenario_yaml)
+    scenario = scenario_of(run.scenario_yaml)
     assert scenario.name == "strip-1"
     assert (scenario.mission.start_m, scenario.mission.goal_m) == ((0.0, 0.0), (60.0, 2000.0))
 
@@ -191,7 +190,7 @@ def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(
     )
     status, metrics = flown(straight, tmp_path / "run", "--scenario", str(world), capsys=capsys)
     assert (status, [each["name"] for each in metrics["contacts"]]) == (1, ["obstacles[0]"])
-    scenario = parse_scenario(load_run(tmp_path / "run").scenario_yaml)
+    scenario = scenario_of(load_run(tmp_path / "run").scenario_yaml)
     assert (scenario.mission.altitude_m, scenario.mission.start_m) == (700.0, (0.0, 0.0))
     assert scenario.environment.wind is not None
     inside = "obstacles[0].circle.center_m=[0, 100]"

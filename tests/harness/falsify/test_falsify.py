@@ -13,15 +13,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from aircraft.airframes import AircraftError
 from harness.cli.app import main
 from harness.cli.falsify import breaking_rows, last_line
 from harness.falsify.breaking_point import FALSIFIED, INDEX, number_text, scenario_at, vary_of
-from harness.files.strict_yaml import InputError
 from harness.run.scenario_flight import fly_and_measure
-from harness.scenario.scenario import Scenario, load_scenario
 from tests.examples import examples
 from tests.harness.breaking import WAY_M, broken, stand_in
+from wayproof import AircraftError, InputError, Scenario, load_scenario
 
 
 @pytest.mark.flights

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aircraft.interface import AircraftState
 from harness.flight.navigation import Navigator
 from harness.scenario.navigation import Navigation
+from wayproof import AircraftState
 
 SPEED_MPS = 20.0
 SEED = np.random.SeedSequence(5, spawn_key=(3,))

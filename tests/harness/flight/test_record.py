@@ -6,11 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from aircraft.guidance.interface import GuidanceOutput
-from aircraft.interface import AircraftState
 from harness.flight.record import COLUMNS, TRACK_FIELDS, FloatArray, Track, digest
 from harness.flight.track_log import TrackLog
 from tests.harness.conftest import track as make_track
+from wayproof import AircraftState, GuidanceOutput
 
 CONTRACT = (
     "time_s east_m north_m up_m course_deg heading_deg roll_deg pitch_deg airspeed_mps groundspeed_mps "

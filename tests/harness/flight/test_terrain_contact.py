@@ -8,13 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from aircraft.interface import AircraftState
 from harness.flight.record import Outcome
 from harness.flight.termination import MissionEnd
 from harness.world.ground import Ground
 from harness.world.world import World
 from harness.world_files.height_field import HeightField
-from planner.interface import Mission
+from wayproof import AircraftState, Mission
 
 BOUNDS = (0.0, 0.0, 20_000.0, 20_000.0)
 MISSION = Mission(

@@ -21,9 +21,9 @@ import wayproof
 from harness.learning.environments import STATE, ScanKeeper, state_of
 from harness.mapping.scan import RangeScan
 from harness.scenario.performance import mission_of
-from harness.scenario.scenario import Scenario
 from tests.closed_loop.small import small_world as world
 from tests.harness.learning.steering import flown
+from wayproof import Scenario
 
 ROOT = Path(__file__).parents[3]
 ID = "wayproof/Waypoints-v0"

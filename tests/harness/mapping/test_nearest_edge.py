@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import wayproof
-from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import FloatArray
+from wayproof import Mission, Path, Plan, PlanRequest, PlanStatus
 
 PROBES = np.random.default_rng(1).uniform(0.0, 4000.0, (200, 2))
 

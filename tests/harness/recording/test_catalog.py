@@ -23,11 +23,11 @@ from harness.recording.log import RerunLog
 from harness.recording.overlay import chunks_of, properties_of
 from harness.recording.properties import run_properties
 from harness.recording.viewer import NO_DRIVER, ViewerError, free_port, viewer_process
-from harness.scenario.scenario import parse_scenario
 from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
 from tests.harness.recording.test_rerun_log import LIMITS, SCENE, column, read, seconds
 from tests.pictures import draw_settled
+from tests.scenarios import scenario_of
 
 SCENARIO = """\
 schema: wayproof/scenario/1
@@ -62,7 +62,7 @@ def record(folder: Path, number: int, flown: Flight) -> dict[str, Any]:
         log.on_plan(plan, None)  # type: ignore[arg-type]
     log.on_block(flown.track)
     log.on_event(100.0, "over")
-    given = run_properties(parse_scenario(SCENARIO), figures)
+    given = run_properties(scenario_of(SCENARIO), figures)
     log.close(figures, given, {"environment.wind.speed_mps": 4.0 + number})
     return given
 

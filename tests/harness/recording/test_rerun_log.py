@@ -20,11 +20,9 @@ import rerun as rr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.interface import AircraftState
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.files.errors import RunFolderError
-from harness.files.input_file import InputError
 from harness.flight.observer import Caution, ShieldState
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
@@ -36,12 +34,13 @@ from harness.recording.scene import quaternions
 from harness.recording.summary import summary
 from harness.recording.viewer import NO_DRIVER, ViewerError, _executable, open_viewer, run_names
 from harness.world.obstacle import Circle, Obstacle, Polygon
-from planner.interface import Mission, MovingEdges, Plan, PlanPicture, PlanStatus
-from planner.interface import Path as PlannedPath
+from planner.interface import MovingEdges
 from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
 from tests.page import NoBrowserError, browser
 from tests.pictures import screenshot, served
+from wayproof import AircraftState, InputError, Mission, Plan, PlanPicture, PlanStatus
+from wayproof import Path as PlannedPath
 
 MISSION = Mission(
     goal_m=(0.0, 2500.0),

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from aircraft.frames import LocalPlane
-from harness.files.input_file import InputError
 from harness.replays.flown import read_flown
+from wayproof import InputError
 
 PLANE = LocalPlane(47.0, 8.0)
 ROWS = np.arange(20, dtype=np.float64)

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 import wayproof
-from planner.interface import Mission, Plan, PlanRequest, PlanStatus
-from wayproof import InputError
+from wayproof import InputError, Mission, Plan, PlanRequest, PlanStatus
 
 
 class Refusing:

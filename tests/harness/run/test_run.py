@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aircraft.airframes import AircraftError
 from aircraft.interface import FlightModel
 from harness.run import scenario_flight as run
 from harness.run.scenario_flight import atmosphere, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run
 from harness.scenario.performance import start_conditions
-from harness.scenario.scenario import Scenario, load_scenario
 from harness.scenario.shipped import scenario_path
+from wayproof import AircraftError, Scenario, load_scenario
 
 
 def shipped(name: str, **overrides: str) -> Scenario:

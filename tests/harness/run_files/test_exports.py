@@ -23,8 +23,8 @@ from harness.flight.record import FloatArray
 from harness.run_files.exports import FORMATS, planned_points
 from harness.run_files.path_files import read_path
 from harness.run_files.run_folder import Run, load_run
-from harness.scenario.scenario import parse_scenario
 from harness.scenario.sections import Origin
+from tests.scenarios import scenario_of
 
 Export = Callable[..., str]
 
@@ -61,7 +61,7 @@ def export(run: Run, tmp_path: Path) -> Export:
 
 def in_plane(run: Run, latitude_deg: list[float], longitude_deg: list[float]) -> FloatArray:
     """Degrees in the run's plane, by PROJ."""
-    origin = parse_scenario(run.scenario_yaml).area.origin
+    origin = scenario_of(run.scenario_yaml).area.origin
     plane = CRS.from_proj4(
         f"+proj=aeqd +lat_0={origin.latitude_deg} +lon_0={origin.longitude_deg} +datum=WGS84"
     )
@@ -152,7 +152,7 @@ def test_what_is_exported_can_be_checked_and_is_trackable(
     checked = load_run(out)
     assert checked.metrics["trackable"] is True
     assert checked.metrics["cross_track_m"]["max"] < 1.0
-    assert parse_scenario(checked.scenario_yaml).mission.altitude_m == pytest.approx(450.0, abs=0.1)
+    assert scenario_of(checked.scenario_yaml).mission.altitude_m == pytest.approx(450.0, abs=0.1)
     length = run.metrics["flown_length_m"]
     assert checked.metrics["flown_length_m"] == pytest.approx(length, rel=0.01)
 
@@ -174,7 +174,7 @@ def test_what_its_user_should_know_is_said(
     shutil.copytree(run.folder, copy)
     place = "area.origin is 47, 8, as where a scenario gives none: the file lies there\n"
     text = run.scenario_yaml.replace("latitude_deg: 61.0", "latitude_deg: 47.0").replace("178.45", "8.0")
-    assert parse_scenario(text).area.origin == Origin()
+    assert scenario_of(text).area.origin == Origin()
     (copy / "scenario.yaml").write_text(text)
     ended: dict[str, Any] = {"outcome": "collision", "reason": "inside an obstacle by 2.4 m"}
     (copy / "metrics.json").write_text(json.dumps({**run.metrics, **ended}))

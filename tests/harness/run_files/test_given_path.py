@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from harness.flight.polylines import polylines
 from harness.run_files.given_path import FloatArray, Tightest, fly_by
 from planner.geometry.curves import end_of
-from planner.interface import Path
+from wayproof import Path
 
 
 def circle(radius: float, turn: float, chord: float) -> FloatArray:

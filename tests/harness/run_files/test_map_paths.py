@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.files.input_file import InputError
 from harness.run_files.path_files import read_path
+from wayproof import InputError
 
 LINE = "8.0,47.0,500 8.01,47.01,520\n 8.03,47.02,540"
 SQUARE = "8,47,9 8.01,47,9 8.01,47.01,9 8,47.01,9 8,47,9"

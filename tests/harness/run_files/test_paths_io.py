@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from pyproj import Geod
 
-from harness.files.strict_yaml import InputError
 from harness.run_files.mission.program import MissionStep
 from harness.run_files.mission.vertices import altitude_m
 from harness.run_files.path_files import read_path
+from wayproof import InputError
 
 WGS84 = Geod(ellps="WGS84")
 POINTS = [(47.0, 8.0), (47.1, 8.0), (47.1, 8.4)]

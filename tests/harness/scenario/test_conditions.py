@@ -11,7 +11,7 @@ import pytest
 
 import wayproof
 from harness.scenario.conditions import told
-from harness.scenario.scenario import parse_scenario
+from tests.scenarios import scenario_of
 
 BASE = """
 schema: wayproof/scenario/1
@@ -31,7 +31,7 @@ def section(scenario: wayproof.Scenario, path: str) -> Any:
 
 
 def drawn(day: str, count: int, more: str = "") -> list[wayproof.Scenario]:
-    return [parse_scenario(f"{BASE}conditions: {day}\nseed: {seed}\n{more}") for seed in range(count)]
+    return [scenario_of(f"{BASE}conditions: {day}\nseed: {seed}\n{more}") for seed in range(count)]
 
 
 def test_typical_winds_have_the_mean_of_the_land_and_deviations_their_sigma() -> None:
@@ -50,12 +50,12 @@ def test_typical_winds_have_the_mean_of_the_land_and_deviations_their_sigma() ->
 def test_what_is_drawn_can_be_read_back_however_large_its_sigma() -> None:
     for day in drawn("ideal", 12, "uncertainty: {thrust: 0.4, centre_of_gravity_m: 0.02}"):
         assert abs(section(day, "aircraft.deviation.thrust")) <= 0.5
-        assert parse_scenario(wayproof.dump_scenario(day)) == day
+        assert scenario_of(wayproof.dump_scenario(day)) == day
 
 
 def test_given_normal_numbers_stand_for_what_the_seed_would_draw() -> None:
     numbers = [0.5, 1.0, *[0.0] * 48, -1.0, *[0.5] * 8]
-    day, other = (parse_scenario(f"{BASE}conditions: typical\nseed: {s}\nnormals: {numbers}") for s in (1, 2))
+    day, other = (scenario_of(f"{BASE}conditions: typical\nseed: {s}\nnormals: {numbers}") for s in (1, 2))
     above = [0.5 * math.erfc(each / math.sqrt(2.0)) for each in (0.5, 1.0, -1.0)]
     wind = section(day, "environment.wind")
     rayleigh = 3.28 * math.sqrt(-4.0 / math.pi * math.log(above[0]))  # its quantile, of mean 3.28
@@ -77,7 +77,7 @@ def test_no_wind_at_the_mission_is_stronger_than_its_share_of_the_airspeed(day: 
 
 
 def test_what_the_file_says_stays_and_ideal_adds_nothing() -> None:
-    ideal = parse_scenario(BASE)
+    ideal = scenario_of(BASE)
     assert ideal.environment.wind is None
     assert ideal.aircraft.deviation is None
     assert ideal.navigation.kind == "perfect"
@@ -118,7 +118,7 @@ def test_a_run_folders_scenario_has_the_day_resolved_and_flies_again_alike(tmp_p
 
 def test_the_wind_changes_in_time_as_told() -> None:
     wind = "wind: {speed_mps: 4, from_deg: 270, changes: [[20, 8, 270], [40, 8, 180]]}"
-    flown = wayproof.fly(parse_scenario(f"{BASE}environment: {{{wind}}}"))
+    flown = wayproof.fly(scenario_of(f"{BASE}environment: {{{wind}}}"))
     track = {name: flown.track[name].to_numpy() for name in flown.track.column_names}
     heading, course = np.radians(track["heading_deg"]), np.radians(track["course_deg"])
     level = np.cos(np.radians(track["pitch_deg"]))  # of the airspeed; the rest is sideslip and climb
@@ -141,5 +141,5 @@ def test_the_wind_changes_in_time_as_told() -> None:
 )
 def test_wrong_keys_are_told_with_their_path(more: str, told: str) -> None:
     with pytest.raises(wayproof.InputError, match=r"line \d|:\d") as caught:
-        parse_scenario(BASE + more, "day.yaml")
+        scenario_of(BASE + more, "day.yaml")
     assert told in str(caught.value)

@@ -11,8 +11,8 @@ import pytest
 
 from harness.scenario import kinds
 from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, NoKeys, PluginError, planner_kinds, registered
-from planner.interface import Mission, Plan, PlanRequest, PlanStatus
-from planner.registry import BUILT_IN, PlannerKind
+from planner.registry import BUILT_IN
+from wayproof import Mission, Plan, PlannerKind, PlanRequest, PlanStatus
 
 MINE = replace(PLANNER.built_in[1], kind="mine")
 MY_LAW = replace(GUIDANCE.built_in[1], kind="mine")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from harness.cli.app import main
-from harness.files.input_file import InputError
-from harness.scenario.scenario import parse_scenario
+from tests.scenarios import scenario_of
+from wayproof import InputError
 
 GOOD = """\
 schema: wayproof/scenario/1
@@ -218,10 +218,10 @@ def test_a_mission_that_begins_by_leaving_is_refused_with_a_course_that_would_do
         f"mission: {{{{start_m: {start}, course_deg: {{}}, goal_m: [5000, 5500]}}}}\n"
     )
     with pytest.raises(InputError) as caught:
-        parse_scenario(text.format(course), "border.yaml")
+        scenario_of(text.format(course), "border.yaml")
     told = re.fullmatch(
         r"border.yaml:4: mission.course_deg: .*; must be another, as (\d+)", str(caught.value)
     )
     assert told
-    assert parse_scenario(text.format(told[1]))
-    assert parse_scenario(text.format(course).replace(start, "[5000, 2000]"))
+    assert scenario_of(text.format(told[1]))
+    assert scenario_of(text.format(course).replace(start, "[5000, 2000]"))

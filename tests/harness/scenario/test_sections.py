@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
 from harness.run.scenario_flight import make_loop
 from harness.scenario.navigation import Navigation, planning_margin_m
-from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario
+from tests.scenarios import scenario_of
+from wayproof import InputError, Scenario, dump_scenario
 
 LEAST = """\
 schema: wayproof/scenario/1
@@ -60,8 +60,8 @@ def test_gps_is_as_large_as_what_drives_it_makes_it() -> None:
 )  # fmt: skip
 def test_faults_name_line_key_and_what_would_be_right(keys: str, sentence: str) -> None:
     with pytest.raises(InputError) as refused:
-        parse_scenario(f"{LEAST}navigation: {{{keys}}}\n")
-    assert str(refused.value).startswith(f"scenario:5: {sentence}")
+        scenario_of(f"{LEAST}navigation: {{{keys}}}\n")
+    assert str(refused.value).startswith(f"scenario.yaml:5: {sentence}")
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_the_margin_has_what_the_heading_misplaces_an_edge_by_before_the_plan_is
 
 
 def scenario(*lines: str) -> Scenario:
-    return parse_scenario(SHORT + "".join(f"{line}\n" for line in lines))
+    return scenario_of(SHORT + "".join(f"{line}\n" for line in lines))
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_the_default_is_the_first_rate_that_the_sensor_divides(sensor_hz: float,
 def test_is_written_out_and_read_back() -> None:
     fine = scenario("simulation: {rate_hz: 240}")
     assert fine.simulation.rate_hz == 240
-    assert parse_scenario(dump_scenario(fine)) == fine
+    assert scenario_of(dump_scenario(fine)) == fine
     assert scenario().with_({"simulation.rate_hz": 480}).simulation.rate_hz == 480
 
 

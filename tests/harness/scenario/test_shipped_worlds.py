@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from harness.cli.app import main
-from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path, shipped_worlds
+from wayproof import load_scenario
 
 WORLDS = shipped_worlds()
 LICENCES = ("licence MIT", "licence BSD-3-Clause", "licence CC0-1.0", "licence of this project")

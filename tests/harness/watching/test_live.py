@@ -14,8 +14,6 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from aircraft.guidance.interface import GuidanceOutput
-from aircraft.interface import AircraftState
 from harness.analysis.metrics import metrics
 from harness.cli.app import main
 from harness.flight.closed_loop import fly
@@ -29,6 +27,7 @@ from harness.watching.relay import Call, Opening, RelayProcess
 from harness.watching.watched_flight import Viewing, fly_watched
 from tests.closed_loop.small import small_world as world
 from tests.point_mass import PointMass
+from wayproof import AircraftState, GuidanceOutput
 
 SERVER = """
 import sys, time

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from aircraft.interface import AircraftState
 from harness.flight.closed_loop import NOT_STEERED
 from harness.watching import watched_flight as pace
+from wayproof import AircraftState
 
 
 class Clock:

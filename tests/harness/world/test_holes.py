@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import shapely
 
-from harness.files.input_file import InputError
-from harness.scenario.scenario import dump_scenario, parse_scenario
 from harness.scenario.sections import Sensor
 from harness.world.obstacle import Obstacle, Polygon
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
+from tests.scenarios import scenario_of
+from wayproof import InputError, dump_scenario
 
 OUTER = ((0.0, 0.0), (1000.0, 0.0), (1000.0, 1000.0), (0.0, 1000.0))
 HOLE = ((300.0, 200.0), (300.0, 800.0), (700.0, 800.0), (700.0, 200.0))
@@ -62,11 +62,11 @@ def test_a_contact_is_found_on_the_way_out_of_a_hole() -> None:
 
 def test_a_scenario_keeps_its_holes() -> None:
     text = YAML.format(holes="[[[200, 200], [200, 200], [800, 200], [800, 800], [200, 200]]]")
-    scenario = parse_scenario(text)
+    scenario = scenario_of(text)
     polygon = scenario.obstacles[0].polygon
     assert polygon is not None
     assert polygon.holes_m == (((200.0, 200.0), (800.0, 200.0), (800.0, 800.0)),)
-    assert parse_scenario(dump_scenario(scenario)) == scenario
+    assert scenario_of(dump_scenario(scenario)) == scenario
     world = World.from_scenario(scenario)
     assert world.clearance_at(700.0, 300.0, 0.0) == pytest.approx(100.0)
 
@@ -82,4 +82,4 @@ def test_a_scenario_keeps_its_holes() -> None:
 )
 def test_holes_that_are_none_are_refused(holes: str, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
-        parse_scenario(YAML.format(holes=holes))
+        scenario_of(YAML.format(holes=holes))

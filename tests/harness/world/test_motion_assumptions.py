@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from harness.scenario.scenario import Scenario, parse_scenario
 from harness.world.motion_assumptions import outside_assumptions
 from harness.world.world import World
+from tests.scenarios import scenario_of
+from wayproof import Scenario
 
 
 def told(obstacle: str, airspeed_mps: float = 25.0) -> tuple[str, ...]:
     return outside_assumptions(
-        parse_scenario(
+        scenario_of(
             "schema: wayproof/scenario/1\nname: a\narea: {bounds_m: [0, 0, 9000, 9000]}\n"
             "mission: {start_m: [500, 500], goal_m: [8000, 8000]}\n"
             "sensor: {range_m: 1000}\nplanner: {clearance_m: 100}\n"

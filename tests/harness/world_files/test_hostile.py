@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from harness.cli.app import main
-from harness.files.input_file import InputError
 from harness.world_files.kinds import read
 from harness.world_files.parts import Reading
 from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, npy, osm, zipped
+from wayproof import InputError
 
 BOMB = '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "lol"><!ENTITY b "&a;&a;">]><osm>&b;</osm>'
 

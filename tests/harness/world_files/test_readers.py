@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.files.input_file import InputError
 from harness.world_files.kinds import kind_of, read
 from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Reading
 from harness.world_files.plane import Mapping, Place
 from harness.world_files.readers.limits import limit_of
 from tests.harness.world_files.making import SQUARE, feature, geojson, osm, zipped
+from wayproof import InputError
 
 
 def read_any(path: Path, **reading: Any) -> Contents:

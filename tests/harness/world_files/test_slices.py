@@ -12,13 +12,13 @@ import pytest
 import shapely
 
 from aircraft.frames import LocalPlane
-from harness.files.input_file import InputError
 from harness.world_files import solids
 from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners_of, expanded, loaded_file
 from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.solids import outlines, simplified
 from tests.harness.world_files.making import SHARED, SQUARE, feature, geojson, geotiff
 from tests.longer import longer
+from wayproof import InputError
 
 AROUND = (-4000.0, -4000.0, 4000.0, 4000.0)
 

@@ -14,9 +14,9 @@ import yaml
 from harness.cli.app import main
 from harness.run.scenario_flight import fly_to_folder
 from harness.run_files.run_folder import load_run
-from harness.scenario.scenario import dump_scenario, load_scenario
 from harness.world.world import World
 from tests.harness.world_files.making import feature, geojson, geotiff, osm
+from wayproof import dump_scenario, load_scenario
 
 
 def hill(folder: Path) -> Path:

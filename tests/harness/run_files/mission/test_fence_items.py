@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from harness.files.input_file import InputError
 from harness.run_files.mission.mission_files import read_waypoints
 from harness.run_files.path_files import read_path
 from harness.world_files.kinds import read as read_world
 from harness.world_files.parts import Reading
+from wayproof import InputError
 
 CORNERS = [(46.99, 7.99), (47.03, 7.99), (47.03, 8.01), (46.99, 8.01)]
 PLACES = [(47.0, 8.0), (47.02, 8.0)]

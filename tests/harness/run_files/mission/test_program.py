@@ -6,10 +6,10 @@ import math
 
 import pytest
 
-from harness.files.input_file import InputError
 from harness.files.mavlink.items import Item
 from harness.run_files.mission.program import Program, program
 from harness.run_files.mission.vertices import altitude_m
+from wayproof import InputError
 
 HOME = (47.0, 8.0)
 

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.files.input_file import InputError
 from harness.run_files.given_path import FloatArray
 from harness.run_files.mission.circle import end_of
 from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.route import LANDING_HEIGHT_M, mission_route
 from harness.run_files.mission.vertices import Flying, Ground, MissionRoute
+from wayproof import InputError
 
 TURN_M = 100.0
 
