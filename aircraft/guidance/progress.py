@@ -30,8 +30,8 @@ class RouteProgress:
     def __init__(self, route: Route, arc_length_m: float = 0.0) -> None:
         from aircraft import kernels  # half a second
 
-        self._nearest = kernels.nearest_on_route
         self.rows = route_rows(route)
+        self._nearest = kernels.nearest_on_route
         self._row, self._along_m = place_on_rows(self.rows, arc_length_m)
         self._segments: list[tuple[float, ...]] = [tuple(row) for row in self.rows.tolist()]
 
@@ -58,16 +58,10 @@ class RouteProgress:
         )
         self._row, self._along_m = row, along_m
         _, _, _, _, curvature_1pm, length_m, start_m, _, _ = self._segments[row]
-        return PathPoint(
-            east_m=east_m - cross_m * tangent_north,
-            north_m=north_m + cross_m * tangent_east,
-            tangent_east=tangent_east,
-            tangent_north=tangent_north,
-            curvature_1pm=curvature_1pm,
-            cross_track_m=cross_m,
-            arc_length_m=start_m + along_m,
-            past_end=length_m == math.inf and along_m > 0.0,
-        )
+        point = east_m - cross_m * tangent_north, north_m + cross_m * tangent_east
+        past_end = length_m == math.inf and along_m > 0.0
+        values = (*point, tangent_east, tangent_north, curvature_1pm, cross_m, start_m + along_m, past_end)
+        return tuple.__new__(PathPoint, values)  # faster than by name
 
 
 def measures_itself(law: object) -> bool:

@@ -118,28 +118,35 @@ class Navigator(StateEstimator):
         if self._perfect:
             return state
         state = delayed_state(self._past, state, self._navigation.latency_s)
-        if state.time_s < self._time_s:
-            raise ValueError(f"time goes back from {self._time_s:g} s to {state.time_s:g} s")
-        if state.time_s != self._time_s:
-            self._go_on(state.time_s, (state.east_m, state.north_m))
+        time_s, east_m, north_m, up_m, east_mps, north_mps, up_mps, heading_rad, *others = state
+        roll_rad, pitch_rad, true_airspeed_mps, *others = others
+        if time_s < self._time_s:
+            raise ValueError(f"time goes back from {self._time_s:g} s to {time_s:g} s")
+        if time_s != self._time_s:
+            self._go_on(time_s, (east_m, north_m))
         (fix_east, fix_north), (drift_east, drift_north) = self._fix_error, self._drift
         _, _, v_east, v_north, v_up, heading, airspeed, altitude = self._errors
         if self._outage >= 0:
             drift_mps = self._navigation.drift_share * state.groundspeed_mps
             east, north = self._directions[self._outage]
             v_east, v_north = v_east + drift_mps * east, v_north + drift_mps * north
-        airspeed_mps = max(0.0, state.airspeed_mps + airspeed)
-        self.held_errors = altitude, airspeed_mps - state.airspeed_mps
-        return state._replace(
-            east_m=state.east_m + fix_east + drift_east,
-            north_m=state.north_m + fix_north + drift_north,
-            up_m=state.up_m + altitude,
-            velocity_east_mps=state.velocity_east_mps + v_east,
-            velocity_north_mps=state.velocity_north_mps + v_north,
-            velocity_up_mps=state.velocity_up_mps + v_up,
-            heading_rad=(state.heading_rad + heading) % math.tau,
-            airspeed_mps=airspeed_mps,
+        airspeed_mps = max(0.0, true_airspeed_mps + airspeed)
+        self.held_errors = altitude, airspeed_mps - true_airspeed_mps
+        values = (
+            time_s,
+            east_m + fix_east + drift_east,
+            north_m + fix_north + drift_north,
+            up_m + altitude,
+            east_mps + v_east,
+            north_mps + v_north,
+            up_mps + v_up,
+            (heading_rad + heading) % math.tau,
+            roll_rad,
+            pitch_rad,
+            airspeed_mps,
+            *others,
         )
+        return tuple.__new__(AircraftState, values)  # a fifth of the time of `_replace`
 
     def _go_on(self, time_s: float, place: tuple[float, float]) -> None:
         """Advances the errors from the call before to this time."""

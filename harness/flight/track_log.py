@@ -35,6 +35,9 @@ ROW_STRUCT = struct.Struct(f"{len(AircraftState._fields) + 3}dq")
 
 NAMES = tuple(ROW_TYPE.fields or ())
 
+BELIEVED_STRUCT = struct.Struct("6d")
+"""`BELIEVED_TYPE` as the standard library writes it."""
+
 BELIEVED_TYPE = np.dtype(
     [
         (name, np.float64)
@@ -71,6 +74,7 @@ class TrackLog:
         self._rows = np.zeros(block_rows, ROW_TYPE)
         self._bytes, self._used = self._rows.data.cast("B"), 0
         self._beliefs = np.full(block_rows, math.nan, BELIEVED_TYPE)
+        self._believed_bytes = self._beliefs.data.cast("B")
         self._believes = False
         self._blocks: list[Track] = []
 
@@ -88,23 +92,26 @@ class TrackLog:
         lies `true_cross_track_m` beside the plan; `steering` has that of the believed one. A state that is not finite,
         with which control is lost, is no row of the track.
         """
+        cross_track_m = steering.cross_track_m
         if believed is not None:
             self._believes = True
-            self._beliefs[self._used] = (
+            BELIEVED_STRUCT.pack_into(
+                self._believed_bytes,
+                self._used * BELIEVED_STRUCT.size,
                 believed.east_m,
                 believed.north_m,
                 believed.up_m,
                 believed.velocity_east_mps,
                 believed.velocity_north_mps,
-                steering.cross_track_m,
+                cross_track_m,
             )
-            steering = steering._replace(cross_track_m=true_cross_track_m)
+            cross_track_m = true_cross_track_m
         ROW_STRUCT.pack_into(  # numpy takes twice as long to fill a row
             self._bytes,
             self._used * ROW_STRUCT.size,
             *state,
             steering.roll_command_rad,
-            steering.cross_track_m,
+            cross_track_m,
             steering.arc_length_m,
             plan_index,
         )
@@ -112,7 +119,7 @@ class TrackLog:
         if self._used == len(self._rows):
             self.hand_on()
         for told in self._row_sinks:
-            told(state, steering, plan_index)
+            told(state, steering._replace(cross_track_m=cross_track_m), plan_index)
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
