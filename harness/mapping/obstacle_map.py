@@ -123,10 +123,11 @@ class ObstacleMap(EdgePoints):
         """
         self._unconfirmed = False
         hits, places = self._hits(scan, ignored)
+        column, row, on_grid = self._column_and_row(places)
+        if not on_grid.all():
+            hits, places, column, row = hits[on_grid], places[on_grid], column[on_grid], row[on_grid]
         if self._shifted:
-            self._place_anew(scan, scan.ranges_m[hits], places)
-        _, _, on_grid = self._column_and_row(places)
-        hits, places = hits[on_grid], places[on_grid]
+            self._place_anew(scan, scan.ranges_m[hits], places, column * self._ny + row)
         if not len(hits):
             return
         rays, cell, join, first = len(scan.ranges_m), self._cell, self._join, self._first_score
@@ -155,20 +156,25 @@ class ObstacleMap(EdgePoints):
         for each in ((cells, found), *again):
             self._count_hits(*each)
 
-    def _place_anew(self, scan: RangeScan, ranges_m: FloatArray, places: ComplexArray) -> None:
+    def _place_anew(
+        self, scan: RangeScan, ranges_m: FloatArray, places: ComplexArray, cells: IntArray
+    ) -> None:
         """Moves edges within their cells to where they are seen now, if that is from much nearer by than before.
 
-        Ranges and places, from the corner of the grid, are those of the scan's hits.
+        Ranges, places, from the corner of the grid, and cells are those of the scan's hits.
         """
         new = self._points[len(self._seen_from_m) : self._count]  # came in with the scan before
         self._seen_from_m = np.concatenate((self._seen_from_m, np.abs(new - self._scanned_at)))
         self._scanned_at = complex(scan.east_m, scan.north_m)
-        column, row, on_grid = self._column_and_row(places)
-        among = (on_grid & (ranges_m < PLACED_ANEW * self._clearance)).nonzero()[0]
-        cells, first = np.unique(column[among] * self._ny + row[among], return_index=True)
-        held = self._slot[cells] >= 0
-        hits, slots = among[first[held]], self._slot[cells[held]]
+        hits = (ranges_m < PLACED_ANEW * self._clearance).nonzero()[0]
+        slots = self._slot[cells[hits]]
+        hits, slots = hits[slots >= 0], slots[slots >= 0]
         nearer = ranges_m[hits] < NEARER_SHARE * self._seen_from_m[slots]
+        if not nearer.any():
+            return
+        first = np.empty(self._count, dtype=np.intp)  # by slot: the first hit in its cell, which is set last
+        first[slots[::-1]] = hits[::-1]
+        nearer &= first[slots] == hits
         hits, slots = hits[nearer], slots[nearer]
         self._seen_from_m[slots] = ranges_m[hits]
         found = places[hits] + self._origin
