@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -23,9 +22,7 @@ from harness.campaign.runs import SEED_STREAM, CampaignRuns
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, node_of
 from harness.flight.record import FloatArray, IntArray
-from harness.run.path_check import origin_of, prepare_check
-from harness.run.path_flight import PathCheck
-from harness.run_files.path_files import read_path
+from harness.run.path_check import CheckedFile
 from harness.scenario.keys import NORMALS
 from harness.scenario.scenario import Scenario, overridden
 from harness.scenario.sections import UncertaintySpec
@@ -141,23 +138,10 @@ class Days(CampaignRuns):
 class PathDays(Days):
     """The days on which a given path is flown."""
 
-    def __init__(
-        self,
-        ask: Callable[[Settings], PathCheck],
-        content: str,
-        command: Sequence[str],
-        vary: Vary,
-        **terms: Any,
-    ) -> None:
-        """Prepares the days; nothing is flown. `terms` are those of `Days`; the root seed is the scenario's.
-
-        `ask`: prepares the check of the path, with some keys of its scenario replaced.
-        `content`: all that the path consists of, as text; a change of it makes other days.
-        `command`: words of the command that flies the path, without those that differ between days.
-        """
-        self._ask, self._command = ask, command
-        self._digest = sha256(content.encode()).hexdigest()
-        scenario = ask(()).scenario
+    def __init__(self, path: CheckedFile, vary: Vary, **terms: Any) -> None:
+        """Prepares the days; nothing is flown. `terms` are those of `Days`; the root seed is the scenario's."""
+        self._path = path
+        scenario = path.prepared().scenario
         keys = {
             "schema": "wayproof/scenario/1",
             "name": scenario.name,
@@ -168,7 +152,7 @@ class PathDays(Days):
             Base(scenario.name, "command line", node_of(keys, COMMAND_LINE)),
             vary,
             seed=scenario.seed,
-            **terms,
+            **{**terms, "sources": ((), path.laws)},
         )
         self._fixed = scenario.normals is not None
 
@@ -179,23 +163,22 @@ class PathDays(Days):
 
     def _drawn_scenario(self, number: int, overrides: Settings) -> Scenario:
         try:
-            return self._ask([*self._settings(number), *overrides]).scenario
+            return self._path.prepared([*self._settings(number), *overrides]).scenario
         except InputError as error:
             raise InputError(f"{error} (day {number})") from error
 
     def job(self, number: int, folder: Path) -> Job:
         """Day `number` as it is handed to who flies it."""
         job = super().job(number, folder)
-        return job if job.cannot_fly else replace(job, path=self._ask(self._settings(number)))
+        return job if job.cannot_fly else replace(job, path=self._path.prepared(self._settings(number)))
 
     def again(self, number: int, folder: Path) -> str:
         """Returns the command that flies day `number` again."""
-        words = [word for pair in self._settings(number) for word in ("--set", "=".join(pair))]
-        return shlex.join([*self._command, *words])
+        return shlex.join(self._path.words(self._settings(number)))
 
     def plain(self) -> dict[str, Any]:
         """All that says what is flown, and what is claimed."""
-        return {**super().plain(), "path": self._digest}
+        return {**super().plain(), "path": sha256(self._path.content().encode()).hexdigest()}
 
 
 def distributions(vary: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -251,7 +234,12 @@ def days_of(
     `as-given`; `world`: of a path, a scenario file with obstacles, bounds and air; `terms`: as `Days` takes them.
     """
     if is_path(subject):
-        return _path_days(subject, settings, vary, world, {**terms, "claim": claim or "as-given"})
+        given = dict(settings)
+        if "planner.kind" in given:
+            raise InputError("wayproof: a planner goes with a scenario; a path is flown as given")
+        keys = settings if "aircraft.model" in given else [("aircraft.model", DEFAULT_AIRCRAFT), *settings]
+        file = CheckedFile(Path(subject), keys, world, laws=terms["sources"][1])
+        return PathDays(file, vary, claim=claim or "as-given", **terms)
     if world is not None:
         raise InputError("wayproof: a world goes with a path; a scenario is one already")
     if claim == "as-given":
@@ -264,27 +252,3 @@ def days_of(
     root_seed = seed.value if seed is not None and type(seed.value) is int else DEFAULT_SEED
     base = Base(path.name, str(path), absolute_paths(root, path.absolute().parent))
     return Days(base, vary, claim=claim or "reached", seed=root_seed, **terms)
-
-
-def _path_days(
-    subject: str, settings: Settings, vary: Vary, world: Path | None, terms: Mapping[str, Any]
-) -> Days:
-    given, others = dict(settings), [each for each in settings if each[0] != "aircraft.model"]
-    named = given.get("aircraft.model", DEFAULT_AIRCRAFT)
-    model = strict_yaml.parse(named, "command line: aircraft.model").plain()
-    if "planner.kind" in given:
-        raise InputError("wayproof: a planner goes with a scenario; a path is flown as given")
-    file = Path(subject)
-    path = read_path(file, "mission.altitude_m" in given, origin_of(world))
-    content = file.read_bytes().hex() + repr((model, others, world and world.read_text()))
-    name = (re.sub(r"[^a-z0-9._-]+", "-", file.stem.lower()).strip("-.") or "path")[:100]
-
-    def ask(replaced: Settings) -> PathCheck:
-        return prepare_check(
-            path, [("aircraft.model", json.dumps(model)), *others, *replaced], world=world, name=name
-        )
-
-    words = ["wayproof", "check", subject, "--aircraft", model]
-    words += ["--scenario", str(world)] if world else []
-    words += [word for pair in others for word in ("--set", "=".join(pair))]
-    return PathDays(ask, content, words, vary, **terms)

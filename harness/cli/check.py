@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -13,7 +11,7 @@ import typer
 from harness.cli.command_line import FAILED, flying_into, print_json, told_apart
 from harness.cli.flight_rows import verdict_rows
 from harness.cli.options import AircraftName, Count, Json, NoRecording, Number, Out, Quiet, argument, option
-from harness.cli.replacing import NOTHING, Given, replacing, sources
+from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say
 
 if TYPE_CHECKING:
@@ -60,8 +58,7 @@ def check(
     1 flown, but not as given
     2 bad input or usage, nothing flown
     """
-    from harness.run.path_check import origin_of, prepare_check
-    from harness.run_files.path_files import read_path
+    from harness.run.path_check import CheckedFile
     from harness.scenario.shipped import scenario_path
 
     if corner_m is not None and not 0.0 <= corner_m < math.inf:
@@ -74,19 +71,8 @@ def check(
         trackability__altitude_m=altitude_tolerance_m,
     ).keys
     world = None if scenario is None else scenario_path(scenario)
-    points = read_path(path, altitude_m is not None, origin_of(world))
-
-    def on_day(day: Sequence[tuple[str, str]]) -> PathCheck:
-        return prepare_check(
-            points,
-            [*replaced, *day],
-            world=world,
-            altitude_m=altitude_m,
-            corner_m=corner_m,
-            name=(re.sub(r"[^a-z0-9._-]+", "-", path.stem.lower()).strip("-.") or "path")[:100],
-        )
-
-    check = on_day(())
+    told = CheckedFile(path, replaced, world, altitude_m, corner_m, given.sources[1])
+    check = told.prepared()
     beside = {"scenario": scenario, "altitude_m": altitude_m, "corner_m": corner_m}
     differs = [(name, str(value)) for name, value in beside.items() if value is not None]
     apart = told_apart([*differs, *replaced], named=("aircraft.model",))
@@ -100,23 +86,9 @@ def check(
         from harness.certification.days import PathDays
         from harness.cli.certify import fly_path_days
 
-        content = f"{path.read_bytes().hex()} {differs} {replaced} {world and world.read_text()}"
-        again = ["wayproof", "check", str(path), "--aircraft", aircraft, *_words(differs, given, replaced)]
-        drawn = PathDays(on_day, content, again, {}, claim="as-given", most=days, purpose="band")
+        drawn = PathDays(told, {}, claim="as-given", most=days, purpose="band")
         fly_path_days(drawn, folder, silent=quiet or as_json)
     return 0 if metrics["check"]["ok"] else FAILED
-
-
-def _words(
-    differs: Sequence[tuple[str, str]], given: Given, replaced: Sequence[tuple[str, str]]
-) -> list[str]:
-    """Returns the options of a check with which a day is flown again: its own, its law, the keys replaced."""
-    from harness.scenario.kinds import source_words
-
-    words = [word for name, value in differs for word in (f"--{name.replace('_', '-')}", value)]
-    own = ("aircraft.model", *(["guidance.kind"] if sources(given.guidance) else []))
-    words += [word for key, value in replaced if key not in own for word in ("--set", f"{key}={value}")]
-    return [*source_words(None, given.guidance), *words]
 
 
 def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -26,7 +27,7 @@ from harness.run.scenario_flight import (
     make_loop,
 )
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
-from harness.run_files.path_files import PathAsGiven
+from harness.run_files.path_files import PathAsGiven, read_path
 from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of
 from harness.scenario.obstacles import WorldFile
@@ -57,6 +58,48 @@ def origin_of(world: FilePath | None) -> tuple[float, float] | None:
     if area is None or "origin" not in area.model_fields_set:
         return None
     return area.origin.latitude_deg, area.origin.longitude_deg
+
+
+@dataclass(frozen=True)
+class CheckedFile:
+    """The file of a path and what `wayproof check` is told of it: keys of a scenario, `aircraft.model` among them.
+
+    World, altitude and corner are as `prepare_check` has them; `laws` are guidance laws as FILE.py:NAME or MODULE:NAME.
+    """
+
+    file: FilePath
+    settings: Sequence[tuple[str, str]]
+    world: FilePath | None = None
+    altitude_m: float | None = None
+    corner_m: float | None = None
+    laws: tuple[str, ...] = ()
+
+    @cached_property
+    def given(self) -> PathAsGiven:
+        """The path; its altitudes are left out where another is set."""
+        level = self.altitude_m is not None or "mission.altitude_m" in dict(self.settings)
+        return read_path(self.file, level, origin_of(self.world))
+
+    def prepared(self, day: Sequence[tuple[str, str]] = ()) -> PathCheck:
+        """Prepares its check, with further keys of a day; errors as `prepare_check`."""
+        name = (re.sub(r"[^a-z0-9._-]+", "-", self.file.stem.lower()).strip("-.") or "path")[:100]
+        beside: dict[str, Any] = {"altitude_m": self.altitude_m, "corner_m": self.corner_m}
+        return prepare_check(self.given, [*self.settings, *day], world=self.world, name=name, **beside)
+
+    def words(self, day: Sequence[tuple[str, str]] = ()) -> list[str]:
+        """Returns the command that checks it again, with further keys of a day."""
+        model = strict_yaml.parse(dict(self.settings)["aircraft.model"], "aircraft.model").plain()
+        beside = {"--scenario": self.world, "--altitude-m": self.altitude_m, "--corner-m": self.corner_m}
+        told = [("--aircraft", model), *(("--guidance", law) for law in self.laws)]
+        told += [(option, str(value)) for option, value in beside.items() if value is not None]
+        own = ("aircraft.model", *("guidance.kind" for _ in self.laws))
+        told += [("--set", f"{key}={value}") for key, value in (*self.settings, *day) if key not in own]
+        return ["wayproof", "check", str(self.file), *(word for pair in told for word in pair)]
+
+    def content(self) -> str:
+        """Returns all that it consists of, as text: a change of it makes other days."""
+        beside = self.settings, self.altitude_m, self.corner_m, self.world and self.world.read_text()
+        return f"{self.file.read_bytes().hex()} {beside}"
 
 
 def prepare_check(

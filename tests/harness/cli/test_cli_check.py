@@ -328,15 +328,18 @@ def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
 
 
 @pytest.mark.flights
-def test_a_failing_day_is_flown_again_by_the_command_of_its_manifest(tmp_path: Path) -> None:
-    path = tmp_path / "line.csv"
+@pytest.mark.parametrize("command", ["check", "certify"])
+def test_a_failing_day_is_flown_again_by_the_command_of_its_manifest(command: str, tmp_path: Path) -> None:
+    """With a guidance law of one's own, which the processes that fly and the command have to import."""
+    path, law = tmp_path / "line.csv", tmp_path / "law.py"
     path.write_text("x_m,y_m\n0,0\n1500,0\n")
-    run = ["check", str(path), "--aircraft", "aerosonde", "--conditions", "typical", "--quiet"]
-    run += ["--altitude-m", "700", "--seed", "9"]
-    run += ["--tolerance-m", "0.01", "--set", "aircraft.autopilot.bank_limit_deg=40"]
-    assert main([*run, "--days", "1", "--out", str(tmp_path / "run")]) == 1
-    (day,) = (tmp_path / "run" / "days" / "runs").iterdir()
-    (command,) = json.loads((day / "manifest.json").read_text())["command"]
-    assert main([*shlex.split(command)[1:], "--no-recording", "--out", str(tmp_path / "again")]) == 1
-    again, flown_day = load_run(tmp_path / "again"), load_run(day)
-    assert again.metrics["digest"] == flown_day.metrics["digest"]
+    law.write_text("from aircraft.guidance.registry import BUILT_IN\nLAW = BUILT_IN[-1]\n")
+    run = [command, str(path), "--aircraft", "aerosonde", "--conditions", "typical", "--quiet", "--seed", "9"]
+    run += ["--guidance", f"{law}:LAW", "--set", "trackability.cross_track_m=0.01"]
+    run += ["--set", "aircraft.autopilot.bank_limit_deg=40", "--out", str(tmp_path / "run")]
+    own = ["--altitude-m", "700", "--days", "1"] if command == "check" else ["--runs", "1"]
+    assert main([*run, *own]) == 1
+    (day,) = (tmp_path / "run").glob("**/runs/0")
+    (again,) = json.loads((day / "manifest.json").read_text())["command"]
+    assert main([*shlex.split(again)[1:], "--no-recording", "--out", str(tmp_path / "again")]) == 1
+    assert load_run(tmp_path / "again").metrics["digest"] == load_run(day).metrics["digest"]
