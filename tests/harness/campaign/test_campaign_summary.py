@@ -28,7 +28,7 @@ from harness.cli.sweep import print_summary
 from harness.files.wording import printable
 from tests.examples import examples
 from tests.page import shown
-from wayproof import InputError
+from wayproof import InputError, load_campaign
 
 SCHEMA = pa.schema(
     [(name, pa.int64()) for name in ("run", "case", "seed")]
@@ -124,7 +124,9 @@ def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
     rows = [row(run, length_ratio=ratio) for run, ratio in enumerate(ratios)]
     rows.append(row(3, "collision", min_clearance_m=-1.0, clearance_violation_s=4.0, trackable=False))
     rows.append(row(4, "error"))
-    total = summarise(campaign(tmp_path, rows, [(1, 5, 9), (2, 6, 8), (3, 4, 7), (4, 4, 4), (9, 9, 9)])).total
+    total = load_campaign(
+        campaign(tmp_path, rows, [(1, 5, 9), (2, 6, 8), (3, 4, 7), (4, 4, 4), (9, 9, 9)])
+    ).summary.total
     assert total == Cell(
         runs=5,
         reached=3,
@@ -158,14 +160,14 @@ def test_tables_by_two_keys_split_the_runs(tmp_path: Path) -> None:
     assert two.cells[1][3].least_clearance_m == -2.5
     assert (one.cells[0][0].runs, one.cells[0][0].reached) == (24, 22)
     assert two.cells[1][3].planner_max_ms == 30.0
-    by_default = summarise(tmp_path / "c")
+    by_default = load_campaign(tmp_path / "c").summary
     assert by_default.varied == ("planner", WIND, "sensor.rays")
     keys = [(table.rows.key, table.columns and table.columns.key) for table in by_default.tables]
     assert keys == [("planner", WIND), ("planner", "sensor.rays"), (WIND, "sensor.rays")]
 
 
 def test_planners_are_compared_in_pairs(tmp_path: Path) -> None:
-    (duel,) = summarise(by_two(tmp_path / "c")).duels
+    (duel,) = load_campaign(by_two(tmp_path / "c")).summary.duels
     assert (duel.first, duel.second, duel.pairs) == ("rolling_window", "bug2", 12)
     assert (duel.only_first, duel.only_second, duel.both_reached) == (2, 0, 10)
     figures = {each.figure: each for each in duel.figures}
@@ -205,7 +207,7 @@ def test_scenarios_are_told_apart_where_each_is_flown_in_every_world(tmp_path: P
         row(run, "reached" if scenario == "storm" else "collision", scenario=scenario, world=world)
         for run, (scenario, world) in enumerate(places)
     ]
-    summary = summarise(campaign(tmp_path, rows))
+    summary = load_campaign(campaign(tmp_path, rows)).summary
     (first, *_) = summary.tables
     assert first.columns is not None
     assert (first.rows.key, first.columns.key) == ("world", "scenario")
@@ -216,7 +218,7 @@ def test_worlds_that_were_flown_once_each_make_no_table(tmp_path: Path) -> None:
     rows = [row(run, world=f"field_{run}.yaml", scenario=f"field_{run}", case=run) for run in range(6)]
     twice = [row(6 + each["run"], **{key: each[key] for key in ("world", "scenario")}) for each in rows]
     for name, flown, expected in (("alone", rows, False), ("twice", rows + twice, True)):
-        tables = summarise(campaign(tmp_path / name, flown)).tables
+        tables = load_campaign(campaign(tmp_path / name, flown)).summary.tables
         assert ("world" in {table.rows.key for table in tables}) == expected
 
 
@@ -260,7 +262,7 @@ def test_entries_of_one_kind_are_told_apart_and_paired(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = entries_campaign(tmp_path / "c")
-    summary = summarise(folder)
+    summary = load_campaign(folder).summary
     names = ["rolling_window, clearance_m 40", "rolling_window, steps 8", "bug2"]
     duels_told = [(duel.first, duel.second, duel.pairs) for duel in summary.duels]
     assert duels_told == [(*pair, 2) for pair in itertools.combinations(names, 2)]
@@ -274,7 +276,7 @@ def test_a_table_that_says_nonsense_of_its_campaign_is_damaged(tmp_path: Path, a
     rows = pq.read_table(folder / "results.parquet").replace_schema_metadata({"wayproof": about})
     pq.write_table(rows, folder / "results.parquet")
     with pytest.raises(InputError, match="is not the results"):
-        summarise(folder)
+        load_campaign(folder)
 
 
 @pytest.mark.parametrize("name", ["results.parquet", "timings.parquet"])
@@ -292,7 +294,7 @@ def test_an_edited_table_is_refused(name: str, tmp_path: Path, capsys: pytest.Ca
 
 def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = entries_campaign(tmp_path / "c")
-    summary = summarise(folder)
+    summary = load_campaign(folder).summary
     assert (summary.planned, summary.missing) == (8, 2)
     print_summary(summary)
     out = capsys.readouterr().out
@@ -335,7 +337,7 @@ def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
     (folder / "runs" / "6").mkdir(parents=True)
     (folder / "runs" / "6" / "flight.rrd").touch()
     (folder / "runs" / "5").mkdir()
-    worst = summarise(folder).worst
+    worst = load_campaign(folder).summary.worst
     assert [run.run for run in worst] == [6, 5, 4, 3, 0, 7]
     assert [(run.folder, run.view) for run in worst[:3]] == [
         ("runs/6", f"wayproof view '{folder}/runs/6'"),
@@ -344,7 +346,7 @@ def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
     ]
     assert worst[0].clearance_ratio == pytest.approx(-0.18)
     assert worst[0].command == f"wayproof fly --from '{folder}/results.parquet' --run 6"
-    page = write_summary(summarise(folder), folder).read_text()
+    page = write_summary(load_campaign(folder).summary, folder).read_text()
     assert 'href="runs/6/flight.rrd"' in page
     assert 'href="runs/5/flight.rrd"' not in page
     assert '</strong> the wanted 50 m. <a href="runs/6">Run folder</a>' in page
@@ -356,12 +358,12 @@ def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
 def test_where_nothing_failed_the_three_closest_are_shown(tmp_path: Path) -> None:
     rows = [row(run, min_clearance_m=100.0 - run) for run in range(6)]
     folder = campaign(tmp_path / "fine", rows)
-    summary = summarise(folder)
+    summary = load_campaign(folder).summary
     assert [run.run for run in summary.worst] == [5, 4, 3]
     assert "No run failed" in write_summary(summary, folder).read_text()
     for each in rows:
         del each["wanted_clearance_m"]
-    worst = summarise(campaign(tmp_path / "unknown", rows)).worst
+    worst = load_campaign(campaign(tmp_path / "unknown", rows)).summary.worst
     assert [(run.run, run.clearance_ratio) for run in worst] == [(5, None), (4, None), (3, None)]
 
 
@@ -407,7 +409,7 @@ def test_every_number_has_one_group_between_its_edges(values: list[float | None]
 
 def test_a_terminal_of_80_columns_shows_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = by_two(tmp_path / "c")
-    print_summary(summarise(folder), all_tables=True)
+    print_summary(load_campaign(folder).summary, all_tables=True)
     printed = capsys.readouterr().out
     lines = printed.splitlines()
     assert max(map(len, lines[:-1])) <= 80
@@ -417,7 +419,7 @@ def test_a_terminal_of_80_columns_shows_it(tmp_path: Path, capsys: pytest.Captur
     assert lines[-1] == f"again: wayproof fly --from {tmp_path}/c/results.parquet --run 21"
     (folder / "runs" / "21").mkdir(parents=True)
     (folder / "runs" / "21" / "flight.rrd").touch()
-    print_summary(summarise(folder))
+    print_summary(load_campaign(folder).summary)
     assert capsys.readouterr().out.splitlines()[-1] == f"view: wayproof view {folder}/runs/21"
 
 
@@ -465,7 +467,7 @@ def test_a_run_folder_has_no_keys_and_damage_is_told(
     assert main(["report", str(tmp_path)]) == 2
     assert "results.parquet: is not the results.parquet of a campaign" in capsys.readouterr().err
     with pytest.raises(InputError, match="not the folder of a campaign"):
-        summarise(tmp_path / "none")
+        load_campaign(tmp_path / "none")
 
 
 def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
@@ -474,7 +476,7 @@ def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
     rows[0] |= {"trackable": True, "trackability.causes": ""}
     rows[13] |= {"trackability.causes": "navigation error; planner too late"}
     folder = campaign(tmp_path / "c", rows)
-    summary = summarise(folder)
+    summary = load_campaign(folder).summary
     assert summary.untracked == {"navigation error": 18, "navigation error; planner too late": 1}
     page = write_summary(summary, folder).read_text()
     assert "In 19 of 20 runs not every leg was tracked, for these causes:" in page
@@ -526,7 +528,7 @@ def test_a_table_for_a_paper_has_the_groups_and_all_runs(
 @pytest.mark.flights
 def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: Any) -> None:
     folder = by_two(tmp_path / "c")
-    summary: Summary = summarise(folder)
+    summary: Summary = load_campaign(folder).summary
     page = write_summary(summary, folder)
     assert "<b>boom" not in page.read_text()
     for width_px in (400, 1280):
@@ -539,7 +541,7 @@ def test_what_never_happened_has_an_upper_bound(tmp_path: Path, capsys: pytest.C
     """Of 0 of 286, Clopper and Pearson's bound at 95 % is 1.04 %: 0.98959^286 = 0.05."""
     rows = [row(run, "collision" if run == 9 else "reached") for run in range(286)]
     folder = campaign(tmp_path / "c", rows)
-    summary = summarise(folder)
+    summary = load_campaign(folder).summary
     told = "lost control, out of bounds: 0 of 286, each less frequent than 1.04 % at 95 % confidence"
     assert summary.never == told
     print_summary(summary)

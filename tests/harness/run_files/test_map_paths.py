@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from harness.run_files.path_files import read_path
-from wayproof import InputError
+from wayproof import InputError, check
 
 LINE = "8.0,47.0,500 8.01,47.01,520\n 8.03,47.02,540"
 SQUARE = "8,47,9 8.01,47,9 8.01,47.01,9 8,47.01,9 8,47,9"
@@ -102,7 +102,7 @@ def test_says_what_is_wrong_with_a_kmz(data: bytes, sentence: str, tmp_path: Pat
     path = tmp_path / "a.kmz"
     path.write_bytes(data)
     with pytest.raises(InputError) as fault:
-        read_path(path)
+        check(path)
     assert str(fault.value).startswith(f"{path}{sentence}")
     assert len(str(fault.value).splitlines()) == 1
 
@@ -201,7 +201,7 @@ def test_says_what_is_wrong(name: str, text: str, sentence: str, tmp_path: Path)
     path = tmp_path / name
     path.write_text(text)
     with pytest.raises(InputError) as fault:
-        read_path(path)
+        check(path)
     assert str(fault.value).startswith(f"{path}:")
     assert sentence in str(fault.value)
     assert len(str(fault.value).splitlines()) == 1

@@ -13,7 +13,7 @@ from pyproj import Geod
 from harness.run_files.mission.program import MissionStep
 from harness.run_files.mission.vertices import altitude_m
 from harness.run_files.path_files import read_path
-from wayproof import InputError
+from wayproof import InputError, check
 
 WGS84 = Geod(ellps="WGS84")
 POINTS = [(47.0, 8.0), (47.1, 8.0), (47.1, 8.4)]
@@ -122,7 +122,7 @@ def test_an_altitude_that_cannot_be_flown_is_told_of_the_file(altitude: float, t
         "--altitude-m"
     )
     with pytest.raises(InputError, match=told):
-        read_path(path)
+        check(path)
     assert len(read_path(path, any_altitude=True).altitudes_m) == 0
 
 
@@ -199,7 +199,7 @@ def test_says_where_and_what_is_wrong(name: str, text: str, sentence: str, tmp_p
     path = tmp_path / name
     path.write_text(text)
     with pytest.raises(InputError) as fault:
-        read_path(path)
+        check(path)
     assert str(fault.value).startswith(f"{path}:")
     assert sentence in str(fault.value)
     assert len(str(fault.value).splitlines()) == 1
@@ -212,7 +212,7 @@ def test_says_where_and_what_is_wrong(name: str, text: str, sentence: str, tmp_p
 def test_says_what_cannot_be_read(name: str, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(InputError, match=sentence):
-        read_path(tmp_path / name)
+        check(tmp_path / name)
 
 
 def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_path: Path) -> None:
@@ -241,7 +241,7 @@ def test_parameters_that_are_no_number_are_left_to_the_autopilot_and_places_must
     assert len(steps_of(path)) == 3
     path.write_text(wpl(line(1, 0, 3, 16, 0, 0, 0, 0, "nan", 8.0, 120, 1), *wpl_items()[1:]))
     with pytest.raises(InputError, match=":3: field 9 is nan; a place must have latitude and longitude"):
-        read_path(path)
+        check(path)
 
 
 @pytest.mark.parametrize(
@@ -262,12 +262,12 @@ def test_no_altitude_is_not_an_altitude_of_zero(
     path = tmp_path / "a.plan"
     path.write_text(plan(item(0, 0, doJumpId=1, command=command, frame=frame, params=params), last))
     with pytest.raises(InputError, match=rf"items\[0\].params\[6\]: is null; a {name} must have an altitude"):
-        read_path(path)
+        check(path)
     path = tmp_path / "a.waypoints"
     cells = ["nan" if each is None else each for each in params]
     path.write_text(wpl(line(1, 0, frame, command, *cells, 1), *wpl_items()[1:]))
     with pytest.raises(InputError, match=f":3: field 11 is nan; a {name} must have an altitude"):
-        read_path(path)
+        check(path)
     here = item(0, 0, doJumpId=2, command=19, params=[9, 0, 0, None, None, None, None])
     path = tmp_path / "b.plan"
     path.write_text(plan(first, here, last))
@@ -296,7 +296,7 @@ def test_a_place_that_is_none_is_told_by_the_number_of_its_item(tmp_path: Path) 
         wpl(line(1, 0, 2, 183, *(0,) * 7, 1), *wpl_items()[1:], line(4, 0, 3, 16, 0, 0, 0, 0, 91, 8, 9, 1))
     )
     with pytest.raises(InputError, match="item 4 is at latitude 91, longitude 8; must be degrees"):
-        read_path(path)
+        check(path)
 
 
 def test_a_first_waypoint_that_is_numbered_1_and_above_home_is_no_home(tmp_path: Path) -> None:
@@ -325,4 +325,4 @@ def test_what_a_plan_does_not_know_of_home_is_null(
     content["mission"]["plannedHomePosition"] = [None, 8, 9]
     path.write_text(json.dumps(content))
     with pytest.raises(InputError, match=r"plannedHomePosition\[0\]: is missing, or null; must be a finite"):
-        read_path(path)
+        check(path)

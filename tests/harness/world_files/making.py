@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 from PIL import Image, TiffImagePlugin
 
+from tests.scenarios import scenario_of
+from wayproof import Scenario
+
 SHARED = Path(__file__).parents[4] / "shared" / "real"
 """Real files, beside the checkout; where they are not, what needs them is skipped."""
 
@@ -46,6 +49,15 @@ def feature(properties: dict[str, Any], ring: Sequence[Sequence[float]] = SQUARE
 def geojson(path: Path, *features: dict[str, Any]) -> Path:
     path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     return path
+
+
+def scenario_with(path: Path, **keys: Any) -> Scenario:
+    """A scenario at 300 m, whose obstacles are those of a file."""
+    obstacles = [{"file": {"path": str(path), **keys}}]
+    ends = "area: {bounds_m: [0, 0, 9000, 9000]}, mission: {start_m: [999, 999], goal_m: [8000, 8000]}"
+    return scenario_of(
+        f"{{schema: wayproof/scenario/1, name: s, {ends}, obstacles: {json.dumps(obstacles)}}}"
+    )
 
 
 def zipped(path: Path, **members: bytes) -> Path:

@@ -13,7 +13,16 @@ import pytest
 from harness.cli.app import main
 from harness.world_files.kinds import read
 from harness.world_files.parts import Reading
-from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, npy, osm, zipped
+from tests.harness.world_files.making import (
+    SQUARE,
+    feature,
+    geojson,
+    geotiff,
+    npy,
+    osm,
+    scenario_with,
+    zipped,
+)
 from wayproof import InputError
 
 BOMB = '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "lol"><!ENTITY b "&a;&a;">]><osm>&b;</osm>'
@@ -119,7 +128,7 @@ def test_a_hostile_file_is_told_in_one_sentence(
     make: Callable[[Path], Path], sentence: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=sentence) as caught:
-        read(make(tmp_path), None, Reading())
+        scenario_with(make(tmp_path))
     assert "\n" not in str(caught.value)
 
 
@@ -176,7 +185,7 @@ def test_a_key_that_the_kind_of_a_file_does_not_use_is_refused_with_its_line(
 def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is a pipe"):
-        read(tmp_path / "pipe", None, Reading())
+        scenario_with(tmp_path / "pipe")
 
 
 def test_a_self_crossing_ring_is_made_valid(tmp_path: Path) -> None:

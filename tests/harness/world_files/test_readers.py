@@ -15,7 +15,7 @@ from harness.world_files.kinds import kind_of, read
 from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Reading
 from harness.world_files.plane import Mapping, Place
 from harness.world_files.readers.limits import limit_of
-from tests.harness.world_files.making import SQUARE, feature, geojson, osm, zipped
+from tests.harness.world_files.making import SQUARE, feature, geojson, osm, scenario_with, zipped
 from wayproof import InputError
 
 
@@ -233,7 +233,7 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
     lifted = path.read_text().replace("<Polygon>", f"<Polygon>{offset}").replace("<kml ", f"<kml {GX} ")
     path.with_name("b.kml").write_text(lifted)
     with pytest.raises(InputError, match="has gx:altitudeOffset, which is not read"):
-        read_any(path.with_name("b.kml"))
+        scenario_with(path.with_name("b.kml"))
     packed = zipped(tmp_path / "a.kmz", doc__kml=path.read_bytes())
     assert [part.top for part in read_any(packed).parts] == [part.top for part in found.parts]
 
@@ -281,4 +281,4 @@ def test_the_name_of_a_group_stands_for_its_kinds_and_no_others(tmp_path: Path) 
     path.write_text("type octile\nheight 1\nwidth 1\nmap\n@\n")
     assert read(path, "occupancy", Reading()).kind == "moving_ai"
     with pytest.raises(InputError, match="is of the kind moving_ai, not terrain; leave kind out"):
-        read(path, "terrain", Reading())
+        scenario_with(path, kind="terrain")

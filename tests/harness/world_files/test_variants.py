@@ -12,7 +12,7 @@ import pytest
 
 from harness.world_files.kinds import read
 from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Reading
-from tests.harness.world_files.making import feature, geojson
+from tests.harness.world_files.making import feature, geojson, scenario_with
 from wayproof import InputError
 
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of rasterio's own
@@ -61,7 +61,7 @@ def test_a_geotiffs_heights_are_metres_or_it_is_refused(
                 setattr(file, name, how[name])
     if metres is None:
         with pytest.raises(InputError, match=r"has heights in (ft|US survey foot); make them metres"):
-            read_any(path)
+            scenario_with(path)
         return
     terrain = read_any(path).terrain
     assert terrain is not None
@@ -220,7 +220,7 @@ def test_a_sequence_of_city_features_has_vertices_a_line(tmp_path: Path) -> None
         (1000.0, 2000.0), (1100.0, 2000.0), (1200.0, 2000.0)
     ]  # fmt: skip
     with pytest.raises(InputError, match="'b2' with a vertex that is not there"):
-        read_any(written(tmp_path / "b.city.jsonl", text.replace("[2010.0, 0.0, 7.0], ", "")))
+        scenario_with(written(tmp_path / "b.city.jsonl", text.replace("[2010.0, 0.0, 7.0], ", "")))
 
 
 @pytest.mark.parametrize(
@@ -288,7 +288,7 @@ def test_coordinates_that_are_no_degrees_ask_for_their_system(place: list[float]
     ring = [place, [place[0] + 0.5, place[1]], [place[0], place[1] + 0.5], place]
     path = written(tmp_path / "a.geojson", json.dumps({"type": "Polygon", "coordinates": [ring]}))
     with pytest.raises(InputError, match="for a longitude and a latitude; must be degrees, or give crs"):
-        read_any(path)
+        scenario_with(path)
     if place[0] > 1e6:
         assert len(read_any(path, crs="EPSG:2056").parts) == 1
 
@@ -308,7 +308,7 @@ def test_openstreetmap_that_osmium_would_pass_over_is_refused(
     body: str, sentence: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=sentence):
-        read_any(written(tmp_path / "a.osm", f'<osm version="0.6">{body}</osm>'))
+        scenario_with(written(tmp_path / "a.osm", f'<osm version="0.6">{body}</osm>'))
 
 
 def test_a_city_is_in_metres_and_its_templates_are_told(tmp_path: Path) -> None:
@@ -320,7 +320,7 @@ def test_a_city_is_in_metres_and_its_templates_are_told(tmp_path: Path) -> None:
     }
     path = written(tmp_path / "a.json", json.dumps(city("urn:ogc:def:crs:EPSG::2263", objects, vertices)))
     with pytest.raises(InputError, match="has heights in US survey foot; make them metres, or give a crs"):
-        read_any(path)
+        scenario_with(path)
     found = read_any(path, crs="EPSG:2263+5703")
     (part,) = found.parts
     assert (part.bottom.height_m, part.top.height_m) == (10.0, 40.0)
@@ -366,4 +366,4 @@ def test_limits_of_geozones_in_their_unit(
     assert [part.top.height_m for part in found.parts] == pytest.approx([top_m])
     assert found.notes == ()
     with pytest.raises(InputError, match="has limits in 'nm'; must be in m, ft or FL"):
-        read_any(written(tmp_path / "b.json", json.dumps(content).replace(json.dumps(uom), '"NM"')))
+        scenario_with(written(tmp_path / "b.json", json.dumps(content).replace(json.dumps(uom), '"NM"')))

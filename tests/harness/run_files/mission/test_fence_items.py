@@ -11,7 +11,7 @@ from harness.run_files.mission.mission_files import read_waypoints
 from harness.run_files.path_files import read_path
 from harness.world_files.kinds import read as read_world
 from harness.world_files.parts import Reading
-from wayproof import InputError
+from wayproof import InputError, check
 
 CORNERS = [(46.99, 7.99), (47.03, 7.99), (47.03, 8.01), (46.99, 8.01)]
 PLACES = [(47.0, 8.0), (47.02, 8.0)]
@@ -48,7 +48,7 @@ def test_a_fence_about_home(tmp_path: Path) -> None:
     path = tmp_path / "fence.txt"
     path.write_text("QGC WPL 110\n0 0 0 5005 50 0 0 0 0 0 0 0\n")
     with pytest.raises(InputError, match="no items to fly to, but 1 fence item and 0 rally points"):
-        read_path(path)
+        check(path)
     with pytest.raises(InputError, match="is a fence about home, which has no position"):
         read_world(path, None, Reading())
     path.write_text(wpl(*WAYPOINTS, (5005, 50.0, 0.0, 0.0)))
@@ -130,5 +130,5 @@ def test_what_is_no_mission_is_told(text: str, said: str, tmp_path: Path) -> Non
     path = tmp_path / "m.txt"
     path.write_text(text)
     with pytest.raises(InputError) as fault:
-        read_path(path)
+        check(path)
     assert said in str(fault.value)

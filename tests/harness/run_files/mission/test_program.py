@@ -36,16 +36,27 @@ def told(done: Program) -> dict[int, tuple[str, str]]:
     return {each.item: (each.what, each.why) for each in done.items}
 
 
-def test_a_jump_is_taken_as_often_as_it_says() -> None:
-    done = run(at(1), at(2), at(3), item(4, 177, 2, 2), at(5))
-    assert flown(done) == [1, 2, 3, 2, 3, 2, 3, 5]
+FORWARD = (item(1, 177, 4, -1), at(2), at(3), at(4), at(5), item(6, 177, 4, -1), at(7))
+CLOSED = ("flown", "to item 4 without end: flown up to item 4 again")
 
 
-def test_a_jump_without_end_forwards_is_a_way_and_backwards_closes_a_loop() -> None:
-    done = run(item(1, 177, 4, -1), at(2), at(3), at(4), at(5), item(6, 177, 4, -1), at(7))
-    assert flown(done) == [4, 5, 4]
-    assert told(done)[6] == ("flown", "to item 4 without end: flown up to item 4 again")
-    assert [number for number, (what, _) in told(done).items() if what == "not reached"] == [2, 3, 7]
+@pytest.mark.parametrize(
+    ("items", "steps", "says"),
+    [
+        ((at(1), at(2), at(3), item(4, 177, 2, 2), at(5)), [1, 2, 3, 2, 3, 2, 3, 5], {}),
+        (FORWARD, [4, 5, 4], {6: CLOSED, **dict.fromkeys((2, 3, 7), ("not reached", ""))}),
+        ((at(1), at(2), at(3, 17), at(4)), [1, 2, 3], {}),
+        ((at(1), at(2), at(3, 21, 0.0), at(4)), [1, 2, 3], {}),
+        ((at(1), at(2), item(3, 20, frame=2), at(4)), [1, 2, 3], {}),
+        ((item(1, 22, 15, 0, 0, 0, 0, 0, 60), at(2), at(3, 22)), [1, 2], {3: ("not flown", "in the air already")}),
+    ],
+)  # fmt: skip
+def test_jumps_ends_and_takeoffs_say_what_is_flown(
+    items: tuple[Item, ...], steps: list[int], says: dict[int, tuple[str, str]]
+) -> None:
+    done = run(*items)
+    assert flown(done) == steps
+    assert {number: told(done)[number] for number in says} == says
 
 
 def test_a_jump_to_a_tag_is_refused_by_name() -> None:
@@ -80,13 +91,6 @@ def test_loiters_have_turns_or_time_or_an_altitude_and_a_side() -> None:
     ]
 
 
-def test_what_ends_a_mission() -> None:
-    assert flown(run(at(1), at(2), at(3, 17), at(4))) == [1, 2, 3]
-    assert flown(run(at(1), at(2), at(3, 21, 0.0), at(4))) == [1, 2, 3]
-    home = run(at(1), at(2), item(3, 20, frame=2), at(4))
-    assert (flown(home), home.steps[-1].position) == ([1, 2, 3], HOME)
-
-
 @pytest.mark.parametrize(
     ("second", "what", "why"),
     [
@@ -110,11 +114,9 @@ def test_what_becomes_of_an_item_is_told(second: Item, what: str, why: str) -> N
     assert (done.items[1].name == "command 31999") is (second.command == 31999)
 
 
-def test_a_takeoff_begins_the_flight_at_its_altitude() -> None:
-    done = run(item(1, 22, 15, 0, 0, 0, 0, 0, 60), at(2), at(3, 22))
-    assert (done.steps[0].position, done.steps[0].height_m) == (HOME, 60.0)
-    assert told(done)[3] == ("not flown", "in the air already")
-    assert flown(done) == [1, 2]
+def test_a_takeoff_and_a_return_are_at_home() -> None:
+    done = run(item(1, 22, 15, 0, 0, 0, 0, 0, 60), at(2), item(3, 20, frame=2))
+    assert (done.steps[0].position, done.steps[0].height_m, done.steps[-1].position) == (HOME, 60.0, HOME)
 
 
 def test_an_item_without_a_place_is_where_the_one_before_was() -> None:
