@@ -346,6 +346,22 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
         ("draws: 3", "worlds: [{forest: {}}, {forest: {}}]", "worlds[1]: is called forest as another"),
         (
             "draws: 3",
+            "worlds: [{forest: {density_1pkm2: 401}}]",
+            "asks for 30075 obstacles; must be at most 10000",
+        ),
+        (
+            "draws: 3",
+            "worlds: [{forest: {trunks: [1, 401]}}]",
+            "asks for 20050 obstacles; must be at most 10000",
+        ),
+        (
+            "draws: 3",
+            "worlds: [{forest: {trunks: [3, 1]}}]",
+            "worlds[0].forest.trunks: is [3, 1]; must be [least",
+        ),
+        ("draws: 3", "worlds: [{forest: {size_m: [900, 1700]}}]", "each side must be at least 4 x room_m"),
+        (
+            "draws: 3",
             "worlds: [{forest: {room_m: 20, gap_m: 0, density_1pkm2: 90}}]",
             "worlds[0].forest: mission",
         ),

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from itertools import combinations
 from typing import Any
 
-import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from harness.files.strict_yaml import key_path
 from harness.scenario.generators import WorldSpec, generated
-from harness.scenario.scenario import scenario_of
 
 ROUNDING_M = 0.2
 
@@ -55,32 +52,3 @@ def test_density_is_the_number_a_square_kilometre_where_there_is_room() -> None:
     discs: dict[str, Any] = {"radius_m": (50, 60), "trunks": (1, 1)}
     assert len(world(1, size_m=(10000, 5000), density_1pkm2=1.0, gap_m=100, **discs)["obstacles"]) == 50
     assert 5 < len(world(1, size_m=(2000, 2000), density_1pkm2=100.0, gap_m=400, **discs)["obstacles"]) < 40
-
-
-@pytest.mark.parametrize(
-    ("keys", "sentence"),
-    [
-        ({"density_1pkm2": 4001, "trunks": (1, 1)}, "asks for 100025 obstacles; must be at most 10000"),
-        ({"density_1pkm2": 50, "trunks": (1, 100)}, "asks for 125000 obstacles"),
-        ({"trunks": (3, 1)}, "must be .least, most."),
-        ({"size_m": (1000, 1500)}, "each side must be at least 4 x room_m"),
-    ],
-)
-def test_what_no_world_can_be_is_refused(keys: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(ValueError, match=sentence):
-        WorldSpec.model_validate({"forest": keys})
-
-
-def test_a_world_seed_holds_the_world() -> None:
-    spec = WorldSpec.model_validate({"seed": 4, "forest": {}})
-    assert generated(spec, 1) == generated(spec, 2) == generated(spec.model_copy(update={"seed": None}), 4)
-    assert world(1) != world(2)
-
-
-def test_the_defaults_make_a_scenario() -> None:
-    made = world(11)
-    keys = {"area": {"bounds_m": made["area.bounds_m"]}, "obstacles": made["obstacles"]}
-    mission = {"start_m": made["mission.start_m"], "goal_m": made["mission.goal_m"]}
-    scenario = scenario_of({"schema": "wayproof/scenario/1", "name": "drawn", **keys, "mission": mission})
-    assert len(scenario.obstacles) == len(made["obstacles"]) > 0
-    assert math.dist(scenario.mission.start_m, scenario.mission.goal_m) > 1000

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from harness.scenario import kinds
-from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, NoKeys, PluginError, planner_kinds, registered
+from harness.scenario.kinds import GUIDANCE, PLANNER, LoopPart, PluginError
 from planner.registry import BUILT_IN
-from wayproof import Mission, Plan, PlannerKind, PlanRequest, PlanStatus
+from wayproof import InputError, Plan, PlanRequest, PlanStatus, fly, load_scenario, make
 
 MINE = replace(PLANNER.built_in[1], kind="mine")
 MY_LAW = replace(GUIDANCE.built_in[1], kind="mine")
@@ -67,51 +67,31 @@ def test_what_is_no_kind_or_cannot_be_loaded_is_refused(
         part.known()
 
 
-MISSION = Mission((900.0, 0.0), 50.0, (-1e3, -1e3, 1e3, 1e3), 40.0, 100.0, 25.0, 1.0, 0.1, 500.0)
-
-
-class Waits:
-    """Finds nothing."""
-
-    def __init__(self, mission: Mission | None = None, patience: int = 3) -> None:
-        self.mission, self.patience = mission, patience
-
-    def plan(self, request: PlanRequest) -> Plan:
-        return Plan(PlanStatus.NO_PATH, "waits")
-
-
-def made(name: str) -> Waits:
-    planner = planner_kinds()[name].make(NoKeys(), MISSION)
-    assert isinstance(planner, Waits)
-    return planner
+def kind_of(planner: object) -> str:
+    """The kind that a scenario names once it is flown by a planner."""
+    return make("paper_circles", planner=planner).scenario.planner.kind
 
 
 def test_a_class_that_is_defined_anew_replaces_the_first() -> None:
-    def define(patience: int) -> type[Waits]:
-        class Later(Waits):
-            def __init__(self) -> None:
-                super().__init__(patience=patience)
+    def define(said: str) -> type:
+        class Later:
+            def plan(self, request: PlanRequest) -> Plan:
+                return Plan(PlanStatus.NO_PATH, said)
 
         return Later
 
-    first, second = registered(define(1)), registered(define(2))
-    assert first == second
-    assert made(second).patience == 2
+    assert kind_of(define("first")) == kind_of(define("second"))
+    assert "second" in fly("paper_circles", planner=define("second")).reason
 
 
-def test_a_built_in_name_is_not_taken() -> None:
-    assert registered(BUILT_IN[0]) == "rolling_window"
-    assert registered("bug2") == "bug2"
-    with pytest.raises(ValueError, match="there is a planner called bug2 already"):
-        PLANNER.register(PlannerKind("bug2", "another", NoKeys, lambda keys, mission: Waits()))
-
-
-def test_a_kind_in_a_file_keeps_its_keys(tmp_path: Path) -> None:
+def test_a_built_in_name_is_not_taken_and_a_kind_in_a_file_keeps_its_keys(tmp_path: Path) -> None:
+    assert [kind_of(each) for each in (BUILT_IN[0], "bug2")] == ["rolling_window", "bug2"]
+    with pytest.raises(InputError, match="there is a planner called bug2 already"):
+        kind_of(replace(BUILT_IN[0], kind="bug2"))
     path = tmp_path / "mine.py"
-    path.write_text("from planner.registry import BUILT_IN\nMINE = BUILT_IN[1]\n")
-    name = registered(f"{path}:MINE")
-    assert name == "mine.py:MINE"
-    assert planner_kinds()[name].config is BUILT_IN[1].config
+    path.write_text("from planner.registry import BUILT_IN\nMINE = BUILT_IN[0]\n")
+    mine = make("paper_circles", planner=f"{path}:MINE").scenario.planner
+    assert (mine.kind, mine.own) == ("mine.py:MINE", load_scenario("paper_circles").planner.own)
 
 
 @pytest.mark.parametrize(
@@ -131,5 +111,5 @@ def test_what_cannot_be_imported_is_told_in_a_sentence(source: str, said: str, t
     (tmp_path / "mine.py").write_text("import json\nNUMBER = 3\nclass Mine: ...\ndef make(): ...\n")
     (tmp_path / "broken.py").write_text("1 / 0\n")
     (tmp_path / "leaves.py").write_text("import sys\nsys.exit(0)\n")
-    with pytest.raises(ValueError, match=said):
-        registered(source.format(folder=tmp_path))
+    with pytest.raises(InputError, match=f"wayproof: planner: .*{said}"):
+        kind_of(source.format(folder=tmp_path))
