@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from aircraft.airframes import AircraftError, aircraft_names, airframe
 from aircraft.envelope import LEAST_BANK_DEG, performance
+from wayproof import InputError, load_scenario
 
 VERIFIED = ("aerosonde", "c172p", "T38")
 
@@ -20,12 +21,16 @@ def test_known_aircraft() -> None:
     assert airframe("aerosonde").mass_kg == 11.0
 
 
-def test_an_unknown_name_lists_the_known_ones() -> None:
-    for name in ("nope", "x" * 300, "~nobody/nope"):
-        with pytest.raises(
-            AircraftError, match=r"unknown aircraft '.*'; known are: aerosonde, ultrastick25e"
-        ):
-            airframe(name)
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        *(("model", name, "unknown aircraft '.*'; known are: aerosonde") for name in ("no", "x" * 300, "~no/no")),
+        ("airspeed_mps", 40, "aerosonde cannot hold 40 m/s; its .* is 17.4 to 32.3 m/s"),
+    ],
+)  # fmt: skip
+def test_what_no_aircraft_is_or_holds_is_told_with_what_would_do(key: str, value: object, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        load_scenario("paper_circles").with_({f"aircraft.{key}": value})
 
 
 def test_turn_radius_of_the_aerosonde() -> None:
@@ -77,11 +82,6 @@ def test_more_wind_or_turbulence_never_tightens_the_turn(name: str, share: float
     assert radii == sorted(radii)
     assert errors == sorted(errors)
     assert performance(frame, airspeed).turn_radius_m <= radii[0]
-
-
-def test_a_speed_out_of_range_names_the_range() -> None:
-    with pytest.raises(AircraftError, match=r"cannot hold 40 m/s; its .* is 17.4 to 32.3 m/s"):
-        performance(airframe("aerosonde"), 40.0)
 
 
 def test_wind_that_cannot_be_made_good_is_refused() -> None:

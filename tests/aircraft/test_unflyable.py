@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from aircraft.airframes import AircraftError, airframe
+from aircraft.airframes import airframe
 from aircraft.model_files import OWN_FOLDER
+from wayproof import InputError, load_scenario
 
 RUDDER = r'      <aerosurface_scale name="rudder">.*?</aerosurface_scale>\n'
 BY_RUDDER = r"\s*<product><value>-?[0-9.]+</value><property>fcs/rudder-pos-rad</property></product>"
@@ -44,13 +45,13 @@ def aerosonde_with(folder: Path, change: tuple[str, str] = ("", ""), without: st
     ],
 )
 def test_what_a_model_lacks_is_told(tmp_path: Path, change: tuple[str, str], without: str, said: str) -> None:
-    with pytest.raises(AircraftError, match=said):
-        airframe(str(aerosonde_with(tmp_path, change, without)))
+    with pytest.raises(InputError, match=f"aircraft.model: .*{said}"):
+        load_scenario("paper_circles").with_({"aircraft.model": aerosonde_with(tmp_path, change, without)})
 
 
 def test_an_engine_that_does_not_run_is_told() -> None:
-    with pytest.raises(AircraftError, match=r"pa28 cannot be trimmed .*: none of its engines runs"):
-        airframe("pa28")
+    with pytest.raises(InputError, match=r"pa28 cannot be trimmed .*: none of its engines runs"):
+        load_scenario("paper_circles").with_({"aircraft.model": "pa28"})
 
 
 def test_a_missing_property_ends_with_status_2(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
@@ -19,10 +20,18 @@ import harness
 import wayproof
 from aircraft.airframes import airframe
 from harness.cli.app import main
-from harness.flight.record import TRACK_FIELDS
 from harness.scenario.kinds import GUIDANCE, PLANNER, guidance_kinds
 from harness.scenario.performance import mission_of
 from tests.harness.api.worlds import SCENARIO, Beeline, small, source_file
+
+CONTRACT = (
+    "time_s east_m north_m up_m course_deg heading_deg roll_deg pitch_deg airspeed_mps groundspeed_mps "
+    "load_factor roll_command_deg cross_track_m clearance_m plan_index"
+)
+FURTHER = (
+    "arc_length_m throttle altitude_above_ground_m actuator_limited_s vertical_actuator_limited_s elevator aileron "
+    "rudder angle_of_attack_deg"
+)
 
 
 @pytest.fixture(scope="module")
@@ -41,17 +50,21 @@ def test_a_flight_has_its_outcome_figures_and_tables(run: wayproof.FlightResult)
     assert run.metrics.cross_track_m.p95 is not None
     assert 0.0 <= run.metrics.cross_track_m.p95 < 1.0
     assert run.metrics.trackability[0].trackable
-    assert tuple(run.track.column_names) == TRACK_FIELDS
+    assert run.track.column_names == [*CONTRACT.split(), *FURTHER.split()]
     assert run.plans["plan_index"].to_pylist() == list(range(run.metrics.replans + 1))
     assert run.scenario == small()
-    assert run.digest == run.metrics.digest
+    columns = (
+        (run.track[name].to_numpy(), "<i8" if name == "plan_index" else "<f8") for name in CONTRACT.split()
+    )
+    joined = b"".join(column.astype(kind).tobytes() for column, kind in columns)
+    assert run.digest == run.metrics.digest == hashlib.sha256(joined).hexdigest()
 
 
 def test_in_memory_and_into_a_folder_the_same_is_flown(
     run: wayproof.FlightResult, kept: wayproof.FlightResult
 ) -> None:
     assert kept.digest == run.digest
-    for name in TRACK_FIELDS:
+    for name in run.track.column_names:
         np.testing.assert_array_equal(kept.track[name].to_numpy(), run.track[name].to_numpy())
     assert kept.folder is not None
     written = json.loads((kept.folder / "metrics.json").read_text())

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 from scipy import stats
 
 from harness.campaign.sampling import Distribution
@@ -41,21 +40,3 @@ def test_whole_numbers_and_choices_are_drawn_alike_the_ends_too() -> None:
     assert {bell.whole_number(share) for share in np.linspace(0.0, 0.999, 100)} == {1, 2, 3, 4}
     choice = Distribution.model_validate({"choice": ["a", "b", "c"]})
     assert [choice.chosen(share) for share in (0.0, 0.33, 0.34, 0.66, 0.67, 0.999)] == [0, 0, 1, 1, 2, 2]
-
-
-@pytest.mark.parametrize(
-    ("keys", "said"),
-    [
-        ({}, "has none of uniform, normal, choice"),
-        ({"uniform": [0, 1], "choice": [1]}, "has uniform and choice"),
-        ({"uniform": [1, 1]}, "least < most"),
-        ({"normal": {"mean": 0, "sigma": 0}}, "greater than 0"),
-        ({"normal": {"mean": 0, "sigma": 1, "least": 2, "most": 1}}, "leaves nothing"),
-        ({"normal": {"mean": 0, "sigma": 1, "least": 50}}, "leaves nothing"),
-        ({"choice": []}, "at least 1 item"),
-        ({"uniform": ["a", 1]}, "valid number"),
-    ],
-)
-def test_a_distribution_that_is_none_is_refused(keys: dict[str, object], said: str) -> None:
-    with pytest.raises(ValidationError, match=said):
-        Distribution.model_validate(keys)

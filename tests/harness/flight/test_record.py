@@ -1,20 +1,13 @@
 from __future__ import annotations
 
-import hashlib
 import math
 
 import numpy as np
 import pytest
 
-from harness.flight.record import COLUMNS, TRACK_FIELDS, FloatArray, Track, digest
+from harness.flight.record import TRACK_FIELDS, FloatArray, Track
 from harness.flight.track_log import TrackLog
-from tests.harness.conftest import track as make_track
 from wayproof import AircraftState, GuidanceOutput
-
-CONTRACT = (
-    "time_s east_m north_m up_m course_deg heading_deg roll_deg pitch_deg airspeed_mps groundspeed_mps "
-    "load_factor roll_command_deg cross_track_m clearance_m plan_index"
-)
 
 
 def state(time_s: float) -> AircraftState:
@@ -28,13 +21,6 @@ def steered(roll_command_rad: float, cross_track_m: float, arc_length_m: float) 
 def none_near(points_m: FloatArray, times_s: FloatArray) -> FloatArray:
     assert points_m.shape == (len(times_s), 2)
     return np.full(len(times_s), np.inf)
-
-
-def test_columns_are_those_of_the_contract() -> None:
-    assert " ".join(COLUMNS) == CONTRACT
-    further = ["arc_length_m", "throttle", "altitude_above_ground_m", "actuator_limited_s"]
-    further += ["vertical_actuator_limited_s", "elevator", "aileron", "rudder", "angle_of_attack_deg"]
-    assert list(TRACK_FIELDS) == [*COLUMNS, *further]
 
 
 def test_row_holds_the_state_in_the_units_of_the_file() -> None:
@@ -63,15 +49,3 @@ def test_a_state_that_is_not_finite_is_no_row_nor_a_block(rows: int) -> None:
     log.add(state(0.4)._replace(velocity_up_mps=math.inf), steered(0.0, math.nan, math.nan), -1)
     np.testing.assert_array_equal(log.close().time_s, np.arange(4) / 10)
     assert all(len(block) for block in blocks)
-
-
-def test_digest_is_the_hash_of_the_columns_in_order() -> None:
-    track = make_track(5, cross_track_m=np.array([np.nan, 1, 2, 3, 4]))
-    joined = b"".join(
-        np.asarray(getattr(track, name), "<i8" if name == "plan_index" else "<f8").tobytes()
-        for name in CONTRACT.split()
-    )
-    assert digest(track) == hashlib.sha256(joined).hexdigest()
-    assert digest(make_track(5, arc_length_m=9.0)) == digest(make_track(5))
-    for name in CONTRACT.split():
-        assert digest(make_track(5, **{name: 17})) != digest(make_track(5)), name
