@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from harness.analysis.metric import Claim
-from harness.campaign.campaign_file import MAX_RUNS, Base, CampaignFile
+from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.flight import Job
 from harness.campaign.results import LAW_KEY, RESULTS, RUN, RUNS, fly_again, read_table
 from harness.campaign.sampling import takes_whole_numbers
@@ -37,6 +37,7 @@ MOST_KEPT_BYTES: Final = 100_000_000
 """Scenarios made by the check are kept up to this size: making one takes six times as long as unpacking it."""
 KIND, MODEL = ("planner", "kind"), ("aircraft", "model")
 """The key of a scenario that a bare entry of `planners`, and one of `aircraft`, replaces."""
+SHIELD: Final = ("planner", "shield")
 LIST_OF_SECTION: Final = {"planner": "planners", "aircraft": "aircraft"}
 """The list of a campaign whose entries replace a section of the scenario."""
 
@@ -82,10 +83,11 @@ class CampaignRuns:
         self._entries = [self._entry_axis(*each) for each in (KIND, MODEL)]
         self._pairs = [len(axis) for axis in self._entries]
         self._sizes = [len(bases), len(campaign.worlds) or 1, *(len(axis) for axis in self._grid)]
-        own = [(_planner_of(base), base.text(MODEL, "aerosonde")) for base in bases]
-        planners_of, models_of = map(list, zip(*own, strict=True))
-        self.planners = [each.label for each in campaign.planners] or planners_of
-        self.aircraft = [each.model for each in campaign.aircraft] or models_of
+        default, shield = PlannerSpec().kind, str(campaign.set_.get(key_path(SHIELD), ""))
+        own = [{"kind": b.text(KIND, default), "shield": shield or b.text(SHIELD, "")} for b in bases]
+        named = [e.filled(shield=shield) for e in campaign.planners]
+        self.planners = [e.label for e in named or [PlannerSpec.model_construct(None, **e) for e in own]]
+        self.aircraft = [e.model for e in campaign.aircraft] or [b.text(MODEL, "aerosonde") for b in bases]
         self._made: dict[int, bytes] = {}  # by `check`
         self._world = lru_cache(maxsize=1)(self._world_changes)  # runs of one case follow each other
         self.cases = campaign.draws * math.prod(self._sizes)
@@ -282,12 +284,6 @@ class CampaignRuns:
 
     def _line(self, origin: Loc, sentence: str) -> str:
         return fault_line(self.file.source, self.file.root.line_of(origin), origin, sentence)
-
-
-def _planner_of(base: Base) -> str:
-    """Returns the label of a scenario's own planner."""
-    kind, shield = base.text(KIND, "rolling_window"), base.text(("planner", "shield"), "")
-    return PlannerSpec.model_construct(kind=kind, shield=shield).label
 
 
 def _chosen_changes(axes: Sequence[_Axis], indices: Sequence[int]) -> list[_Change]:

@@ -16,6 +16,7 @@ import yaml
 
 from harness.files.input_file import InputError as InputError
 from harness.files.input_file import read_text
+from harness.files.wording import counted
 
 MAX_BYTES: Final = 32_000_000
 MAX_VALUES: Final = 3_000_000
@@ -158,7 +159,9 @@ class _Composer:
         self.next(())
         event = self.next(())
         if isinstance(event, yaml.StreamEndEvent):
-            raise InputError(f"{self.source}:1: is empty; must be a mapping that begins with `schema:`")
+            comments = sum(line.lstrip().startswith("#") for line in self.text.splitlines())
+            what = f"has no key, only {counted(comments, 'line')} of comments" if comments else "is empty"
+            raise InputError(f"{self.source}:1: {what}; must be a mapping that begins with `schema:`")
         node = self.node(self.next(()), (), 1)
         self.next(())
         if not isinstance(event := self.next(()), yaml.StreamEndEvent):

@@ -161,7 +161,10 @@ def test_names_line_and_key(
 
 BYTES = {
     "empty": (b"", ":1: is empty"),
-    "only a comment": (b"# nothing\n", ":1: is empty"),
+    "only a comment": (
+        b"# a town\n\n # of wind\n",
+        ":1: has no key, only 2 lines of comments; must be a map",
+    ),
     "only spaces": (b"   \n\n", ":1: is empty"),
     "a word": (b"scenario\n", ":1: is the text 'scenario'; must be a mapping"),
     "a list": (b"- 1\n- 2\n", ":1: is a list of 2; must be a mapping"),
