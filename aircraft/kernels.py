@@ -9,6 +9,7 @@ fields, so that a function can change it. The frame is the local ENU plane; head
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
@@ -52,7 +53,12 @@ def for_types_of(function: Any, *arguments: Any) -> Any:
     numba looks at the types at every call of the function, which takes as long as the arithmetic. The code does not:
     it must get arrays of the same layout.
     """
-    return function.compile(tuple(map(numba.typeof, arguments)))
+    return _machine_code(function, tuple(map(numba.typeof, arguments)))
+
+
+@functools.cache
+def _machine_code(function: Any, types: tuple[Any, ...]) -> Any:
+    return function.compile(types)
 
 
 @compiled

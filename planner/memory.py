@@ -75,12 +75,12 @@ class ObstacleMemory:
     @property
     def genuine_m(self) -> FloatArray:
         """(k, 2) points seen to stand still, without refused places."""
-        return self._points if self._genuine.all() else self._points[self._genuine]
+        return self._points if self._genuine.all() else self._points.compress(self._genuine, axis=0)
 
     @property
     def refused_m(self) -> FloatArray:
         """(k, 2) refused places."""
-        return self._points[~self._genuine]
+        return self._points.compress(~self._genuine, axis=0)
 
     def refuse(self, place: tuple[float, float]) -> None:
         """Remembers a place as an edge point, so that no path leads there again."""

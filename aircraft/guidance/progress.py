@@ -31,7 +31,7 @@ class RouteProgress:
         from aircraft import kernels  # half a second
 
         self.rows = route_rows(route)
-        self._nearest = kernels.nearest_on_route
+        self._nearest = kernels.for_types_of(kernels.nearest_on_route, self.rows, 0, *[math.nan] * 3)
         self._row, self._along_m = place_on_rows(self.rows, arc_length_m)
         self._segments: list[tuple[float, ...]] = [tuple(row) for row in self.rows.tolist()]
 

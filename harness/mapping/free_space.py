@@ -108,7 +108,7 @@ class FreeSpace:
         Returns:
             Whether any of it stands in space that was seen to be free: an edge point with free cells all about it.
         """
-        edges_m = edges_m[self.contains(edges_m)]
+        edges_m = edges_m.compress(self.contains(edges_m), axis=0)
         if not len(edges_m) or not self.surrounds(edges_m).any():
             return False
         _, _, x_low, x_high, y_low, y_high = self._window(scan, math.ceil(scan.max_range_m / self._cell) + 1)

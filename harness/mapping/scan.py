@@ -101,7 +101,8 @@ class RangeScan:
         if self.beam_rad:
             sides = np.empty(len(self.ranges_m))
             _fill_sides(sides, self.ranges_m, self.beam_rad, self.noise_m, all_round(self), self.lossy)
-            turned *= np.exp((-0.5j * self.beam_rad) * sides.take(rays))
+            by_side = np.exp((-0.5j * self.beam_rad) * np.array((0.0, 1.0, -1.0)))
+            turned *= by_side[sides.take(rays).astype(np.intp)]
         turned *= cmath.rect(1.0, -self.heading_rad)
         return turned
 

@@ -9,6 +9,7 @@ Points are complex: east + i north, m.
 from __future__ import annotations
 
 import math
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -134,7 +135,7 @@ def register(
     ahead = (outline.points[len(outline.points) // 2] - sensor).conjugate()
     near = near[np.argsort(-np.angle((places[near] - sensor) * ahead))]
     along, straight = _tangents(outline.points)
-    reach = 1.5 * float(np.median(np.abs(np.diff(outline.points)))) + 1e-6
+    reach = 1.5 * median(np.abs(outline.points[1:] - outline.points[:-1]).tolist()) + 1e-6
     shift = 0j
     for i in range(ROUNDS):
         within_m = max(gate_m * CLOSER_FACTOR**i, near_m)

@@ -30,7 +30,7 @@ def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray,
     Returns:
         (m,) the indices, square by square; the squares.
     """
-    squares = np.floor(points[some] / side).astype(np.int64)
+    squares = np.floor(points.take(some, axis=0) / side).astype(np.int64)
     squares -= squares.min(axis=0) - 1
     width = int(squares[:, 1].max()) + 2
     keys = squares @ (width, 1)
@@ -73,7 +73,7 @@ def joined(count: int, one: IntArray, other: IntArray) -> IntArray:
 def gathered(points: FloatArray, keep: FloatArray, some: IntArray) -> FloatArray:
     """(3, k) east and north of k of (n, 2) points, and the distance to be kept from each, one row after the other."""
     rows = np.empty((3, len(some)))
-    rows[:2], rows[2] = points[some].T, keep[some]
+    rows[:2], rows[2] = points.take(some, axis=0).T, keep.take(some)  # an index takes five times as long
     return rows
 
 
