@@ -79,7 +79,10 @@ class CampaignRuns:
         self._sources = planners, laws
         self.file, self.campaign = file, file.campaign
         campaign, bases = file.campaign, file.bases
-        self._grid = [self._grid_axis(name) for name in campaign.grid]
+        self._grid: list[_Axis] = [
+            [[self._change(loc_of(name), ("grid", name, index))] for index in range(len(values))]
+            for name, values in campaign.grid.items()
+        ]
         self._entries = [self._entry_axis(*each) for each in (KIND, MODEL)]
         self._pairs = [len(axis) for axis in self._entries]
         self._sizes = [len(bases), len(campaign.worlds) or 1, *(len(axis) for axis in self._grid)]
@@ -230,11 +233,6 @@ class CampaignRuns:
         origin: Loc = ("worlds", world, "forest")
         line = self.file.root.line_of(origin)
         return [_Change(loc, node_of(plain, line), origin) for loc, plain in made.items()]
-
-    def _grid_axis(self, name: str) -> _Axis:
-        """Returns the changes for each value of a key of the grid."""
-        origins: list[Loc] = [("grid", name, index) for index in range(len(self.campaign.grid[name]))]
-        return [[self._change(loc_of(name), origin)] for origin in origins]
 
     def _entry_axis(self, section: str, first: str) -> _Axis:
         """Returns the changes for each entry of `planners` or `aircraft`: bare text, or keys of that section."""

@@ -39,8 +39,8 @@ Evaluate: TypeAlias = Callable[[FloatArray, IntArray], FloatArray]
 class Rare:
     """The probability that a day fails: an unbiased estimate, and bounds of it, each by itself at some confidence.
 
-    `levels`: of the margin, falling. `plain_runs`: days drawn as they come, `plain_failures` of which failed.
-    `estimates`: of each independent run, 0 if it met no failure. `method`: how the bounds were derived.
+    `levels`: of the margin, falling. `plain_runs`: how many days were drawn as they come. `estimates`: of each
+    independent run, 0 if it met no failure. `method`: how the bounds were derived.
     """
 
     failure_probability: float
@@ -49,7 +49,6 @@ class Rare:
     levels: tuple[float, ...]
     estimates: tuple[float, ...]
     plain_runs: int
-    plain_failures: int
     method: str
 
 
@@ -79,7 +78,7 @@ def subset_simulation(evaluate: Evaluate, normals: int, most: int, seed: int, co
         if levels:
             why = "runs of the subset simulation differ too much"
         method = f"Clopper-Pearson, failures of the {count} days drawn as they come: {why}"
-    told = tuple(levels), tuple(estimates.tolist()), count, failed
+    told = tuple(levels), tuple(estimates.tolist()), count
     return Rare(mean, min(low, mean), max(high, mean), *told, method)
 
 

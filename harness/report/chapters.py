@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +25,6 @@ from harness.world.optimum import Optimum, shortest_path
 from harness.world.world import World
 
 if TYPE_CHECKING:
-    from harness.flight.record import FloatArray
     from harness.report.figures import DrawnRun, FigureScene
     from harness.report.page import Chapter, Picture
 
@@ -118,7 +116,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     pictures = [_picture(folder / "path", path, caption), _picture(folder / "profiles", strips, PROFILES)]
     facts = {"conditions": told(scenario)} | _facts(scene, optimum)
     if "check" in metrics:  # a path that was given is compared with no other
-        del facts["clairvoyant optimum"], facts["estimate with turn radius R"]
+        del facts["clairvoyant optimum"]
         if not scene.obstacles:
             del facts["obstacles"], facts["wanted clearance"]
     return Chapter(scene.name, facts, [flight.row], pictures, optimum.reason)
@@ -129,9 +127,6 @@ def _enlarged(scene: FigureScene, drawn: DrawnRun) -> str:
     near = drawn.nearest(scene.clearance_m) is not None
     return "; enlarged: where it came nearest to an obstacle" if near else ""
 
-
-JOINING_SHARES = np.linspace(0.05, 1.0, 20)
-"""Places along each line of the optimum at which a Dubins curve may join it."""
 
 PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
 
@@ -150,7 +145,7 @@ def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:
 def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> FigureScene:
     from harness.report.figures import FigureScene
 
-    mission, wind, radius_m = scenario.mission, scenario.environment.wind, _turn_radius_m(scenario, run)
+    mission, wind = scenario.mission, scenario.environment.wind
     return FigureScene(
         name=scenario.name,
         bounds_m=scenario.area.bounds_m,
@@ -159,38 +154,11 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
         goal_m=mission.goal_m,
         goal_radius_m=mission.goal_radius_m,
         clearance_m=scenario.planner.clearance_m,
-        turn_radius_m=radius_m,
+        turn_radius_m=_turn_radius_m(scenario, run),
         optimum_m=optimum.points_m,
-        turning_optimum_m=turning_optimum_m(optimum.points_m, mission.course_deg, radius_m),
         wind=(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0),
         navigation_margin_m=scenario.navigation.margin_m or 0.0,
     )
-
-
-def turning_optimum_m(points_m: FloatArray, course_deg: float | None, radius_m: float) -> float | None:
-    """Estimates the length of the optimum (k, 2) with the shortest turn from the start's course onto one of its lines.
-
-    What the bends of the optimum cost is left out. None where there is no optimum or course.
-    """
-    if len(points_m) < 2 or course_deg is None:
-        return None
-    from planner.geometry.curves import Pose, turn_onto
-
-    steps = np.diff(points_m, axis=0)
-    lengths = np.hypot(*steps.T)
-    course = math.radians(course_deg)
-    east_m, north_m = points_m[0].tolist()
-    start = Pose(east_m, north_m, math.sin(course), math.cos(course))
-    left = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
-    ways = []
-    for line, share in product(range(len(steps)), JOINING_SHARES):
-        east_m, north_m = (points_m[line] + share * steps[line]).tolist()
-        curve_m = sum(row[5] for row in turn_onto(start, (east_m, north_m), radius_m) or ())
-        to_go_m = float(left[line] - share * lengths[line])
-        # A curve shorter than the optimum up to there leads through an obstacle.
-        if curve_m:
-            ways.append(to_go_m + max(curve_m, float(left[0]) - to_go_m))
-    return min(ways, default=None)
 
 
 def _drawn(flight: ReportedFlight) -> DrawnRun | None:
@@ -221,7 +189,6 @@ def _facts(scene: FigureScene, optimum: Optimum) -> dict[str, str]:
     return {
         "straight line": km(math.dist(scene.start_m, scene.goal_m)),
         "clairvoyant optimum": km(optimum.length_m),
-        "estimate with turn radius R": km(scene.turning_optimum_m),
         "obstacles": str(len(scene.obstacles)),
         "wanted clearance": f"{number(scene.clearance_m)} m{beyond}",
         "turn radius R": f"{number(scene.turn_radius_m)} m",

@@ -67,8 +67,8 @@ class DrawnRun:
 class FigureScene:
     """The part of a scenario that all its flights have in common, the true obstacles among it.
 
-    `optimum_m` is the clairvoyant shortest path (k, 2), empty where there is none; `turning_optimum_m` its estimated
-    length for an aircraft that turns. `wind` has its speed (m/s) and where it blows from (degrees).
+    `optimum_m` is the clairvoyant shortest path (k, 2), empty where there is none. `wind` has its speed (m/s) and where
+    it blows from (degrees).
     """
 
     name: str
@@ -80,7 +80,6 @@ class FigureScene:
     clearance_m: float
     turn_radius_m: float
     optimum_m: FloatArray
-    turning_optimum_m: float | None = None
     wind: tuple[float, float] = (0.0, 0.0)
     navigation_margin_m: float = 0.0
 

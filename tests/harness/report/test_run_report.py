@@ -5,18 +5,15 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-import math
 import shlex
 import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from harness.analysis.causes import FINDINGS
 from harness.cli.app import main
-from harness.report.chapters import turning_optimum_m
 from harness.run_files.run_folder import REPORT_FILES, load_run
 from tests.page import shown
 
@@ -176,12 +173,3 @@ def test_the_page_of_a_given_path_has_no_figures_of_a_planner(tmp_path: Path, ch
     narrow = "[...document.querySelectorAll('table.one th')].map(each => each.getBoundingClientRect().width)"
     assert min(page.evaluate(narrow)) > 110
     page.close()
-
-
-def test_the_estimate_beside_the_optimum_turns_onto_it() -> None:
-    """Facing away at a distance D: a turn of pi + 2 atan(R / D) and a line as long as D; facing it: nothing more."""
-    line, radius_m, far_m = np.array([(0.0, 0.0), (0.0, 2950.0)]), 110.0, 2950.0
-    away_m = radius_m * (math.pi + 2.0 * math.atan(radius_m / far_m)) + far_m
-    assert turning_optimum_m(line, 180.0, radius_m) == pytest.approx(away_m, rel=1e-3)
-    assert turning_optimum_m(line, 0.0, radius_m) == pytest.approx(far_m)
-    assert turning_optimum_m(np.zeros((0, 2)), 0.0, radius_m) is None
