@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections import deque
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -25,6 +26,9 @@ HEADING_CORRELATION_S: Final = 60.0
 
 AIRSPEED_CORRELATION_S: Final = 300.0
 """Correlation time of the airspeed error. Chosen: a pressure sensor drifts with its temperature, over minutes."""
+
+NOISE_ROWS: Final = 64
+"""Errors are drawn for this many updates at once."""
 
 LOOKS_APART_S: Final = 5.0
 """Motion is measured between looks at an obstacle that are about this far apart in time."""
@@ -87,7 +91,8 @@ class Navigator(StateEstimator):
 
     def __init__(self, navigation: Navigation, seed_sequence: np.random.SeedSequence) -> None:
         self._navigation = navigation
-        self._rng, directions = (child_stream(seed_sequence, number) for number in range(2))
+        errors, directions = (child_stream(seed_sequence, number) for number in range(2))
+        self._noise = _noise(errors)
         turns = directions.uniform(0.0, math.tau, len(navigation.outages_s))
         self._directions = np.column_stack([np.sin(turns), np.cos(turns)]).tolist()
         position_s, position_m = navigation.position_correlation_s, navigation.position_sigma_m
@@ -151,7 +156,7 @@ class Navigator(StateEstimator):
     def _go_on(self, time_s: float, place: tuple[float, float]) -> None:
         """Advances the errors from the call before to this time."""
         first, before_s = math.isnan(self._time_s), self._time_s
-        noise = self._rng.standard_normal(8).tolist()
+        noise = next(self._noise)
         if not first:
             kept, fresh = _shares(time_s - before_s, self._correlation_s)
             noise = [a * old + b * new for a, old, b, new in zip(kept, self._unit, fresh, noise, strict=True)]
@@ -177,6 +182,12 @@ class Navigator(StateEstimator):
             if begin_s <= time_s < end_s:
                 return index
         return -1
+
+
+def _noise(stream: np.random.Generator) -> Iterator[list[float]]:
+    """Standard normal numbers, one for each process, without end."""
+    while True:
+        yield from stream.standard_normal((NOISE_ROWS, 8)).tolist()
 
 
 @functools.lru_cache(maxsize=64)

@@ -89,7 +89,8 @@ class EdgePoints(ABC):
 
     def _column_and_row(self, places: ComplexArray) -> tuple[IntArray, IntArray, BoolArray]:
         """Returns the cells of places, seen from the corner of the grid, and which of them lie on the grid."""
-        column, row = (places.view(np.float64).reshape(-1, 2).T * (1.0 / self._cell)).astype(np.int64)
+        cells = (places.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
+        column, row = cells[::2], cells[1::2]
         return column, row, (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
 
     def _in_reach(self, sensor: complex, renewed_m: float) -> NDArray[np.int32]:

@@ -31,7 +31,7 @@ def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray,
         (m,) the indices, square by square; the squares.
     """
     squares = np.floor(points.take(some, axis=0) / side).astype(np.int64)
-    squares -= squares.min(axis=0) - 1
+    squares -= [squares[:, 0].min() - 1, squares[:, 1].min() - 1]
     width = int(squares[:, 1].max()) + 2
     keys = squares @ (width, 1)
     order = np.argsort(keys, kind="stable")

@@ -257,7 +257,8 @@ class LocalPlanning:
     def _room_m(self, start: Start, points: FloatArray) -> FloatArray:
         """(m,) most distance that can be kept from each point: its distance from the nearer of start and goal."""
         ends = (start.pose[:2], self._mission.goal_m)
-        away: FloatArray = np.minimum(*(np.hypot(*(points - end).T) for end in ends)) - 1e-3
+        east, north = points.T
+        away: FloatArray = np.minimum(*(np.hypot(east - x, north - y) for x, y in ends)) - 1e-3
         return away
 
     def _searches(

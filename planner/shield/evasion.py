@@ -70,8 +70,8 @@ class Threats:
     def about(cls, request: PlanRequest, still_m: FloatArray, mission: Mission) -> Threats:
         """The threats that can be met within `AHEAD_S`; `still_m` are all (n, 2) edge points that stand still."""
         reach_m = AHEAD_S * LATEST * mission.speed_mps + mission.clearance_m
-        away_m = still_m - request.position_m
-        near_m = still_m.compress(np.einsum("ij,ij->i", away_m, away_m) < reach_m * reach_m, axis=0)
+        east, north = still_m[:, 0] - request.position_m[0], still_m[:, 1] - request.position_m[1]
+        near_m = still_m.compress(east * east + north * north < reach_m * reach_m, axis=0)
         moving = [np.zeros((0, 5))]
         for each in request.seen.moving:
             seen = each.points_m + np.array(each.velocity_mps) * (request.time_s - each.time_s)
