@@ -19,6 +19,9 @@ Cells = tuple[IntArray, IntArray, IntArray, IntArray]
 """(c,) where each square begins among gathered points; (c,) how many it has; (p,) twice: squares that touch each other,
 diagonally too, each pair once."""
 
+SortedBefore = dict[int, tuple[IntArray, tuple[IntArray, Cells]]]
+"""By label of an obstacle: (m,) the indices of its points, and what `cells_of` returned for them."""
+
 Buckets = tuple[FloatArray, IntArray, FloatArray]
 """(3, m) east and north of points by squares and the distance to be kept from each; (b + 1,) where each square begins
 among them, and the end; (3, b) centre and radius of a circle about each that holds what is to be kept from them. m."""

@@ -141,7 +141,10 @@ class LocalPlanning:
         keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
         labels = self.memory.labels
         self.work_count.add(0, TANGENT_WORK, len(points))
-        window = Window(start.pose[:2], points, labels, self.memory.cell_m, keep, self.work_count)
+        memory = self.memory
+        window = Window(
+            start.pose[:2], points, labels, memory.cell_m, keep, self.work_count, memory.sorted_before
+        )
         begun = start
         fitted: list[tuple[float, Route]] = []
 
