@@ -86,10 +86,7 @@ class CampaignRuns:
         self._entries = [self._entry_axis(*each) for each in (KIND, MODEL)]
         self._pairs = [len(axis) for axis in self._entries]
         self._sizes = [len(bases), len(campaign.worlds) or 1, *(len(axis) for axis in self._grid)]
-        default, shield = PlannerSpec().kind, str(campaign.set_.get(key_path(SHIELD), ""))
-        own = [{"kind": b.text(KIND, default), "shield": shield or b.text(SHIELD, "")} for b in bases]
-        named = [e.filled(shield=shield) for e in campaign.planners]
-        self.planners = [e.label for e in named or [PlannerSpec.model_construct(None, **e) for e in own]]
+        self.planners = _labels(file)
         self.aircraft = [e.model for e in campaign.aircraft] or [b.text(MODEL, "aerosonde") for b in bases]
         self._made: dict[int, bytes] = {}  # by `check`
         self._world = lru_cache(maxsize=1)(self._world_changes)  # runs of one case follow each other
@@ -282,6 +279,15 @@ class CampaignRuns:
 
     def _line(self, origin: Loc, sentence: str) -> str:
         return fault_line(self.file.source, self.file.root.line_of(origin), origin, sentence)
+
+
+def _labels(file: CampaignFile) -> list[str]:
+    """Returns the labels of the planners, else of each scenario's own, with the shield that the campaign sets."""
+    default, shield = PlannerSpec().kind, str(file.campaign.set_.get(key_path(SHIELD), ""))
+    if file.campaign.planners:
+        return [each.filled(shield=shield).label for each in file.campaign.planners]
+    own = ((base.text(KIND, default), shield or base.text(SHIELD, "")) for base in file.bases)
+    return [PlannerSpec.model_construct(kind=kind, shield=of).label for kind, of in own]
 
 
 def _chosen_changes(axes: Sequence[_Axis], indices: Sequence[int]) -> list[_Change]:

@@ -38,7 +38,7 @@ def read(path: Path, reading: Reading) -> Contents:
     for content in contents:
         vertices = _vertices(content, contents[0].get("transform"))
         for name, thing in content["CityObjects"].items():
-            kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
+            kind = _object_type(thing)
             if kind.startswith(SOLID_TYPES):
                 parts += _parts(name, thing, vertices, buildings, passed)
             else:
@@ -53,6 +53,10 @@ def read(path: Path, reading: Reading) -> Contents:
     else:
         check_metres(crs)
     return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
+
+
+def _object_type(thing: Any) -> str:
+    return str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
 
 
 def _parts(

@@ -72,14 +72,18 @@ def read_ed269(path: Path, reading: Reading) -> Contents:
     for zone in content:
         if not isinstance(zone, dict) or not isinstance(zone.get("geometry"), list):
             raise InputError("has a zone without a list `geometry`; must be ED-269")
-        when = zone.get("applicability") or ()
-        times = [t for t in ([when] if isinstance(when, dict) else when) if isinstance(t, dict)]
-        at_times = any(t.get("permanent") == "NO" or "schedule" in t for t in times)
+        at_times = _is_at_times(zone.get("applicability") or ())
         name = str(zone.get("identifier") or zone.get("name") or "")[:40]
         passed = found.passes(zone.get("restriction"), zone["geometry"], at_times)
         for volume in () if passed else zone["geometry"]:
             _add_volume(found, volume, name)
     return found.contents("ed269")
+
+
+def _is_at_times(applicability: Any) -> bool:
+    """Whether a zone of ED-269 applies at times only."""
+    times = [applicability] if isinstance(applicability, dict) else applicability
+    return any(isinstance(t, dict) and (t.get("permanent") == "NO" or "schedule" in t) for t in times)
 
 
 def _add_volume(found: _Zones, volume: Any, name: str) -> None:
