@@ -12,7 +12,7 @@ import pytest
 
 from aircraft.frames import LocalPlane
 from harness.replays.flown import read_flown
-from wayproof import InputError
+from wayproof import InputError, replay
 
 PLANE = LocalPlane(47.0, 8.0)
 ROWS = np.arange(20, dtype=np.float64)
@@ -100,6 +100,11 @@ def test_a_log_is_the_track_that_was_written(
         assert found.airspeed_mps is None
 
 
+def mission_in(folder: Path) -> Path:
+    (folder / "mission.json").write_text('{"mission": {"corners_east_north_m": [[0, 0], [900, 0]]}}')
+    return folder / "mission.json"
+
+
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
@@ -121,7 +126,7 @@ def test_a_log_is_the_track_that_was_written(
 def test_a_file_that_is_no_log_is_told(name: str, content: bytes, sentence: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError) as raised:
-        read_flown(tmp_path / name, PLANE)
+        replay(tmp_path / name, "aerosonde", mission_in(tmp_path))
     assert sentence in str(raised.value)
     assert "\n" not in str(raised.value)
 
@@ -134,7 +139,7 @@ def test_a_damaged_dataflash_log_is_told_in_one_line(
     write_dataflash(whole)
     whole.write_bytes(whole.read_bytes()[:86] + bytes(300))
     with pytest.raises(InputError, match=r"has 0 rows with a position|cannot be read as"):
-        read_flown(whole, PLANE)
+        replay(whole, "aerosonde", mission_in(tmp_path))
     assert capfd.readouterr() == ("", "")
 
 
