@@ -19,7 +19,7 @@ class Actuator:
     deadband_deg: float = 0.0  # about the trim
 
     def of_command(self, travel_deg: float) -> NormActuator:
-        """The same in units of the command, for a surface that moves by `travel_deg` for a command of 1."""
+        """Returns this servo in units of the command, for a surface that moves by `travel_deg` for a command of 1."""
         rate = None if self.rate_limit_degps is None else self.rate_limit_degps / travel_deg
         return NormActuator(self.lag_s, rate, self.deadband_deg / travel_deg)
 
@@ -44,7 +44,7 @@ class Actuators:
 
     @staticmethod
     def alike(actuator: Actuator) -> Actuators:
-        """The same servo at every surface and the throttle."""
+        """Returns actuators with one servo at every surface and the throttle."""
         return Actuators(actuator, actuator, actuator, actuator)
 
     @property

@@ -98,7 +98,7 @@ class Gains:
     throttle_load_forward: float  # throttle against induced drag, per (load factor squared - 1)
 
     def rounded(self, digits: int) -> Gains:
-        """The same gains, rounded to a number of significant digits."""
+        """Returns the gains rounded to a number of significant digits."""
         return Gains(**{f.name: float(f"{getattr(self, f.name):.{digits}g}") for f in fields(self)})
 
     def properties(self) -> dict[str, float]:

@@ -221,7 +221,7 @@ def air_direction(
     bearing_east: float,
     bearing_north: float,
 ) -> tuple[float, float]:
-    """Where to head in a wind that is not weaker than the airspeed.
+    """Returns the direction to head in a wind that is not weaker than the airspeed.
 
     If the bearing can be made good, the wind triangle. If not, along sqrt(W^2 - V^2) b - w, as PX4's npfg has it
     (`CourseToAirspeedRefMapper::infeasibleAirVelRef`): this is the wind triangle where feasibility ends, and

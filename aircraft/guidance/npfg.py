@@ -131,7 +131,7 @@ def npfg(at: NpfgInput, has: NpfgConfig, nominal_mps: float, largest_mps: float)
 
 
 def feasibility(airspeed_mps: float, wind: complex, direction: complex) -> float:
-    """How well a direction over the ground can be made good: 1 in light wind, 0 where the wind is too strong."""
+    """Returns how well a direction over the ground can be made good, from 1 (light wind) to 0 (wind too strong)."""
     against = abs(wind) if dot(wind, direction) < 0.0 else abs(cross(direction, wind))
     share = min(max((airspeed_mps - against) / FEASIBILITY_BUFFER_MPS, 0.0), 1.0)
     return math.sin(0.5 * math.pi * share) ** 2

@@ -245,7 +245,7 @@ class WaypointLaw:
         return radius_m + self._acceptance_m(ground_speed_mps, 0.5 * math.pi)
 
     def _gone_round_rad(self, leg: MissionLeg, state: AircraftState) -> float:
-        """How far round a circle the aircraft is from where its route begins."""
+        """Returns the angle round a circle that the aircraft is from where its route begins."""
         assert leg.centre_m is not None
         east, north = leg.centre_m
         bearing = math.atan2(state.north_m - north, state.east_m - east)

@@ -44,7 +44,7 @@ class Breach:
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """How far a flown track stayed from obstacles, fences and the ground, and where it did not."""
+    """Result of comparing a track with the world: its distances from obstacles, fences and ground, and its breaches."""
 
     breaches: tuple[Breach, ...]
     """In order of time."""

@@ -93,7 +93,7 @@ def is_allowed_for(causes: Collection[str], error_m: float | None, margin_m: flo
 def cross_track_cause(
     track: Track, peak: int, plans: Sequence[AcceptedPlan], limits: FlightLimits, force: InForce
 ) -> str:
-    """Why the aircraft is off the plan, at the row where it is most: the first cause that applies."""
+    """Names the cause for which the aircraft is off the plan, at the row where it is most: the first that applies."""
     within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= limits.cross_track_threshold_m)
     grows = int(within[-1]) if len(within) else 0
     first = int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S))
@@ -116,7 +116,7 @@ def cross_track_cause(
 
 
 def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) -> str | None:
-    """Why a corner was passed too far off: whether any turn would do in calm air, whether any would in that wind."""
+    """Names the cause for which a corner was passed too far off: no turn would do in calm air, or none in that wind."""
     half_rad = math.radians(abs(corner.turn_deg)) / 2.0
     outside = 1.0 / max(math.cos(half_rad), 1e-9) - 1.0
     needed = GRAVITY_MPS2 * math.tan(force.bank_limit_rad) * allowed_m / max(outside, 1e-9)
@@ -127,7 +127,7 @@ def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) 
 
 
 def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven | None) -> str:
-    """Why the altitude is off, at the row where it is most."""
+    """Names the cause for which the altitude is off, at the row where it is most."""
     wanted_m = given.altitude_m if given else np.full(len(track), limits.altitude_m)
     good = np.flatnonzero(np.abs(track.up_m[:peak] - wanted_m[:peak]) <= 0.5 * limits.max_altitude_error_m)
     steep = steepness_cause(track, int(good[-1]) if len(good) else 0, peak + 1, given)
@@ -144,7 +144,7 @@ def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven
 
 
 def speed_cause(lead: Track, fast_mps: float, limits: FlightLimits) -> str:
-    """Why the airspeed is too high by this (negative: too low), over the rows of which it is the mean."""
+    """Names the cause for which the mean airspeed over some rows is too high by this (negative: too low)."""
     limit = _vertical_limit(lead, limits)
     if limit is None and abs(fast_mps) <= SURE_SIGMAS * limits.airspeed_sigma_mps:
         limit = NAVIGATION_ERROR if _throttle_share(lead) < SATURATED_SHARE else None

@@ -17,7 +17,7 @@ LOAD_AVERAGED_S = 1.0
 
 @dataclass(frozen=True)
 class FlightLimits:
-    """What a flight is measured against."""
+    """The limits and reference values that a flight is measured against."""
 
     altitude_m: float
     """Altitude to be held, above mean sea level."""

@@ -117,7 +117,7 @@ def round_length_m(most_m: float) -> float:
 
 
 def severity(outcome: str) -> float:
-    """How bad an outcome is; one that is not known is the mildest of those that did not reach the goal."""
+    """Ranks how bad an outcome is; an unknown one counts as the mildest of those that did not reach the goal."""
     return SEVERITY.get(outcome, SEVERITY["unreachable"])
 
 
@@ -138,7 +138,7 @@ def holds(claim: Claim, metrics: Mapping[str, Any]) -> bool:
 
 
 def margin(claim: Claim, metrics: Mapping[str, Any]) -> float | None:
-    """How far a flight was from where a claim fails, by the content of its `metrics.json`; 0 where it does not hold.
+    """Returns the margin by which a claim holds of a flight, by the content of its `metrics.json`; 0 if it does not.
 
     `no-contact`: the least distance to an obstacle (m). `trackable`, `as-given`: what is left of the limit that was
     used most, as a share of it. None: the claim has no such figure, or there is no obstacle.

@@ -89,7 +89,7 @@ def _timing(flight: Flight) -> dict[str, Any]:
 
 
 def _off_path(track: Track) -> dict[str, Any]:
-    """How far the true and the believed positions were off the path, while a plan was flown."""
+    """Returns the figures of how far the true and the believed positions were off the path, while a plan was flown."""
     under_plan = track.plan_index >= 0
     believed_m = track.believed_cross_track_m if track.has_beliefs else track.cross_track_m
     assert believed_m is not None

@@ -154,14 +154,14 @@ class _Flown:
         )
 
     def _cross_track_cause(self, leg: Track, first: int, row: int) -> str:
-        """Why a leg is off its plan at a row of it."""
+        """Names the cause for which a leg is off its plan at a row of it."""
         most = self.limits.cross_track_threshold_m
         if _is_misled(leg.believed_cross_track_m, leg.cross_track_m, most, row):
             return NAVIGATION_ERROR
         return cross_track_cause(self.track, first + row, self.plans, self.limits, self.force)
 
     def _altitude_cause(self, leg: Track, high_m: FloatArray, first: int) -> str:
-        """Why a leg is off its altitude by this, where it is most."""
+        """Names the cause for which a leg is off its altitude by this, at the row where it is most."""
         believed = None if leg.believed_up_m is None else leg.believed_up_m - (leg.up_m - high_m)
         row = int(np.abs(high_m).argmax())
         if _is_misled(believed, high_m, self.limits.max_altitude_error_m, row):
@@ -169,7 +169,7 @@ class _Flown:
         return altitude_cause(self.track, first + row, self.limits, self.given)
 
     def _speed_cause(self, first: int, rows: int, fast_mps: float) -> str:
-        """Why the airspeed is too high by this, over the rows of which it is the mean."""
+        """Names the cause for which the mean airspeed over some rows is too high by this."""
         steep = self._steep(first, rows)
         if steep is not None:
             return steep
@@ -216,7 +216,7 @@ class _Flown:
         return judged
 
     def _cause_off_given(self, given: AsGiven, worst: int) -> str:
-        """Why the aircraft is too far off the path as given, at the row where that is worst."""
+        """Names the cause for which the aircraft is too far off the path as given, at the row where that is worst."""
         track, believed_m = self.track, given.believed_off_m
         allowed_m, along_m = float(given.allowed_m[worst]), float(track.arc_length_m[worst])
         if believed_m is not None and believed_m[worst] <= max(allowed_m, track.navigation_error_m[worst]):

@@ -42,7 +42,7 @@ T = TypeVar("T")
 
 
 class Turns(NamedTuple):
-    """What a bare run and its flight cost in turns, and the flight's figures."""
+    """Times (s) of a bare run and of its flight, taken in turns, and the flight's figures."""
 
     bare_s: float
     flight_s: float

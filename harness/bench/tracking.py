@@ -25,7 +25,7 @@ STRAIGHT_RADII: Final = (1.0, 4.0)
 
 
 class Tracking(NamedTuple):
-    """How a course was flown: m, and a share of the time."""
+    """Figures of how closely a course was flown: m, and a share of the time."""
 
     cross_track_p95_m: float
     cross_track_max_m: float

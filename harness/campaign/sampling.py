@@ -50,7 +50,7 @@ class Normal(Section):
 
 
 class Distribution(Section):
-    """What a key is drawn from: exactly one of the forms."""
+    """The distribution that a key is drawn from: exactly one of the forms."""
 
     model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": [name]} for name in FORMS]})
 

@@ -131,7 +131,7 @@ class Days(CampaignRuns):
         return replace(super().job(number, folder), cannot_fly=self.grounded.get(number, ""))
 
     def plain(self) -> dict[str, Any]:
-        """All that says what is flown, and what is claimed."""
+        """Returns what is flown and what is claimed, as JSON has it."""
         return {**super().plain(), "claim": self.claim, **({"rare": True} if self.rare else {})}
 
 
@@ -177,7 +177,7 @@ class PathDays(Days):
         return shlex.join(self._path.words(self._settings(number)))
 
     def plain(self) -> dict[str, Any]:
-        """All that says what is flown, and what is claimed."""
+        """Returns what is flown and what is claimed, as JSON has it."""
         return {**super().plain(), "path": sha256(self._path.content().encode()).hexdigest()}
 
 

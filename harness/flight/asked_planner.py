@@ -59,13 +59,13 @@ class AskedPlanner:
 
     @property
     def shield(self) -> ShieldReport | None:
-        """What the planner's shield did so far; None without one."""
+        """Record of what the planner's shield did so far; None without one."""
         report = getattr(self._planner, "report", None)
         return report if isinstance(report, ShieldReport) else None
 
     @property
     def backup(self) -> str:
-        """Why the shield flies its backup; empty while it flies the planner's path, and without a shield."""
+        """Reason why the shield flies its backup; empty while it flies the planner's path, and without a shield."""
         return str(getattr(self._planner, "backup", "")) if self.shielded else ""
 
     def plan(self, request: PlanRequest) -> Answer:

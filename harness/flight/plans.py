@@ -53,7 +53,7 @@ class Plans:
 
     @property
     def shield(self) -> ShieldReport | None:
-        """What the planner's shield did so far; None without one."""
+        """Record of what the planner's shield did so far; None without one."""
         return self._planner.shield
 
     @property

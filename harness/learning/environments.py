@@ -142,7 +142,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
 
     @property
     def episode(self) -> Episode:
-        """What has been flown so far, to be flown again."""
+        """The episode flown so far, with which `wayproof.fly` flies it again."""
         return Episode(self._flown, tuple(self._pilot.noted))
 
     def _steered(self, loop: Loop) -> Loop:

@@ -50,7 +50,7 @@ class ReadOnlyMap:
 
     @property
     def last_contradiction_s(self) -> float:
-        """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
+        """Time (s) at which something last stood, or seemed to, in space that had been seen free; -inf: never."""
         return self._seen.last_contradiction_s
 
     def edges_since(self, revision: int) -> FloatArray:

@@ -27,7 +27,7 @@ CORNERS_WANTED: Final = "two or more pairs [east, north] of numbers in m"
 
 
 class Origin(BaseModel):
-    """Where east = north = up = 0 of a log lies."""
+    """The place on earth of the origin (east = north = up = 0) of a log."""
 
     model_config = ConfigDict(strict=True)
     latitude_deg: FiniteFloat

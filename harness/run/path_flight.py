@@ -93,7 +93,7 @@ class PathCheck:
     """Files among the obstacles, for a path that is not flown at one altitude."""
 
     def allowed_cut_m(self, waypoint: int) -> float:
-        """How far off a corner may be passed; nothing of the aircraft or its guidance enters.
+        """Returns how far off a corner may be passed (m); nothing of the aircraft or its guidance enters.
 
         It is `corner_m` where that is given. Else a drawn path is to be flown as drawn: it is the cross-track limit. At
         a waypoint of a mission it is the acceptance radius of the file, else `CORNER_M`.

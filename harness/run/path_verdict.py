@@ -82,7 +82,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
 def _told(
     check: PathCheck, flight: Flight, limits: FlightLimits, asked: AsGiven, passing: _Passing
 ) -> dict[str, Any]:
-    """What stands under `check`; whether it is ok, and the verdict, follow from it."""
+    """Returns the content of `check`, without `ok` and the verdict, which follow from it."""
     track, given, plan = flight.track, check.given, check.plan
     # The place where the track is furthest off the path in relation to what is allowed there.
     row = int((passing.off_m / np.maximum(asked.allowed_m, 1e-9)).argmax())
@@ -140,7 +140,7 @@ def verdict(
 
 
 def _breaches_told(seen: Kept) -> list[str]:
-    """What was touched, entered and left, the deepest of each kind, and how many more there are."""
+    """Says what was touched, entered and left: the deepest of each kind, and how many more there are."""
     kinds = (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves"))
     crossed = [([each for each in seen.crossings if each.kind == kind], verb) for kind, verb in kinds]
     found = []
@@ -154,7 +154,7 @@ def _breaches_told(seen: Kept) -> list[str]:
 
 
 def _flown_as_given_told(told: Mapping[str, Any], limits: FlightLimits) -> str:
-    """How a path was flown, and how much of the limits was used."""
+    """Says how a path was flown, and how much of the limits was used."""
     used, tolerance_m = told["limit_used"], limits.cross_track_threshold_m
     how = "as drawn" if told["drawn"] else "with its corners cut by no more than allowed"
     wide_m = max((corner["allowed_cut_m"] for corner in told["corners"]), default=0.0)
@@ -191,7 +191,7 @@ def _speed_and_load_held(legs: Sequence[Mapping[str, Any]], limits: FlightLimits
 
 
 def _deviation_told(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
-    """How far off the path and a corner an aircraft was, where too far; `corners_alone`: nothing else is wrong."""
+    """Says how far off the path and a corner an aircraft was, if too far; `corners_alone`: nothing else is wrong."""
     worst, enough_m = told["worst"], told["corner_m_that_would_do"]
     missed = next((corner for corner in told["corners"] if not corner["kept"]), None)
     noun, faults = "waypoint" if told["drawn"] else "item", []
@@ -256,7 +256,7 @@ def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:
 
 
 def _leg_ends(plan: PathPlan, corners: Sequence[CutCorner]) -> list[CutCorner]:
-    """Where legs end: at every item of a mission; at the corners of a drawn line, and where its slope changes."""
+    """Finds the ends of legs: every item of a mission; the corners of a drawn line, and where its slope changes."""
     known = {(corner.waypoint, round(corner.arc_length_m, 3)): corner for corner in corners}
     plain = {
         (number, round(along, 3)): CutCorner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along, 0.0)  # no corner
@@ -291,7 +291,7 @@ class _Passing:
         return next((each.waypoint for each in self.corners if row in self.stations.at_corner(each)), None)
 
     def of(self, corner: CutCorner) -> dict[str, Any]:
-        """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there.
+        """Returns the entry of a corner under `check`; `flown_cut_m` is None if the aircraft did not get there.
 
         What it is off counts up to where it is within the tolerance of the path again.
         """

@@ -138,7 +138,7 @@ def fly_and_measure(scenario: Scenario) -> dict[str, Any]:
 
 
 class RunNames(NamedTuple):
-    """What a run folder says of itself.
+    """Names that a run folder and its recording give themselves.
 
     The manifest says that `command` was called, by default the command line. A recording is called `identity`, by
     default its name with a hash of all settings and versions, and names the keys that a campaign `varied`; a `thin` one

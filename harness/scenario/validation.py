@@ -104,7 +104,7 @@ def _known_keys(model: type[BaseModel], loc: Loc) -> tuple[str, ...]:
 
 
 def _sentence(details: ErrorDetails, known: tuple[str, ...]) -> str:
-    """What is wrong, and what would be right."""
+    """Makes the sentence that says what is wrong with a value, and what would be right."""
     kind, value, context = details["type"], details["input"], details.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])

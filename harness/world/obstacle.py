@@ -146,7 +146,7 @@ class Obstacle:
 
     @property
     def epoch_s(self) -> float:
-        """When its motion starts: as it appears, or at 0 if it is always there."""
+        """Time (s) at which its motion starts: as it appears, or 0 if it is always there."""
         return self.active_s[0] if self.active_s else 0.0
 
     @property

@@ -75,7 +75,7 @@ def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What became of one file: valid polygons in the plane and area, their bottoms and tops, and what was assumed."""
+    """The result of one file: valid polygons in the plane and area, their bottoms and tops, and what was assumed."""
 
     spec: FileSpec
     kind: str
@@ -87,7 +87,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Expanded:
-    """What became of all files of a scenario: one source a file, and the terrain of all together, None without."""
+    """The result of all files of a scenario: one source a file, and the terrain of all together, None without."""
 
     sources: tuple[Source, ...]
     ground: HeightField | None

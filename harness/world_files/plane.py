@@ -24,7 +24,7 @@ METRES: Final = ("m", "metre", "meter", "metres", "meters", "degree")
 
 
 class Place(NamedTuple):
-    """Where the local plane of a scenario touches the earth: ENU (0, 0), WGS84."""
+    """The place where the local plane of a scenario touches the earth: ENU (0, 0), WGS84."""
 
     latitude_deg: float
     longitude_deg: float

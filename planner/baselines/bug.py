@@ -81,7 +81,7 @@ class Bug1(Walker[BugState]):
         return ()
 
     def says(self, state: BugState) -> str:
-        """What the planner does."""
+        """A sentence that says what the planner is doing, for the plan's reason."""
         if isinstance(state, Circling):
             return f"going round an obstacle, {state.walked_m / 1000:.1f} km from the hit point"
         if isinstance(state, Returning):

@@ -48,7 +48,7 @@ class Node(NamedTuple):
 
     @property
     def places(self) -> list[Point]:
-        """Where the curves end."""
+        """The places (east, north) at which the curves end."""
         return [along(way[-1], way[-1][5])[:2] for way in self.ways]
 
 

@@ -23,7 +23,7 @@ class Mark:
     uy: float
 
     def reversed(self) -> Mark:
-        """The same place passed the other way."""
+        """Returns the same tangent point, passed the other way round."""
         return Mark(self.place, -self.ux, -self.uy)
 
 

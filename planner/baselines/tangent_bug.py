@@ -99,7 +99,7 @@ class TangentBug(Walker[TangentBugState]):
         return (state.anchor, state.hit.place) if isinstance(state, BoundaryFollowing) else ()
 
     def says(self, state: TangentBugState) -> str:
-        """What the planner does."""
+        """A sentence that says what the planner is doing, for the plan's reason."""
         if isinstance(state, BoundaryFollowing):
             return f"local minimum, following a boundary for {state.walked_m / 1000:.1f} km"
         return "motion to the goal"

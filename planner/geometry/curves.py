@@ -161,7 +161,7 @@ def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | Non
 
 
 class Limits(NamedTuple):
-    """How a curve may bend."""
+    """Limits of the bend of a curve."""
 
     radius_m: float  # smallest radius
     roll_m: float  # flown, downwind, while rolling into a turn; straight between a left and a right turn

@@ -92,7 +92,7 @@ def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArra
 
 @compiled(ROWS, FLOATS, FLOAT)
 def _in_squares(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, IntArray, FloatArray]:
-    """What `bucketed` returns, but the points."""
+    """Returns the indices and the buckets of `bucketed`, without its points."""
     count, order = len(points), np.empty(len(points), dtype=np.intp)
     west, south, east, north = math.inf, math.inf, -math.inf, -math.inf
     for i in range(count):

@@ -119,5 +119,5 @@ def whole_units(sector: Sector, direction_rad: float, course_rad: float, unit_ra
 
 
 def signed(angle_rad: float) -> float:
-    """The same angle in [-pi, pi)."""
+    """Returns an angle as the equal one in [-pi, pi)."""
     return (angle_rad + math.pi) % math.tau - math.pi

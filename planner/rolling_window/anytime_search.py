@@ -57,7 +57,7 @@ class AnytimeSearch:
         self.done = True
 
     def _now(self) -> tuple[Start, Course | None]:
-        """Where a plan would begin now, and the course that is flown."""
+        """Returns the start of a plan made now, and the course that is flown."""
         assert self._start is not None
         return self._start, self._flown
 

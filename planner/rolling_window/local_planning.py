@@ -68,7 +68,7 @@ Now = Callable[[], tuple[Start, Course | None]]
 
 
 class Trail:
-    """Where the aircraft has been: squares of the plane that were flown through, and those around them."""
+    """The squares of the plane that the aircraft has flown through, and those around them."""
 
     def __init__(self, side_m: float) -> None:
         self._side = side_m

@@ -11,7 +11,7 @@ from planner.shield.committed_plan import CommittedPlan
 
 
 class PlanningState(Enum):
-    """What the planner is doing about the plan in effect."""
+    """The state of planning: what is being done about the plan in effect."""
 
     FOLLOWING = "following"  # the committed plan leads on; the window rolls as it is due
     LOITERING = "loitering"  # in the turn that the committed plan ends with, the search for a way on goes on

@@ -55,7 +55,7 @@ straight all second turns that lead into the same last turn are one way."""
 
 @dataclass(frozen=True, eq=False)
 class Threats:
-    """What is near: edges of what stands, and of what moves.
+    """The edges near the aircraft: of obstacles that stand, and of those that move.
 
     A row of `moving` is an edge point now, or one of what is taken to lie behind, its velocity, and how fast it may
     come nearer beyond that.
@@ -96,7 +96,7 @@ class Threats:
 
     @cached_property
     def _still(self) -> Buckets:
-        """What stands, by squares."""
+        """The edge points of obstacles that stand, sorted into squares."""
         return bucketed(self.still_m, np.zeros(len(self.still_m)), SQUARE_SIDE_STEPS * self.step_m)[1]
 
 

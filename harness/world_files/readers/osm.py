@@ -78,7 +78,7 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
 
 @dataclass
 class _Found:
-    """What has been found so far; `ways` are buildings, by name, whose area may come later or never."""
+    """Parts found so far in a file; `ways` are buildings, by name, whose area may come later or never."""
 
     buildings: limits.Buildings
     shape_of: Any
