@@ -56,14 +56,6 @@ def test_no_failing_range_as_wide_as_a_step_lies_below_the_answer(
     assert result.fails is None or fails(result.fails)
 
 
-def test_the_mild_end_comes_first_and_may_be_all_there_is() -> None:
-    at_once, asked = found(lambda place: True)
-    assert (at_once.fails, at_once.passes, asked) == (0.0, None, [0.0])
-    never, asked = found(lambda place: False)
-    assert (never.fails, never.settled) == (None, True)
-    assert asked == [step / never.steps for step in range(never.steps + 1)]
-
-
 @pytest.mark.parametrize("conditions", range(2, 14))
 def test_the_conditions_are_counted(conditions: int) -> None:
     result, asked = found(lambda place: place > 0.77, conditions=conditions, tolerance=0.001)
