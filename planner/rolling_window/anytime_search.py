@@ -18,6 +18,10 @@ from planner.rolling_window.local_planning import DOUBTFUL_SHARE, Attempt, Local
 from planner.rolling_window.multi_step_search import Candidate
 from planner.shield.committed_plan import Start
 
+LONG_SHARE, MOST_WORK = 0.0015, 6000.0
+"""A portion of a search is at least the first share of the work that it has done so far, up to `MOST_WORK` units: else
+a search among the edges of a large maze would go on for minutes, flown in a turn."""
+
 
 class _Found(NamedTuple):
     """A route found, with its start, the attempt that found it and the edge points it was found among."""
@@ -40,6 +44,7 @@ class AnytimeSearch:
         self._start: Start | None = None
         self._flown: Course | None = None
         self._steps = self._searched()
+        self._begun = local.work_count.done  # counted when it began
         self.known = local.memory.known  # number of edge points, of what stands still, that it began with
         self.done = False  # all ways have been looked for
         self.stuck: Course | None = None  # the first way that was found and could not be taken
@@ -47,7 +52,8 @@ class AnytimeSearch:
 
     def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
         """Yields the courses found with one more portion of work."""
-        enough = self._local.work_count.done + work
+        done = self._local.work_count.done
+        enough = done + max(work, min(LONG_SHARE * (done - self._begun), MOST_WORK))
         self._start, self._flown = start, flown
         for step in self._steps:
             if step is not None:

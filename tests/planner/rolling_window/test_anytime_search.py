@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -79,6 +79,26 @@ def test_a_portion_is_hardly_larger_than_asked_for(trap: MapView) -> None:
         assert local.work_count.done - before < 2 * 800.0
         portions += 1
     assert portions > 7
+
+
+@pytest.mark.parametrize(("most", "portions"), [(1.3e6, 650), (1e7, 667 + 732 + 1000)])
+def test_portions_grow_in_a_search_that_goes_on_for_minutes(
+    trap: MapView, monkeypatch: pytest.MonkeyPatch, most: float, portions: int
+) -> None:
+    """By hand: 2,000 a portion up to 1.33 million, 0.15 % more in each up to 4 million, then 6,000."""
+    local, thinking = planning(trap)
+
+    def endless(*_: object) -> Iterator[None]:
+        while True:
+            local.work_count.add(0, 10.0, 1)
+            yield
+
+    monkeypatch.setattr(local, "route", endless)
+    asked = 0
+    while local.work_count.done < most:
+        assert not list(thinking.courses(START, None, 2000.0))
+        asked += 1
+    assert asked == pytest.approx(portions, rel=0.005)
 
 
 def test_what_is_found_late_begins_where_the_aircraft_has_got_to(trap: MapView) -> None:
