@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
+from harness.cli.app import main
 from harness.files.errors import RunFolderError
 from harness.flight.observer import Caution, ShieldState
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
@@ -468,17 +469,18 @@ def test_overlaid_runs_have_names_of_their_own(folders: list[str], names: list[s
     assert run_names([Path(folder) for folder in folders]) == names
 
 
-def test_view_says_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(RunFolderError, match=r"has no flight\.rrd"):
-        open_viewer([tmp_path])
-    (tmp_path / "flight.rrd").write_bytes(b"not a recording")
-    with pytest.raises(RunFolderError, match="recording"):
-        open_viewer([tmp_path, tmp_path], web=True)
+def test_view_says_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(screen, raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
-    with pytest.raises(ViewerError, match=r"no screen.*wayproof view --web"):
-        open_viewer([tmp_path])
+    (tmp_path / "flight.rrd").write_bytes(b"not a recording")
+    assert main(["view", str(tmp_path), str(tmp_path), "--web"]) == 2
+    assert "recording" in capsys.readouterr().err
+    assert main(["view", str(tmp_path)]) == 1
+    assert "no screen" in (said := capsys.readouterr().err)
+    assert "`wayproof view --web`" in said
 
 
 @pytest.mark.flights

@@ -22,19 +22,23 @@ mission: {start_m: [1000, 1000], goal_m: [31000, 1000]}
 SHORT = LEAST.replace("40000, 40000", "10000, 10000").replace("[31000, 1000]", "[1000, 3000]")
 
 
+def scenario(*lines: str) -> Scenario:
+    return scenario_of(SHORT + "".join(f"{line}\n" for line in lines))
+
+
 def test_what_is_given_goes_before_the_preset_and_only_that_counts_as_given() -> None:
-    found = Navigation.model_validate(
-        {"kind": "gnss", "position_sigma_m": 2, "outages_s": [[5, 9], [10, 20]]}
-    )
+    given = scenario("navigation: {kind: gnss, position_sigma_m: 2, outages_s: [[5, 9], [10, 20]]}")
+    found = given.navigation
     assert (found.position_sigma_m, found.position_correlation_s) == (2.0, 1100.0)
     assert found.outages_s == ((5.0, 9.0), (10.0, 20.0))
-    assert found.model_fields_set == {"kind", "position_sigma_m", "outages_s"}
+    other = given.with_({"navigation.kind": "rtk"}).navigation
+    assert (other.position_sigma_m, other.position_correlation_s) == (2.0, 100.0)
 
 
 def test_gps_is_as_large_as_what_drives_it_makes_it() -> None:
     """Beard and McLain drive the error by 0.21 m (0.40 m in altitude) once a second."""
     grown = 1.0 / math.sqrt(1.0 - math.exp(-2.0 / 1100.0))
-    gnss = Navigation(kind="gnss")
+    gnss = scenario("navigation: {kind: gnss}").navigation
     assert gnss.position_sigma_m == pytest.approx(0.21 * grown, rel=0.06)
     assert gnss.altitude_sigma_m == pytest.approx(0.40 * grown, rel=0.06)
 
@@ -96,10 +100,6 @@ def test_the_margin_has_what_the_heading_misplaces_an_edge_by_before_the_plan_is
     navigation = Navigation(kind="rtk", heading_sigma_deg=heading_deg)
     margin_m = planning_margin_m(navigation, 25.0, 1000.0, clearance_m, radius_m)
     assert margin_m == pytest.approx(3.0 * 0.017 + 3.0 * math.radians(heading_deg) * along_m)
-
-
-def scenario(*lines: str) -> Scenario:
-    return scenario_of(SHORT + "".join(f"{line}\n" for line in lines))
 
 
 @pytest.mark.parametrize(
