@@ -145,7 +145,7 @@ class MovingObstacles:
         return moving
 
     def _look(self, now: Look, moving: BoolArray | None) -> None:
-        """Begins to follow what has come to places that were looked through before, or has drawn back."""
+        """Begins to follow outlines that have come to places seen through by earlier scans, or have drawn back."""
         changed = self._earlier.changed(now)
         if changed is None:
             return

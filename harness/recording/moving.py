@@ -66,7 +66,7 @@ class Changing:
         self._obstacles = [each for each in enumerate(scene.obstacles) if not each[1].stands_for_ever]
 
     def send(self, rec: rr.RecordingStream, time_s: FloatArray) -> None:
-        """Sends their changes at consecutive times of the track."""
+        """Sends where the obstacles are, and which appear or vanish, at the next times of the track."""
         until = float(time_s[-1])
         for index, obstacle in self._obstacles:
             start, stop = obstacle.interval_s

@@ -44,7 +44,7 @@ class LoopPart:
     factory_parameter: str
     """Name of the one parameter that a function which makes such a part may have."""
     registered: dict[str, Any] = field(default_factory=dict)
-    """The kinds that this process, and no other, knows by name."""
+    """Kinds by name that this process, and no other, knows."""
 
     def plugins(self) -> dict[str, tuple[Any, str | None]]:
         """Loads the kinds of other distributions: kind and owner (distribution, version) by name; or a PluginError."""

@@ -188,7 +188,7 @@ class Walker(ABC, Generic[WalkState]):
         return self._plan
 
     def enclosed(self) -> str:
-        """Beginning of a sentence that says why the goal cannot be reached."""
+        """Returns the beginning of a sentence that says why the goal cannot be reached."""
         return f"an obstacle encloses the goal at a distance of {self.keep_m:.0f} m from its edge"
 
     def straight(self, place: Point, target: Point) -> tuple[FloatArray, bool]:

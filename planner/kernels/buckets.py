@@ -42,7 +42,7 @@ def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray,
 
 
 def _touching(keys: IntArray, width: int) -> Cells:
-    """`Cells` of (m,) sorted keys: column times `width`, one more than there are rows, and row added."""
+    """Returns the `Cells` of (m,) sorted keys; a key is column times `width` (rows + 1) plus row."""
     first = np.flatnonzero(np.diff(keys, prepend=-1))
     squares, one, other = keys[first], [], []
     for step in (1, width - 1, width, width + 1):
