@@ -76,7 +76,7 @@ def compared(
 
     heights, found = track.altitude_above_ground_m, [*_contacts(track, world), *others[0]]
     margins = [float(np.min(track.clearance_m, initial=np.inf)), others[1]]
-    for fence in fences.exclusions:
+    for fence in (each for each in fences.every if not each.inclusion):
         margin = -inside_m(track, fence.area)
         margins.append(float(margin.min()))
         found += crossings(track, margin, fence.area, fence.kind, fence.name)

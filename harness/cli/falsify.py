@@ -52,7 +52,7 @@ def falsify(
     """
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
-    from harness.falsify.breaking_point import FALSIFIED, INDEX, Effort, vary_of
+    from harness.falsify.breaking_point import FALSIFIED, Effort, vary_of
     from harness.falsify.breaking_point import falsify as search
     from harness.scenario.kinds import source_words
 
@@ -65,18 +65,8 @@ def falsify(
     # Indices as `--set` takes them, which no shell takes for a pattern.
     keys = "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in varied)])
     folder = out or Path("runs") / loaded(()).name / f"{keys}{told_apart(given.keys, named=())}"
-    ended: list[int] = []
-
-    def left() -> str:
-        return f"the flights so far are in {folder / INDEX}" if ended else "no flight had ended yet"
-
-    with interruptible(left), step_bar(quiet) as bar:
-
-        def report(done: int, of: int, told: str) -> None:
-            ended.append(done)
-            bar(done, of, told)
-
-        found = search(loaded, varied, folder, claim=claim, effort=Effort(runs, tolerance), progress=report)
+    with interruptible(lambda: "nothing was written"), step_bar(quiet) as bar:
+        found = search(loaded, varied, folder, claim=claim, effort=Effort(runs, tolerance), progress=bar)
     if as_json:
         print_json(found.plain())
     elif not quiet:

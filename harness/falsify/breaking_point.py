@@ -275,11 +275,6 @@ def falsify(
             tuple(trials.values()),
         )
         _write(out, result.plain(), scenario_at(load, vary, found.values) if found else None)
-    except KeyboardInterrupt:
-        if trials:
-            done = [asdict(each) for each in trials.values()]
-            _write(out, {"schema": SCHEMA, "complete": False, "trials": done}, None)
-        raise
     finally:
         lock.release()
         with suppress(OSError):  # a folder that holds anything stays

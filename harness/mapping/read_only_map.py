@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import NoReturn
 
-from planner.interface import BoolArray, FloatArray, MapView, MovingEdges
+from planner.interface import BoolArray, FloatArray, MapView
 
 
 class ReadOnlyMap:
@@ -28,30 +29,11 @@ class ReadOnlyMap:
             f"{name[:100]} of the map cannot be deleted: a planner may only read what was seen"
         )
 
-    @property
-    def spacing_m(self) -> float:
-        """Edge points of one wall are about this far apart."""
-        return self._seen.spacing_m
-
-    @property
-    def revision(self) -> int:
-        """Grows by one with every change of the set of edge points."""
-        return self._seen.revision
-
-    @property
-    def last_removal_revision(self) -> int:
-        """The last revision at which edge points were taken away again; 0 where none ever was."""
-        return self._seen.last_removal_revision
-
-    @property
-    def moving(self) -> tuple[MovingEdges, ...]:
-        """Obstacles known to move; their edges are not among the others."""
-        return self._seen.moving
-
-    @property
-    def last_contradiction_s(self) -> float:
-        """Time (s) at which something last stood, or seemed to, in space that had been seen free; -inf: never."""
-        return self._seen.last_contradiction_s
+    spacing_m = property(attrgetter("_seen.spacing_m"))
+    revision = property(attrgetter("_seen.revision"))
+    last_removal_revision = property(attrgetter("_seen.last_removal_revision"))
+    moving = property(attrgetter("_seen.moving"))
+    last_contradiction_s = property(attrgetter("_seen.last_contradiction_s"))
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) read-only edge points that came in after `revision`, oldest first; all of them after -1."""

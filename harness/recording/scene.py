@@ -176,36 +176,18 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
     goal = circle(scene.mission.goal_m, scene.mission.goal_radius_m)
     rec.log(f"{look.PLAN}/bounds", lines_2d([bounds], look.BOUNDS, 1.5, 5), static=True)
     rec.log(f"{look.PLAN}/goal", lines_2d([goal], look.GOAL, 2.0, 45), static=True)
-    rec.log(
-        f"{look.PLAN}/ends",
-        rr.Points2D(
-            [scene.start_m, scene.mission.goal_m],
-            colors=ends,
-            radii=rr.Radius.ui_points(5.0),
-            labels=["start", "goal"],
-            show_labels=True,
-            draw_order=46,
-        ),
-        static=True,
-    )
+    places = scene.start_m, scene.mission.goal_m
+    told: dict[str, Any] = {"colors": ends, "labels": ["start", "goal"]}
+    dots = rr.Points2D(places, radii=rr.Radius.ui_points(5.0), show_labels=True, draw_order=46, **told)
+    rec.log(f"{look.PLAN}/ends", dots, static=True)
     _log_scale_and_wind(rec, scene)
     ground = [np.column_stack((points, np.full(len(points), scene.base_m))) for points in (bounds, goal)]
-    rec.log(
-        f"{look.WORLD}/area",
-        rr.LineStrips3D(ground, colors=[look.BOUNDS, look.GOAL], radii=rr.Radius.ui_points(0.75)),
-        static=True,
-    )
-    poles = [
-        [(*point, scene.base_m), (*point, 1.5 * scene.obstacle_top_m - 0.5 * scene.base_m)]
-        for point in (scene.start_m, scene.mission.goal_m)
-    ]
-    rec.log(
-        f"{look.WORLD}/ends",
-        rr.LineStrips3D(
-            poles, colors=ends, radii=rr.Radius.ui_points(1.5), labels=["start", "goal"], show_labels=True
-        ),
-        static=True,
-    )
+    area = rr.LineStrips3D(ground, colors=[look.BOUNDS, look.GOAL], radii=rr.Radius.ui_points(0.75))
+    rec.log(f"{look.WORLD}/area", area, static=True)
+    top_m = 1.5 * scene.obstacle_top_m - 0.5 * scene.base_m
+    poles = [[(*place, scene.base_m), (*place, top_m)] for place in places]
+    lines = rr.LineStrips3D(poles, radii=rr.Radius.ui_points(1.5), show_labels=True, **told)
+    rec.log(f"{look.WORLD}/ends", lines, static=True)
 
 
 def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:

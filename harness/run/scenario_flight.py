@@ -27,7 +27,7 @@ from harness.flight.record import AcceptedPlan, Flight, Track
 from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import ScanErrors, SensedMap
 from harness.recording.properties import run_properties
-from harness.run_files.run_folder import RunFolder
+from harness.run_files.run_folder import RECORDING, RunFolder
 from harness.scenario.parts import airframe_of, flown_airframe, law_of, planner_of
 from harness.scenario.performance import air_of, mission_of, performance_of, start_conditions, wind_mps_of
 from harness.scenario.scenario import Scenario, dump_scenario
@@ -246,7 +246,7 @@ def _recording(scene: Scene, loop: Loop, folder: RunFolder, named: RunNames) -> 
 
     settings = hashlib.sha256(f"{scene.scenario_yaml}{versions()}".encode()).hexdigest()
     identity = named.identity or f"{scene.name} ({settings[:8]})"
-    return RerunLog(folder.recording_path, scene, identity, lambda: loop.seen.moving, named.thin)
+    return RerunLog(folder.path / RECORDING, scene, identity, lambda: loop.seen.moving, named.thin)
 
 
 def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None) -> Scene:

@@ -101,15 +101,9 @@ def _on_plan(plan: PlanRow, arc_length_m: FloatArray) -> FloatArray:
 def plan_text(path: ExportedPath) -> str:
     """Returns a plan of QGroundControl, without fences."""
     held = path.scenario.mission.altitude_m
+    simple = {"autoContinue": True, "command": WAYPOINT, "frame": ABOVE_SEA, "type": "SimpleItem"}
     items = [
-        {
-            "autoContinue": True,
-            "command": WAYPOINT,
-            "doJumpId": number,
-            "frame": ABOVE_SEA,
-            "params": [0, 0, 0, None, *place, held],
-            "type": "SimpleItem",
-        }
+        {**simple, "doJumpId": number, "params": [0, 0, 0, None, *place, held]}
         for number, place in enumerate(path.degrees.tolist(), start=1)
     ]
     mission = {

@@ -22,11 +22,6 @@ class Fences:
     inside_all: bool = False
 
     @property
-    def exclusions(self) -> tuple[Fence, ...]:
-        """Fences to stay out of."""
-        return tuple(fence for fence in self.every if not fence.inclusion)
-
-    @property
     def inclusions(self) -> tuple[Fence, ...]:
         """Fences to stay inside of."""
         return tuple(fence for fence in self.every if fence.inclusion)

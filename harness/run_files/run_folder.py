@@ -121,11 +121,6 @@ class RunFolder(AbstractContextManager["RunFolder"]):
             raise RunFolderError(f"cannot write the run folder {path}: {error.strerror or error}") from error
         return cls(path, manifest, lock)
 
-    @property
-    def recording_path(self) -> Path:
-        """Path of the recording."""
-        return self.path / RECORDING
-
     def finish(self, track: Track, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
         """Writes track, plans and metrics, then marks the run complete: last, after the recording is closed.
 
