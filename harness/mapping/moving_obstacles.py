@@ -199,7 +199,7 @@ class MovingObstacles:
             if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
                 whole = self._whole(come[run], hits, places, scan)
                 if extent_m(places[whole]) < NARROW_SIGMAS * self._noise:
-                    whole = self._about(come[run], hits, places, scan)
+                    whole = self._near_mean(come[run], hits, places, scan)
                 self._tracks.append(
                     FollowedOutline(self._outline(scan, hits[whole], places[whole]), scan.time_s)
                 )
@@ -340,8 +340,8 @@ class MovingObstacles:
         step_m = NO_STEP * self._clearance + MEDIAN_SIGMAS * self._noise
         return some[grown(np.searchsorted(some, mine), hits[some], places[some], step_m, scan)]
 
-    def _about(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
-        """Returns all returns about the mean of some, clockwise, or these where none is near it."""
+    def _near_mean(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
+        """Returns the returns near the mean place of `mine`, clockwise, or `mine` where none is near it."""
         near = (np.abs(places - places[mine].mean()) < self._gate).nonzero()[0]
         if not len(near):
             return mine

@@ -128,7 +128,7 @@ def register(
         None where too few of the returns are near, or it would be laid further away than the gate.
     """
     hits, places = returns
-    near = _about(outline.points, places, gate_m)
+    near = _within_gate(outline.points, places, gate_m)
     if min(len(near), len(outline.points)) < FEWEST:
         return None
     sensor = complex(scan.east_m, scan.north_m)
@@ -185,7 +185,7 @@ def _least_squares(
     return complex(c * right.real - b * right.imag, a * right.imag - b * right.real) / float(a * c - b * b)
 
 
-def _about(points: ComplexArray, places: ComplexArray, gate_m: float) -> IntArray:
+def _within_gate(points: ComplexArray, places: ComplexArray, gate_m: float) -> IntArray:
     """Returns the indices of places within `gate_m` of the upright box round some points."""
     inside = np.ones(len(places), dtype=np.bool_)
     for of_points, of_places in ((points.real, places.real), (points.imag, places.imag)):

@@ -145,8 +145,8 @@ class Frame:
     world: str = ""
 
     @property
-    def kept(self) -> dict[str, Any]:
-        """The values that a recording keeps of it."""
+    def recorded(self) -> dict[str, Any]:
+        """Returns the values of the frame that a recording keeps."""
         return {name: getattr(self, name) for name in ("bounds_m", "altitude_m", "clearance_m", "world")}
 
     @property

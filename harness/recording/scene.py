@@ -61,7 +61,7 @@ AIRCRAFT_TRIANGLES = np.array(
 
 def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None:
     """Logs all that never changes; of a thin recording few points of circles, and the summary when it is known."""
-    rec.send_property(look.FRAME, rr.AnyValues(**scene.frame.kept))
+    rec.send_property(look.FRAME, rr.AnyValues(**scene.frame.recorded))
     rec.log(look.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     rec.log(look.PLAN, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
     _log_area(rec, scene)

@@ -56,7 +56,7 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     marks = {name: entry for name, entry in every.items() if entry[1]}
     kinds = list(dict.fromkeys(fence["kind"] for fence in check["fences"]))
     lines = math.ceil((2 + len(marks) + len(kinds)) / 2)
-    scene = _about(scene, np.concatenate((given_m, flown)))
+    scene = _framed(scene, np.concatenate((given_m, flown)))
     heights_in = [map_height_in(scene), NEAR_MISS_HEIGHT_IN]
     with styled(sum(heights_in) + LEGEND_ROW_IN * (lines + 1)) as figure:
         rows = figure.add_gridspec(2, 1, height_ratios=heights_in)
@@ -93,7 +93,7 @@ def _places(entries: Iterable[Mapping[str, Any]]) -> list[tuple[float, float]]:
     return [(each["east_m"], each["north_m"]) for each in entries]
 
 
-def _about(scene: FigureScene, points_m: FloatArray) -> FigureScene:
+def _framed(scene: FigureScene, points_m: FloatArray) -> FigureScene:
     """Returns the scene with its frame drawn close about a path."""
     from dataclasses import replace
 

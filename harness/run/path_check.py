@@ -124,7 +124,7 @@ def prepare_check(
     def validly(root: Node) -> Scenario:
         return validated(root, "command line" if world is None else str(world), folder, ends_checked=False)
 
-    root = overridden(_with_keys(base, {**_mission_about(given.points_m, base), **keys}), settings)
+    root = overridden(_with_keys(base, {**_mission_keys(given.points_m, base), **keys}), settings)
     scenario = validly(root)
     field = None if scenario.ground is None else scenario.ground.field()
     plan = planned(given, scenario, altitude_m, None if field is None else field.at, corner_m)
@@ -135,7 +135,7 @@ def prepare_check(
         keys["mission", "course_deg"] = math.degrees(math.atan2(east, north)) % 360.0
         keys["mission", "altitude_m"] = float(plan.profile.altitude_m[0])
         root = overridden(
-            _with_keys(base, {**_mission_about(plan.way.given_m[:, :2], base), **keys}), settings
+            _with_keys(base, {**_mission_keys(plan.way.given_m[:, :2], base), **keys}), settings
         )
         if not plan.profile.level:
             root, files = _without_files(root, folder, scenario.ground)
@@ -184,7 +184,7 @@ def _with_keys(root: Node, keys: Mapping[Loc, Any]) -> Node:
     return root
 
 
-def _mission_about(points_m: FloatArray, base: Node) -> dict[Loc, Any]:
+def _mission_keys(points_m: FloatArray, base: Node) -> dict[Loc, Any]:
     """Returns the keys of a mission from the start of a path (n, 2) to its end, or its point furthest from there.
 
     Start and goal may lie anywhere, in an obstacle too: that is then what the flight finds.

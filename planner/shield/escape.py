@@ -242,7 +242,7 @@ class Escapes:
 
     def _threats(self, request: PlanRequest) -> Threats:
         """What was seen to stand near the aircraft, and all that moves; refused places are left out."""
-        return Threats.about(request, self._memory.genuine_m, self._mission)
+        return Threats.within_reach(request, self._memory.genuine_m, self._mission)
 
     @staticmethod
     def _turn_away(request: PlanRequest, path: Path, reason: str) -> Escape:

@@ -67,8 +67,8 @@ class Threats:
     step_m: float  # ways are tested at places this far apart
 
     @classmethod
-    def about(cls, request: PlanRequest, still_m: FloatArray, mission: Mission) -> Threats:
-        """The threats that can be met within `AHEAD_S`; `still_m` are all (n, 2) edge points that stand still."""
+    def within_reach(cls, request: PlanRequest, still_m: FloatArray, mission: Mission) -> Threats:
+        """Collects the threats that can be met within `AHEAD_S`; `still_m` are all (n, 2) edge points that stand."""
         reach_m = AHEAD_S * LATEST * mission.speed_mps + mission.clearance_m
         east, north = still_m[:, 0] - request.position_m[0], still_m[:, 1] - request.position_m[1]
         near_m = still_m.compress(east * east + north * north < reach_m * reach_m, axis=0)
