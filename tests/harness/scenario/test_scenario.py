@@ -106,20 +106,9 @@ def test_repeated_vertices_are_dropped(ring: str) -> None:
 
 
 def test_an_area_where_the_plane_may_be_off_by_a_metre_is_refused() -> None:
-    with pytest.raises(
-        InputError, match=r"3: area\.bounds_m: reaches 849 km from area\.origin; .* up to 400 km"
-    ):
-        scenario_of(in_area("{latitude_deg: 0, longitude_deg: 8}", "[-1000, -1000, 600000, 600000]"))
-
-
-def in_area(origin: str, bounds: str) -> str:
-    xmin, ymin, *_ = (float(each) for each in bounds.strip("[]").split(","))
-    return f"""
-schema: wayproof/scenario/1
-name: far
-area: {{bounds_m: {bounds}, origin: {origin}}}
-mission: {{start_m: [{xmin + 200}, {ymin + 200}], goal_m: [{xmin + 5000}, {ymin + 5000}]}}
-""".lstrip()
+    said = r"3: area\.bounds_m: reaches 849 km from area\.origin; .* up to 400 km"
+    with pytest.raises(InputError, match=said):
+        scenario_of(LEAST.replace("[0, 0, 40000, 40000]", "[-1000, -1000, 600000, 600000]"))
 
 
 @pytest.mark.parametrize("own", ["active_s: [60, 120]", "velocity_mps: [3, 0]"])
@@ -332,16 +321,9 @@ def test_a_scenario_with_other_keys_is_derived_anew_and_the_first_one_stays() ->
 
 
 def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
-    bare = scenario_of(
-        "{schema: wayproof/scenario/1, name: a, area: {bounds_m: [0, 0, 9000, 9000]},"
-        " mission: {start_m: [1000, 1000], goal_m: [8000, 8000]}}"
-    )
+    bare = scenario_of(LEAST)
     faster = bare.with_({"aircraft.model": "c172p", "environment.wind.speed_mps": 5})
-    written = scenario_of(
-        "{schema: wayproof/scenario/1, name: a, area: {bounds_m: [0, 0, 9000, 9000]},"
-        " mission: {start_m: [1000, 1000], goal_m: [8000, 8000]},"
-        " aircraft: {model: c172p}, environment: {wind: {speed_mps: 5}}}"
-    )
+    written = scenario_of(LEAST + "aircraft: {model: c172p}\nenvironment: {wind: {speed_mps: 5}}\n")
     assert faster == written
     assert faster.planner != bare.planner
     assert faster.with_({"aircraft": None, "environment": None}) == bare
