@@ -150,7 +150,7 @@ def test_edges_of_an_obstacle_are_those_of_its_points_where_others_had_their_ind
         window = Window((0.0, 0.0), points, labels, memory.cell_m, keep, sorted_before=memory.sorted_before)
         edges = window.sector_edges((0.0, 0.0), labels[:1].tolist())
         half = 0.5 - math.asin(CLEARANCE / 900.0)
-        bearings = sorted((math.atan2(edge.uy, edge.ux) - way for edge in edges))
+        bearings = sorted(math.atan2(edge.uy, edge.ux) - way for edge in edges)
         np.testing.assert_allclose(bearings, (-half, half), atol=0.05)
         assert len(memory.sorted_before) == 1, "the next search finds it"
 
