@@ -79,7 +79,7 @@ class Walker(ABC, Generic[WalkState]):
 
     @abstractmethod
     def begin(self, place: Point) -> WalkState:
-        """The state at the start of the flight."""
+        """The state in which a walk begins, at the start of the flight or anew."""
 
     def after(self, state: WalkState, flown: FloatArray) -> WalkState:
         """The state after a part of a leg, (n, 2)."""
