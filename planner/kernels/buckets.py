@@ -43,14 +43,12 @@ def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray,
 
 def _touching(keys: IntArray, width: int) -> Cells:
     """Returns the `Cells` of (m,) sorted keys; a key is column times `width` (rows + 1) plus row."""
-    first = np.flatnonzero(np.diff(keys, prepend=-1))
-    squares, one, other = keys[first], [], []
-    for step in (1, width - 1, width, width + 1):
-        there = np.searchsorted(squares, squares + step)
-        touched = squares[np.minimum(there, len(squares) - 1)] == squares + step
-        one.append(np.flatnonzero(touched))
-        other.append(there[touched])
-    return first, np.diff(first, append=len(keys)), np.concatenate(one), np.concatenate(other)
+    first = np.flatnonzero(np.concatenate(((True,), keys[1:] != keys[:-1])))
+    squares, counts = keys[first], np.concatenate((first[1:], (len(keys),))) - first
+    beside = squares + np.array(((1,), (width - 1,), (width,), (width + 1,)))
+    there = np.searchsorted(squares, beside)
+    touched = squares[np.minimum(there, len(squares) - 1)] == beside
+    return first, counts, np.flatnonzero(touched) % len(squares), there[touched]
 
 
 @compiled(COUNT, COUNTS, COUNTS)
