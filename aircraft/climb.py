@@ -22,15 +22,15 @@ STEEPEST_RATE_SHARE = 0.4
 SETTLING_S, JUDGED_S = 15.0, 10.0
 """A trial settles for the first time and is judged over the second."""
 KEPT_RATE_SHARE = 0.05
-"""A rate is held if the mean rate differs from it by at most this share."""
+"""A rate of climb or sink counts as held if the mean rate flown is off it by at most this share of it."""
 TOLERANCE = 0.02
-"""A rate is found to this share of the steepest one tried."""
+"""The steepest rate that is held is found to within this share of the steepest rate that is tried."""
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 """A climb must stay below the first throttle command, a descent above the second."""
 SPEEDS_FLOWN = 5
-"""Rates are measured at this many airspeeds, evenly from the lowest to the highest."""
+"""Rates of climb and sink are measured at this many airspeeds, evenly over the range of level flight."""
 FIGURES_VERSION = 1
-"""Is raised when the measurement changes, so that figures in the cache are measured anew."""
+"""Number raised whenever the measurement of climb rates changes, so that those in the cache are measured anew."""
 
 
 @dataclass(frozen=True)

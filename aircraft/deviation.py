@@ -10,13 +10,13 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from typing import Final
 
-SURFACES: Final = ("elevator", "aileron", "rudder")
-ALPHA_PROPERTIES: Final = {"aero/alpha-rad", "aero/alpha-deg"}
+SURFACES: Final = ("elevator", "aileron", "rudder")  # whose effect may deviate
+ALPHA_PROPERTIES: Final = {"aero/alpha-rad", "aero/alpha-deg"}  # angle of attack
 LIFT_AXES: Final = ("LIFT", "NORMAL", "Z")
 DRAG_AXES: Final = ("DRAG", "AXIAL", "X")
 FLOWN_PREFIX: Final = "wayproof/flown/"
 """A property of this prefix is one of JSBSim's times its factor; the aerodynamics read it instead."""
-UNITS_M: Final = {"IN": 0.0254, "FT": 0.3048, "M": 1.0}
+UNITS_M: Final = {"IN": 0.0254, "FT": 0.3048, "M": 1.0}  # units of lengths in a JSBSim file
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Deviation:
 
 
 AS_MODELLED: Final = Deviation()
-"""Nothing differs."""
+"""The deviation of an aircraft that flies exactly as its model."""
 
 
 def deviate(root: ElementTree.Element, deviation: Deviation) -> None:

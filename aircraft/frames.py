@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 PATCH_M = 500.0
-"""Half the width of a patch of the plane."""
+"""Half the width of a square patch of the plane, within which `LocalPlane.patch` stands for the projection."""
 SEMI_MAJOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)

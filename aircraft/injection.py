@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation, deviate
 
-THROTTLE = "fcs/throttle-cmd-norm"
+THROTTLE = "fcs/throttle-cmd-norm"  # JSBSim's property of the throttle command
 READ_LATE = {
     "attitude/phi-rad": "velocities/phidot-rad_sec",
     "attitude/theta-rad": "velocities/thetadot-rad_sec",

@@ -60,7 +60,7 @@ class AircraftState(NamedTuple):
         return math.atan2(self.velocity_east_mps, self.velocity_north_mps) % math.tau
 
 
-FIELDS: Final = AircraftState._fields
+FIELDS: Final = AircraftState._fields  # names of a state's fields, in order
 UNDELAYED: Final = FIELDS.index("load_factor") + 1
 """Fields of a state from this index on are never delayed; those before it are, except the time."""
 EAST_AT, NORTH_AT, HEADING_AT = (FIELDS.index(name) - 1 for name in ("east_m", "north_m", "heading_rad"))

@@ -40,9 +40,9 @@ STATE_PROPERTIES = (
 COMMAND_PROPERTIES = ("wayproof/roll-cmd-rad", "wayproof/altitude-cmd-ft", "wayproof/airspeed-cmd-fps")
 WIND_PROPERTIES = ("atmosphere/wind-east-fps", "atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
 """Velocity of the wind, in the direction that it blows towards."""
-TURBULENCE_TYPE = {"milspec": 3.0, "tustin": 4.0}
+TURBULENCE_TYPE = {"milspec": 3.0, "tustin": 4.0}  # JSBSim's numbers
 TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}
-"""JSBSim's numbers of turbulence models and of their intensities."""
+"""JSBSim's numbers of the intensities of turbulence."""
 GROUND_FT = 2.0 / FOOT_M
 """An aircraft at or below this altitude counts as at the ground: its centre of gravity is still above that."""
 MAX_ROLL_RAD = math.radians(75.0)
@@ -56,7 +56,7 @@ SETTLING_STEP_S = 1e-9
 AIR_STEPS = 600
 """The wind is worked out for this many steps at once."""
 TERRAIN_BELOW_FT = 10.0 / FOOT_M
-"""The flight model's ground is at least so far below the aircraft, so that its wheels do not touch it: contact is
+"""The flight model's ground is at least this far below the aircraft, whose wheels thus never touch it: contact is
 judged by the true world."""
 INTEGRATOR_MEMORY_STEPS = 6
 """After this many steps an integrator of JSBSim has replaced every derivative that it remembers."""

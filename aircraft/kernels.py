@@ -23,7 +23,7 @@ INTERCEPT_SINE = 0.7
 """Sine of the steepest angle to the path at which the law `preview` approaches it from far off."""
 CURVATURE, LENGTH, START, STOP, TURNED = 4, 5, 6, 7, 8
 """Columns of a route's rows."""
-PREVIEW_GAINS = np.dtype(
+PREVIEW_GAINS = np.dtype(  # what the law `preview` is configured by
     [
         ("bandwidth_radps", np.float64),
         ("damping", np.float64),

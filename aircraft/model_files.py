@@ -21,17 +21,17 @@ from pathlib import Path, PurePath
 from aircraft.actuators import NormActuator
 from aircraft.deviation import AS_MODELLED, Deviation
 
-OWN_FOLDER = Path(__file__).parent
+OWN_FOLDER = Path(__file__).parent  # this package, which holds the shipped aircraft
 MAX_FILES = 1000
-"""Most files and folders in the folder of a model."""
+"""A model's folder with more files and folders than this is refused."""
 MAX_BYTES = 5_000_000
-"""Largest size of an XML file."""
+"""An XML file of a model that is larger than this is refused."""
 MAX_FOLDER_BYTES = 200_000_000
-"""Largest size of all files together; all go into the digest, also those that JSBSim does not read."""
+"""A model's folder whose files have more bytes than this together is refused; all of them go into the digest."""
 MAX_ENTITY_LETTERS = 100
-"""Longest text that an XML entity may stand for."""
+"""An XML entity that stands for a longer text than this is refused."""
 MAX_DEPTH = 60
-"""Deepest nesting of elements; the deepest of JSBSim's own models has 13."""
+"""A model's XML with elements nested deeper than this is refused; the deepest of JSBSim's own models has 13."""
 
 
 class AircraftError(ValueError):

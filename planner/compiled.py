@@ -24,14 +24,14 @@ from typing import Any, Generic, ParamSpec, TypeVar
 from planner.kernel_cache import seal
 
 FLOAT, COUNT, BOOL = "float64", "intp", "boolean"
-FLOATS = "Array(float64, 1, 'C', readonly=True)"
+FLOATS = "Array(float64, 1, 'C', readonly=True)"  # (n,)
 ROWS = "Array(float64, 2, 'C', readonly=True)"
 """(n, k): points, or the segments of a path."""
 PLACES = "Array(complex128, 1, 'C', readonly=True)"
 """(n,) points, east + i north."""
-POINT = "UniTuple(float64, 2)"
-GRID = "Array(boolean, 2, 'C', readonly=True)"
-COUNTS = "Array(intp, 1, 'C', readonly=True)"
+POINT = "UniTuple(float64, 2)"  # east, north
+GRID = "Array(boolean, 2, 'C', readonly=True)"  # mask of cells
+INTS = "Array(intp, 1, 'C', readonly=True)"  # (n,) counts, indices or labels
 BOOLS_OUT, COUNTS_OUT, FLOATS_OUT, PLACES_OUT = "boolean[::1]", "intp[::1]", "float64[::1]", "complex128[::1]"
 """Arrays that a function changes."""
 

@@ -29,7 +29,7 @@ TWO_PI = 6.2832
 QUARTER_TURN_RAD = 1.5708
 """Largest Nu on a leg, rad: pi/2 to the digits that the autopilot uses."""
 HALF_RIGHT_SINE = 0.7071
-"""Sine of the steepest angle to a leg; and the cosine, behind a leg's beginning, from which on the law aims there."""
+"""Sine of 45 degrees: the steepest angle to a leg; from so near to straight behind it, the law aims at its start."""
 SLOW_MPS = 0.1
 """Least ground speed on a leg; a slower or backwards flight counts as this fast along the nose."""
 MIN_CIRCLE_SPEED_MPS = 1.0

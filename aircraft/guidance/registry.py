@@ -17,7 +17,7 @@ from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.pure_pursuit import PurePursuitConfig, PurePursuitLaw
 from aircraft.guidance.vector_field import VectorFieldConfig, VectorFieldLaw
 
-DEFAULT_KIND = "preview"
+DEFAULT_KIND = "preview"  # law of a flight that names none
 
 
 @dataclass(frozen=True)

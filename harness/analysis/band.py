@@ -13,9 +13,9 @@ from harness.files.input_file import read_index
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 
-BAND_FILE: Final = "band.json"
+BAND_FILE: Final = "band.json"  # file in a folder of days
 SCHEMA: Final = "wayproof/band/1"
-BAND_SHARE: Final = 0.95
+BAND_SHARE: Final = 0.95  # of the days' tracks lie inside the band
 STATIONS, STEP_M = 400, 5.0
 """The band has at most this many places along the path, at least this far apart."""
 

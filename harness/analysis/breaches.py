@@ -19,8 +19,8 @@ from harness.world.world import World
 if TYPE_CHECKING:
     from shapely import Geometry
 
-CONTACT: Final = "obstacle"
-TERRAIN: Final = "terrain"
+CONTACT: Final = "obstacle"  # kind of a breach: contact with an obstacle
+TERRAIN: Final = "terrain"  # kind of a breach: contact with the ground
 CONTACTS: Final = (CONTACT, TERRAIN)
 """Kinds of breaches that are contacts; the others are crossings of lines in the air."""
 

@@ -44,7 +44,7 @@ def _smooth(figure: str, title: str, unit: str, short: tuple[str, str], factor: 
     ]  # fmt: skip
 
 
-_SMOOTHNESS_SHOWN: Final = ("heading_change_deg", "bending_energy_1pm")
+_SMOOTHNESS_SHOWN: Final = ("heading_change_deg", "bending_energy_1pm")  # they have entries of their own
 HINTS: Final[Mapping[str, str]] = {
     "total_system_error_p95_m": "distance of the true position from the path, as planned or as given",
     "flight_technical_error_p95_m": "distance of the believed position from the path",

@@ -23,15 +23,15 @@ from harness.bench.tracking import course, fly_course
 from harness.scenario.kinds import GUIDANCE
 from planner.kernel_cache import seal
 
-BANKS_DEG: Final = (10.0, 20.0, 30.0, 40.0, 45.0)
-ROLL_IN_AND_SETTLE_S: Final = 10.0
-MEASURED_TURN_S: Final = 30.0
-COURSE_SEED: Final = 1
-COURSE_TURNS: Final = 8
-RADIUS_TOLERANCE: Final = 0.02
-DEFAULT_WIND_SHARE: Final = 0.3
+BANKS_DEG: Final = (10.0, 20.0, 30.0, 40.0, 45.0)  # of measured turns; the bank limit too
+ROLL_IN_AND_SETTLE_S: Final = 10.0  # before a turn is measured
+MEASURED_TURN_S: Final = 30.0  # a turn is measured for this time
+COURSE_SEED: Final = 1  # of the course on which radii are tried
+COURSE_TURNS: Final = 8  # turns of that course
+RADIUS_TOLERANCE: Final = 0.02  # share to which the tightest tracked radius is found
+DEFAULT_WIND_SHARE: Final = 0.3  # of the airspeed: wind in which radii are tried besides calm
 CARD_FORMAT: Final = 2
-"""The number goes up when cards get other content, so that older ones are made anew."""
+"""Number raised whenever cards get other content, so that older ones are made anew."""
 Report = Callable[[int, int, str], None]
 
 

@@ -22,7 +22,7 @@ from harness.scenario.shipped import shipped_scenarios
 from harness.scenario.validation import NAME_PATTERN, KeyFault, KeyFaults, shown
 
 SCHEMA: Final = "wayproof/campaign/1"
-MAX_RUNS: Final = 1_000_000
+MAX_RUNS: Final = 1_000_000  # a campaign of more is refused
 
 GIVEN_ELSEWHERE: Final[dict[Loc, str]] = {
     ("schema",): "leave it out",

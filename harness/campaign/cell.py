@@ -16,7 +16,7 @@ from harness.campaign.results import Runs
 from harness.files.strict_yaml import Scalar
 from harness.flight.record import FloatArray, IntArray
 
-CONFIDENCE: Final = 0.95
+CONFIDENCE: Final = 0.95  # of intervals of shares of runs
 
 
 @dataclass(frozen=True)
@@ -159,10 +159,10 @@ MAX_NUMBERS: Final = 8
 """A key with more different numbers than this is taken as drawn at random."""
 BINS: Final = 4
 """More numbers drawn at random than this are grouped into this many quantiles, or directions into as many sectors."""
-NOT_SET: Final = "not set"
+NOT_SET: Final = "not set"  # label of runs without a value of a key
 DIRECTION_ENDS: Final = ("from_deg", "course_deg", "heading_deg")
 """Keys that end so hold directions, of which 359 degrees is beside 0."""
-COMPASS_SECTORS: Final = tuple(
+COMPASS_SECTORS: Final = tuple(  # labels of bins of directions, deg
     f"{name}, {low:g} to {low + 90:g}" for name, low in zip("NESW", (-45, 45, 135, 225), strict=True)
 )
 

@@ -34,15 +34,15 @@ from harness.files.whole_file import append_to, replace_text, replacing
 from harness.files.wording import counted
 from harness.scenario.kinds import PLANNER
 
-LOCK: Final = "lock"
-JOURNAL: Final = "journal.jsonl"
+LOCK: Final = "lock"  # file that is locked while a process writes the folder
+JOURNAL: Final = "journal.jsonl"  # file with a line for every finished run, from which a campaign resumes
 SEAL_KEY: Final = "sha256"
 """Key of a journal line under which the SHA-256 of the rest of the line stands."""
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/2"
-TABLES_EVERY_S: Final = 30.0
+TABLES_EVERY_S: Final = 30.0  # least wall time between two writes of the tables
 TABLES_SHARE: Final = 0.01
-"""Tables are written at most every `TABLES_EVERY_S`, and so seldom that it takes at most this share of the time."""
-MAX_CHANGES: Final = 3
+"""Writing the tables takes at most this share of a campaign's wall time, and is done at most every `TABLES_EVERY_S`."""
+MAX_CHANGES: Final = 3  # differences from the campaign in the folder that an error names
 
 
 class CampaignFolder:

@@ -16,8 +16,8 @@ from harness.analysis.metric import Metric, number
 from harness.analysis.registry import METRICS
 from harness.flight.record import FloatArray, IntArray
 
-BOOTSTRAP_CONFIDENCE: Final = 0.95
-RESAMPLES: Final = 1999
+BOOTSTRAP_CONFIDENCE: Final = 0.95  # of an interval of a mean difference
+RESAMPLES: Final = 1999  # of the cases, drawn for an interval
 MIN_CASES: Final = 4
 """With fewer cases there is no interval, since more than a fortieth of all resamples would hold one case only."""
 RESAMPLING_SEED: Final = 1

@@ -31,8 +31,8 @@ INDEX: Final = "campaign.json"
 """File in a campaign's folder that says what is flown."""
 RUNS: Final = "runs"
 """Folder in a campaign's folder that holds run folders, each named by the number of its run."""
-RESULTS: Final = "results.parquet"
-TIMINGS: Final = "timings.parquet"
+RESULTS: Final = "results.parquet"  # a row for each finished run
+TIMINGS: Final = "timings.parquet"  # wall times of each run
 SCHEMA: Final = "wayproof/results/1"
 NAMED: Final = ("planner", "aircraft", "world", "scenario")
 """Columns of names, which count as varied keys where they have more than one value."""

@@ -37,7 +37,7 @@ MOST_KEPT_BYTES: Final = 100_000_000
 """Scenarios made by the check are kept up to this size: making one takes six times as long as unpacking it."""
 KIND, MODEL = ("planner", "kind"), ("aircraft", "model")
 """The key of a scenario that a bare entry of `planners`, and one of `aircraft`, replaces."""
-SHIELD: Final = ("planner", "shield")
+SHIELD: Final = ("planner", "shield")  # key of a scenario
 LIST_OF_SECTION: Final = {"planner": "planners", "aircraft": "aircraft"}
 """The list of a campaign whose entries replace a section of the scenario."""
 

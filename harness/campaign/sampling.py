@@ -17,7 +17,7 @@ from harness.scenario.validation import KeyFault
 
 LEAST_PROBABILITY: Final = 1e-12
 """The inverse of a normal distribution is taken no nearer to 0 and 1 than this, at 7 standard deviations."""
-FORMS: Final = ("uniform", "normal", "choice")
+FORMS: Final = ("uniform", "normal", "choice")  # keys of a distribution, of which exactly one is given
 
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
 

@@ -32,8 +32,8 @@ ONE_THREAD_ENVIRONMENT: Final = dict.fromkeys(
 )
 """Environment of a worker, which has one flight a processor, and no threads of numpy or Arrow beside it."""
 
-CONNECT_S: Final = 10.0
-SCHEDULER_PORT: Final = 8786
+CONNECT_S: Final = 10.0  # longest wait for a Dask scheduler
+SCHEDULER_PORT: Final = 8786  # where an address names none
 SCHEDULER_GONE: Final = "the Dask scheduler has gone"
 INTERRUPT_S: Final = 0.1
 """Requests to end the process are looked for at least this often."""

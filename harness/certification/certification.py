@@ -35,7 +35,7 @@ from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray, IntArray
 from harness.run_files.run_folder import TRACK
 
-CERTIFICATE: Final = "certificate.json"
+CERTIFICATE: Final = "certificate.json"  # file of the verdict
 SCHEMA: Final = "wayproof/certificate/1"
 SECTIONS: Final = ("environment", "navigation", "uncertainty", "sensor", "aircraft")
 """Sections of a scenario whose numbers may differ between days without being varied by name: conditions draw them."""
@@ -43,7 +43,7 @@ DEFAULT_RUNS: Final = (1000, 10_000)
 """Default of the largest number of days to fly: by counting, and by subset simulation."""
 MOST_FOLDERS: Final = 20
 """A subset simulation keeps the run folders of at most this many days that fail: thousands may fail."""
-DEFAULT_CONFIDENCE: Final = 0.95
+DEFAULT_CONFIDENCE: Final = 0.95  # of the bounds
 
 
 @dataclass(frozen=True)

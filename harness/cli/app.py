@@ -34,7 +34,7 @@ from harness.files.spawning import open_standard_files
 from harness.flight.signals import taken_as_interrupt
 from planner.compiled import own_this_process
 
-INTERRUPTED_STATUS: Final = 130
+INTERRUPTED_STATUS: Final = 130  # exit status after Ctrl-C
 MEMORY_BYTES: Final = 1_200_000_000
 """A flight needs this much address space; with half of it libraries abort."""
 COMPLETION_VARIABLE: Final = "_WAYPROOF_COMPLETE"

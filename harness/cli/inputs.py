@@ -19,7 +19,7 @@ from harness.cli.terminal import say, step_bar
 from harness.files.input_file import InputError
 
 _AIRCRAFT_ROW: Final = "{:13} {:>7} {:>10} {:>6} {:>6} {:6} "
-_WIDTH: Final = 80
+_WIDTH: Final = 80  # of printed lines, in letters
 WHAT_HELP: Final = "planners, aircraft, guidance, scenarios, worlds, campaigns or metrics."
 
 

@@ -68,7 +68,7 @@ class Given:
         return replace(self, options=(*self.options, *more))
 
 
-NOTHING: Final = Given()
+NOTHING: Final = Given()  # no replacement
 
 
 def replacing(*names: str) -> Callable[[Run], Callable[..., int]]:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from harness.campaign.summary import Summary, Table
     from harness.campaign.workers import Workers as Flyers
 
-MOST_FAILURES: Final = 5
+MOST_FAILURES: Final = 5  # runs that failed are named on the terminal up to this many
 LEGEND: Final = (
     "reached, below the wanted clearance, tracks: 95 % interval; "
     "length over the optimum: median/p95; plan: p99/max"

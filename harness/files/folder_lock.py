@@ -11,7 +11,7 @@ from harness.files.errors import RunFolderError
 from harness.files.input_file import read_index
 from harness.files.whole_file import PARTIAL
 
-MAX_INDEX_BYTES: Final = 10**9
+MAX_INDEX_BYTES: Final = 10**9  # largest index of a folder that is read
 
 
 class FolderLock:

@@ -9,14 +9,14 @@ import stat
 from pathlib import Path
 from typing import Any, BinaryIO, Final, NoReturn
 
-MAX_JSON_BYTES: Final = 16_000_000
+MAX_JSON_BYTES: Final = 16_000_000  # a larger JSON file is refused
 
 
 class InputError(ValueError):
     """Input that cannot be used. Its text is what a person reads: one line a fault."""
 
 
-_KIND_NAMES: Final = {
+_KIND_NAMES: Final = {  # what a path may be instead of a file
     stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
 }  # fmt: skip

@@ -14,12 +14,12 @@ from xml.etree import ElementTree
 from harness.files.input_file import InputError, finite, shown
 from harness.files.zip_archive import unpacked
 
-COUNTED_ELEMENTS: Final = frozenset(
+COUNTED_ELEMENTS: Final = frozenset(  # told, since they are not read
     ["Point", "Model", "NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay", "LinearRing"]
 )
 REFUSED_ELEMENTS: Final = ("altitudeOffset", "Track", "MultiTrack")
 """Elements of Google's extension that are refused by name."""
-COMMA: Final = re.compile(r"\s*,\s*")
+COMMA: Final = re.compile(r"\s*,\s*")  # blanks about it are dropped
 
 Element = ElementTree.Element
 Point = tuple[float, float, float | None]

@@ -18,12 +18,12 @@ from harness.files.input_file import InputError as InputError
 from harness.files.input_file import read_text
 from harness.files.wording import counted
 
-MAX_BYTES: Final = 32_000_000
+MAX_BYTES: Final = 32_000_000  # of a file; a larger one is refused
 MAX_VALUES: Final = 3_000_000
 """A file has at most this many values: enough for 100,000 obstacles with four corners each."""
-MAX_DEPTH: Final = 20
-MAX_KEYS: Final = 1000
-MAX_KEY_LENGTH: Final = 100
+MAX_DEPTH: Final = 20  # of nested values; a deeper file is refused
+MAX_KEYS: Final = 1000  # of one mapping; more are refused
+MAX_KEY_LENGTH: Final = 100  # letters; a longer key is refused
 COMMAND_LINE: Final = 0
 """The `line` of a value that came from the command line."""
 IN_PYTHON: Final = -1
@@ -33,7 +33,7 @@ Scalar: TypeAlias = str | int | float | bool | None
 Loc: TypeAlias = tuple[str | int, ...]
 
 _LOADER: Final = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
-_CONSTANTS: Final[dict[str, bool | None]] = {
+_CONSTANTS: Final[dict[str, bool | None]] = {  # plain scalars that are null, true or false
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
@@ -42,7 +42,7 @@ _INT: Final = re.compile(r"[-+]?[0-9]{1,18}")
 _OCTAL_OR_HEX: Final = re.compile(r"0o[0-7]{1,18}|0x[0-9a-fA-F]{1,15}")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
-_TAB_BEFORE: Final = re.compile(r"[ ?:-]*\t")
+_TAB_BEFORE: Final = re.compile(r"[ ?:-]*\t")  # a line that is indented with a tab
 _UNPRINTABLE: Final = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 

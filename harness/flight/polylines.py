@@ -9,7 +9,7 @@ import numpy as np
 
 from planner.interface import FloatArray
 
-CHORD_ERROR_M = 0.5
+CHORD_ERROR_M = 0.5  # drawn arcs are at most this far off
 
 
 def polylines(paths: Sequence[FloatArray], chord_error_m: float = CHORD_ERROR_M) -> list[FloatArray]:

@@ -14,9 +14,9 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
-ENDING_SIGNALS: Final = (signal.SIGTERM, signal.SIGHUP)
-HELD_SIGNALS: Final = (signal.SIGINT, *ENDING_SIGNALS)
-REPEAT_S: Final = 2.0
+ENDING_SIGNALS: Final = (signal.SIGTERM, signal.SIGHUP)  # taken like Ctrl-C
+HELD_SIGNALS: Final = (signal.SIGINT, *ENDING_SIGNALS)  # held back where machine code may be at work
+REPEAT_S: Final = 2.0  # a signal again within this is the same; one held for longer is let through
 
 
 @contextmanager

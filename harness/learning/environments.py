@@ -39,7 +39,7 @@ Floats = NDArray[np.float32]
 
 DEFAULT_BEAMS: Final = 72
 """Default of the largest number of beams of an observation."""
-BAD_OUTCOMES: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)
+BAD_OUTCOMES: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)  # cost 1 of reward
 STATE: Final = (
     "goal distance over the diagonal of the area",
     "cosine of the goal's bearing from the course",
@@ -52,8 +52,8 @@ STATE: Final = (
     "ground speed over twice the airspeed of the mission",
 )
 """What each number of the observation's `state` is, in order."""
-STATE_LOW: Final = np.array([0, -1, -1, 0, 0, -1, -1, -1, 0], dtype=np.float32)
-STATE_HIGH: Final = np.ones(len(STATE), dtype=np.float32)
+STATE_LOW: Final = np.array([0, -1, -1, 0, 0, -1, -1, -1, 0], dtype=np.float32)  # of `state`
+STATE_HIGH: Final = np.ones(len(STATE), dtype=np.float32)  # largest value of each number of `state`
 
 
 class WaypointsEnv(gymnasium.Env[Observation, Action]):

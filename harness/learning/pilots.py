@@ -14,8 +14,8 @@ from planner.geometry.curves import Pose, along, turn_onto
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 
 NEAREST_M = 1.0
-"""A waypoint that is nearer than this is passed."""
-SAME_TIME_S = 1e-6
+"""A waypoint nearer to the aircraft than this is taken as passed; the way to it is flown at least this long."""
+SAME_TIME_S = 1e-6  # times no further apart are one
 
 
 class Waypoint(NamedTuple):

@@ -17,7 +17,7 @@ from planner.interface import BoolArray, ComplexArray, FloatArray
 
 FLAGS, FLAGS_OUT, LOOKS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]", "uint8[:, :]"
 """Numba types of parts of grids; _OUT is written to."""
-BEAMS = "UniTuple(float64, 5)"
+BEAMS = "UniTuple(float64, 5)"  # numbers that describe the beams of a scan
 
 
 @compiled(FLOAT, FLOAT, FLOAT, COUNT, inner=True)

@@ -16,7 +16,7 @@ from planner.interface import ComplexArray, FloatArray
 
 LEAST_MPS = 0.5
 """An obstacle slower than this counts as standing still."""
-MOST_MPS = 30.0
+MOST_MPS = 30.0  # no obstacle is taken to be faster
 SURE_SIGMAS = 8.0
 """A speed is known to be above or below a limit if it is this many of its standard errors away."""
 VAGUE_MPS = 1.5

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.compiled import BOOL, COUNT, COUNTS, COUNTS_OUT, FLOAT, FLOATS, PLACES, PLACES_OUT, compiled
+from planner.compiled import BOOL, COUNT, COUNTS_OUT, FLOAT, FLOATS, INTS, PLACES, PLACES_OUT, compiled
 from planner.interface import ComplexArray, FloatArray, IntArray
 
 CONFIRMED_SCORE = 2
@@ -25,7 +25,7 @@ SCORES, SLOTS = "Array(int8, 1, 'C', readonly=True)", "Array(int32, 1, 'C', read
 SCORES_OUT, SLOTS_OUT, PLACE = "int8[::1]", "int32[::1]", "complex128"
 
 
-@compiled(COUNTS, PLACES, SCORES, SLOTS, FLOAT, COUNT, COUNT, BOOL, FLOAT, COUNT)
+@compiled(INTS, PLACES, SCORES, SLOTS, FLOAT, COUNT, COUNT, BOOL, FLOAT, COUNT)
 def new_edges(
     hits: IntArray,
     places: ComplexArray,
@@ -81,7 +81,7 @@ def new_edges(
     return counted[:k], found[:k]
 
 
-@compiled(COUNTS, PLACES, FLOATS, FLOAT, BOOL, FLOAT, BOOL)
+@compiled(INTS, PLACES, FLOATS, FLOAT, BOOL, FLOAT, BOOL)
 def ends(
     hits: IntArray,
     places: ComplexArray,
@@ -129,9 +129,7 @@ def ends(
     return found[:k]
 
 
-@compiled(
-    COUNTS, PLACES, SCORES_OUT, SLOTS_OUT, PLACES_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT, COUNT, PLACE
-)
+@compiled(INTS, PLACES, SCORES_OUT, SLOTS_OUT, PLACES_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT, COUNT, PLACE)
 def count_hits(
     cells: IntArray,
     places: ComplexArray,

@@ -36,7 +36,7 @@ STOOD_S = 20.0
 """A cell that has been an edge for this time belongs to an obstacle that stands: a moving one has left it by then."""
 
 SLOTS, FLAGS = "Array(int32, 1, 'C', readonly=True)", "Array(boolean, 1, 'C', readonly=True)"
-COUNTED_OUT = "float32[:, ::1]"
+COUNTED_OUT = "float32[:, ::1]"  # (cells, 3) counts of rays, changed
 
 
 class ReflectionMap(EdgePoints):

@@ -19,23 +19,23 @@ if TYPE_CHECKING:
     from harness.world_files.height_field import HeightField
     from planner.interface import Mission
 
-TIMELINE = "sim_time"
+TIMELINE = "sim_time"  # name of the time axis
 
-WORLD = "world"
-PLAN = "plan"
-SERIES = "series"
-STATES = "states"
-EVENTS = "events"
-SUMMARY = "summary"
+WORLD = "world"  # entities of the 3D view
+PLAN = "plan"  # entities of the plan view
+SERIES = "series"  # curves over time
+STATES = "states"  # lanes of states
+EVENTS = "events"  # the text log
+SUMMARY = "summary"  # page with the figures
 COLOURS = "colours"
-"""WORLD to COLOURS are the entities at the top of a recording; COLOURS is a page that explains the views' colours."""
+"""Entity at the top of a recording: a page that explains the colours of the views."""
 END = "end"
 """Below WORLD and PLAN: the place where a flight ended that did not end at the goal."""
 FRAME = "frame"
 """Property of the recording that holds the `Frame`."""
-WHOLE = "whole_track"
+WHOLE = "whole_track"  # below WORLD and PLAN: the whole track
 FLOWN = "flown"
-"""Below WORLD and PLAN: WHOLE is the whole track; FLOWN is the trail in pieces, which are shown up to the cursor."""
+"""Below WORLD and PLAN: the trail in pieces, which are shown up to the cursor."""
 BELIEVED = "believed"
 """Below WORLD and PLAN: the believed positions, drawn as the trail is; only where navigation is not perfect."""
 NAVIGATION = "navigation_error"
@@ -54,46 +54,46 @@ PLANNER_LANE, BANK_LANE, TRACKING_LANE, SHIELD_LANE = "planner", "saturation", "
 
 Colour = tuple[int, int, int]
 
-BACKGROUND: Colour = (17, 19, 24)
-BOUNDS: Colour = (128, 134, 146)
-OUTLINE: Colour = (104, 112, 128)
-OBSTACLE: Colour = (112, 120, 138)
-EDGE_POINTS: Colour = (214, 218, 226)
+BACKGROUND: Colour = (17, 19, 24)  # of the views
+BOUNDS: Colour = (128, 134, 146)  # of the area's border
+OUTLINE: Colour = (104, 112, 128)  # of standing obstacles' outlines
+OBSTACLE: Colour = (112, 120, 138)  # of standing obstacles as solids
+EDGE_POINTS: Colour = (214, 218, 226)  # of what the sensor has shown
 MOVING: Colour = (176, 116, 92)
-"""Moving and timed obstacles are filled in MOVING and outlined in MOVING_OUTLINE."""
+"""Moving and timed obstacles, as they truly are, are filled in this colour."""
 MOVES: Colour = (255, 150, 96)
 """Colour of obstacles that the map knows to move."""
-MET_DOTS: Colour = (196, 124, 232)
-MOVING_OUTLINE: Colour = (96, 68, 56)
-GOAL: Colour = (52, 160, 92)
-START_LIGHT: Colour = (222, 230, 244)
-GOAL_LIGHT: Colour = (160, 246, 190)
-END_LIGHT: Colour = (255, 216, 210)
-"""Colours of labels at the start (START_LIGHT), at the goal (GOAL_LIGHT), and where a flight ended elsewhere."""
-GOAL_DIM: Colour = (48, 112, 72)
+MET_DOTS: Colour = (196, 124, 232)  # of places where the plan expects to meet what moves
+MOVING_OUTLINE: Colour = (96, 68, 56)  # of moving and timed obstacles
+GOAL: Colour = (52, 160, 92)  # of the goal circle
+START_COLOUR: Colour = (222, 230, 244)  # of the start's dot and label, of the wind's arrow and of the scale
+GOAL_LABEL_COLOUR: Colour = (160, 246, 190)  # of the dot and label at the goal
+END_LABEL_COLOUR: Colour = (255, 216, 210)
+"""Colour of the label where a flight ended that did not end at the goal."""
+TRACKED_COLOUR: Colour = (48, 112, 72)  # of the lane `tracking` where a leg is trackable
 AIRCRAFT: Colour = (255, 255, 255)
-TRACK: Colour = (255, 179, 64)
-WHOLE_TRACK: Colour = (92, 72, 40)
-CHOSEN: Colour = (64, 196, 255)
-CANDIDATE: Colour = (54, 112, 148)
-GUIDE: Colour = (236, 112, 214)
-SECTOR: Colour = (74, 148, 98)
-WINDOW: Colour = (146, 130, 236)
-SENSING: Colour = (92, 98, 110)
-HIT: Colour = (255, 92, 92)
-WANTED: Colour = (255, 92, 92)
-CALM: Colour = (58, 64, 74)
-HOLD: Colour = (156, 84, 60)
+TRACK: Colour = (255, 179, 64)  # of the flown track and of curves of what was flown
+WHOLE_TRACK: Colour = (92, 72, 40)  # of the track still ahead of the cursor
+CHOSEN: Colour = (64, 196, 255)  # of the plan in effect
+CANDIDATE: Colour = (54, 112, 148)  # of candidates that a plan was compared with
+GUIDE: Colour = (236, 112, 214)  # of the guide vector
+SECTOR: Colour = (74, 148, 98)  # of free sectors
+WINDOW: Colour = (146, 130, 236)  # of the planning window
+SENSING: Colour = (92, 98, 110)  # of the circle at the sensing range
+HIT: Colour = (255, 92, 92)  # of the last scan's returns; of untracked legs and saturated bank in the lanes
+WANTED: Colour = (255, 92, 92)  # of curves of limits
+CALM: Colour = (58, 64, 74)  # of a lane where nothing is to be told
+HOLD: Colour = (156, 84, 60)  # of a lane while a holding turn or backup is flown
 MODES: tuple[Colour, ...] = ((36, 98, 130), (88, 76, 148), (34, 112, 104), (122, 66, 116), (96, 104, 52))
 """Colours of the planner's states in the order in which they come up: dark, for white letters."""
 
 ERROR_COLOURS: tuple[Colour, ...] = ((255, 214, 92), (255, 138, 48), (255, 44, 84))
 """Colours of the flown track: on the plan, at half the error limit, and at or beyond the limit."""
 
-TOLD_PLAN: Colour = (58, 150, 214)
-TOLD: Colour = (134, 142, 156)
+TOLD_PLAN: Colour = (58, 150, 214)  # of plans in the event log
+TOLD: Colour = (134, 142, 156)  # of other events in the event log
 WARNED: Colour = (214, 120, 20)
-"""Colours in the event log, legible on black and white: of plans (TOLD_PLAN), events (TOLD) and warnings (this)."""
+"""Colour of warnings in the event log, legible on black and white."""
 
 BELIEVED_OFF = "cross_track/believed"
 """Below SERIES: the cross-track error that guidance sees."""

@@ -19,7 +19,7 @@ from harness.recording.layout import Layout
 
 VIEWER_TIMEOUT_S: Final = 5.0
 """A viewer that has not taken what was sent within this time counts as gone."""
-_AT_ONCE_BYTES = 1 << 20
+_AT_ONCE_BYTES = 1 << 20  # read from the pipe at once
 _HEADER_BYTES = 12
 """Length of the header of an .rrd file."""
 _MESSAGE_HEADER = struct.Struct("<QQ")

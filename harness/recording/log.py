@@ -244,7 +244,7 @@ class RerunLog:
         changes = tracking_changes(metrics["trackability"])
         send_changes(self._rec, look.TRACKING_LANE, changes)
         causes = dict.fromkeys((state for _, state in changes), look.HIT) | {NAVIGATION_ERROR: look.WARNED}
-        log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM})
+        log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.TRACKED_COLOUR})
         self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
 
     def _draw(self, scan: RangeScan) -> None:

@@ -32,7 +32,7 @@ RUN_ENTITIES = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "grey")
 """Names of the colours in `blueprint.OVERLAY`, for the summary."""
 
-BAND_COLOUR = (120, 120, 120)
+BAND_COLOUR = (120, 120, 120)  # of the band about the tracks of many days
 
 FLOWN_LINE = "/flown"
 """Entities of time series that are drawn for every run end so."""

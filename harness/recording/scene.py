@@ -114,7 +114,7 @@ def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
     last = np.array([[track.east_m[-1], track.north_m[-1], track.up_m[-1]]])
     mark: dict[str, Any] = {"colors": [look.HIT], "radii": rr.Radius.ui_points(7.0)}
     told: dict[str, Any] = {"labels": [outcome.replace("_", " ")], "show_labels": True}
-    told |= {"colors": [look.END_LIGHT], "radii": rr.Radius.ui_points(0.0)}
+    told |= {"colors": [look.END_LABEL_COLOUR], "radii": rr.Radius.ui_points(0.0)}
     for below, style, order in (("", mark, 70), ("/label", told, 71)):
         plan, world = f"{look.PLAN}/{look.END}{below}", f"{look.WORLD}/{look.END}{below}"
         rec.log(plan, rr.Points2D(last[:, :2], draw_order=order, **style), static=True)
@@ -170,7 +170,7 @@ def quaternions(heading_deg: FloatArray, pitch_deg: FloatArray, roll_deg: FloatA
 
 
 def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
-    ends = [look.START_LIGHT, look.GOAL_LIGHT]
+    ends = [look.START_COLOUR, look.GOAL_LABEL_COLOUR]
     xmin, ymin, xmax, ymax = scene.mission.bounds_m
     bounds = np.array([(xmin, ymin), (xmax, ymin), (xmax, ymax), (xmin, ymax), (xmin, ymin)])
     goal = circle(scene.mission.goal_m, scene.mission.goal_radius_m)
@@ -213,7 +213,7 @@ def _log_labelled(rec: rr.RecordingStream, name: str, line: FloatArray, label: s
     """Logs a line (k, 2) of the plan view that never changes, with a label at its middle."""
     strips = rr.LineStrips2D(
         [line],
-        colors=[look.START_LIGHT],
+        colors=[look.START_COLOUR],
         radii=rr.Radius.ui_points(1.0),
         labels=[label],
         show_labels=True,

@@ -23,7 +23,7 @@ from harness.world_files.height_field import HeightField
 if TYPE_CHECKING:
     import pyarrow as pa
 
-CIRCLE_POINTS = 72
+CIRCLE_POINTS = 72  # points of a drawn circle, if few obstacles are drawn
 MOST_NODES: Final = 160_000
 """The drawn mesh of the ground has at most this many nodes; a screen shows no more."""
 TO_LIGHT: Final = (-0.5, 0.5, 0.7071)

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 Change = tuple[float, str]
 """Simulated time in s, and the state from then on."""
 
-WAITING = "waiting for a plan"
-HOLDING = "holding"
+WAITING = "waiting for a plan"  # state of the planner before its first plan
+HOLDING = "holding"  # state of the planner while no plan leads on
 AT_LIMIT, FREE = "bank command at its limit", "bank command below its limit"
-TRACKABLE = "trackable"
+TRACKABLE = "trackable"  # state of a leg that was tracked
 CLEAR_AGAIN_FACTOR: Final = 1.05
 """An aircraft that came too near is clear again at this many times the wanted clearance."""
 TOLD_DELAY_S: Final = 0.05

@@ -24,8 +24,8 @@ OPTIONAL: Final = (
     *("baro_height_m", "lap", "autonomous", "target_index"),
 )
 """Columns of a table that are read beside time, place and height, where it has them; their names give the units."""
-AIRSPEED_COLUMNS: Final = ("airspeed_tas_mps", "airspeed_ias_mps")
-TABLES: Final = (".parquet", ".csv")
+AIRSPEED_COLUMNS: Final = ("airspeed_tas_mps", "airspeed_ias_mps")  # the first that a log has is used
+TABLES: Final = (".parquet", ".csv")  # endings of logs that are tables
 
 
 @dataclass(frozen=True, eq=False)

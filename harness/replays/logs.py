@@ -17,7 +17,7 @@ from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 from harness.run_files.drawn_lines import NEEDS_LOGS
 
-MAX_BYTES: Final = 1_000_000_000
+MAX_BYTES: Final = 1_000_000_000  # a larger log is refused
 LONGEST_S: Final = 1e7
 """A log whose times span more than this is damaged or had its clock set in flight."""
 ULOG_HEADER: Final = 16

@@ -17,7 +17,7 @@ from harness.flight.record import FloatArray
 FIRST_SETTLED_LAP: Final = 2
 """Laps before this one are not compared, since the autopilot has just been switched on."""
 PASSED_M: Final = 5.0
-"""Without a known radius, a corner counts as reached once it is this much further away than at its nearest."""
+"""Without a known radius, a corner passed within a quarter of the shortest leg counts as reached this far on."""
 FIGURES = {
     "outside_p95_m": "outside the corners, p95, m",
     "outside_max_mean_m": "mean of the largest of each lap, m",

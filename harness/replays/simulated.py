@@ -38,8 +38,8 @@ ZERO_SIGMAS: Final = (
     "airspeed_sigma_mps",
 )
 """A replay sets these keys of `navigation` to zero and keeps only the latency."""
-AREA_MARGIN_M: Final = 1000.0
-LEAST_ALTITUDE_M: Final = 50.0
+AREA_MARGIN_M: Final = 1000.0  # the area reaches this far beyond the flown track
+LEAST_ALTITUDE_M: Final = 50.0  # lower heights of a log are not above the sea
 UNKNOWN_ALTITUDE_M: Final = 300.0
 """A log with heights below `LEAST_ALTITUDE_M`, which are not above the sea, is flown at this altitude."""
 TIME_LIMIT_FACTOR: Final = 1.25

@@ -20,7 +20,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1)), (0, (6, 1, 1, 1)), (0, (1, 1)))
 """Line styles of the planners in order: they differ in print too."""
 
-STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {  # matplotlib's settings of all figures
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.labelsize": 9,

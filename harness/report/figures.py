@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from harness.run_files.run_tables import PlanRow
     from harness.world.obstacle import Obstacle
 
-STANDING_STYLE: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}
+STANDING_STYLE: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}  # of obstacles that stand for ever
 CHANGING_STYLE = STANDING_STYLE | {"ls": "--"}
-"""Style of obstacles that move or stand for a time, drawn where they are at first; STANDING_STYLE is for all others."""
+"""Style of obstacles that move or stand for a time, drawn where they are at first."""
 
 NEAREST_MARK: dict[str, Any] = {"marker": "s", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 7, "zorder": 8}
 """Mark of the place where a flight was nearest to an obstacle, and too near, in the flight's colour."""
 
-LEGEND_ROW_IN = 0.19
-TALLEST_MAP_IN = 6.0
+LEGEND_ROW_IN = 0.19  # height of a row of the legend
+TALLEST_MAP_IN = 6.0  # a map is at most this high
 
 SPARE_FACTOR = 1.35
 """A curvature plot reaches up to this many times the turn limit or, where that is more, the flown curve."""

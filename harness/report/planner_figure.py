@@ -38,7 +38,7 @@ CLOSE_UP_CLEARANCES: Final = 4.0
 PLOT_CLEARANCES: Final = 3.0
 """The plot of the clearance about a near miss reaches up to this many wanted clearances."""
 
-PLANNED_DASHES: Any = (0, (4, 2))
+PLANNED_DASHES: Any = (0, (4, 2))  # of planned paths
 
 
 def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:

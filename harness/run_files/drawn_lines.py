@@ -42,7 +42,7 @@ FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
 an error of the receiver."""
 MOST_BROKEN_SHARE: Final = 0.05
 """A file in which more than this share of the fixes cannot be read is refused."""
-DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)
+DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)  # begins an IGC file's line with the date
 EARTH_RADIUS_M: Final = 6_371_000.0
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 

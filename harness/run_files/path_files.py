@@ -24,8 +24,8 @@ from harness.run_files.mission.mission_files import PLAN, read_plan, read_waypoi
 from harness.run_files.mission.program import Program
 from harness.scenario.sections import ALTITUDES_M
 
-MAX_BYTES: Final = 64_000_000
-MAX_SPAN_M: Final = 500e3
+MAX_BYTES: Final = 64_000_000  # a larger path file is refused
+MAX_SPAN_M: Final = 500e3  # a path that reaches further is refused
 ON_EARTH_DEG: Final = (85.0, 360.0)
 """Latitudes and longitudes are at most this, to either side."""
 LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {

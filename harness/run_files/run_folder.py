@@ -51,8 +51,8 @@ HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)
 """Files whose SHA-256 stands in the manifest of a complete run."""
 
 SCHEMA = "wayproof/run/1"
-VERSIONED_DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")
-COMPRESSION = "lz4"
+VERSIONED_DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")  # whose versions the manifest has
+COMPRESSION = "lz4"  # of Parquet files
 UNSPLIT_COLUMN = "plan_index"
 """The one column that is not written byte plane by byte plane, which halves size and time of all others."""
 

@@ -55,7 +55,7 @@ class Day(NamedTuple):
 
 
 # fmt: off
-DAYS: Final = {
+DAYS: Final = {  # sources: `aircraft/README.md`
     "typical": Day(
         wind_mps=3.28, most_wind=0.35, speed_change=0.15, direction_change_deg=15.0,
         turbulence="light", vertical_gust_mps=2.3, vertical_gust_every_s=120.0,

@@ -92,7 +92,7 @@ def _entry_points(find: Callable[..., EntryPoints], group: str, path: tuple[str,
 
 
 PLANNER = LoopPart("planner", PlannerKind, PLANNERS, "wayproof.planners", ("plan(request)",), "mission")
-LAW_METHODS = ("update(state)", "follow(route, arc_length_m)")
+LAW_METHODS = ("update(state)", "follow(route, arc_length_m)")  # a law must have both
 GUIDANCE = LoopPart("guidance law", GuidanceKind, LAWS, "wayproof.guidance", LAW_METHODS, "limits")
 
 

@@ -18,7 +18,7 @@ Offset = Annotated[float, Field(ge=-MAX_ERROR_M, le=MAX_ERROR_M)]
 MARGIN_SIGMAS: Final = 3.0
 """The planner's margin covers this many sigma of the position error: 1 - exp(-9 / 2) of all errors in the plane."""
 
-_ERROR_KEYS: Final = (
+_ERROR_KEYS: Final = (  # zero where navigation is perfect
     *(
         "position_sigma_m",
         "velocity_sigma_mps",

@@ -105,10 +105,10 @@ INSIDE_M: Final = 1e-3
 """A flight begins this far inside the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
 SURVEY_ALTITUDE_M: Final = 300.0
 """Altitude above the sea at which an aircraft's range of airspeeds is measured."""
-PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)
+PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # between which the survey proves level flight
 PROVEN_FACTOR: Final = 1.05
-"""The survey proves level flight between these altitudes at airspeeds that are by this factor within its range: the
-density of the air differs by 7 % at most."""
+"""The survey proves level flight at airspeeds within its range by this factor, as the air's density differs by 7 %
+there."""
 PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01
 """It does so for deviations up to these: shares, and the shift over the cube root of the mass (m/kg^1/3)."""
 ALTITUDE_STEP_M: Final = 50.0

@@ -24,7 +24,7 @@ from harness.world.obstacle import Obstacle
 from harness.world.tangent_graph import ANGLE_SLACK_RAD, Tangents, TangentScene
 from planner.interface import FloatArray
 
-DRAWN_STEP_RAD = math.radians(1.0)
+DRAWN_STEP_RAD = math.radians(1.0)  # between points of a drawn arc
 
 
 @dataclass(frozen=True, eq=False)

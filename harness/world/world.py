@@ -34,7 +34,7 @@ Fix = tuple[float, float, float]
 TOUCH_M = 1e-3
 """An overlap shorter than this along a way is no contact."""
 
-NO_EDGES = np.zeros((4, 0))
+NO_EDGES = np.zeros((4, 0))  # of a world without polygons
 
 _BLOCK_ROWS = 256
 """A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy."""

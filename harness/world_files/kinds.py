@@ -70,7 +70,7 @@ _BINARY_BEGINS: Final = (
 )
 _KIND_IN_ZIP: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}
 """The kind of a ZIP archive by the ending of a file in it."""
-_PLACE_LINE: Final = r"[ \t]*[-+]?\d+\.\d+[ \t,]+[-+]?\d+\.\d+[ \t]*\n"
+_PLACE_LINE: Final = r"[ \t]*[-+]?\d+\.\d+[ \t,]+[-+]?\d+\.\d+[ \t]*\n"  # latitude and longitude in a line
 _TEXTS: Final = (
     ("rally", r"\Arally\b"),
     ("osm", r"\A<(?:[?!][^<]*<)*osm[\s>/]"),

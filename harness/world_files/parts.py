@@ -20,7 +20,7 @@ Affine = tuple[float, float, float, float, float, float]
 Box = tuple[float, float, float, float]
 """xmin, ymin, xmax, ymax."""
 
-WGS84: Final = "EPSG:4326"
+WGS84: Final = "EPSG:4326"  # latitude and longitude
 FOOT_M: Final = 0.3048
 LEVEL_M: Final = 3.0
 """Height of a storey (m), for a building whose file gives only the number of storeys."""
@@ -43,7 +43,7 @@ class Limit:
 
 NO_BOTTOM: Final = Limit(-math.inf)
 """A part without a bottom begins at the ground, or below."""
-NO_TOP: Final = Limit(math.inf)
+NO_TOP: Final = Limit(math.inf)  # a part without a top has no end upwards
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,7 @@ PROGRESS_SHARE = 0.05
 LOOKS_PER_RANGE = 40.0
 """The local tangent graph is made anew this many times per sensing range flown, and when the way is blocked."""
 SHORTER_SHARE = 0.005
-"""A way to the goal that nothing cuts is dropped only for one that is shorter by this share."""
+"""A way to the goal that follows no boundary and that nothing cuts is dropped only for one shorter by this share."""
 SHORTCUT_TRIES = 16
 """A straight way to a boundary is tried to this many of its places."""
 

@@ -26,9 +26,9 @@ from planner.geometry.curves import Pose
 from planner.interface import BoolArray, FloatArray, Mission, PlanPicture, PlanRequest
 from planner.keys import MarginConfig
 
-SECTORS = 72
+SECTORS = 72  # of the polar histogram
 WIDTH_RAD = math.tau / SECTORS
-"""Number of sectors of the polar histogram, and the width of one."""
+"""Width of a sector of the polar histogram."""
 
 WINDOW_RADII, WINDOW_CLEARANCES = 12.0, 6.0
 """Numbers of turn radii and of clearances that add up to the radius of the active window, at most the sensor range."""

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from planner.compiled import COUNT, COUNTS, FLOAT, FLOATS, ROWS, compiled
+from planner.compiled import COUNT, FLOAT, FLOATS, INTS, ROWS, compiled
 from planner.interface import FloatArray, IntArray
 
 TARGET_BUCKETS = 4096
@@ -51,7 +51,7 @@ def _touching(keys: IntArray, width: int) -> Cells:
     return first, counts, np.flatnonzero(touched) % len(squares), there[touched]
 
 
-@compiled(COUNT, COUNTS, COUNTS)
+@compiled(COUNT, INTS, INTS)
 def joined(count: int, one: IntArray, other: IntArray) -> IntArray:
     """(count,) the first square of the group that each square is joined to by touching pairs: union-find."""
     first = np.empty(count, dtype=np.intp)

@@ -11,12 +11,12 @@ import math
 
 import numpy as np
 
-from planner.compiled import BOOLS_OUT, COUNT, COUNTS, COUNTS_OUT, FLOAT, FLOATS_OUT, POINT, ROWS, compiled
+from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, FLOATS_OUT, INTS, POINT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 from planner.kernels.buckets import Buckets, Cells
 
-BUCKETS, CELLS = f"Tuple(({ROWS}, {COUNTS}, {ROWS}))", f"UniTuple({COUNTS}, 4)"
-RAY = "UniTuple(float64, 4)"
+BUCKETS, CELLS = f"Tuple(({ROWS}, {INTS}, {ROWS}))", f"UniTuple({INTS}, 4)"
+RAY = "UniTuple(float64, 4)"  # east, north, unit vector
 
 EDGE_OFF_RAD = 1e-7
 """Edges are turned this much into the free sector, clear of rounding errors."""
@@ -39,7 +39,7 @@ def _first_of(
     return nearest, met
 
 
-@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, INTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
 def first_met(
     places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float, ux: float, uy: float
 ) -> tuple[float, int]:
@@ -150,7 +150,7 @@ def _find_ends(tangents: FloatArray, row: int, cells: Cells, outmost: IntArray, 
         ends[b] &= not beyond < 0.0
 
 
-@compiled(BUCKETS, COUNTS, ROWS, CELLS, FLOAT, POINT, FLOAT)
+@compiled(BUCKETS, INTS, ROWS, CELLS, FLOAT, POINT, FLOAT)
 def fan_edges(
     buckets: Buckets,
     labels: IntArray,
@@ -208,7 +208,7 @@ def fan_edges(
     return edges[:count], hiding[:hides], looked
 
 
-@compiled(ROWS, COUNTS, ROWS, POINT, POINT, COUNT)
+@compiled(ROWS, INTS, ROWS, POINT, POINT, COUNT)
 def entered(
     places: FloatArray,
     first: IntArray,
@@ -246,7 +246,7 @@ def entered(
     return entry[:count], which[:count]
 
 
-@compiled(ROWS, COUNTS, ROWS, ROWS)
+@compiled(ROWS, INTS, ROWS, ROWS)
 def shortcuts(
     places: FloatArray, first: IntArray, circles: FloatArray, nodes: FloatArray
 ) -> tuple[IntArray, int]:

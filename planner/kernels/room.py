@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from planner.compiled import COUNTS, FLOAT, ROWS, compiled
+from planner.compiled import FLOAT, INTS, ROWS, compiled
 from planner.interface import FloatArray, IntArray
 
 
-@compiled(ROWS, ROWS, COUNTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, rare=True)
+@compiled(ROWS, ROWS, INTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, rare=True)
 def room_along(
     places: FloatArray,
     still: FloatArray,

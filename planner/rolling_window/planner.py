@@ -38,7 +38,7 @@ from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import meets, room_m
 from planner.shield.intervention_log import ShieldReport
 
-KEPT_PLAN = Plan(PlanStatus.KEPT, "the plan in effect serves")
+KEPT_PLAN = Plan(PlanStatus.KEPT, "the plan in effect serves")  # answer when nothing needs a search
 NO_BETTER = "the plan in effect serves as well as any other"
 THINKING_ON = "thinking on; the plan in effect goes on"
 CHAIN = "a closed chain of obstacles lies between the aircraft and the goal"

@@ -51,10 +51,10 @@ WHY_NOT: Final = {
 }
 """Reasons why commands are not flown, where there is one to tell."""
 
-RETURN_POINT: Final = 5000
+RETURN_POINT: Final = 5000  # of a fence
 CORNERS: Final = {5001: True, 5002: False}
 """Commands for a corner of a fence: True to stay inside of, False outside; the first parameter counts the corners."""
-HOME_CIRCLE: Final = 5005
+HOME_CIRCLE: Final = 5005  # ArduPilot's fence about home
 CIRCLES: Final = {5003: True, 5004: False, HOME_CIRCLE: True}
 """Commands for a circular fence: True to stay inside of, False outside; the first parameter is the radius."""
 RALLY_POINT: Final = 5100

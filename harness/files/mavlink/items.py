@@ -24,9 +24,9 @@ FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11:
 """The datum of the altitude for each MAV_FRAME. Autopilots load no item to fly to in any other global frame."""
 NOWHERE_DEG: Final = 1e-7
 """A position with less than this in both is no position; ArduPilot writes zeros where none is meant."""
-WPL: Final = "QGC WPL"
-WPL_FIELDS: Final = 12
-COMMENT: Final = "#"
+WPL: Final = "QGC WPL"  # begins a mission file in plain text
+WPL_FIELDS: Final = 12  # of a line of such a file
+COMMENT: Final = "#"  # begins a line to skip
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
     from types import ModuleType
 
-GYMNASIUM = "gymnasium"
+GYMNASIUM = "gymnasium"  # once it is imported, the environments are registered
 ENVIRONMENTS = {"wayproof/Waypoints-v0": "harness.learning.environments:WaypointsEnv"}
 
 

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-ROOMS = ("planner", "aircraft", "harness")
+ROOMS = ("planner", "aircraft", "harness")  # top packages, found beside this one
 
 
 @functools.cache

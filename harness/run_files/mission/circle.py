@@ -17,7 +17,7 @@ from harness.run_files.given_path import SHORTEST_M, FloatArray, Row
 Pose = tuple[complex, complex]
 """A place and a direction."""
 
-SHARE_ROUNDING: Final = 1e-9
+SHARE_ROUNDING: Final = 1e-9  # of a radius
 ON_CIRCLE_M: Final = 0.01
 """A place no further than this from a circle lies on it."""
 

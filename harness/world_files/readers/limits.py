@@ -14,9 +14,9 @@ from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum,
 
 _FEET: Final = dict.fromkeys(("FEET", "FOOT", "FT", "F"), FOOT_M)
 _METRES: Final = dict.fromkeys(("METRES", "METERS", "METRE", "METER", "MTR", "M"), 1.0)
-_UNIT_M: Final = {"FL": 100.0 * FOOT_M, **_FEET, **_METRES}
-_GROUND_WORDS: Final = ("SURFACE", "GROUND", "RELATIVE", "ASFC", "AGL", "GND", "SFC")
-_SEA_WORDS: Final = ("AMSL", "MSL", "SEA", "STD", "QNH", "ALT", "GEOID", "MEAN", "LEVEL")
+_UNIT_M: Final = {"FL": 100.0 * FOOT_M, **_FEET, **_METRES}  # metres of a unit; FL is a flight level
+_GROUND_WORDS: Final = ("SURFACE", "GROUND", "RELATIVE", "ASFC", "AGL", "GND", "SFC")  # mean above ground
+_SEA_WORDS: Final = ("AMSL", "MSL", "SEA", "STD", "QNH", "ALT", "GEOID", "MEAN", "LEVEL")  # above the sea
 _DATUMS: Final = {**dict.fromkeys(_GROUND_WORDS, Datum.GROUND), **dict.fromkeys(_SEA_WORDS, Datum.SEA)}
 _LIMIT_WORD: Final = re.compile("|".join(sorted((*_UNIT_M, *_DATUMS, "ABOVE"), key=len, reverse=True)))
 _WORDS_BESIDE: Final = rf"((?:{_LIMIT_WORD.pattern}|[\s()'./+\N{{DEGREE SIGN}}])*)"
@@ -54,7 +54,7 @@ _LENGTHS_M: Final = {
     **{"": 1.0, "cm": 0.01, "km": 1000.0},
 }
 """Metres of the units that OpenStreetMap has: https://wiki.openstreetmap.org/wiki/Map_features/Units."""
-_HEIGHTS: Final = (
+_HEIGHTS: Final = (  # attributes with the height of a building
     "height",
     "building:height",
     "building_height",

@@ -17,8 +17,8 @@ from harness.world_files.parts import WGS84, Contents, Limit, Part, Reading
 from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import Place, arc, circle, corridor, on_earth, polar
 
-MILE_M: Final = 1852.0
-COMMANDS: Final = ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")
+MILE_M: Final = 1852.0  # nautical
+COMMANDS: Final = ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")  # with a value after a blank
 _PLACE: Final = re.compile(r"([\d.:\s°'\",]+)([NS])([\d.:\s°'\",]+)([EW])")
 
 

@@ -25,9 +25,9 @@ CACHE_MB: Final = 64
 MAX_TILE_BYTES, MAX_NUMPY_BYTES = 30_000_000, 500_000_000
 """A ZIP archive with an SRTM tile, and one with NumPy arrays, unpack to at most this many bytes."""
 VOIDS: Final = (-9999.0, -32767.0, -32768.0)
-"""Values that mean a cell without a height in files that name no such value."""
+"""In files that name no value for missing heights, these mean a cell without one."""
 HEIGHTS_M: Final = (-12_000.0, 9_000.0)
-"""Heights of the ground on earth lie between these."""
+"""Cells with heights at or beyond these bounds count as missing: no ground on earth lies there."""
 
 
 @contextmanager
