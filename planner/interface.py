@@ -22,11 +22,11 @@ IntArray = NDArray[np.intp]
 ComplexArray = NDArray[np.complex128]
 
 OFF_PATH_ERRORS = 4.0
-"""An aircraft further from a path than this many tracking errors has left it."""
+"""An aircraft further from a path than this many tracking errors, and than 1 m, has left it."""
 UNIT_TOLERANCE = 1e-6
 """A tangent counts as a unit vector if its length differs from 1 by less than this."""
 MOST_ROWS = 1_000_000
-"""Most rows of an array in a picture."""
+"""A picture with an array of more rows than this is refused."""
 
 
 def _frozen(array: FloatArray) -> FloatArray:

@@ -32,7 +32,7 @@ class Course:
     to_goal: bool = True  # it leads to the goal, not only into a turn
 
     def ahead(self, arc_length_m: float) -> Course:
-        """The rest of the course from an arc length on."""
+        """The rest of the course from an arc length on; the whole of it where no rest is left."""
         segments = between(self.path, arc_length_m, self.path.length_m)
         if not segments:
             return self

@@ -11,7 +11,7 @@ from planner.interface import FloatArray, Path
 from planner.kernels.buckets import Buckets, bucketed
 
 SQUARE_SIDE_KEEPS = 3.0
-"""Side of the squares that edge points are sorted into, in distances kept."""
+"""Side of the squares that edge points are sorted into, over the largest distance kept from one."""
 
 CALL_WORK, TANGENT_WORK, POINT_WORK, HUG_WORK = 14.0, 0.04, 0.0016, 0.006
 """Counted work, about 1 us a unit: of a call, and in it of each point that tangents are drawn to, that is compared with

@@ -11,7 +11,7 @@ from planner.compiled import BOOL, BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, FLOATS, 
 from planner.interface import BoolArray, FloatArray, IntArray
 
 OUTSIDE = 0
-"""Node of the world outside of the area."""
+"""Number of the node that stands for the border and all outside of the area."""
 
 
 @compiled(COUNTS_OUT, BOOLS_OUT, COUNT, inner=True)

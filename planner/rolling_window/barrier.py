@@ -23,7 +23,7 @@ THINNING_SHARE = 0.1
 """One point is taken in per square of this share of the clearance. Fewer points prove less, but nothing false."""
 
 NODE_LISTS = 4096
-"""Number of lists that nodes are put into by their place."""
+"""Number of lists that nodes are put into by the square in which they lie (a hash table)."""
 
 
 class Barrier:
@@ -47,7 +47,7 @@ class Barrier:
         self.closed = False
 
     def add(self, points_m: FloatArray) -> None:
-        """Takes in edge points, (k, 2)."""
+        """Takes in (k, 2) edge points, one a square of the thinning, and sets `closed` once they close a chain."""
         known, fresh = len(self._places), []
         places = np.floor(points_m / (THINNING_SHARE * self._clearance)).astype(np.int64).tolist()
         for i, (column, row) in enumerate(places):
@@ -100,7 +100,7 @@ class Proof:
         return closed
 
     def _taken_in(self, ends: tuple[Point, Point], most: int) -> bool:
-        """Takes in at most `most` more points; returns whether they close all ways."""
+        """Takes in at most `most` more points, none near the ends of the way; returns whether they close all ways."""
         memory, keeps_m = self._memory, self._keeps_m
         if self._barrier is None:
             self._barrier = Barrier(*ends, self._mission.bounds_m, keeps_m, self._border_m)

@@ -60,7 +60,7 @@ class Commitment:
         return CommittedPlan(plan, certified.path, course, certified.loiter_entry_m)
 
     def _certified(self, seen: MapView, course: Course, cut_m: float) -> Certified | None:
-        """The part of a course that is certified; None where no part is."""
+        """The certified part of a course with a turn late enough; else all of it to the goal, or any turn; or None."""
         certifier = self._certifier(1.5 * seen.spacing_m)
         terrain = self._local.room.terrain(self._mission.clearance_m + self._mission.tracking_error_m)
         certified = certifier.certify(course.path, seen, terrain, cut_m)

@@ -54,7 +54,7 @@ class CostToGo:
         self._levels = np.full(self._columns * self._rows, math.inf)
 
     def __call__(self, place: Point) -> float:
-        """Distance to the goal, m; infinite where there is no way."""
+        """Distance to the goal, m, at least the straight line; that outside of the grid; infinite: there is no way."""
         column = int((place[0] - self._low[0]) / self._cell) + 1
         row = int((place[1] - self._low[1]) / self._cell) + 1
         if not (0 < column < self._columns - 1 and 0 < row < self._rows - 1):

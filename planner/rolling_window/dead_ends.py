@@ -13,7 +13,7 @@ from planner.memory import ObstacleMemory
 from planner.world_stability import WorldStability
 
 TURNS_TO_GIVE_UP = 2
-"""A place is given up when the aircraft has turned away in front of it this many times."""
+"""A place is given up when the aircraft has turned away within two clearances of it this many times."""
 
 RETRY_S = 60.0
 """Given-up places are tried again this long after something last moved or appeared."""
@@ -106,7 +106,7 @@ class GivingUp:
         return no_room and self.stability.settled(time_s) and not (doubtful and len(self._memory.refused_m))
 
     def try_again(self, narrow: bool, at_end: bool, arc_length_m: float) -> None:
-        """After a search that found nothing: doubles the effort, or tries again what was given up."""
+        """After a search in vain: more effort (`narrow`: none); forgives the refused if that or `at_end`."""
         self._retries += narrow
         if narrow or at_end:
             self.given_up_at_m = arc_length_m

@@ -31,7 +31,7 @@ LEAST_HUG_SHARE, LEAST_MARGIN_SHARE = 0.005, 0.4
 the margin is still kept where there is no room for all of it."""
 
 MOST_TRACKS = 300
-"""Most candidates that a search expands."""
+"""A search expands at most this many track points (a wide one in proportion more), and as many after the first find."""
 
 WIDE_FACTOR, WIDE_STEPS = 4, 60
 """A wide search, where N steps with n candidates find no way, has `WIDE_FACTOR` times as many of both and is led by the
@@ -46,7 +46,7 @@ SWITCH_SHARE, RETRACE_SHARE = 0.03, 0.25
 `RETRACE_SHARE` of what leads back along where the aircraft has been."""
 
 TRAIL_CLEARANCES = 4.0
-"""Places within this many clearances of the flown trail count as retraced."""
+"""Side (in clearances) of squares of the plane: places in or beside one flown through count as retraced."""
 
 TURN_EXITS = 8
 """A held turn may be left at this many places of it: from some no curve fits the way on."""
@@ -290,7 +290,7 @@ class LocalPlanning:
     def _searched(
         self, window: Window, attempt: Attempt, widening: int, around: Sequence[int] = ()
     ) -> Iterator[Candidate | None]:
-        """The n best candidates of one search. None after each step of work."""
+        """Yields the best candidates of one search, as many as wanted, and None before each place looked at."""
         to_go: CostToGo | None = None
         if widening > 1:
             ends = window.center_m, self._mission.goal_m

@@ -74,11 +74,12 @@ def search_candidates(
     around: Iterable[int] = (),
     to_go: CostToGo | None = None,
 ) -> Iterator[Candidate | None]:
-    """Candidates from the centre of the window to the goal, cheapest first, as far as they are asked for.
+    """Searches for ways from the centre of the window to the goal, the least length, or cost `to_go`, first.
+
+    Edges of obstacles are passed at `outer_m`; from the centre those of the obstacles `around` are tried as well.
 
     Yields:
-        Candidates that see the goal from their last track point but one; none where n candidates at every one
-        of N steps were not enough. None after each step looked at.
+        Complete candidates, cheapest first, none if the `width` does not suffice; None before each place looked at.
     """
     start, (steps, keep_best, most_tracks, wide) = window.center_m, width
     _, _, straight = guide_vector(start, goal)
@@ -122,7 +123,7 @@ def search_candidates(
 
 
 def _wide_apart_m(window: Window, outer_m: float) -> float:
-    """How far apart track points of a wide search are not counted as one."""
+    """Distance (m) within which two track points of a wide search count as one."""
     kept_m = float(window.keep_m.max(initial=0.0))
     return max(APART_SHARE * outer_m, WIDE_APART_SHARE * 2.0 * math.sqrt(outer_m * outer_m - kept_m * kept_m))
 

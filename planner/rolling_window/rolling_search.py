@@ -18,7 +18,7 @@ from planner.shield.escape import room_m
 from planner.shield.evasion import Threats
 
 BETTER_SHARE = 0.005
-"""A course that can still be flown is replaced only by one shorter by this share of its remaining length."""
+"""A course to the goal that can still be flown is replaced only by one shorter by this share of its rest."""
 
 
 class Work(Enum):
@@ -107,7 +107,7 @@ class RollingSearch:
         return None
 
     def _begun(self, position: Point) -> AnytimeSearch:
-        """A new search."""
+        """Begins a search, with the effort and the order that searches in vain have led to."""
         self.gone = self._memory.cleared
         effort, widest_first = self._giving_up.effort, self._giving_up.tried_again
         return AnytimeSearch(self._local, effort, lambda: self._no_way.closed(position), widest_first)
@@ -120,7 +120,7 @@ class RollingSearch:
         self._monitor.lengthened_m = course.path.length_m - before_m
 
     def _worth_m(self, ahead: Course | None) -> float:
-        """Greatest length (m) of a course that the course in effect is left for."""
+        """Greatest length (m) of a course that the one in effect is left for; infinite if that leads to no goal."""
         if ahead is None or not ahead.to_goal or ahead.nodes[-1] != self._mission.goal_m:
             return math.inf
         return ahead.path.length_m * (1.0 - BETTER_SHARE)

@@ -12,7 +12,7 @@ from planner.geometry.terrain import POINT_WORK, Terrain
 from planner.kernels.fans import shortcuts
 
 MOST_LEFT_OUT = 6
-"""Most corners, from the first on, that are left out one at a time."""
+"""Most corners, from the first on, that are left out one at a time, or are passed in the turn at the start."""
 
 
 def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
@@ -30,7 +30,7 @@ def optimise(
     cut_m: float,
     terrain: Terrain,
 ) -> Route | None:
-    """The curve through the shortcuts of a track, at the minimum turn radius.
+    """The curve through the shortcuts of a track that `terrain` admits, no tighter than the limits; None: none does.
 
     All shortcuts are taken first. Where their corners leave no room for the turns, or the curve comes too near
     to something, the turn that is being flown at the start is flown on, past the first corners; then the first turn
