@@ -6,6 +6,9 @@ import sys
 def run() -> int:
     """Runs the command line and returns its exit status; an interrupt while its modules are imported ends it too."""
     try:
+        from planner.compiled import own_this_process
+
+        own_this_process()
         from harness.cli.app import main
     except KeyboardInterrupt:
         return 130

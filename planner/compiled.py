@@ -35,6 +35,8 @@ INTS = "Array(intp, 1, 'C', readonly=True)"  # (n,) counts, indices or labels
 BOOLS_OUT, COUNTS_OUT, FLOATS_OUT, PLACES_OUT = "boolean[::1]", "intp[::1]", "float64[::1]", "complex128[::1]"
 """Arrays that a function changes."""
 
+STARTING_OBJECTS = 300_000
+"""Garbage is looked for once this many more objects are there than before, until all is compiled: a start has fewer."""
 STARTS_BYTES = 2500
 """Starting a second process takes about as long as compiling this many bytes of byte code."""
 
@@ -127,7 +129,8 @@ def compile_all(rare: bool = False) -> None:
     """
     global _second
     with _compiling:
-        if not (_functions() or (rare and _waiting)):
+        waiting = _functions() + (list(_waiting) if rare else [])
+        if not waiting:
             return
         while _functions():
             _start_second(0)
@@ -140,9 +143,11 @@ def compile_all(rare: bool = False) -> None:
         _compile(list(_waiting) if rare else ())
         # The compiler stays for good. Once it is counted among the old objects, garbage is looked for there only when
         # as many new ones have come as would be a quarter of it: that would hold a flight up for a tenth of a second.
-        gc.collect()
+        if not _process_is_ours or any(each.anew for each in waiting):
+            gc.collect()
         if _process_is_ours:
             gc.freeze()
+            gc.set_threshold(*_usual_threshold)
 
 
 def begin_compiling(busy_bytes: int) -> None:
@@ -236,13 +241,14 @@ def _share(functions: Sequence[Compiled[..., Any]], busy_bytes: int) -> frozense
     return frozenset(names)
 
 
-_process_is_ours = False
+_process_is_ours, _usual_threshold = False, gc.get_threshold()
 
 
 def own_this_process() -> None:
-    """Says that nobody else's objects live in this process: what is there after compiling is never garbage."""
+    """Says that nobody else's objects live in this process: until all is compiled garbage is hardly looked for."""
     global _process_is_ours
     _process_is_ours = True
+    gc.set_threshold(STARTING_OBJECTS)
 
 
 def _tell(line: str) -> None:

@@ -32,7 +32,6 @@ from harness.files.errors import RunFolderError, WriteError
 from harness.files.input_file import InputError
 from harness.files.spawning import open_standard_files
 from harness.flight.signals import taken_as_interrupt
-from planner.compiled import own_this_process
 
 INTERRUPTED_STATUS: Final = 130  # exit status after Ctrl-C
 MEMORY_BYTES: Final = 1_200_000_000
@@ -78,7 +77,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = [word for word in given if word != "--debug"]
     if arguments is None:
         open_standard_files()
-        own_this_process()
         results_alone()
         _warn_of_little_memory()
     with taken_as_interrupt() as came:
