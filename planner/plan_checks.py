@@ -29,7 +29,7 @@ START_S = 1.0
 JOIN_M = 0.1
 """Largest gap between two segments, and between the end of a loiter and its beginning."""
 FULL_TURN_RAD = 1e-3
-"""A loiter may differ from a full turn by this."""
+"""A loiter may turn by this (rad) more or less than a full turn."""
 
 
 class WrongAnswerError(ValueError):

@@ -16,7 +16,7 @@ from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield.intervention_log import ShieldReport
 
 OWN_PACKAGES: Final = ("harness.", "planner.")
-"""Lines of code in these packages, wayproof's own, say nothing to the author of a planner."""
+"""Where a planner raised, lines of code in these packages, wayproof's own, are not named to its author."""
 
 
 class PlannerFailedError(RuntimeError):

@@ -185,7 +185,7 @@ class Navigator(StateEstimator):
 
 
 def _noise(stream: np.random.Generator) -> Iterator[list[float]]:
-    """Standard normal numbers, one for each process, without end."""
+    """Yields, without end, a standard normal number for each of the eight processes, for one update after the other."""
     while True:
         yield from stream.standard_normal((NOISE_ROWS, 8)).tolist()
 

@@ -24,7 +24,7 @@ class Caution(str):
 
 
 NOMINAL = "nominal"
-"""The shield flies the planner's path."""
+"""The `ShieldState` while the shield flies the planner's path."""
 
 
 class ShieldState(str):

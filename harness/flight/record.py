@@ -182,14 +182,14 @@ BELIEVED_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if column
 SURFACES = ("elevator", "aileron", "rudder")
 """Names of the columns of control surfaces."""
 
-COLUMNS = tuple(name for name, column in TRACK_COLUMNS.items() if column.in_digest)
+DIGEST_COLUMNS = tuple(name for name, column in TRACK_COLUMNS.items() if column.in_digest)
 """Names of the columns of `track.parquet` that the digest covers, in its order."""
 
 
 def digest(track: Track) -> str:
-    """SHA-256 (hex) over the little-endian bytes of every column of `COLUMNS`, one column after the other."""
+    """SHA-256 (hex) over the little-endian bytes of every column of `DIGEST_COLUMNS`, one column after the other."""
     sha = hashlib.sha256()
-    for name in COLUMNS:
+    for name in DIGEST_COLUMNS:
         sha.update(getattr(track, name).tobytes())
     return sha.hexdigest()
 

@@ -57,7 +57,7 @@ class MissionEnd:
         return math.hypot(state.east_m - east, state.north_m - north)
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
-        """Returns how the flight ends now; None while it goes on."""
+        """Returns how the flight ends now; None while it goes on. Only a fault is looked for before more can happen."""
         if fault is not None:
             return Ending(Outcome.LOST_CONTROL, fault)
         if state.time_s < self._next_look_s:

@@ -33,7 +33,7 @@ ROW_TYPE = np.dtype(
 ROW_STRUCT = struct.Struct(f"{len(AircraftState._fields) + 3}dq")
 """`ROW_TYPE` as the standard library writes it."""
 
-NAMES = tuple(ROW_TYPE.fields or ())
+NAMES = tuple(ROW_TYPE.fields or ())  # of the fields of a row
 
 BELIEVED_STRUCT = struct.Struct("6d")
 """`BELIEVED_TYPE` as the standard library writes it."""

@@ -34,7 +34,7 @@ LOOK_EVERY_S = 3.0
 """Looks for obstacles that have come into free space are at least this far apart."""
 LOOK_EVERY_SHARE = 0.6
 """The time between two looks is at least that in which the fastest obstacle moves by this share of the clearance."""
-NO_STEP = 0.25
+FACE_SHARE = 0.25
 """Neighbouring returns nearer to each other than this share of the clearance belong to one obstacle."""
 OWN_SHARE = 0.1
 """A return within this share of the clearance from where a followed obstacle was belongs to that obstacle."""
@@ -96,7 +96,7 @@ class EarlierScans:
         late |= in_all(self._drawn_back(before, scan)[hits] for before in of_late[: self._many])
         if late.any():
             # Where rays are far apart an outline ends anywhere.
-            changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < NO_STEP * self._clearance)
+            changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < FACE_SHARE * self._clearance)
         return changed
 
     def have_come(self, places: ComplexArray, fewest: int) -> bool:
@@ -114,7 +114,7 @@ class EarlierScans:
         shows all of the velocity, no scan may have looked through where a place was then either, moved back by it. If
         fewer than half of the places near the obstacle pass that, the velocity is wrong, and it is not asked.
         """
-        first, near_m = self._looks[0], NO_STEP * self._clearance
+        first, near_m = self._looks[0], FACE_SHARE * self._clearance
         own = near_any(first.places, track.shown_at(first.scan.time_s), self.own_m)
         stood = first.places[~own & ~looked_through(now, first.places, self._sure)]
         may = ~near_any(places, stood, near_m) | come(first.scan, places, self._sure)

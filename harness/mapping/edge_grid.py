@@ -13,7 +13,7 @@ from harness.mapping.scan_comparison import near_any
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 MOST_CELLS = 16_000_000
-"""A grid has at most this many cells; in a larger area they are wider than a quarter of the clearance."""
+"""A grid of edges or of free space has at most this many cells; in a larger area its cells are wider."""
 
 
 class EdgePoints(ABC):

@@ -19,7 +19,7 @@ CERTAIN_SCORE = 6
 GAP_PARTS = 8
 """A gap between joined hits is split into this many parts; it spans no more cells, so points are one cell apart."""
 CORNER_SINE = 0.3
-"""A wall has a corner where it turns by an angle of at least this sine."""
+"""A wall has a corner where it turns away from the sensor by an angle of at least this sine."""
 
 SCORES, SLOTS = "Array(int8, 1, 'C', readonly=True)", "Array(int32, 1, 'C', readonly=True)"
 SCORES_OUT, SLOTS_OUT, PLACE = "int8[::1]", "int32[::1]", "complex128"

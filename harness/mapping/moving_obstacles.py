@@ -22,7 +22,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from harness.mapping.earlier_scans import NO_STEP, EarlierScans, Look
+from harness.mapping.earlier_scans import FACE_SHARE, EarlierScans, Look
 from harness.mapping.followed_outline import (
     FEWEST_SHIFTS,
     LEAST_MPS,
@@ -36,7 +36,7 @@ from harness.mapping.scan_comparison import grown, in_a_row, joined, looked_thro
 from harness.mapping.scan_matching import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, means, register
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
-NO_PLACES = np.zeros((0, 2))
+NO_PLACES = np.zeros((0, 2))  # no trail
 DECIDED_S = 5.0
 """No outline followed for less than this time is decided to move or to stand."""
 UNDECIDED_S = 30.0
@@ -179,7 +179,7 @@ class MovingObstacles:
     def _step(self, scan: RangeScan, hits: IntArray) -> FloatArray:
         """(k,) distances (m) up to which neighbouring returns belong to one face, at the range of each."""
         step = np.maximum(
-            NO_STEP * self._clearance + 6.0 * self._noise, SLANT * scan.spacing_rad * scan.ranges_m[hits]
+            FACE_SHARE * self._clearance + 6.0 * self._noise, SLANT * scan.spacing_rad * scan.ranges_m[hits]
         )
         return np.minimum(step, self._apart)
 
@@ -222,7 +222,7 @@ class MovingObstacles:
         """Returns the outline of neighbouring returns; a parabola, or means of several, where they err."""
         if self._is_free:
             return Outline(
-                bow(places, NO_STEP * self._clearance),
+                bow(places, FACE_SHARE * self._clearance),
                 ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
             )
         away = np.abs(places - complex(scan.east_m, scan.north_m)).mean()
@@ -337,7 +337,7 @@ class MovingObstacles:
             may = ~self._stands(_pairs(places), LATELY_S)
             may[mine] = True
         some = may.nonzero()[0]
-        step_m = NO_STEP * self._clearance + MEDIAN_SIGMAS * self._noise
+        step_m = FACE_SHARE * self._clearance + MEDIAN_SIGMAS * self._noise
         return some[grown(np.searchsorted(some, mine), hits[some], places[some], step_m, scan)]
 
     def _near_mean(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:

@@ -161,7 +161,7 @@ class Bug2(Bug1):
         self._start = mission.goal_m
 
     def begin(self, place: Point) -> BugState:
-        """The M-line begins where the walk does, or is begun anew."""
+        """Straight to the goal: the M-line begins at the start of the flight, or where the walk is begun anew."""
         self._start = place
         return Straight()
 

@@ -25,7 +25,7 @@ from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, Pla
 from planner.keys import MarginConfig, key
 
 MARGIN_SHARES = (1.0, 0.125)
-"""Shares of the margin that a tree keeps, tried in this order."""
+"""Shares of the margin that a tree keeps, tried in this order until one finds a way."""
 
 HOLD_REGROW_S = 5.0
 """In a holding turn a new tree is grown this often."""

@@ -18,12 +18,12 @@ from planner.interface import FloatArray, IntArray, MapView, Mission
 from planner.memory import ObstacleMemory
 
 SIMPLIFY_SHARE = 0.2
-"""The outline is simplified by this share of the margin."""
+"""The outline of grown obstacles is simplified by at most this share of the margin."""
 GRAZED_M, TOUCH_SHARE = 0.01, 0.05
 """A line that goes less deep into an obstacle passes it; one that enters within this share of the kept distance from
 where it begins on a boundary leads inside."""
 QUARTER_CORNERS = 12
-"""Corners of a quarter of a disc."""
+"""A disc about edge points is drawn with this many corners a quarter."""
 DENT_SHARE = 4.0
 """A line that touches an obstacle and meets it again within this many kept distances leads into a dent."""
 CELL_SHARE = 0.35
@@ -171,7 +171,7 @@ class GrownObstacles:
         return piece(np.concatenate((corners, corners[1:])), at, at + min(length_m, ring.length))
 
     def nearest_to_goal_m(self, place: Point) -> float:
-        """Least distance (m) from the goal of the known obstacles beside a place; the border does not count."""
+        """Least distance (m) from the goal of obstacles beside a place, of their part inside the border; inf: none."""
         self._unite()
         beside_m, here = TOUCH_SHARE * self.keep_m + self._margin_m, shapely.Point(place)
         # What the border joins are obstacles of their own.

@@ -37,9 +37,9 @@ TOO_NEAR_COST, BLOCKED_COST = 3.0, 50.0
 TURN_COST = 0.05
 """Cost, in steps, of a step flown at the turn radius; it falls with the square of the curvature."""
 LAMBDA_STEPS = 0.3
-"""Temperature lambda, in steps."""
+"""Temperature lambda of the weights exp(-cost / lambda), in the unit of costs, which is a step."""
 ROUNDS = 3
-"""Number of rounds: the weighted mean is taken once in each."""
+"""Each plan takes this many rounds of sampling and weighted mean, each with less noise than the one before."""
 ROLLOUTS_DRAWN = 24
 """Most rollouts in the picture of a plan."""
 

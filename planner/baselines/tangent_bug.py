@@ -36,7 +36,7 @@ LOOKS_PER_RANGE = 40.0
 SHORTER_SHARE = 0.005
 """A way to the goal that follows no boundary and that nothing cuts is dropped only for one shorter by this share."""
 SHORTCUT_TRIES = 16
-"""A straight way to a boundary is tried to this many of its places."""
+"""A straight way to a boundary is tried to this many of its places, evenly spaced, the furthest first."""
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ ON_RIGHT = -1.0
 """Side of the obstacle (1: left, -1: right): a point that meets an obstacle turns left and has it on its right."""
 
 BREACH_SHARE = 0.25
-"""A new edge point counts when it comes nearer than the kept distance by this share of the margin."""
+"""An edge point cuts the walk if it is nearer to it than the kept distance by this share of the margin."""
 
 SAME_PLACE_SHARE = 0.5
 """Places on a boundary passed in one sense and nearer than this share of the kept distance are the same: no two

@@ -58,7 +58,7 @@ STRAIGHT_ON_RADII = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
 space straight ahead is in sight."""
 
 SPARSE_STEP = 16
-"""Every place of this number in a disc is tested before the others: most discs that are not free fail there."""
+"""One in this many places of a disc is tested before the others: most discs that are not free fail there."""
 
 SIDES = (1.0, -1.0)
 """Signs of the curvature of a turn: left, right."""
@@ -120,7 +120,7 @@ class Certifier:
         self._disc = _disc(disc_radius_m(radius_m, clearance_m), spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: MapView) -> float:
-        """Arc length up to which a path lies in space that was seen to be free."""
+        """Arc length, at most the horizon, up to which a path lies in space that was seen to be free."""
         end = min(path.length_m, self._horizon)
         pieces = max(math.ceil(end / self._spacing), 1)
         free = seen.seen_free(places_along(path, end, pieces))
@@ -180,7 +180,7 @@ class Certifier:
     def certify_up_to(
         self, over_m: float, path: Path, seen: MapView, bounds_m: tuple[float, float, float, float]
     ) -> Certified | None:
-        """The whole path as certified, if up to `over_m`, the goal, it is seen to be free, also beside, and inside."""
+        """All of a path, certified if up to `over_m`, the goal, it is inside and seen free, also beside; else None."""
         flown = between(path, 0.0, over_m)
         if not flown or over_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
             return None

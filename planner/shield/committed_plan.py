@@ -21,7 +21,7 @@ BROKEN_SHARE = 0.99
 """Share of the clearance: an edge point seen nearer than that to a certified turn breaks the certificate."""
 
 PROLONG_SHARE = 0.6
-"""A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
+"""A plan that serves is prolonged when its certified part ends within this share of the sensing range ahead."""
 
 REPLAN_SHARE, CUT_SHARE, GRAZED_SHARE = 0.0625, 0.02, 0.005
 """The next search begins after the first share of the distance to what is wrong with the plan, but after the second
@@ -166,7 +166,7 @@ class PlanMonitor:
         return len(self._waiting) > 0
 
     def nothing_new(self) -> None:
-        """Counts a request in which no edge came in and none waits."""
+        """Counts one more request since edges were last compared, where none came in and none waits."""
         self._since += 1
 
     def urgent(self, plan: CommittedPlan, here_m: float) -> bool:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.flight.record import COLUMNS, Flight, FloatArray, Outcome
+from harness.flight.record import DIGEST_COLUMNS, Flight, FloatArray, Outcome
 from harness.run.scenario_flight import make_loop
 from harness.scenario.kinds import planner_kinds
 from harness.world.obstacle import Obstacle
@@ -41,7 +41,7 @@ def rows_alike(one: Flight, other: Flight) -> int:
     """How many rows two tracks have in common from the start, bit for bit."""
     length = min(len(one.track), len(other.track))
     differ = np.zeros(length, dtype=bool)
-    for name in set(COLUMNS) - {TRUTH}:
+    for name in set(DIGEST_COLUMNS) - {TRUTH}:
         a, b = (getattr(flight.track, name)[:length] for flight in (one, other))
         differ |= a.view(np.uint64) != b.view(np.uint64)
     return int(differ.argmax()) if differ.any() else length
