@@ -38,18 +38,6 @@ def unpacked(data: bytes, ending: str, most: int) -> tuple[str, bytes]:
     return name.rpartition("/")[2], inner
 
 
-def member_path(path: Path, ending: str, most: int) -> str:
-    """Returns GDAL's path to the one file with an ending in an archive that unpacks to at most `most` bytes."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.infolist()
-    except DAMAGES as error:
-        raise InputError("is a damaged ZIP archive; get it again") from error
-    if sum(each.file_size for each in members) > most:
-        raise InputError(f"unpacks to more than {most // 10**6} MB; cut the area of interest out of it")
-    return f"/vsizip/{path.absolute()}/{_chosen([each.filename for each in members], ending)}"
-
-
 def _chosen(names: list[str], ending: str) -> str:
     """Returns the name of the one file in an archive with an ending; InputError if there is not exactly one."""
     own = [name for name in names if not name.lower().startswith("__macosx/")]  # macOS adds forks of files

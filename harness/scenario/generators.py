@@ -15,7 +15,6 @@ from pydantic import AfterValidator, Field, Strict, model_validator
 
 from harness.files.strict_yaml import Loc
 from harness.scenario.sections import MAX_COORDINATE_M, Length, Section
-from harness.scenario.validation import KeyFault
 
 MAX_OBSTACLES: Final = 10_000
 """A forest that is asked for more trunks is refused."""
@@ -104,14 +103,6 @@ class WorldSpec(Section):
     """Holds the world: the same one in every case. Default: another one in every case."""
     forest: Forest
     """Copses of overlapping round trunks."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _circles_are_a_forest(cls, keys: Any) -> Any:
-        """Refuses the generator `circles` of former versions, and tells the forest that makes the same worlds."""
-        if isinstance(keys, dict) and "circles" in keys:
-            raise KeyFault(("circles",), "is no generator; write forest with trunks: [1, 1] in its place")
-        return keys
 
 
 def generated(spec: WorldSpec, seed: int) -> dict[Loc, Any]:

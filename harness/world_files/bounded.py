@@ -31,11 +31,6 @@ def text_of(data: bytes) -> str:
         return data.decode("latin-1")
 
 
-def json_of(path: Path, lines: bool = False) -> Any:
-    """Parses a JSON file; where `lines`, returns a list of the texts in it, which may stand one a line."""
-    text = text_of(read_bytes(path, MAX_TREE_BYTES))
-    first, _, more = text.lstrip().partition("\n")
-    if lines and first.rstrip().endswith("}") and more.lstrip().startswith("{"):
-        return [parsed_json(line, "", once=False) for line in text.splitlines() if line.strip()]
-    whole = parsed_json(text, "", once=False)
-    return [whole] if lines else whole
+def json_of(path: Path) -> Any:
+    """Parses a JSON file, in which a key may come more than once in a mapping: the last one counts."""
+    return parsed_json(text_of(read_bytes(path, MAX_TREE_BYTES)), "", once=False)

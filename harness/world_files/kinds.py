@@ -56,8 +56,10 @@ REFUSED: Final = {
     **{".pgm": IMAGE, ".png": IMAGE, ".world": GAZEBO, ".sdf": GAZEBO, ".igc": FLIGHT, ".gpx": FLIGHT},
     **dict.fromkeys((".gpkg", ".shp", ".fgb"), "a vector file; make GeoJSON of it (ogr2ogr a.geojson FILE)"),
     ".scen": "a list of MovingAI problems; give the .map file that it names",
+    ".gz": "a packed file; unpack it",
     ".npy": "a plain array; save it as GeoTIFF or ESRI ASCII grid",
     "rally": "a list of rally points: places to return to, no obstacles; give the fence",
+    "cityjsonseq": "a sequence of CityJSON features; make CityJSON of it (cjseq collect)",
     "overpass": "JSON of Overpass; ask it for XML ([out:xml]) and give that",
 }
 """What a file that is not read is, by its ending or kind, and what to give instead."""
@@ -84,6 +86,7 @@ _TEXTS: Final = (
 """Kind of a text without comments by a pattern in it; an airspace begins with its class, or its name and a shape."""
 _JSON_PATTERNS: Final = (
     ("overpass", r'"generator"\s*:\s*"Overpass'),
+    ("cityjsonseq", r'"CityJSONFeature"'),
     ("cityjson", r'"CityObjects"\s*:'),
     ("plan_fence", r'"geoFence"\s*:|"fileType"\s*:\s*"Plan"'),
     ("ed269", r'"UASZoneList"\s*:|"horizontalProjection"\s*:'),
@@ -123,7 +126,7 @@ def kind_of(path: Path) -> str:
         raise InputError("is empty; get it again")
     if first.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError("is UTF-16; save it as UTF-8")
-    if path.name.lower().endswith((".hgt", ".hgt.gz")):
+    if ending == ".hgt":
         return "srtm"
     found = next((kind for kind, pattern in _BINARY_BEGINS if pattern.match(first)), None)
     found = found or (_zip_kind(path) if first[:2] == b"PK" else _text_kind(path, first))

@@ -28,21 +28,19 @@ WALL_SHARE: Final = 1e-9
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads the buildings and bridges of a CityJSON file, or of a sequence of them (CityJSONSeq), a feature a line."""
-    contents = json_of(path, lines=True)
-    if not all(isinstance(each, dict) and isinstance(each.get("CityObjects"), dict) for each in contents):
+    """Reads the buildings and bridges of a CityJSON file."""
+    content = json_of(path)
+    if not isinstance(content, dict) or not isinstance(content.get("CityObjects"), dict):
         raise InputError("has no CityObjects; must be CityJSON")
-    crs = reading.crs or _crs(contents[0].get("metadata"))
+    crs, vertices = reading.crs or _crs(content.get("metadata")), _vertices(content)
     parts: list[Part] = []
     passed, buildings = Counter[str](), limits.Buildings(reading)
-    for content in contents:
-        vertices = _vertices(content, contents[0].get("transform"))
-        for name, thing in content["CityObjects"].items():
-            kind = _object_type(thing)
-            if kind.startswith(SOLID_TYPES):
-                parts += _parts(name, thing, vertices, buildings, passed)
-            else:
-                passed[kind] += 1
+    for name, thing in content["CityObjects"].items():
+        kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
+        if kind.startswith(SOLID_TYPES):
+            parts += _parts(name, thing, vertices, buildings, passed)
+        else:
+            passed[kind] += 1
     if not parts:
         raise InputError("has no building with a shape; must have some")
     notes = buildings.notes()
@@ -53,10 +51,6 @@ def read(path: Path, reading: Reading) -> Contents:
     else:
         check_metres(crs)
     return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
-
-
-def _object_type(thing: Any) -> str:
-    return str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
 
 
 def _parts(
@@ -80,11 +74,11 @@ def _parts(
     return [Part(footprint, Limit(low), Limit(high), name=name[:40])]
 
 
-def _vertices(content: dict[str, Any], common: Any) -> FloatArray:
-    """(n, 3) x, y, z of a file or feature; `common` is how all of a sequence are scaled."""
+def _vertices(content: dict[str, Any]) -> FloatArray:
+    """(n, 3) x, y, z of a file."""
     try:
         vertices = np.array(content.get("vertices", []), dtype=np.float64).reshape(-1, 3)
-        if (how := content.get("transform", common)) is not None:
+        if (how := content.get("transform")) is not None:
             vertices = vertices * np.array(how["scale"], np.float64) + np.array(how["translate"], np.float64)
     except (TypeError, ValueError, KeyError) as error:
         raise InputError("has vertices or a transform that are not numbers in threes") from error

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from harness.files.input_file import InputError
-from harness.files.zip_archive import DAMAGES, member_path
+from harness.files.zip_archive import DAMAGES
 from harness.world_files.bounded import read_bytes
 from harness.world_files.parts import WGS84, Contents, Raster, Reading
 from harness.world_files.plane import check_metres
@@ -22,8 +22,8 @@ MAX_CELLS: Final = 60_000_000
 """A raster has at most this many cells: half a gigabyte of heights."""
 CACHE_MB: Final = 64
 """Size of GDAL's cache, which is a twentieth of the machine's memory otherwise."""
-MAX_TILE_BYTES, MAX_NUMPY_BYTES = 30_000_000, 500_000_000
-"""A ZIP archive with an SRTM tile, and one with NumPy arrays, unpack to at most this many bytes."""
+MAX_NUMPY_BYTES: Final = 500_000_000
+"""A ZIP archive with NumPy arrays unpacks to at most this many bytes."""
 VOIDS: Final = (-9999.0, -32767.0, -32768.0)
 """In files that name no value for missing heights, these mean a cell without one."""
 HEIGHTS_M: Final = (-12_000.0, 9_000.0)
@@ -31,7 +31,7 @@ HEIGHTS_M: Final = (-12_000.0, 9_000.0)
 
 
 @contextmanager
-def opened(path: Path | str, driver: str) -> Iterator[Any]:
+def opened(path: Path, driver: str) -> Iterator[Any]:
     """Opens a raster with rasterio, by no other driver of GDAL than `driver`."""
     try:
         import rasterio
@@ -56,9 +56,9 @@ def opened(path: Path | str, driver: str) -> Iterator[Any]:
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads a raster of one band of heights in metres; an SRTM tile may be packed as .zip or .gz."""
+    """Reads a raster of one band of heights in metres; an SRTM tile may be packed as .hgt.zip."""
     notes: tuple[str, ...] = ()
-    with opened(*_path_and_driver(path)) as source:
+    with opened(path, _driver(path)) as source:
         if source.count > 1 or source.colorinterp[0].name == "palette":
             raise InputError(f"has {source.count} bands or a palette; must have one band, of heights")
         if source.driver == "AAIGrid":
@@ -83,20 +83,18 @@ def read(path: Path, reading: Reading) -> Contents:
     return Contents("raster", crs, raster=Raster(values, affine), notes=notes)
 
 
-def _path_and_driver(path: Path) -> tuple[Path | str, str]:
-    """Returns the path that GDAL opens, of the file or of a tile packed in it, and the driver's name."""
+def _driver(path: Path) -> str:
+    """Returns GDAL's driver for a raster; that of SRTM opens a tile in an archive too, by the name of both."""
     begin = read_bytes(path, first=2)
     if begin in (b"II", b"MM"):
-        return path, "GTiff"
-    if begin == b"PK":
-        return member_path(path, ".hgt", MAX_TILE_BYTES), "SRTMHGT"
-    if begin == b"\x1f\x8b":
-        return f"/vsigzip/{path.absolute()}", "SRTMHGT"
-    if path.suffix.lower() != ".hgt":
-        return path, "AAIGrid"
-    if not re.match(r"[NS]\d{2}[EW]\d{3}", path.name, re.IGNORECASE):
-        raise InputError("is an SRTM tile by its ending; its name must say where it lies, as N46E009.hgt")
-    return path, "SRTMHGT"
+        return "GTiff"
+    if path.suffix.lower() != ".hgt" and begin != b"PK":
+        return "AAIGrid"
+    if not re.fullmatch(r"[NS]\d{2}[EW]\d{3}\.hgt(\.zip)?", path.name, re.IGNORECASE):
+        raise InputError(
+            "is an SRTM tile; its name must say where it lies, as N46E009.hgt, or N46E009.hgt.zip"
+        )
+    return "SRTMHGT"
 
 
 def _check_grid(path: Path, source: Any) -> None:

@@ -362,7 +362,7 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
         (
             "draws: 3",
             "worlds: [{circles: {}}]",
-            "worlds[0].circles: is no generator; write forest with trunks: [1, 1] in its place",
+            "worlds[0].circles: unknown key; known here: label, seed, forest",
         ),
         ("draws: 3", "worlds: [{}]", "worlds[0].forest: is missing"),
         ("draws: 3", "worlds: [{forest: {}}, {forest: {}}]", "worlds[1]: is called forest as another"),

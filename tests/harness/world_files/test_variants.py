@@ -206,23 +206,6 @@ def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_
     assert any("1 building without height" in note for note in found.notes)
 
 
-def test_a_sequence_of_city_features_has_vertices_a_line(tmp_path: Path) -> None:
-    how = {"scale": [0.1, 0.1, 0.1], "translate": [1000.0, 2000.0, 0.0]}
-    first = city("https://www.opengis.net/def/crs/EPSG/0/7415", {}, [], transform=how)
-    lines = [first]
-    for k in range(3):
-        square = [[x + 1000 * k, y, z] for x, y, z in SQUARE_M]
-        objects = {f"b{k}": floor(height=5)}
-        lines.append({"type": "CityJSONFeature", "id": f"b{k}", "CityObjects": objects, "vertices": square})
-    text = "\n".join(map(json.dumps, lines)) + "\n"
-    found = read_any(written(tmp_path / "a.city.jsonl", text))
-    assert [part.footprint.bounds[:2] for part in found.parts] == [
-        (1000.0, 2000.0), (1100.0, 2000.0), (1200.0, 2000.0)
-    ]  # fmt: skip
-    with pytest.raises(InputError, match="'b2' with a vertex that is not there"):
-        scenario_with(written(tmp_path / "b.city.jsonl", text.replace("[2010.0, 0.0, 7.0], ", "")))
-
-
 @pytest.mark.parametrize(
     ("tags", "bottom", "top"),
     [
