@@ -51,7 +51,8 @@ def world(
     """
     from harness.files.strict_yaml import dump
     from harness.files.whole_file import replace_text
-    from harness.world_files.expansion import FileFault, FileSpec
+    from harness.world_files.expansion import FileFault
+    from harness.world_files.parts import FileSpec
     from harness.world_files.siting import site
 
     ends = _ends(start, goal)

@@ -34,7 +34,7 @@ from harness.scenario.obstacles import WorldFile
 from harness.scenario.scenario import Scenario, load_scenario, overridden, validated, with_key
 
 if TYPE_CHECKING:
-    from harness.world_files.expansion import FileSpec
+    from harness.world_files.parts import FileSpec
 
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: this length, and this share of its span."""

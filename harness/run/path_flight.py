@@ -35,7 +35,7 @@ from harness.scenario.validation import KeyFault
 from planner.interface import Path, Plan, PlanRequest, PlanStatus
 
 if TYPE_CHECKING:
-    from harness.world_files.expansion import FileSpec
+    from harness.world_files.parts import FileSpec
 
 BEND_SHARE = 0.25
 """Altitudes of a drawn line that are straight within this share of the altitude threshold are one slope."""

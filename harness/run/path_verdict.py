@@ -26,7 +26,7 @@ from harness.world.world import World
 if TYPE_CHECKING:
     from harness.run.path_flight import PathCheck, PathPlan
     from harness.scenario.scenario import Scenario
-    from harness.world_files.expansion import FileSpec
+    from harness.world_files.parts import FileSpec
 
 SPACING_SHARE: Final = 0.25
 """Points along the given path are measured so close together, in limits of the cross-track error."""

@@ -16,7 +16,8 @@ from harness.scenario.sections import Interval, Point
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
-    from harness.world_files.expansion import FileSpec, Source
+    from harness.world_files.expansion import Source
+    from harness.world_files.parts import FileSpec
 
 
 def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[ScenarioKeys, Sequence[str]]:
@@ -55,7 +56,7 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:
     """Makes a FileSpec of a key `file`: beside the scenario file, or from here; `package:path` in an installed one."""
-    from harness.world_files.expansion import FileSpec
+    from harness.world_files.parts import FileSpec
 
     keys = {name: getattr(file, name) for name in WorldFile.model_fields if name != "path"}
     package, colon, inner = file.path.partition(":")

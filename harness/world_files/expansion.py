@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -17,7 +16,7 @@ from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.height_field import HeightField, cell_sides, height_field
-from harness.world_files.parts import BoolArray, Box, Contents, FloatArray, Raster, Reading
+from harness.world_files.parts import BoolArray, Box, Contents, FileSpec, FloatArray, Raster
 from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.solids import Layer, Solid, clipped, placed_cells, simplified, sliced_parts
 
@@ -29,24 +28,6 @@ MAX_CORNERS: Final = 900_000
 """Most corners of all files together: a scenario with more could not be read again."""
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
 """A polygon without a known bottom or top gets these, in metres above mean sea level."""
-
-
-@dataclass(frozen=True)
-class FileSpec:
-    """One file of a scenario, as its key `file` has it."""
-
-    path: Path
-    kind: str | None = None
-    vertical_clearance_m: float = 10.0
-    metres_per_cell: float | None = None
-    shift_m: tuple[float, float] = (0.0, 0.0)
-    crs: str | None = None
-    tolerance_m: float | None = None
-    nodata: str = "solid"
-    unknown: str = "free"
-    default_height_m: float = 6.0
-    ground_m: float | None = None
-
 
 USED_BY: Final = {
     "metres_per_cell": ("ascii_grid", *kinds.GROUPS["occupancy"]),
@@ -162,15 +143,15 @@ def loaded_file(spec: FileSpec) -> Contents:
         raise InputError(f"cannot be read ({reason}); give the path of a file") from error
     # One path, however its folder is written, of a link by its name.
     path = spec.path.parent.resolve() / spec.path.name
-    reading = Reading(spec.metres_per_cell, spec.crs, spec.default_height_m)
-    return _loaded(path, (stamp.st_size, stamp.st_mtime_ns), spec.kind, reading)
+    read = {key: getattr(spec, key) for key in ("kind", "metres_per_cell", "crs", "default_height_m")}
+    return _loaded(FileSpec(path, **read), (stamp.st_size, stamp.st_mtime_ns))
 
 
 @lru_cache(maxsize=4)
-def _loaded(path: Path, stamp: tuple[int, int], kind: str | None, reading: Reading) -> Contents:
+def _loaded(spec: FileSpec, stamp: tuple[int, int]) -> Contents:
     try:
-        contents = kinds.read(path, kind, reading)
-        with path.open("rb") as file:
+        contents = kinds.read(spec)
+        with spec.path.open("rb") as file:
             return replace(contents, sha256=hashlib.file_digest(file, "sha256").hexdigest())
     except MemoryError as error:
         raise InputError("needs more memory than there is; cut the area of interest out of it") from error

@@ -11,7 +11,7 @@ from typing import Final
 
 from harness.files.input_file import InputError
 from harness.world_files import bounded
-from harness.world_files.parts import Contents, Reading
+from harness.world_files.parts import Contents, FileSpec
 from harness.world_files.readers import (
     city_json,
     fences,
@@ -24,7 +24,7 @@ from harness.world_files.readers import (
     zones,
 )
 
-Reader = Callable[[Path, Reading], Contents]
+Reader = Callable[[FileSpec], Contents]
 GROUPS: Final[dict[str, dict[str, Reader]]] = {
     "terrain": {
         **dict.fromkeys(("geotiff", "ascii_grid", "srtm"), raster.read),
@@ -96,13 +96,14 @@ _JSON_PATTERNS: Final = (
 """The kind of a JSON file by a key that it has somewhere; the first that is found counts."""
 
 
-def read(path: Path, kind: str | None, reading: Reading) -> Contents:
-    """Reads a world file as a kind of `KINDS`; where `kind` is None or of `GROUPS`, the content tells the kind."""
-    bounded.read_bytes(path, first=1)  # a library might wait for who writes a pipe
-    found = kind if kind in KINDS else kind_of(path)
+def read(spec: FileSpec) -> Contents:
+    """Reads a world file as its kind; where that is None or one of `GROUPS`, the content tells the kind."""
+    bounded.read_bytes(spec.path, first=1)  # a library might wait for who writes a pipe
+    kind = spec.kind
+    found = kind if kind in KINDS else kind_of(spec.path)
     if kind in GROUPS and found not in GROUPS[kind]:
         raise InputError(f"is of the kind {found}, not {kind}; leave kind out, or give {found}")
-    contents = footprints.finished(KINDS[found](path, reading))
+    contents = footprints.finished(KINDS[found](spec))
     return replace(contents, kind=found, notes=_together(contents.notes))
 
 

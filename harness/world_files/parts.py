@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -97,11 +98,11 @@ class Raster:
 class Contents:
     """Parts or raster of a file, its crs as pyproj takes it (None for metres of its own), and notes on assumptions."""
 
-    kind: str
     crs: str | None
     parts: tuple[Part, ...] = ()
     raster: Raster | None = None
     notes: tuple[str, ...] = ()
+    kind: str = ""
     sha256: str = ""
 
     @property
@@ -111,9 +112,17 @@ class Contents:
 
 
 @dataclass(frozen=True)
-class Reading:
-    """Answers to what a file may leave open: side of a cell, crs, height of a building that has none."""
+class FileSpec:
+    """One file of a scenario, as its key `file` has it."""
 
+    path: Path
+    kind: str | None = None
+    vertical_clearance_m: float = 10.0
     metres_per_cell: float | None = None
+    shift_m: tuple[float, float] = (0.0, 0.0)
     crs: str | None = None
-    default_height_m: float = 2 * LEVEL_M
+    tolerance_m: float | None = None
+    nodata: str = "solid"
+    unknown: str = "free"
+    default_height_m: float = 6.0
+    ground_m: float | None = None

@@ -16,7 +16,6 @@ from harness.files.input_file import InputError
 from harness.world_files.expansion import (
     Expanded,
     FileFault,
-    FileSpec,
     blaming,
     corners_of,
     expanded,
@@ -24,7 +23,7 @@ from harness.world_files.expansion import (
     unused_keys,
 )
 from harness.world_files.free_room import ROOM_RADII, WAY_RADII, FreeRoom, ends, free_room
-from harness.world_files.parts import WGS84, Box, Contents, FloatArray
+from harness.world_files.parts import WGS84, Box, Contents, FileSpec, FloatArray
 from harness.world_files.plane import CIRCLE_DEG, Mapping, Place, geodetic, short_way
 from harness.world_files.solids import placed_cells
 

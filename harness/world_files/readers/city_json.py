@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +12,7 @@ import shapely
 
 from harness.files.input_file import InputError
 from harness.world_files.bounded import json_of
-from harness.world_files.parts import Contents, FloatArray, Limit, Part, Reading
+from harness.world_files.parts import Contents, FileSpec, FloatArray, Limit, Part
 from harness.world_files.plane import check_metres
 from harness.world_files.readers import limits
 
@@ -27,14 +26,14 @@ WALL_SHARE: Final = 1e-9
 """A surface is a wall if its area seen from above is less than this share of its length squared."""
 
 
-def read(path: Path, reading: Reading) -> Contents:
+def read(spec: FileSpec) -> Contents:
     """Reads the buildings and bridges of a CityJSON file."""
-    content = json_of(path)
+    content = json_of(spec.path)
     if not isinstance(content, dict) or not isinstance(content.get("CityObjects"), dict):
         raise InputError("has no CityObjects; must be CityJSON")
-    crs, vertices = reading.crs or _crs(content.get("metadata")), _vertices(content)
+    crs, vertices = spec.crs or _crs(content.get("metadata")), _vertices(content)
     parts: list[Part] = []
-    passed, buildings = Counter[str](), limits.Buildings(reading)
+    passed, buildings = Counter[str](), limits.Buildings(spec)
     for name, thing in content["CityObjects"].items():
         kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
         if kind.startswith(SOLID_TYPES):
@@ -50,7 +49,7 @@ def read(path: Path, reading: Reading) -> Contents:
         notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
     else:
         check_metres(crs)
-    return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
+    return Contents(crs, tuple(parts), notes=tuple(notes))
 
 
 def _parts(

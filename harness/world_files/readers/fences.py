@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import shapely
@@ -13,30 +12,30 @@ from harness.files.mavlink import commands
 from harness.files.mavlink.items import WPL, Fence, item_fences, plan_fences, wpl_items
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, json_of, read_bytes, text_of
-from harness.world_files.parts import WGS84, Contents, Part, Reading
+from harness.world_files.parts import WGS84, Contents, FileSpec, Part
 from harness.world_files.readers.footprints import circle, on_earth
 
 
-def read_plan(path: Path, reading: Reading) -> Contents:
+def read_plan(spec: FileSpec) -> Contents:
     """Reads the geoFence of a QGroundControl plan."""
-    content = json_of(path)
+    content = json_of(spec.path)
     if not isinstance(content, dict) or not isinstance(content.get("geoFence"), dict):
         raise InputError("has no geoFence; must be a QGroundControl plan with one")
     mission, rally = content.get("mission"), content.get("rallyPoints")
     firmware = mission.get("firmwareType") if isinstance(mission, dict) else None
     points = rally.get("points") if isinstance(rally, dict) else None
     fences = plan_fences(content["geoFence"], "")
-    return _contents("plan_fence", fences, firmware == commands.PX4, len(points or ()))
+    return _contents(fences, firmware == commands.PX4, len(points or ()))
 
 
-def read_ardupilot(path: Path, reading: Reading) -> Contents:
+def read_ardupilot(spec: FileSpec) -> Contents:
     """Reads an ArduPilot fence: lines of latitude and longitude, the return point first; or a waypoint file."""
-    text = text_of(read_bytes(path, MAX_TREE_BYTES))
+    text = text_of(read_bytes(spec.path, MAX_TREE_BYTES))
     if text.startswith(WPL):
         items = wpl_items(text, "")
         home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
         rally = [item.command for item in items].count(commands.RALLY_POINT)
-        return _contents("ardupilot_fence", item_fences(items, home), False, rally)
+        return _contents(item_fences(items, home), False, rally)
     rows = filter(None, (line.partition("#")[0].split() for line in text.splitlines()))
     try:
         places = [(float(north), float(east)) for north, east in rows]
@@ -45,10 +44,10 @@ def read_ardupilot(path: Path, reading: Reading) -> Contents:
     if len(places) < 4:
         raise InputError(f"has {len(places)} lines; must be a return point and at least three corners")
     # Mission Planner saves polygons as fences, without a return point.
-    bare = path.suffix.lower() == ".poly" or (places[0] == places[-1] != places[1])
+    bare = spec.path.suffix.lower() == ".poly" or (places[0] == places[-1] != places[1])
     told = ("has no return point: its first place is a corner",) if bare else ()
     fence = Fence("fence", True, (tuple(places if bare else places[1:]),))
-    return _contents("ardupilot_fence", (fence,), False, 0, told)
+    return _contents((fence,), False, 0, told)
 
 
 def _fence_shape(fence: Fence) -> Any:
@@ -60,9 +59,7 @@ def _fence_shape(fence: Fence) -> Any:
     return shapely.Polygon(places)
 
 
-def _contents(
-    kind: str, fences: Sequence[Fence], any_of: bool, rally: int, told: tuple[str, ...] = ()
-) -> Contents:
+def _contents(fences: Sequence[Fence], any_of: bool, rally: int, told: tuple[str, ...] = ()) -> Contents:
     """Returns fences as parts; where `any_of`, as with PX4, the union of all inclusion fences is one part."""
     points = counted(rally, "rally point")
     if not fences:
@@ -78,4 +75,4 @@ def _contents(
     notes = ["a fence has no heights: taken as solid at every altitude", *told]
     if rally:
         notes.append(f"{points} passed over: places to return to, no obstacles")
-    return Contents(kind, WGS84, tuple(parts), notes=tuple(notes))
+    return Contents(WGS84, tuple(parts), notes=tuple(notes))

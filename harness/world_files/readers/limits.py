@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError
 from harness.files.wording import counted
-from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum, Limit, Part, Reading
+from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum, FileSpec, Limit, Part
 
 _FEET: Final = dict.fromkeys(("FEET", "FOOT", "FT", "F"), FOOT_M)
 _METRES: Final = dict.fromkeys(("METRES", "METERS", "METRE", "METER", "MTR", "M"), 1.0)
@@ -170,8 +170,8 @@ def _largest_m(value: Any) -> float:
 class Buildings:
     """The buildings of one file, with counts of heights that are missing or odd for the notes."""
 
-    def __init__(self, reading: Reading) -> None:
-        self._default_m, self._guessed = reading.default_height_m, 0
+    def __init__(self, spec: FileSpec) -> None:
+        self._default_m, self._guessed = spec.default_height_m, 0
         self._odd = Counter[str]()  # heights that are no plain length, and how often each comes
 
     def part(self, tags: Mapping[str, Any], footprint: Any, name: str = "") -> Part:
@@ -238,10 +238,10 @@ def name_of(tags: Mapping[str, Any]) -> str:
 
 
 def parts_of(
-    features: Sequence[tuple[Mapping[str, Any], Any]], reading: Reading, notes: list[str]
+    features: Sequence[tuple[Mapping[str, Any], Any]], spec: FileSpec, notes: list[str]
 ) -> tuple[Part, ...]:
     """Turns features (attributes, footprint) into parts: buildings by their heights, all others by their limits."""
-    parts, buildings, bare = [], Buildings(reading), 0
+    parts, buildings, bare = [], Buildings(spec), 0
     for tags, footprint in features:
         name = name_of(tags)
         if is_building(tags):

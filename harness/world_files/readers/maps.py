@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, Final
 
 import shapely
@@ -13,27 +12,27 @@ from harness.files.input_file import InputError
 from harness.files.kml import Shape, read_kml
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, json_of, read_bytes
-from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Datum, Limit, Part, Reading
+from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Datum, FileSpec, Limit, Part
 from harness.world_files.readers import limits
 
 DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
 """Datum of a KML altitude by its altitudeMode; an altitude that is clamped to the ground has none."""
 
 
-def read_geojson(path: Path, reading: Reading) -> Contents:
+def read_geojson(spec: FileSpec) -> Contents:
     """Reads the polygons of a GeoJSON file; points and lines are passed over and counted."""
-    content = json_of(path)
+    content = json_of(spec.path)
     shapes = [
         (tags, polygon_of(each)) for tags, geometry in features_of(content) for each in simple(geometry)
     ]
     notes: list[str] = []
-    parts = limits.parts_of([each for each in shapes if each[1] is not None], reading, notes)
+    parts = limits.parts_of([each for each in shapes if each[1] is not None], spec, notes)
     if passed := sum(shape is None for _, shape in shapes):
         notes.append(f"{counted(passed, 'point or line')} without an area passed over")
     # An older file may name a system that is not WGS84.
     named = re.search(r"EPSG:+(?:[\d.]*:)?(\d+)", str(content.get("crs")))
-    crs = reading.crs or (f"EPSG:{named[1]}" if named else WGS84)
-    return Contents("geojson", crs, parts, notes=tuple(notes))
+    crs = spec.crs or (f"EPSG:{named[1]}" if named else WGS84)
+    return Contents(crs, parts, notes=tuple(notes))
 
 
 def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any]]:
@@ -73,9 +72,9 @@ def polygon_of(geometry: dict[str, Any]) -> Any:
         raise InputError(f"has a polygon whose rings are not lists of positions ({said})") from error
 
 
-def read_kml_polygons(path: Path, reading: Reading) -> Contents:
+def read_kml_polygons(spec: FileSpec) -> Contents:
     """Reads the polygons of a KML file, or of a KMZ archive with one, by limits in their ExtendedData or altitudes."""
-    found = read_kml(read_bytes(path, MAX_TREE_BYTES), "", MAX_TREE_BYTES)
+    found = read_kml(read_bytes(spec.path, MAX_TREE_BYTES), "", MAX_TREE_BYTES)
     notes: list[str] = []
     parts = tuple(_kml_part(each, notes) for each in found.polygons if each.rings)
     flat = sum((part.bottom, part.top) == (NO_BOTTOM, NO_TOP) for part in parts)
@@ -85,7 +84,7 @@ def read_kml_polygons(path: Path, reading: Reading) -> Contents:
         notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
     others = {"LineString": len(found.lines), **found.others}
     notes += [f"{counted(count, kind)} passed over" for kind, count in others.items() if count > 0]
-    return Contents("kml", reading.crs or WGS84, parts, notes=tuple(notes))
+    return Contents(spec.crs or WGS84, parts, notes=tuple(notes))
 
 
 def _kml_part(shape: Shape, notes: list[str]) -> Part:

@@ -13,7 +13,7 @@ import numpy as np
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.world_files.bounded import read_bytes, text_of
-from harness.world_files.parts import Contents, FloatArray, Raster, Reading
+from harness.world_files.parts import Contents, FileSpec, FloatArray, Raster
 from harness.world_files.readers import raster
 
 FREE_CELLS, BLOCKED_CELLS = b".GS", b"@OTW"
@@ -24,9 +24,9 @@ IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}
 """GDAL's driver of an image by its first byte."""
 
 
-def read_moving_ai(path: Path, reading: Reading) -> Contents:
+def read_moving_ai(spec: FileSpec) -> Contents:
     """Reads a MovingAI map; a cell is as large as `metres_per_cell` says, else one metre."""
-    text = text_of(read_bytes(path))
+    text = text_of(read_bytes(spec.path))
     side = r"\s*(height|width)\s+(\d{1,9})\s*\n"
     head = re.match(rf"type.*\n{side}{side}\s*map\s*\n", text)
     if head is None or head[1] == head[3]:
@@ -42,20 +42,20 @@ def read_moving_ai(path: Path, reading: Reading) -> Contents:
     if strange := set(np.unique(cells).tolist()) - set(FREE_CELLS + BLOCKED_CELLS):
         raise InputError(f"has the cell {chr(min(strange))!r}; must be one of . G S @ O T W")
     occupied = np.isin(cells, list(BLOCKED_CELLS)).astype(np.float64)
-    size = reading.metres_per_cell or 1.0
-    notes = () if reading.metres_per_cell else ("says not how large a cell is: 1 m (metres_per_cell)",)
+    size = spec.metres_per_cell or 1.0
+    notes = () if spec.metres_per_cell else ("says not how large a cell is: 1 m (metres_per_cell)",)
     place = (size, 0, 0, 0, -size, rows * size)
-    return Contents("moving_ai", None, raster=Raster(occupied, place, True), notes=notes)
+    return Contents(None, raster=Raster(occupied, place, True), notes=notes)
 
 
-def read_ros(path: Path, reading: Reading) -> Contents:
+def read_ros(spec: FileSpec) -> Contents:
     """Reads a map of ROS map_server: a YAML file and the image that it names.
 
     Occupied and free are told as map_server does: p = (255 - grey) / 255, or grey / 255 if `negate`; above
     `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown.
     """
     try:
-        keys = strict_yaml.parse(text_of(read_bytes(path, 100_000)), "map").plain()
+        keys = strict_yaml.parse(text_of(read_bytes(spec.path, 100_000)), "map").plain()
     except InputError as error:
         raise InputError(str(error).removeprefix("map:")) from error
     if not isinstance(keys, dict) or not isinstance(keys.get("image"), str):
@@ -70,16 +70,16 @@ def read_ros(path: Path, reading: Reading) -> Contents:
         raise InputError(f"has {told}; must be metres above 0, and shares between 0 and 1")
     if not isinstance(origin, tuple) or len(origin) not in (2, 3) or not _are_numbers(origin):
         raise InputError("has an origin that is not [x, y, yaw]")
-    greys = _greys(path.parent / keys["image"])
+    greys = _greys(spec.path.parent / keys["image"])
     share = np.abs(greys - (not keys.get("negate", 0)))
     solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
     # The lower left corner is given, and the map is turned counter-clockwise about it by `yaw` radians.
     x, y, yaw = (*origin, 0.0)[:3]
-    cell = reading.metres_per_cell or size
+    cell = spec.metres_per_cell or size
     west, south, rows = x * cell / size, y * cell / size, len(solid)
     cos, sin = cell * math.cos(yaw), cell * math.sin(yaw)
     place = (cos, sin, west - rows * sin, sin, -cos, south + rows * cos)
-    return Contents("ros_map", None, raster=Raster(solid, place, True))
+    return Contents(None, raster=Raster(solid, place, True))
 
 
 def _greys(path: Path) -> FloatArray:

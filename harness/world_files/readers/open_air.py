@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Final
 
 import shapely
@@ -13,7 +12,7 @@ import shapely
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, text_of
-from harness.world_files.parts import WGS84, Contents, Limit, Part, Reading
+from harness.world_files.parts import WGS84, Contents, FileSpec, Limit, Part
 from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import Place, arc, circle, corridor, on_earth, polar
 
@@ -83,10 +82,10 @@ class _Airspace:
         return [Part(shape, *band, self.name) for shape in found]
 
 
-def read(path: Path, reading: Reading) -> Contents:
+def read(spec: FileSpec) -> Contents:
     """Reads every airspace of whatever class; an InputError names the line at fault."""
     spaces, ignored, notes = list[_Airspace](), Counter[str](), list[str]()
-    for number, line in enumerate(text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines(), 1):
+    for number, line in enumerate(text_of(read_bytes(spec.path, MAX_TREE_BYTES)).splitlines(), 1):
         command, _, rest = (part.strip() for part in line.partition("*")[0].strip().partition(" "))
         try:
             _take(spaces, command.upper(), rest, ignored)
@@ -104,7 +103,7 @@ def read(path: Path, reading: Reading) -> Contents:
         notes.append(f"{counted(ignored.total(), 'line')} of commands that draw nothing passed over: {words}")
     if empty := parts.count([]):
         notes.append(f"{counted(empty, 'airspace')} without an area passed over")
-    return Contents("openair", WGS84, tuple(part for each in parts for part in each), notes=tuple(notes))
+    return Contents(WGS84, tuple(part for each in parts for part in each), notes=tuple(notes))
 
 
 def _take(spaces: list[_Airspace], command: str, rest: str, ignored: Counter[str]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -15,7 +15,7 @@ import shapely
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_BYTES, read_bytes
-from harness.world_files.parts import WGS84, Contents, Part, Reading
+from harness.world_files.parts import WGS84, Contents, FileSpec, Part
 from harness.world_files.readers import limits
 
 TALL_MAN_MADE: Final = frozenset(
@@ -25,24 +25,24 @@ TALL_MAN_MADE: Final = frozenset(
 """Values of `man_made` for what stands up like a building, which piers, pipelines and the like do not."""
 
 
-def read_xml(path: Path, reading: Reading) -> Contents:
+def read_xml(spec: FileSpec) -> Contents:
     """Reads an OpenStreetMap XML file."""
-    data = read_bytes(path, MAX_BYTES)
+    data = read_bytes(spec.path, MAX_BYTES)
     if re.search(rb"<nd [^>]*\blat=", data):
         raise InputError("has places inside its ways (`out geom`); ask for `out body; >; out skel`")
     if re.search(rb"<way id=['\"]-|action=['\"]delete", data):
         raise InputError("has ways of JOSM that are new or deleted; give a file without them")
     osmium = _imported_osmium()
     if data.rfind(b"<node ") < data.find(b"<way "):
-        return read_pbf(path, reading)
+        return read_pbf(spec)
     # Written again with nodes before ways before relations, as osmium needs them and Overpass does not.
     with TemporaryDirectory() as folder:
         ordered = Path(folder) / "ordered.osm.pbf"
         with _osmium_errors(), osmium.SimpleWriter(str(ordered)) as writer:
             for kind in (osmium.osm.NODE, osmium.osm.WAY, osmium.osm.RELATION):
-                for each in osmium.FileProcessor(str(path), kind):
+                for each in osmium.FileProcessor(str(spec.path), kind):
                     writer.add(each)
-        return read_pbf(ordered, reading)
+        return read_pbf(replace(spec, path=ordered))
 
 
 @contextmanager
@@ -65,13 +65,13 @@ def _imported_osmium() -> Any:
     return osmium
 
 
-def read_pbf(path: Path, reading: Reading) -> Contents:
+def read_pbf(spec: FileSpec) -> Contents:
     """Reads an OpenStreetMap PBF file."""
     osmium = _imported_osmium()
     keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
-    found = _Found(limits.Buildings(reading), osmium.geom.WKBFactory())
+    found = _Found(limits.Buildings(spec), osmium.geom.WKBFactory())
     with _osmium_errors():
-        for each in osmium.FileProcessor(str(path)).with_locations().with_areas().with_filter(keys):
+        for each in osmium.FileProcessor(str(spec.path)).with_locations().with_areas().with_filter(keys):
             found.take(each, {tag.k: tag.v for tag in each.tags})
     return found.contents()
 
@@ -125,7 +125,7 @@ class _Found:
             notes.append(f"{counted(broken, 'building')} whose outline is not there passed over")
         if self.tall:
             notes.append(f"{counted(self.tall, 'object')} with a height and no area passed over")
-        return Contents("osm", WGS84, tuple(self.parts), notes=tuple(notes))
+        return Contents(WGS84, tuple(self.parts), notes=tuple(notes))
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from harness.files.input_file import InputError
 from harness.files.zip_archive import DAMAGES
 from harness.world_files.bounded import read_bytes
-from harness.world_files.parts import WGS84, Contents, Raster, Reading
+from harness.world_files.parts import WGS84, Contents, FileSpec, Raster
 from harness.world_files.plane import check_metres
 
 MAX_CELLS: Final = 60_000_000
@@ -55,32 +55,32 @@ def opened(path: Path, driver: str) -> Iterator[Any]:
         raise InputError(f"cannot be read as a raster ({said}); it may be torn: get it again") from error
 
 
-def read(path: Path, reading: Reading) -> Contents:
+def read(spec: FileSpec) -> Contents:
     """Reads a raster of one band of heights in metres; an SRTM tile may be packed as .hgt.zip."""
     notes: tuple[str, ...] = ()
-    with opened(path, _driver(path)) as source:
+    with opened(spec.path, _driver(spec.path)) as source:
         if source.count > 1 or source.colorinterp[0].name == "palette":
             raise InputError(f"has {source.count} bands or a palette; must have one band, of heights")
         if source.driver == "AAIGrid":
-            _check_grid(path, source)
+            _check_grid(spec.path, source)
         band = source.read(1, masked=True)
         values = band.data.astype(np.float64) * source.scales[0] + source.offsets[0]
         values[np.ma.getmaskarray(band) | np.isin(band.data, VOIDS)] = np.nan
         affine: Any = tuple(source.transform)[:6]
         if source.transform.is_identity:
             raise InputError("says not where it lies (no transformation); warp it with gdalwarp")
-        if (crs := reading.crs or _crs(source, affine)) is not None:
+        if (crs := spec.crs or _crs(source, affine)) is not None:
             check_metres(crs, source.units[0] or "")
         elif source.driver != "AAIGrid":
             raise InputError("names no coordinate reference system; give crs, as EPSG:32632")
         else:
-            scale = (reading.metres_per_cell or affine[0]) / affine[0]
+            scale = (spec.metres_per_cell or affine[0]) / affine[0]
             affine = tuple(scale * each for each in affine)
             notes = ("names no place on earth: its metres are taken as they are (crs, metres_per_cell)",)
     values[(values <= HEIGHTS_M[0]) | (values >= HEIGHTS_M[1])] = np.nan
     if np.isnan(values).all():
         raise InputError("has no cell with a height between -12000 and 9000 m; must be terrain")
-    return Contents("raster", crs, raster=Raster(values, affine), notes=notes)
+    return Contents(crs, raster=Raster(values, affine), notes=notes)
 
 
 def _driver(path: Path) -> str:
@@ -120,12 +120,12 @@ def _crs(source: Any, affine: tuple[float, ...]) -> str | None:
     return WGS84 if degrees and source.driver == "AAIGrid" else None
 
 
-def read_numpy(path: Path, reading: Reading) -> Contents:
+def read_numpy(spec: FileSpec) -> Contents:
     """Reads `elevation` in rows from the north and its edges in degrees, as in matplotlib's `jacksboro_fault_dem`."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(spec.path) as archive:
             too_large = sum(each.file_size for each in archive.infolist()) > MAX_NUMPY_BYTES
-        with np.load(path, allow_pickle=False) as arrays:
+        with np.load(spec.path, allow_pickle=False) as arrays:
             values: Any = np.zeros(0) if too_large else arrays["elevation"].astype(np.float64)
             west, east, south, north = (float(arrays[name]) for name in ("xmin", "xmax", "ymin", "ymax"))
     except (KeyError, TypeError, *DAMAGES) as error:
@@ -137,4 +137,4 @@ def read_numpy(path: Path, reading: Reading) -> Contents:
         )
     rows, columns = values.shape
     affine: Any = ((east - west) / columns, 0.0, west, 0.0, -(north - south) / rows, north)
-    return Contents("numpy_dem", reading.crs or WGS84, raster=Raster(values, affine))
+    return Contents(spec.crs or WGS84, raster=Raster(values, affine))

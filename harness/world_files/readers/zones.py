@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Final
 
 from harness.files.input_file import InputError, numbers
 from harness.files.wording import counted
 from harness.world_files.bounded import json_of
-from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Limit, Part, Reading
+from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, FileSpec, Limit, Part
 from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import circle
 from harness.world_files.readers.maps import features_of, polygon_of, simple
@@ -51,19 +50,19 @@ class _Zones:
             found.append(none if value is None else told)
         self.parts.append(Part(shape, *limits.band_of(found[0], found[1], self.notes, name), name=name))
 
-    def contents(self, kind: str) -> Contents:
+    def contents(self) -> Contents:
         """Returns all zones as parts, with the notes on them."""
         if not self.parts:
             raise InputError("has no zone with an area that forbids something; must have some")
         told = [
             f"{counted(self.told[why], what)} {sentence}" for why, what, sentence in NOTES if self.told[why]
         ]
-        return Contents(kind, WGS84, tuple(self.parts), notes=(*self.notes, *told))
+        return Contents(WGS84, tuple(self.parts), notes=(*self.notes, *told))
 
 
-def read_ed269(path: Path, reading: Reading) -> Contents:
+def read_ed269(spec: FileSpec) -> Contents:
     """Reads the zones of an ED-269 file, whatever their times, except those without restriction."""
-    content = json_of(path)
+    content = json_of(spec.path)
     if isinstance(content, dict):
         content = content.get("features", content.get("UASZoneList"))
     if not isinstance(content, list):
@@ -77,7 +76,7 @@ def read_ed269(path: Path, reading: Reading) -> Contents:
         passed = found.passes(zone.get("restriction"), zone["geometry"], at_times)
         for volume in () if passed else zone["geometry"]:
             _add_volume(found, volume, name)
-    return found.contents("ed269")
+    return found.contents()
 
 
 def _is_at_times(applicability: Any) -> bool:
@@ -100,10 +99,10 @@ def _add_volume(found: _Zones, volume: Any, name: str) -> None:
     found.add(shape, volume, unit, name)
 
 
-def read_ed318(path: Path, reading: Reading) -> Contents:
+def read_ed318(spec: FileSpec) -> Contents:
     """Reads the zones of an ED-318 file: each geometry has a layer, and a circle is a point with an extent."""
     found = _Zones(("", "Reference"))
-    for tags, geometry in features_of(json_of(path)):
+    for tags, geometry in features_of(json_of(spec.path)):
         name, at_times = limits.name_of(tags), bool(tags.get("limitedApplicability"))
         passed = found.passes(str(tags.get("type", "")).upper(), geometry, at_times)
         for one in () if passed else simple(geometry):
@@ -118,7 +117,7 @@ def read_ed318(path: Path, reading: Reading) -> Contents:
                 found.told["flat"] += 1
             else:
                 found.add(shape, layer, _unit(layer.get("uom")), name)
-    return found.contents("ed318")
+    return found.contents()
 
 
 def _disc(says: Mapping[str, Any], center: str) -> Any:

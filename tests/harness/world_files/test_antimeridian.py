@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from harness.run_files.path_files import read_path
-from harness.world_files.expansion import FileSpec
-from harness.world_files.parts import FloatArray
+from harness.world_files.parts import FileSpec, FloatArray
 from harness.world_files.siting import Craft, Site, site
 from tests.harness.world_files.making import feature, geojson
 

@@ -12,7 +12,7 @@ import pytest
 
 from harness.cli.app import main
 from harness.world_files.kinds import read
-from harness.world_files.parts import Reading
+from harness.world_files.parts import FileSpec
 from tests.harness.world_files.making import (
     SQUARE,
     feature,
@@ -194,6 +194,6 @@ def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
 
 def test_a_self_crossing_ring_is_made_valid(tmp_path: Path) -> None:
     bow = [SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3], SQUARE[0]]
-    (part,) = read(geojson(tmp_path / "a.json", feature({}, bow)), None, Reading()).parts
+    (part,) = read(FileSpec(geojson(tmp_path / "a.json", feature({}, bow)))).parts
     assert part.footprint.is_valid
     assert part.footprint.area == pytest.approx(5e-5)

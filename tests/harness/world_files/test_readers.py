@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from harness.world_files.kinds import kind_of, read
-from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Reading
+from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, FileSpec, Limit
 from harness.world_files.plane import Mapping, Place
 from harness.world_files.readers.limits import limit_of
 from tests.harness.world_files.making import SQUARE, feature, geojson, osm, scenario_with, zipped
@@ -19,7 +19,7 @@ from wayproof import InputError
 
 
 def read_any(path: Path, **reading: Any) -> Contents:
-    return read(path, None, Reading(**reading))
+    return read(FileSpec(path, **reading))
 
 
 def test_an_ascii_grid_has_rows_from_the_north(tmp_path: Path) -> None:
@@ -278,6 +278,6 @@ def test_kinds_are_told_from_what_stands_in_a_file(tmp_path: Path) -> None:
 def test_the_name_of_a_group_stands_for_its_kinds_and_no_others(tmp_path: Path) -> None:
     path = tmp_path / "map.txt"
     path.write_text("type octile\nheight 1\nwidth 1\nmap\n@\n")
-    assert read(path, "occupancy", Reading()).kind == "moving_ai"
+    assert read(FileSpec(path, "occupancy")).kind == "moving_ai"
     with pytest.raises(InputError, match="is of the kind moving_ai, not terrain; leave kind out"):
         scenario_with(path, kind="terrain")

@@ -10,7 +10,7 @@ import pytest
 import shapely
 from pyproj import Geod
 
-from harness.world_files.expansion import FileSpec
+from harness.world_files.parts import FileSpec
 from harness.world_files.siting import Craft, Site, site
 from tests.harness.world_files.making import feature, geojson
 

@@ -13,7 +13,8 @@ import shapely
 
 from aircraft.frames import LocalPlane
 from harness.world_files import solids
-from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners_of, expanded, loaded_file
+from harness.world_files.expansion import Expanded, FileFault, corners_of, expanded, loaded_file
+from harness.world_files.parts import FileSpec
 from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.solids import outlines, simplified
 from tests.harness.world_files.making import SHARED, SQUARE, feature, geojson, geotiff

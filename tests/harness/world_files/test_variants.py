@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from harness.world_files.kinds import read
-from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Reading
+from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, FileSpec, Limit
 from tests.harness.world_files.making import feature, geojson, scenario_with
 from wayproof import InputError
 
@@ -22,7 +22,7 @@ RING = [*CORNERS, CORNERS[0]]
 
 
 def read_any(path: Path, **reading: Any) -> Contents:
-    return read(path, None, Reading(**reading))
+    return read(FileSpec(path, **reading))
 
 
 def same(found: Limit, wanted: Limit) -> bool:

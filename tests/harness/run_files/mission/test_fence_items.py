@@ -10,7 +10,7 @@ import pytest
 from harness.run_files.mission.mission_files import read_waypoints
 from harness.run_files.path_files import read_path
 from harness.world_files.kinds import read as read_world
-from harness.world_files.parts import Reading
+from harness.world_files.parts import FileSpec
 from wayproof import InputError, check
 
 CORNERS = [(46.99, 7.99), (47.03, 7.99), (47.03, 8.01), (46.99, 8.01)]
@@ -50,9 +50,9 @@ def test_a_fence_about_home(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no items to fly to, but 1 fence item and 0 rally points"):
         check(path)
     with pytest.raises(InputError, match="is a fence about home, which has no position"):
-        read_world(path, None, Reading())
+        read_world(FileSpec(path))
     path.write_text(wpl(*WAYPOINTS, (5005, 50.0, 0.0, 0.0)))
-    (part,) = read_world(path, None, Reading()).parts
+    (part,) = read_world(FileSpec(path)).parts
     assert part.keep_in
     assert part.footprint.centroid.coords[0] == pytest.approx((8.0, 47.0), abs=1e-9)
     assert part.footprint.bounds[3] == pytest.approx(47.0 + 50.0 / 111_170.0, abs=1e-6)
@@ -75,7 +75,7 @@ def test_check_and_world_agree_on_several_inclusion_fences(
     path = tmp_path / "m.plan"
     path.write_text(json.dumps(plan))
     assert read_path(path).fences.inside_all is every
-    assert len(read_world(path, None, Reading()).parts) == 1 + every
+    assert len(read_world(FileSpec(path)).parts) == 1 + every
 
 
 def test_a_home_whose_altitude_is_not_above_the_sea_is_told() -> None:
