@@ -89,7 +89,9 @@ class RollingSearch:
         search = self.last = self.running or self._begun(request.position_m)
         self.running, nearest_m = search, -math.inf
         for course in search.courses(start, ahead, first if begins else more):
-            if serves and course.path.length_m > self._worth_m(ahead):
+            # Only the beginning of a way: a whole one that serves is not left for it.
+            length_m = course.path.length_m if course.nodes[-1] == self._mission.goal_m else math.inf
+            if serves and length_m > self._worth_m(ahead):
                 search.done = True
                 break
             found = self._commitment.commit(request, start, course, search.candidates, self.cut_m(course))

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from planner.geometry.curves import on_loiter
-from planner.interface import BoolArray, FloatArray, Mission, NoWayToBegin, Plan, PlanStatus
+from planner.geometry.curves import Pose, on_loiter
+from planner.interface import BoolArray, FloatArray, Mission, NoWayToBegin, Path, Plan, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
 from planner.rolling_window.planner import NO_BETTER, THINKING_ON, RollingWindow
+from planner.rolling_window.rolling_search import Work
 from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
 from planner.shield.certificate import CertificateBroken
+from planner.shield.committed_plan import Start
 from planner.shield.escape import Escape
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
@@ -173,6 +176,20 @@ def test_a_search_that_is_not_done_goes_on_while_the_plan_is_flown() -> None:
     answer = pilot._no_way_found(now)
     assert (answer.status, answer.reason, answer.wants_more_time) == (PlanStatus.NO_PATH, THINKING_ON, True)
     assert pilot.state is before
+
+
+def test_a_course_that_serves_is_not_left_for_the_beginning_of_another() -> None:
+    seen, pilot = Seen(nothing()), planner()
+    now = request_on(flown(pilot, seen), 0.0, seen)
+    assert pilot._monitor.proposed is not None
+    ahead = pilot._monitor.proposed.course
+    beginning = replace(ahead, path=Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 900.0)])), nodes=((900.0, 0.0),))
+    search = SimpleNamespace(courses=lambda *_: [beginning], done=False, stuck=None, candidates=[], known=0)
+    pilot._search._begun = lambda _: search  # type: ignore[assignment, method-assign, return-value]
+    start = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
+    for serves in (True, False):
+        found = pilot._search.go_on(now, start, ahead, serves, Work.WHILE_SERVING, None)
+        assert (found is None) is serves
 
 
 @pytest.mark.parametrize(("turns", "given_up"), [(0.9, False), (1.1, True)])
