@@ -44,9 +44,9 @@ TURBULENCE_TYPE = {"milspec": 3.0, "tustin": 4.0}  # JSBSim's numbers
 TURBULENCE_SEVERITY = {"light": 3.0, "moderate": 4.0, "severe": 6.0}
 """JSBSim's numbers of the intensities of turbulence."""
 GROUND_FT = 2.0 / FOOT_M
-"""An aircraft at or below this altitude counts as at the ground: its centre of gravity is still above that."""
+"""An aircraft at or below this altitude above the sea counts as at the ground: its centre of gravity is above that."""
 MAX_ROLL_RAD = math.radians(75.0)
-"""An aircraft that rolls further counts as rolled over."""
+"""An aircraft that rolls further than this to either side counts as rolled over: control is lost."""
 ALPHA_MARGIN_DEG = 3.0
 """Pitch commands stay this far below the angle of attack that counts as stalled."""
 STEEPEST_SINK_SHARE = 0.3

@@ -33,9 +33,9 @@ HALF_RIGHT_SINE = 0.7071
 SLOW_MPS = 0.1
 """Least ground speed on a leg; a slower or backwards flight counts as this fast along the nose."""
 MIN_CIRCLE_SPEED_MPS = 1.0
-"""Least ground speed on a circle."""
+"""On a circle a slower ground speed counts as this."""
 NEAR_CENTRE_M = 0.1
-"""Nearer to the centre of a circle than this the direction to it is undefined."""
+"""Nearer to a circle's centre than this, the direction out of it is taken along the course, or the nose."""
 SHORT_LEG_M = 1e-6
 """A shorter leg has no direction."""
 PAST_LEG_S = 3.0
@@ -43,7 +43,7 @@ PAST_LEG_S = 3.0
 INTEGRATOR_RANGE_RAD = math.radians(5.0)
 """The integrator grows only while Nu1, the angle to intercept the leg, is below this."""
 INTEGRATOR_LIMIT_RAD = 0.1
-"""Largest value of the integrator."""
+"""Largest value of the integrator, to either side."""
 MAX_UPDATE_S = 0.1
 """The integrator counts no more time than this since the last call."""
 FAR_M = 1e4
@@ -176,7 +176,7 @@ def nose(at: L1Motion) -> complex:
 
 
 def leg_velocity(at: L1Motion) -> tuple[complex, float]:
-    """The ground velocity that a leg is flown with, and its speed, m/s."""
+    """The ground velocity for a leg, and its speed, m/s: along the nose at the least speed if slow or backwards."""
     speed = abs(at.velocity)
     if speed < SLOW_MPS or dot(at.velocity, nose(at)) <= 0.0:
         return SLOW_MPS * nose(at), SLOW_MPS
@@ -184,7 +184,7 @@ def leg_velocity(at: L1Motion) -> tuple[complex, float]:
 
 
 def leg_direction(at: L1Motion, begin: complex, end: complex) -> complex:
-    """A leg's unit direction."""
+    """Unit direction of a leg; of one too short for it, that to its end, or else that of the nose."""
     for way in (end - begin, end - at.place):
         if abs(way) >= SHORT_LEG_M:
             return way / abs(way)
