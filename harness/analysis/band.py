@@ -49,7 +49,7 @@ def _positions_at(track: FloatArray, stations_m: FloatArray) -> FloatArray:
 
 
 def write_band(folder: Path, runs: Sequence[Path]) -> None:
-    """Writes `band.json` into the folder of some days, from the tracks in their run folders."""
+    """Writes `band.json` into the folder of some days, from the tracks in their run folders; nothing without any."""
     import pyarrow.parquet as pq
 
     if not runs:

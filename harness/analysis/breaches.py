@@ -71,7 +71,7 @@ def compared(
     bounded: bool,
     others: tuple[Sequence[Breach], float] = ((), math.inf),
 ) -> Kept:
-    """Compares a track with obstacles, fences and the bounds of the area."""
+    """Compares a track with obstacles, fences and, if `bounded`, the area; `others`: breaches, margin found before."""
     import shapely
 
     heights, found = track.altitude_above_ground_m, [*_contacts(track, world), *others[0]]
@@ -109,7 +109,7 @@ def _where(track: Track, row: int) -> dict[str, float]:
 
 
 def _contacts(track: Track, world: World) -> list[Breach]:
-    """Returns the contacts of a track with obstacles, one by one."""
+    """Returns the contacts of a track with obstacles, one by one, those between two rows among them."""
     steps_m = np.append(np.hypot(np.diff(track.east_m), np.diff(track.north_m)), 0.0)
     steps_m += world.max_obstacle_speed_mps * np.append(np.diff(track.time_s), 0.0)
     fixes = np.column_stack((track.east_m, track.north_m, track.time_s))
@@ -163,7 +163,7 @@ def crossings(
 
 
 def _stretches(track: Track, margin_m: FloatArray, kind: str, name: str) -> list[Breach]:
-    """Returns one breach for every run of rows with a negative margin."""
+    """Returns one breach for every run of rows with a negative margin, up to the first row after it."""
     wrong = np.concatenate(([False], margin_m < 0.0, [False]))
     edges = np.flatnonzero(wrong[1:] != wrong[:-1])
     found = []

@@ -116,7 +116,7 @@ def cross_track_cause(
 
 
 def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) -> str | None:
-    """Names the cause for which a corner was passed too far off: no turn would do in calm air, or none in that wind."""
+    """Names the cause for which a corner was passed too far off: too tight in calm air, or in that wind; else None."""
     half_rad = math.radians(abs(corner.turn_deg)) / 2.0
     outside = 1.0 / max(math.cos(half_rad), 1e-9) - 1.0
     needed = GRAVITY_MPS2 * math.tan(force.bank_limit_rad) * allowed_m / max(outside, 1e-9)
@@ -246,7 +246,7 @@ def _throttle_share(track: Track) -> float:
 
 
 def averaged(values: FloatArray, track: Track, over_s: float) -> FloatArray:
-    """Returns the running mean of values over a time, over the whole where that is shorter."""
+    """Returns the running means of a track's values over a time; where the track is no longer, one mean of all."""
     span = float(track.time_s[-1] - track.time_s[0])
     rows = 1 + round(over_s * (len(values) - 1) / span) if span > over_s else len(values)
     total = np.append(0.0, np.cumsum(values))

@@ -55,7 +55,7 @@ class Deviation:
 
 
 def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: float) -> Deviation:
-    """Measures a track against a path that was given."""
+    """Measures a track, as far as the path's end, against the path (k, 3) and back, up to `window_m` further along."""
     # What is flown beyond the end is no part of the path.
     flown = np.flatnonzero(track.arc_length_m <= given_m[-1, 2])
     rows = np.full(len(track), math.nan)
@@ -107,7 +107,7 @@ class Stations:
 
 
 def distances_m(points: FloatArray, line: FloatArray, window_m: float) -> FloatArray:
-    """(n,) distances of points from those parts of a line that are about as far along."""
+    """(n,) distances of points (n, 3) from those parts of a line (k, 3) that are as far along, within `window_m`."""
     line = np.concatenate((line, line[-1:])) if len(line) == 1 else line
     along = line[:, 2]
     found = np.empty(len(points))

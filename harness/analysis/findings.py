@@ -48,7 +48,7 @@ def findings(flight: Flight, limits: FlightLimits) -> tuple[Finding, ...]:
 
 
 def beyond_end_m(track: Track, plans: Sequence[AcceptedPlan]) -> FloatArray:
-    """(n,) how far beyond the end of the plan in effect the aircraft is; 0 on the plan, and on one that loiters."""
+    """(n,) how far beyond the end of the plan in effect the aircraft is; 0 on it, without one, and if it loiters."""
     length = np.array([math.inf if plan.loiter else float(plan.segments[:, 5].sum()) for plan in plans])
     flown = track.plan_index >= 0
     beyond = np.zeros(len(track))

@@ -117,7 +117,7 @@ def planned_profile(track: Track, plans: Sequence[FlownPlan], window_m: float) -
 
 
 def turn_onto_first_plan_1pm(track: Track, plans: Sequence[FlownPlan], window_m: float) -> float:
-    """Curvature of the corner from the course of the aircraft onto the first plan, where it takes that up."""
+    """Curvature of the corner from the aircraft's course onto the first plan; 0 where the rows do not take that up."""
     flown = np.flatnonzero(track.plan_index >= 0)
     if not len(flown) or track.plan_index[flown[0]] != 0 or track.arc_length_m[flown[0]] > window_m:
         return 0.0

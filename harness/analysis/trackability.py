@@ -179,7 +179,7 @@ class _Flown:
         return speed_cause(self.track.part(first, first + rows), fast_mps, self.limits)
 
     def _steep(self, first: int, rows: int) -> str | None:
-        """Whether the path was too steep over the rows of a mean, or shortly before."""
+        """Returns the cause that the path was too steep over the rows of a mean or just before; else None."""
         time_s = self.track.time_s
         since = int(np.searchsorted(time_s, time_s[first] - LEAD_S))
         return steepness_cause(self.track, since, first + rows, self.given)

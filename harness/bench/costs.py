@@ -96,7 +96,7 @@ def _flown_alone(scenario: Scenario, progress: Progress | None) -> tuple[Flight,
 
 
 def watched(loop: Loop, seconds: dict[str, float]) -> Loop:
-    """A loop whose blocks are timed; what is left over is the loop itself: verdicts, log and turns."""
+    """A loop whose blocks add their times to `seconds`; the rest is the loop itself: verdicts, log and turns."""
     parts = {
         name: _Watched(getattr(loop, name), block, methods, seconds)
         for name, (block, *methods) in TIMED_PARTS.items()

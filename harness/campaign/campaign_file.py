@@ -37,7 +37,7 @@ Values = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 
 
 def _bare(section: type[Section], name: str) -> BeforeValidator:
-    """Takes bare text for a section with one key."""
+    """Makes a validator that takes bare text for a section in which only this key is given."""
     return BeforeValidator(
         lambda value: {name: value} if isinstance(value, str) else value, json_schema_input_type=str | section
     )

@@ -183,7 +183,7 @@ def are_numbers(values: Sequence[Scalar]) -> bool:
 
 
 def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis, IntArray]:
-    """Returns the groups of a key's values, and each value's group: numbers rising, names as they first appear."""
+    """Returns the groups of values and each one's group: numbers rising, many binned; names as they come; None last."""
     given = [*dict.fromkeys(value for value in values if value is not None)]
     if not are_numbers(values):
         names = {value: str(value).lower() if isinstance(value, bool) else str(value) for value in given}

@@ -184,7 +184,7 @@ class Runs:
 
     @classmethod
     def of(cls, folder: Path) -> Runs:
-        """Reads the runs in a campaign's folder; an InputError where it holds none, or a file cannot be read."""
+        """Reads the runs in a campaign's folder; an InputError: none, none readable, or drawn near failure."""
         timings = folder / TIMINGS
         runs = cls(results_of(folder), read_table(timings)[0] if timings.is_file() else None)
         if runs.rare:

@@ -266,7 +266,7 @@ def _counted_verdict(tally: Tally, terms: Terms, grown: bool) -> dict[str, Any]:
 
 
 def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
-    """Groups the rows of days that failed by outcome and cause, the most frequent first."""
+    """Groups rows of days that failed by outcome and cause, the most frequent first, each with its first five runs."""
     alike: dict[tuple[str, str], list[int]] = {}
     for row in rows:
         flown = row.get("trackability.causes") or row.get("check.verdict") or ""
@@ -299,7 +299,7 @@ def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]
 
 
 def differing(days: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Finds the keys of plain scenarios that differ between days; returns their values, one a day, by key path."""
+    """Finds keys of plain scenarios, no lists, that differ between days; returns the values, one a day, by key path."""
     flat = [dict(leaf for name in SECTIONS for leaf in _leaves(day.get(name), name)) for day in days]
     columns = {
         key: [each.get(key) for each in flat] for key in dict.fromkeys(key for each in flat for key in each)

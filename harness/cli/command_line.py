@@ -29,7 +29,7 @@ FOLDER_KEYS: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraf
 
 
 def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
-    """Loads a scenario by file or shipped name, with keys replaced."""
+    """Loads a scenario by file or shipped name, with keys replaced; the error on a campaign names its command."""
     from harness.campaign.campaign_file import is_a
     from harness.scenario.scenario import load_scenario
     from harness.scenario.shipped import shipped_campaigns

@@ -205,7 +205,7 @@ class ScanKeeper(Observer):
 
 
 def state_of(state: AircraftState, mission: Mission, bank_limit_rad: float) -> Floats:
-    """The numbers of `STATE`, of what the aircraft believes."""
+    """The numbers of `STATE`, of what the aircraft believes, cut to the observation's bounds."""
     xmin, ymin, xmax, ymax = mission.bounds_m
     east, north = mission.goal_m[0] - state.east_m, mission.goal_m[1] - state.north_m
     bearing = math.atan2(east, north) - state.course_rad

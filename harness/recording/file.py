@@ -118,7 +118,7 @@ class RecordingFile:
 
 
 def end_of_whole(data: bytearray, begin: int) -> int:
-    """Returns the index at which the last whole message ends."""
+    """Returns the index at which the last whole message ends, the first beginning at `begin`; 0 where none is whole."""
     end = 0
     while begin + _MESSAGE_HEADER.size <= len(data):
         _, length = _MESSAGE_HEADER.unpack_from(data, begin)

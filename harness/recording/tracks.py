@@ -27,7 +27,7 @@ SERIES: Final = {
 def write_tracks(
     name: str, corners_m: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], path: Path
 ) -> None:
-    """Writes the recording; an OSError says that it cannot be written."""
+    """Writes the recording of tracks, by label, and the mission's corners (k, 2); an OSError: it cannot be written."""
     views = [
         rrb.TimeSeriesView(origin=f"{look.SERIES}/{column}", name=label)
         for column, label in SERIES.items()

@@ -266,7 +266,7 @@ def free_port() -> int:
 
 
 def answers(port: int, viewer: subprocess.Popen[str]) -> bool:
-    """Tells whether a viewer comes to listen on a port."""
+    """Tells whether a viewer comes to listen on a port before it ends, or `START_TIMEOUT_S` are over."""
     until = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < until and viewer.poll() is None:
         with contextlib.suppress(OSError), socket.create_connection((LOCALHOST, port), timeout=1.0):

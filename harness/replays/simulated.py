@@ -74,7 +74,7 @@ class LapsEnd:
         return math.nan
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
-        """Returns how the flight ends now; None while it goes on."""
+        """Notes corners reached since the last call; returns how the flight ends now, None while it goes on."""
         self.switches_s += [self._before_s] * (max(self._law.leg, 0) - len(self.switches_s))
         self._before_s = state.time_s
         if fault is not None:

@@ -191,7 +191,7 @@ def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
 
 
 def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **style: Any) -> patches.Patch:
-    """Returns an obstacle grown by a distance, where it is at a time, or where it appears."""
+    """Returns the patch of an obstacle grown by a distance, displaced to where it is at a time; None: not displaced."""
     shape = obstacle.shape
     moved = np.array((0.0, 0.0) if at_s is None else obstacle.displacement_m(at_s)) / 1e3
     if isinstance(shape, Circle):

@@ -243,7 +243,7 @@ def _turn_radius_of(given: PathAsGiven, scenario: Scenario) -> Callable[[float],
 def fly_along(
     plan: PathPlan, loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None
 ) -> Flight:
-    """Flies a path to its end."""
+    """Flies a path to its end, or until twice the time that it should take, and a minute, is over."""
     path, state = Path(plan.way.segments), loop.model.state()
     air = state.airspeed_mps * np.exp(1j * (0.5 * math.pi - state.heading_rad))  # east + i north
     wind_mps = abs(complex(state.velocity_east_mps, state.velocity_north_mps) - air)

@@ -102,7 +102,7 @@ def jsbsim_aircraft(
 
 
 def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
-    """Returns the limits that a scenario's flight is measured against."""
+    """Returns the limits that a scenario's flight is measured against; no navigation margin unless it is `planned`."""
     performance, limits = performance_of(scenario), scenario.trackability
     frame = airframe_of(scenario.aircraft)
     guidance = frame.guidance_limits()

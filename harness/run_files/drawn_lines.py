@@ -36,7 +36,7 @@ ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
 """Values of KML's altitudeMode, the last the default; at any other value, and at that, the altitude means nothing."""
 
 FLYING_MPS: Final = 12.0
-"""Before the first fix, and after the last, at this ground speed the aircraft rolls, or stands."""
+"""A recorded flight goes from the first to the last fix at this ground speed or more; elsewhere the aircraft rolls."""
 FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
 """No glider is faster than these over the ground, and up or down: a fix that would need it from both its neighbours is
 an error of the receiver."""

@@ -22,8 +22,8 @@ SAME_PLACE_M: Final = 0.01
 """Points no further apart than this are one point."""
 SAME_LINE_M: Final = 0.01
 """A point nearer than this to the line of its neighbours is taken to lie on it."""
-AT_ONCE: Final = 10_000
-"""This many points are simplified together, since GEOS recurses once for each that it keeps."""
+BATCH: Final = 10_000
+"""This many segments are simplified at a time, since GEOS recurses once for each point that it keeps."""
 SHORTEST_M: Final = 1e-6
 """A segment shorter than this is left out."""
 PAST_RAD: Final = np.radians(140.0)
@@ -333,7 +333,7 @@ def needed(points_m: FloatArray, tolerance_m: float = SAME_LINE_M) -> NDArray[np
     # Heights are not looked at: each point carries its number there.
     numbered = shapely.LineString(np.column_stack((points_m, np.arange(len(points_m)))))
     apart = shapely.get_coordinates(shapely.remove_repeated_points(numbered, SAME_PLACE_M), include_z=True)
-    pieces = [shapely.LineString(apart[i : i + AT_ONCE + 1]) for i in range(0, len(apart) - 1, AT_ONCE)]
+    pieces = [shapely.LineString(apart[i : i + BATCH + 1]) for i in range(0, len(apart) - 1, BATCH)]
     simple = [shapely.simplify(piece, tolerance_m, preserve_topology=False) for piece in pieces]
     kept = [shapely.get_coordinates(piece, include_z=True)[1:, 2] for piece in simple]
     return np.concatenate(([0], *kept)).astype(np.int64)

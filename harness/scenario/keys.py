@@ -45,7 +45,7 @@ class TrackabilitySpec(Section):
 DEFAULT_RATES_HZ: Final = (STEP_RATE_HZ, 120)
 """Where no step rate is given, the first of these is taken that the sensor's rate divides."""
 LEAST_RATE_HZ: Final = 30
-"""Least step rate: with it the Aerosonde's track on 14 turns is 0.07 m from that with 480 steps a second."""
+"""A lower rate is refused: at this one the Aerosonde's track on 14 turns is 0.07 m from that at 480 steps a second."""
 
 
 class Simulation(Section):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 MAX_FAULTS: Final = 2
 """An error on a file has at most this many lines."""
 MOST_WHOLE: Final = 2**53
-"""Whole numbers are at most this: a float has each of them up to there."""
+"""A whole number of this size or more, either way, is refused: below it a float has each of them."""
 NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"
 """Pattern of a name that a folder may be called after."""
 

@@ -47,7 +47,7 @@ class CommittedPlan:
         return arc_length_m >= self.loiter_entry_m
 
     def over(self, arc_length_m: float) -> bool:
-        """Tells whether no path is left at this arc length: the aircraft missed the goal."""
+        """Tells whether no path is left at this arc length, the goal missed; a plan that loiters is never over."""
         return not (self.path.loiter or between(self.path, arc_length_m, self.path.length_m))
 
     def left(self, arc_length_m: float) -> Path:
