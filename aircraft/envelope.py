@@ -21,8 +21,7 @@ HOLD_RESERVE_DEG = {None: 5.0, "light": 5.0, "moderate": 10.0, "severe": 15.0}
 and 7 degrees in moderate turbulence the aircraft was up to 7 m and 3 m off."""
 
 CALM_HOLD_RESERVE_DEG = 10.0
-"""Bank (deg) kept in reserve in a full turn held in calm air, all of which takes the same bank: with 5 a J3Cub that
-entered it from a weave was off it by 22 m."""
+"""Bank (deg) kept in reserve in a full turn in calm air: with 5 a J3Cub that came from a weave was off it by 22 m."""
 
 SPACED_RESERVE_DEG = {None: 7.0, "light": 7.0, "moderate": 12.0, "severe": 17.0}
 """Bank (deg) kept in reserve below the limit in wind, in a turn with a straight before and after it to roll on.
@@ -38,8 +37,7 @@ WEAVE_FACTOR = 1.5
 """Cross-track error that is hardly ever exceeded in calm air, in units of the largest on the survey's weave."""
 
 ROLL_IN_LIMIT_S = 1.5
-"""Planned turns take at most this long to roll into: an aircraft that rolls slowly is given wide turns, for it would
-leave the path where curvature steps."""
+"""Planned turns take at most this long to roll into: an aircraft that rolls slowly is given wider ones."""
 
 STRONGEST_WIND_SHARE = 0.9
 """Strongest wind that is planned for, as a share of the airspeed."""

@@ -68,8 +68,7 @@ ERROR_LEVEL = 4
 HARMLESS_ERROR = "No filename given."
 """JSBSim logs this as an error of every model."""
 _LOGGER = _Silence()
-"""JSBSim's only logger. It is kept for ever, since JSBSim drops its own reference to it without Python's lock when a
-thread ends."""
+"""JSBSim's only logger, kept for ever: JSBSim drops its own reference without Python's lock when a thread ends."""
 
 
 def node(fdm: Any, path: str) -> Any:

@@ -56,8 +56,7 @@ SETTLING_STEP_S = 1e-9
 AIR_STEPS = 600
 """The wind is worked out for this many steps at once."""
 TERRAIN_BELOW_FT = 10.0 / FOOT_M
-"""The flight model's ground is at least this far below the aircraft, whose wheels thus never touch it: contact is
-judged by the true world."""
+"""The flight model's ground is at least this far below the aircraft: contact is judged by the true world."""
 INTEGRATOR_MEMORY_STEPS = 6
 """After this many steps an integrator of JSBSim has replaced every derivative that it remembers."""
 

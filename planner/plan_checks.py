@@ -17,7 +17,7 @@ import numpy as np
 from planner.interface import UNIT_TOLERANCE, FloatArray, Mission, Path, Plan, PlanPicture, PlanStatus
 
 MOST_REASON_LETTERS = 2000
-"""A reason is one sentence, no longer than this."""
+"""A reason is one sentence; a longer one than this is refused."""
 MOST_SEGMENTS = 100_000
 """Most segments of a path and most waypoints of a plan: as many as a curve of 100 km sampled at 1 m has."""
 LONGEST_M, MOST_TURNING_RAD = 1e7, 1e5

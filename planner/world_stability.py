@@ -7,8 +7,7 @@ import math
 from planner.interface import MapView
 
 SETTLED_S = 600.0
-"""No goal is called unreachable for this long after something last moved or appeared: what closes the way may go
-again."""
+"""No goal is called unreachable for this long after something last moved or appeared: the way may open again."""
 
 
 class WorldStability:

@@ -45,8 +45,7 @@ class Smoothness:
     heading_change_deg: float
     """Total absolute change of direction, the sum of |k_i| l_i."""
     bending_energy_1pm: float
-    """Integral of the squared curvature over the length, the sum of k_i^2 l_i (Horn, The curve of least energy, ACM
-    TOMS 9, 1983)."""
+    """Integral of the squared curvature over the length, the sum of k_i^2 l_i (Horn, ACM TOMS 9, 1983)."""
     max_curvature_1pm: float
     """Largest |k_i|."""
     max_curvature_rate_1pm2: float

@@ -190,6 +190,8 @@ def certify(
 
 
 def _simulate(days: Days, folder: CampaignFolder, fly: Callable[[range], None], confidence: float) -> Rare:
+    """Runs a subset simulation; the margin of a day is 0 where a crash left none, infinite where nothing can be hit."""
+
     def margins(normals: FloatArray, seeds: IntArray) -> FloatArray:
         fly(numbers := days.give(normals, seeds))
         cells = [folder.over[run].row.get("margin", 0.0) for run in numbers]

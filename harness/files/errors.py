@@ -21,7 +21,7 @@ class WriteError(OSError):
 
 
 MOST_CHARACTERS = 2000
-"""A text from other code stands in a sentence with at most this many characters."""
+"""A text from other code is cut to this many characters before it stands in a sentence."""
 
 
 class PlannerError(RuntimeError):

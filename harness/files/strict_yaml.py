@@ -20,7 +20,7 @@ from harness.files.wording import counted
 
 MAX_BYTES: Final = 32_000_000  # of a file; a larger one is refused
 MAX_VALUES: Final = 3_000_000
-"""A file has at most this many values: enough for 100,000 obstacles with four corners each."""
+"""A file with more values than this is refused: it is enough for 100,000 obstacles with four corners each."""
 MAX_DEPTH: Final = 20  # of nested values; a deeper file is refused
 MAX_KEYS: Final = 1000  # of one mapping; more are refused
 MAX_KEY_LENGTH: Final = 100  # letters; a longer key is refused

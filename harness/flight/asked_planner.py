@@ -52,8 +52,7 @@ class AskedPlanner:
         self.shielded = self.shield is not None
         """Whether there is a shield around the planner."""
         self.compute_ms = math.nan
-        """Processor time of the planner's thread for the last answer that was not to keep the plan in effect: what else
-        the machine does is not in it."""
+        """Processor time of the planner's thread for the last answer that was not to keep the plan in effect."""
         self.wall_ms = math.nan
         """Wall-clock time for the same."""
 

@@ -170,6 +170,7 @@ def _side(ranges: FloatArray, ray: int, beam_rad: float, noise_m: float, closed:
 def _fill_sides(
     sides: FloatArray, ranges: FloatArray, beam_rad: float, noise_m: float, closed: bool, lossy: bool
 ) -> None:
+    """Writes from where in its beam each return comes: 1 right side, -1 left side, 0 the axis; 0 without a return."""
     for ray in range(len(ranges)):
         sides[ray] = _side(ranges, ray, beam_rad, noise_m, closed, lossy) if ranges[ray] < math.inf else 0.0
 
@@ -188,6 +189,7 @@ def _fill_returned(
     closed: bool,
     lossy: bool,
 ) -> int:
+    """Writes the rays that returned and the places (m) of their returns; returns how many."""
     many, cos, sin = 0, math.cos(turned_rad), math.sin(turned_rad)
     half_cos, half_sin = math.cos(0.5 * beam_rad), math.sin(0.5 * beam_rad)
     for ray in range(len(ranges)):

@@ -112,8 +112,7 @@ SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     f"{THROTTLE}/flown": ("throttle", TRACK, 1.5),
     BELIEVED_OFF: ("as believed", CHOSEN, 1.0),
 }
-"""Name, colour and width of every line of the time series, by its entity below SERIES; of overlaid runs, only
-those called `flown` are drawn."""
+"""Name, colour and width of each line of time series, by entity below SERIES; overlays draw those called `flown`."""
 WHOLE_ONLY = ("bank/pitch", BELIEVED_OFF)
 """Lines that a thin recording does not have."""
 SEARCH, DELAYS = "search/flown", f"{PLAN_DELAY}/flown"

@@ -28,8 +28,7 @@ from planner.interface import Path as PlannedPath
 DEFAULT_LAW: Final = "bearing"
 """The guidance law of a simulated flight, with gain 1.5 and no switch by passing."""
 LATENCY_S: Final = 0.2
-"""Age of the state that the law works with. A log does not tell the receiver; this is ArduPilot's value for an unknown
-one (AP_GPS_Backend::get_lag)."""
+"""Age of the state that the law works with: ArduPilot's for an unknown receiver (AP_GPS_Backend::get_lag)."""
 ZERO_SIGMAS: Final = (
     "position_sigma_m",
     "altitude_sigma_m",

@@ -27,7 +27,7 @@ from harness.scenario.sections import ALTITUDES_M
 MAX_BYTES: Final = 64_000_000  # a larger path file is refused
 MAX_SPAN_M: Final = 500e3  # a path that reaches further is refused
 ON_EARTH_DEG: Final = (85.0, 360.0)
-"""Latitudes and longitudes are at most this, to either side."""
+"""A latitude or a longitude further than this from 0, to either side, is refused."""
 LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
     ".csv": read_csv,
     ".geojson": read_geojson,
@@ -96,6 +96,7 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
 
 
 def _of_line(found: PathAsRead, source: str, any_altitude: bool, origin_deg: Place | None) -> PathAsGiven:
+    """Puts a drawn line into the plane and checks it; its altitudes are left out with `any_altitude`."""
     count = len(found.points)
     if count < 2:
         raise InputError(f"{source}: has {counted(count, 'point')}; a path has at least 2")
@@ -117,6 +118,7 @@ def _of_line(found: PathAsRead, source: str, any_altitude: bool, origin_deg: Pla
 
 
 def _of_mission(flown: Program, source: str, origin_deg: Place | None) -> PathAsGiven:
+    """Puts a mission and its fences into the plane, and checks them."""
     placed = [(f"item {step.item}", step.position) for step in flown.steps if step.position is not None]
     names, positions = zip(*placed, strict=True)
     origin, place = _plane(positions, names, origin_deg, source)

@@ -45,7 +45,7 @@ REPORT = "report.html"
 REPORT_FILES = ("report.html", "report.csv", "path.svg", "path.png", "profiles.svg", "profiles.png")
 """Files that `wayproof report` adds to a run folder."""
 MAX_BYTES = 64_000_000
-"""A scenario in the folder is read up to this size."""
+"""A larger scenario file in the folder is refused."""
 
 HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)
 """Files whose SHA-256 stands in the manifest of a complete run."""

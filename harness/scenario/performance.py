@@ -107,8 +107,7 @@ SURVEY_ALTITUDE_M: Final = 300.0
 """Altitude above the sea at which an aircraft's range of airspeeds is measured."""
 PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # between which the survey proves level flight
 PROVEN_FACTOR: Final = 1.05
-"""The survey proves level flight at airspeeds within its range by this factor, as the air's density differs by 7 %
-there."""
+"""The survey proves level flight at airspeeds this factor within its range: there the air's density differs by 7 %."""
 PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01
 """It does so for deviations up to these: shares, and the shift over the cube root of the mass (m/kg^1/3)."""
 ALTITUDE_STEP_M: Final = 50.0

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 MAX_FAULTS: Final = 2
-"""An error on a file has at most this many lines."""
+"""An error on a file has at most this many lines, the last of which counts what is left out."""
 MOST_WHOLE: Final = 2**53
 """A whole number of this size or more, either way, is refused: below it a float has each of them."""
 NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"

@@ -22,7 +22,7 @@ Position = tuple[float, float, float]
 """East, north and up (m)."""
 
 SAMPLE_M: Final = 0.5
-"""A way is compared with the ground at least this often; ground thinner along it is no contact."""
+"""A way is compared with the ground at places at most this far apart; ground thinner along it is no contact."""
 
 SQUARES: Final = (64, 16, 4, 1)
 """Half widths, in cells of the grid, of the squares in which the highest ground is looked for."""

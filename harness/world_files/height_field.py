@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 NO_HEIGHT: Final = 65_535
 """This number stands for a height that is not known."""
 MAX_NODES: Final = 4_000_000
-"""A field has at most this many heights."""
+"""A field with more heights than this is refused."""
 COARSER_NODES: Final = 1_000_000
 """A field that would have more heights than this is made coarser than its file, and a note says so."""
 

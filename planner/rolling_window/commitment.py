@@ -18,8 +18,7 @@ from planner.shield.certificate import Certified, Certifier, hold_centre
 from planner.shield.committed_plan import CommittedPlan, Start
 
 PROGRESS_SHARE = 0.25
-"""A new plan leads on if it gains this share of the hold radius along its course, and its hold lies at least as far
-from that of the plan in effect."""
+"""A plan leads on if it gains this share of the hold radius along its course, its hold as far from the old one's."""
 
 CONCENTRIC_SHARE = 0.05
 """An arc whose centre lies within this share of the hold radius from that of a hold is part of the hold."""

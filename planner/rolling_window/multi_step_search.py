@@ -22,8 +22,7 @@ from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.window import SectorEdge, Window, guide_vector
 
 SHORT_OF_SHARE = 0.005
-"""A step ends before the obstacle that it meets by this share of the distance kept: from there the edges of that
-obstacle can be seen."""
+"""A step ends short of what it meets by this share of the kept distance: from there its edges can be seen."""
 
 MOST_TURN_RAD, MOST_AWAY_RAD = 2.1, 0.8
 """Largest turn from one step to the next, and largest turn away from the obstacle that the last step hugged; rad."""

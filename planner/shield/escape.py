@@ -29,8 +29,7 @@ LOITER_SHARES = (1.0, 0.5, 0.25)
 """Shares of the distance that paths keep from edge points; a turn is sought with one share after the other."""
 
 CLEARER_SHARE = 0.2
-"""An option is better than those before it only if it keeps further from everything by this share of the distance that
-paths keep."""
+"""An option is better than one before only if it keeps further from everything by this share of the kept distance."""
 
 EVADING_S = 60.0
 """Certified plans are checked against threats for this long after something appeared: they assume a still world."""

@@ -26,8 +26,7 @@ AHEAD_S = 30.0
 """Moving obstacles are taken to keep their velocity for this time; a way is judged up to it."""
 
 DISCOUNT = 0.05
-"""For each metre along a way, an obstacle met there counts as this many metres further away: there is time to evade
-it."""
+"""For each metre along a way, an obstacle met there counts as this many metres further away: it can be evaded."""
 
 UNKNOWN_MPS, UNKNOWN_S = 10.0, 8.0
 """An obstacle that has just appeared is taken to come nearer at this speed for this time: its velocity is not known."""

@@ -164,6 +164,7 @@ def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
 
 
 def _simple(item: Any, where: str, number: int) -> Item:
+    """Returns a simple item, whose place is in `params` or, before version 4.0 of QGroundControl, apart."""
     if not isinstance(item, dict):
         raise InputError(f"{where}: must be a mission item")
     params, place = listed(item.get("params"), f"{where}.params", " of 7"), item.get("coordinate")

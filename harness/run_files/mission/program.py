@@ -182,6 +182,7 @@ class _Run:
         return target
 
     def _do(self, item: Item) -> None:
+        """Takes an item up: changes the speed, flies it, passes it over, or notes why it is not flown."""
         if item.command == commands.CHANGE_SPEED:
             self._tell(item, *self._change_speed(int(item.params[0]), item.params[1]))
         elif item.command in commands.WITHOUT_EFFECT:
@@ -194,6 +195,7 @@ class _Run:
             self._tell(item, NOT_FLOWN, commands.WHY_NOT.get(item.command, "an aeroplane here cannot"))
 
     def _change_speed(self, kind: int, speed: float) -> tuple[str, str]:
+        """Returns how a speed change was treated and why; the next step takes on a true airspeed, no other speed."""
         if kind == AIRSPEED and speed > 0.0:
             self._airspeed_mps = speed
             return FLOWN, f"airspeed {speed:g} m/s"
@@ -206,6 +208,7 @@ class _Run:
         return NOT_FLOWN, f"a {told} of {speed:g} m/s is not held"
 
     def _fly(self, item: Item) -> None:
+        """Adds the step of an item, or notes why it is not flown; notes whether the mission ends with it."""
         fly: dict[int, Callable[[Item], Flown]] = {
             commands.RETURN_TO_LAUNCH: self._return,
             **dict.fromkeys(commands.LOITERS, self._loiter),
@@ -255,6 +258,7 @@ class _Run:
         return replace(step, position=position), commands.TAKEOFFS[item.command]
 
     def _loiter(self, item: Item) -> Flown:
+        """Returns the step of a loiter by turns, by time, to an altitude, or for ever (one turn); None: no place."""
         if item.position is None and not self.steps:
             return None, "has no position, and nothing is before it"
         first, second, third, _ = item.params[:4]

@@ -134,6 +134,7 @@ class _RouteBuilder:
         return max(abs(rise) / max(rate, 1e-3 * self._mps) * self._mps, 1.0)
 
     def _land(self, step: MissionStep, place: complex, altitude: float) -> None:
+        """Adds the end of an approach, `LANDING_HEIGHT_M` above the landing; over it if no higher before."""
         here, above = self._here(), altitude + LANDING_HEIGHT_M
         if here is None or not self._altitude_m > above:
             self._add(Vertex(place, max(altitude, min(above, self._altitude_m)), step.item))
@@ -142,6 +143,7 @@ class _RouteBuilder:
         self._add(Vertex(here + share * (place - here), above, step.item))
 
     def _loiter(self, number: int, loiter: Loiter, center: complex, altitude: float) -> None:
+        """Adds the turn onto a loiter's circle, the way round it, and the turn off towards the next place."""
         turn_m, item = self._flying.turn_radius_m(self._mps), self._steps[number].item
         circle = Circle(center, loiter.radius_m or turn_m, -1 if loiter.clockwise else 1)
         climbs = loiter.turns is None and loiter.time_s is None

@@ -19,7 +19,7 @@ from harness.world_files.parts import WGS84, Contents, FileSpec, Raster
 from harness.world_files.plane import check_metres
 
 MAX_CELLS: Final = 60_000_000
-"""A raster has at most this many cells: half a gigabyte of heights."""
+"""A raster with more cells, half a gigabyte of heights, is refused."""
 CACHE_MB: Final = 64
 """Size of GDAL's cache, which is a twentieth of the machine's memory otherwise."""
 MAX_NUMPY_BYTES: Final = 500_000_000
