@@ -16,12 +16,6 @@ class InputError(ValueError):
     """Input that cannot be used. Its text is what a person reads: one line a fault."""
 
 
-_KIND_NAMES: Final = {  # what a path may be instead of a file
-    stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}  # fmt: skip
-
-
 def read_text(path: Path, max_bytes: int, what: str) -> str:
     """Reads a regular file as UTF-8; an InputError says why it cannot be read, and `what` the file should be."""
     return decoded(read_data(path, max_bytes, what), str(path), what)
@@ -61,11 +55,11 @@ def decoded(data: bytes, source: str, what: str) -> str:
 def open_regular(path: Path) -> BinaryIO:
     """Opens a regular file for reading, without waiting on a pipe; an InputError says that it is no such file."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
-    if kind != stat.S_IFREG:
+    mode = os.fstat(descriptor).st_mode
+    if not stat.S_ISREG(mode):
         os.close(descriptor)
-        told = f"is {_KIND_NAMES.get(kind, 'something else')}, not a file; give the path of a file"
-        raise InputError(f"{path}: {told}")
+        what = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
+        raise InputError(f"{path}: is {what}, not a file; give the path of a file")
     return os.fdopen(descriptor, "rb")
 
 

@@ -73,24 +73,14 @@ def _shapes(number: int, placemark: Element, source: str, kind: str) -> list[Sha
     where = f"{source}: {name}" if source else name
     kept = {item.get("name", ""): text_of(item, "value") for item in named(placemark, "Data")}
     kept |= {item.get("name", ""): (item.text or "").strip() for item in named(placemark, "SimpleData")}
-    rings = _boundary if kind == "Polygon" else _line
-    return [
-        Shape(name, text_of(each, "altitudeMode"), rings(each, where), kept)
-        for each in named(placemark, kind)
-    ]
-
-
-def _line(line: Element, where: str) -> tuple[tuple[Point, ...], ...]:
-    """Returns the points of a LineString."""
-    return (_points(line, where, "point"),)
-
-
-def _boundary(area: Element, where: str) -> tuple[tuple[Point, ...], ...]:
-    """Returns the corners of a Polygon's outer ring, then of its inner ones."""
-    rings = [ring for kind in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(area, kind)]
-    if not rings:
-        raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
-    return tuple(_points(ring, where, "corner") for ring in rings)
+    found = []
+    for each in named(placemark, kind):
+        bounds = [ring for side in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(each, side)]
+        if kind == "Polygon" and not bounds:
+            raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
+        rings = tuple(_points(ring, where, "corner" if bounds else "point") for ring in bounds or [each])
+        found.append(Shape(name, text_of(each, "altitudeMode"), rings, kept))
+    return found
 
 
 def parsed_xml(data: bytes, source: str, root: str) -> Element:

@@ -14,19 +14,13 @@ import numpy as np
 from pydantic import AfterValidator, Field, Strict, model_validator
 
 from harness.files.strict_yaml import Loc
-from harness.scenario.sections import MAX_COORDINATE_M, Length, Section
+from harness.scenario.sections import MAX_COORDINATE_M, Length, Section, in_order
 
 MAX_OBSTACLES: Final = 10_000
 """A forest that is asked for more trunks is refused."""
 TRIES, TRIES_AT_ONCE = 100, 10
 """A copse is tried at this many places before it is left out, and at this many of them at once."""
 Place = tuple[float, float]
-
-
-def _in_order(span: tuple[float, float]) -> tuple[float, float]:
-    if span[0] > span[1]:
-        raise ValueError(f"is {list(span)}; must be [least, most]")
-    return span
 
 
 Count = Annotated[int, Field(ge=1, le=1000)]
@@ -43,9 +37,9 @@ class Forest(Section):
     """How many copses a square kilometre."""
     gap_m: Annotated[float, Field(ge=0, le=MAX_COORDINATE_M)] = 400.0
     """Least width of the ways between them; 0 lets them touch."""
-    radius_m: Annotated[tuple[Length, Length], Strict(False), AfterValidator(_in_order)] = (40.0, 80.0)
+    radius_m: Annotated[tuple[Length, Length], Strict(False), AfterValidator(in_order)] = (40.0, 80.0)
     """Least and largest radius of a trunk."""
-    trunks: Annotated[tuple[Count, Count], Strict(False), AfterValidator(_in_order)] = (1, 3)
+    trunks: Annotated[tuple[Count, Count], Strict(False), AfterValidator(in_order)] = (1, 3)
     """Least and largest number of trunks in a copse."""
 
     @model_validator(mode="after")

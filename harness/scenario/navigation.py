@@ -19,15 +19,9 @@ MARGIN_SIGMAS: Final = 3.0
 """The planner's margin covers this many sigma of the position error: 1 - exp(-9 / 2) of all errors in the plane."""
 
 _ERROR_KEYS: Final = (  # zero where navigation is perfect
-    *(
-        "position_sigma_m",
-        "velocity_sigma_mps",
-        "heading_sigma_deg",
-        "airspeed_sigma_mps",
-        "altitude_sigma_m",
-    ),
-    *("drift_share", "latency_s"),
-)
+    "position_sigma_m", "velocity_sigma_mps", "heading_sigma_deg", "airspeed_sigma_mps", "altitude_sigma_m",
+    "drift_share", "latency_s",
+)  # fmt: skip
 _PERFECT: Final[dict[str, Any]] = dict.fromkeys(_ERROR_KEYS, 0.0) | {
     "position_correlation_s": 1100.0,  # [BM], 1 / k_GPS of the Gauss-Markov table
     "position_bias_m": (0.0, 0.0),
@@ -110,9 +104,10 @@ class Navigation(Section):
                 raise KeyFault((name,), f"{told}, but kind perfect has no error; {right}")
         last_s = -math.inf
         for index, (begin_s, end_s) in enumerate(self.outages_s):
-            if not last_s < begin_s < end_s:
-                told = f"is [{begin_s:g}, {end_s:g}]; must be [from, to] with from < to"
-                told += "" if math.isinf(last_s) else f", after the one before ends at {last_s:g} s"
+            if begin_s <= last_s:
+                told = (
+                    f"is [{begin_s:g}, {end_s:g}]; must begin after {last_s:g} s, the end of the one before"
+                )
                 raise KeyFault(("outages_s", index), told)
             last_s = end_s
         return self

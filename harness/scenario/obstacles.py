@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, FailFast, Field, Strict, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, FailFast, Field, Strict, field_validator, model_validator
 
-from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity
+from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity, in_order
 
 Height = Annotated[float, Field(ge=-1000, le=30_000)]
 Shift = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -126,7 +126,7 @@ class Obstacle(Section):
     active_s: Interval | None = None
     """Pops up at the first time and is gone after the second. Default: there for the whole flight."""
 
-    heights_m: Annotated[tuple[Height, Height], Strict(False)] | None = None
+    heights_m: Annotated[tuple[Height, Height], Strict(False), AfterValidator(in_order)] | None = None
     """Bottom and top above mean sea level, for drawings; twice the same: terrain, cut there. Default: without end."""
 
     @model_validator(mode="after")
@@ -138,15 +138,6 @@ class Obstacle(Section):
         if self.file and self.velocity_mps:
             raise ValueError("is a file with velocity_mps; what a file holds stands still")
         return self
-
-    @field_validator("heights_m", "active_s")
-    @classmethod
-    def _in_order(cls, span: Interval | None, info: ValidationInfo) -> Interval | None:
-        heights = info.field_name == "heights_m"
-        if span and (span[0] > span[1] or (span[0] == span[1] and not heights)):
-            first, last, than = ("bottom", "top", "<=") if heights else ("start", "stop", "<")
-            raise ValueError(f"is {list(span)}; must be [{first}, {last}] with {first} {than} {last}")
-        return span
 
     @property
     def fixed(self) -> bool:

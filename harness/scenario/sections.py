@@ -11,7 +11,7 @@ import itertools
 from functools import cache
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
 from harness.scenario.validation import KeyFault
 
@@ -66,11 +66,26 @@ Length = Annotated[float, Field(gt=0, le=MAX_COORDINATE_M)]
 Speed = Annotated[float, Field(ge=-1000, le=1000)]
 Velocity = Annotated[tuple[Speed, Speed], Strict(False)]
 Time = Annotated[float, Field(ge=0, le=1e7)]
-Interval = Annotated[tuple[Time, Time], Strict(False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Latitude = Annotated[float, Field(ge=-85, le=85)]
 Longitude = Annotated[float, Field(ge=-180, le=180)]
-PitchLimit = Annotated[float, Field(ge=-90, le=90)]
+PitchLimits = tuple[Annotated[float, Field(ge=-90, lt=0)], Annotated[float, Field(gt=0, le=90)]]
+
+
+def in_order(span: tuple[float, float]) -> tuple[float, float]:
+    """Returns a range as it is; a ValueError says that its ends stand the wrong way round."""
+    if span[0] > span[1]:
+        raise ValueError(f"is {list(span)}; must be [least, most]")
+    return span
+
+
+def _lasting(span: tuple[float, float]) -> tuple[float, float]:
+    if not span[0] < span[1]:
+        raise ValueError(f"is [{span[0]:g}, {span[1]:g}]; must be [from, to] with from < to")
+    return span
+
+
+Interval = Annotated[tuple[Time, Time], Strict(False), AfterValidator(_lasting)]
 
 
 class Geodetic(Section):
@@ -164,20 +179,12 @@ class AutopilotSpec(Section):
     """Fastest roll that is commanded. Default: that of the aircraft's card."""
     roll_time_constant_s: Annotated[float | None, Field(ge=0.05, le=5)] = None
     """Time constant of roll behind its command. Default: that of the aircraft's card."""
-    pitch_limits_deg: Annotated[tuple[PitchLimit, PitchLimit], Strict(False)] = (-30.0, 30.0)
+    pitch_limits_deg: Annotated[PitchLimits, Strict(False)] = (-30.0, 30.0)
     """Least and largest pitch that is commanded."""
     least_airspeed_mps: Annotated[float | None, Field(gt=0, le=1000)] = None
     """Below this true airspeed height goes before speed. Default: 0.97 of the lowest of level flight."""
     state_latency_s: Annotated[float, Field(ge=0, le=2)] = DERIVED
     """Age of the attitude, airspeed and height that the autopilot flies by. Default: navigation.latency_s."""
-
-    @model_validator(mode="after")
-    def _pitch_in_order(self) -> AutopilotSpec:
-        least, most = self.pitch_limits_deg
-        if not least < 0.0 < most:
-            told = f"is [{least:g}, {most:g}]; must be a negative and a positive angle to 90 degrees"
-            raise KeyFault(("pitch_limits_deg",), told)
-        return self
 
 
 MOST_SHARE: Final = 0.5

@@ -53,11 +53,8 @@ def _path_or_shipped(text: str, shipped: dict[str, Path], folder: Path, what: st
 def summary(path: Path) -> str:
     """Returns what a scenario is for: the first line of the comment it begins with, the one for editors left out."""
     with path.open(encoding="utf-8") as file:
-        return (
-            next(line for line in file if not line.startswith("# yaml-language-server:"))
-            .lstrip("# ")
-            .rstrip()
-        )
+        first = next(line for line in file if not line.startswith("# yaml-language-server:"))
+    return first.lstrip("# ").rstrip()
 
 
 def _folder() -> Path:

@@ -35,6 +35,7 @@ _SENTENCES: Final = {
     **dict.fromkeys(("model_type", "dict_type"), "is {shown}; must be a mapping `key: value`"),
     "greater_than": "is {shown}; must be greater than {gt:.12g}",
     "greater_than_equal": "is {shown}; must be at least {ge:.12g}",
+    "multiple_of": "is {shown}; must be a multiple of {multiple_of:g}",
     "less_than": "is {shown}; must be less than {lt:.12g}",
     "less_than_equal": "is {shown}; must be at most {le:.12g}",
 }

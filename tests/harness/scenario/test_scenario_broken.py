@@ -80,7 +80,7 @@ BROKEN = {
         "9: obstacles[1].polygon.vertices_m", "encloses no area"),
     "a spike out and back": (SQUARE, "[[12000, 3000], [14000, 3000], [16000, 3000], [14000, 3000], [14000, 5000]]",
         "9: obstacles[1].polygon.vertices_m", "crosses or touches itself"),
-    "stops before it starts": ("[60, 600]", "[600, 60]", "10: obstacles[1].active_s", "start < stop"),
+    "stops before it starts": ("[60, 600]", "[600, 60]", "10: obstacles[1].active_s", "from < to"),
     "start outside": ("[1000, 5000]", "[-1, 5000]", "12: mission.start_m", "must lie inside area.bounds_m"),
     "start in a circle": ("[1000, 5000]", "[8000, 5100]", "12: mission.start_m", "lies inside obstacles[0]"),
     "start near a circle": ("[1000, 5000]", "[7000, 5000]", "12: mission.start_m", "100 m from obstacles[0]"),
