@@ -130,10 +130,7 @@ def source_words(planner: str | None, law: str | None) -> list[str]:
 
 
 def registered(given: object, part: LoopPart = PLANNER) -> str:
-    """Registers what was given, or FILE.py:NAME or MODULE:NAME names; returns its name for scenarios of this process.
-
-    A ValueError, one sentence, says why it cannot be used.
-    """
+    """Registers what was given, or a source names; returns its name for scenarios. A ValueError says what is wrong."""
     if isinstance(given, str):
         return registered_source(given, part) if is_source(given) else given
     try:

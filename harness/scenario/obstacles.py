@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, ConfigDict, FailFast, Field, Strict, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, FailFast, Field, Strict, model_validator
 
 from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity, in_order
 
@@ -22,27 +21,37 @@ class Circle(Section):
     """Radius."""
 
 
-Ring = Annotated[tuple[Point, ...], Strict(False)]
-Rings = Annotated[tuple[Ring, ...], Strict(False)]
+def _simple(points: tuple[Point, ...]) -> tuple[Point, ...]:
+    """Drops vertices that repeat the one before, or at the end the first; a ValueError says why it is no polygon."""
+    import shapely
+
+    ring = tuple(point for index, point in enumerate(points) if not index or point != points[index - 1])
+    ring = ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
+    if len(ring) < 3:
+        raise ValueError(f"has {len(ring)} distinct vertices; must be at least 3")
+    shape = shapely.Polygon(ring)
+    if shape.convex_hull.area == 0:
+        raise ValueError("encloses no area: its vertices lie on one line; must be a polygon")
+    if not shape.is_valid:
+        where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")
+        raise ValueError(
+            f"crosses or touches itself at ({where}); give the vertices in order round the shape"
+        )
+    return ring
+
+
+Ring = Annotated[tuple[Point, ...], Strict(False), AfterValidator(_simple)]
 
 
 class Polygon(Section):
     """A simple polygon, convex or not, its vertices in either direction; kept without repeated vertices."""
 
-    vertices_m: Annotated[tuple[Point, ...], Strict(False), FailFast(), Field(min_length=3)]
+    vertices_m: Annotated[
+        tuple[Point, ...], Strict(False), FailFast(), Field(min_length=3), AfterValidator(_simple)
+    ]
     """Vertices in order round the shape: east, north. Repeated ones, also the first at the end, are dropped."""
-    holes_m: Rings | None = None
+    holes_m: Annotated[tuple[Ring, ...], Strict(False)] | None = None
     """Rings inside the shape, in either direction, within which it is free. Default: none."""
-
-    @field_validator("vertices_m")
-    @classmethod
-    def _enclose_an_area(cls, vertices_m: Ring) -> Ring:
-        return _ring(vertices_m)
-
-    @field_validator("holes_m")
-    @classmethod
-    def _are_rings(cls, holes_m: tuple[Ring, ...] | None) -> tuple[Ring, ...] | None:
-        return tuple(_ring(hole, f"hole {number} ") for number, hole in enumerate(holes_m or ())) or None
 
     @model_validator(mode="after")
     def _has_its_holes_inside(self) -> Polygon:
@@ -54,24 +63,6 @@ class Polygon(Section):
             wrong = f"has holes_m that lie outside of it, cross or touch ({told})"
             raise ValueError(f"{wrong}; each hole must lie inside, apart from the others")
         return self
-
-
-def _ring(points: Sequence[Point], name: str = "") -> Ring:
-    """Drops vertices that repeat the one before, or at the end the first; `name` begins the fault of a bad ring."""
-    import shapely
-
-    ring = tuple(point for index, point in enumerate(points) if not index or point != points[index - 1])
-    ring = ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
-    if len(ring) < 3:
-        raise ValueError(f"{name}has {len(ring)} distinct vertices; must be at least 3")
-    shape = shapely.Polygon(ring)
-    if shape.convex_hull.area == 0:
-        raise ValueError(f"{name}encloses no area: its vertices lie on one line; must be a polygon")
-    if not shape.is_valid:
-        where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")
-        told = f"crosses or touches itself at ({where}); give the vertices in order round the shape"
-        raise ValueError(f"{name}{told}")
-    return ring
 
 
 KindName = Literal[
@@ -125,7 +116,6 @@ class Obstacle(Section):
     """Moves in a straight line: east, north; as its shape says at active_s[0]. Default: it stands still."""
     active_s: Interval | None = None
     """Pops up at the first time and is gone after the second. Default: there for the whole flight."""
-
     heights_m: Annotated[tuple[Height, Height], Strict(False), AfterValidator(in_order)] | None = None
     """Bottom and top above mean sea level, for drawings; twice the same: terrain, cut there. Default: without end."""
 

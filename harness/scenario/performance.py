@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from aircraft.frames import LocalPlane
 from aircraft.start import Atmosphere, StartConditions, VerticalGusts, profile_share
+from harness.scenario.environment import Wind
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.parts import airframe_of, card_of, flown_airframe
 from harness.scenario.sections import Bounds, DeviationSpec
@@ -47,12 +48,9 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
 
 def wind_mps_of(scenario: ScenarioKeys) -> float:
     """Largest speed of the wind at the mission's altitude at any time (m/s); the ground is taken to be at sea level."""
-    wind = scenario.environment.wind
-    if wind is None:
-        return 0.0
-    if wind.measured_at_m is None:
-        return wind.fastest_mps
-    return wind.fastest_mps * profile_share(scenario.mission.altitude_m, wind.measured_at_m)
+    wind = scenario.environment.wind or Wind()
+    at_m, altitude_m = wind.measured_at_m, scenario.mission.altitude_m
+    return wind.fastest_mps * (1.0 if at_m is None else profile_share(altitude_m, at_m))
 
 
 def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -> Mission:

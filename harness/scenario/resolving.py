@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from aircraft.interface import GRAVITY_MPS2
 from harness.scenario.conditions import with_day, with_servos
-from harness.scenario.files_resolved import with_files_expanded
+from harness.scenario.files_resolved import file_beside, with_files_expanded
 from harness.scenario.keys import ScenarioKeys, step_rate_hz
 from harness.scenario.kinds import guidance_kinds
 from harness.scenario.navigation import planning_margin_m
@@ -121,11 +120,8 @@ def model_or_folder(model: str, folder: Path | None) -> str:
 
     if "/" not in model and model in aircraft_names():
         return model
-    for place in (folder or Path(), Path()):
-        with suppress(OSError, RuntimeError):  # too long, not allowed, or the home of nobody: no folder
-            if (place / model).expanduser().is_dir():
-                return str((place / model).expanduser().resolve())
-    return model
+    found = file_beside(model, folder) or file_beside(model, Path())
+    return str(found.resolve()) if found and found.is_dir() else model
 
 
 def _airframe(spec: AircraftSpec) -> Airframe:
