@@ -27,7 +27,7 @@ FURTHEST_M = 1e8
 START_S = 1.0
 """A path may begin this much flying time ahead of the aircraft or behind it; see `start_tolerance_m`."""
 JOIN_M = 0.1
-"""Largest gap between two segments, and between the end of a loiter and its beginning."""
+"""A path with a wider gap than this between two segments, or between end and begin of its loiter, is refused."""
 FULL_TURN_RAD = 1e-3
 """A loiter may turn by this (rad) more or less than a full turn."""
 

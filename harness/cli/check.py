@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 
 PATH: Final = "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints)."
-WORLD: Final = "A scenario that gives obstacles, bounds, environment, seed, altitude."
-ALTITUDE: Final = "One altitude above sea level throughout. Default: the file's, else WORLD's, else 300."
-LEVEL: Final = "Largest distance from the altitude. Default: 10 m."
-TOLERANCE: Final = "Largest distance from the path. Default: a tenth of C, or 10 m without C."
+WORLD_HELP: Final = "A scenario that gives obstacles, bounds, environment, seed, altitude."
+ALTITUDE_HELP: Final = "One altitude above sea level throughout. Default: the file's, else WORLD's, else 300."
+LEVEL_HELP: Final = "Largest distance from the altitude. Default: 10 m."
+TOLERANCE_HELP: Final = "Largest distance from the path. Default: a tenth of C, or 10 m without C."
 ACCEPTED: Final = "at waypoints of a mission the acceptance radius in the file, else 90 m."
-CORNER: Final = f"Largest distance from corners. Default: T; {ACCEPTED}"
-DAYS: Final = "Fly it on N days of its conditions too: DIR/days, as `certify` does."
+CORNER_HELP: Final = f"Largest distance from corners. Default: T; {ACCEPTED}"
+DAYS_HELP: Final = "Fly it on N days of its conditions too: DIR/days, as `certify` does."
 
 
 @replacing("guidance", "conditions", "wind", "turbulence", "seed", "settings")
@@ -34,13 +34,13 @@ def check(
     aircraft: AircraftName,
     given: Given = NOTHING,
     airspeed_mps: Annotated[Number, option("V", "True airspeed. Default: the aircraft's cruise.")] = None,
-    altitude_m: Annotated[Number, option("H", ALTITUDE)] = None,
-    scenario: Annotated[str | None, option("WORLD", WORLD)] = None,
+    altitude_m: Annotated[Number, option("H", ALTITUDE_HELP)] = None,
+    scenario: Annotated[str | None, option("WORLD", WORLD_HELP)] = None,
     clearance_m: Annotated[Number, option("C", "Wanted clearance. Default: WORLD's, if written.")] = None,
-    tolerance_m: Annotated[Number, option("T", TOLERANCE)] = None,
-    altitude_tolerance_m: Annotated[Number, option("A", LEVEL)] = None,
-    corner_m: Annotated[Number, option("R", CORNER)] = None,
-    days: Annotated[Count, option("N", DAYS, min=1)] = None,
+    tolerance_m: Annotated[Number, option("T", TOLERANCE_HELP)] = None,
+    altitude_tolerance_m: Annotated[Number, option("A", LEVEL_HELP)] = None,
+    corner_m: Annotated[Number, option("R", CORNER_HELP)] = None,
+    days: Annotated[Count, option("N", DAYS_HELP, min=1)] = None,
     out: Out = None,
     no_recording: NoRecording = False,
     quiet: Quiet = False,

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from planner.interface import MovingEdges
 
 SCAN_SHARE = 0.004
-"""A scan is drawn after every flight of this share of the area, and before every plan."""
+"""A scan is drawn each time that this share of the area's longer side was flown, and before every plan."""
 LEAST_PERIOD_S = 2.0
 """Except before plans, scans are drawn no more often than this, so that an hour stays small in any area."""
 CELL_SHARE = 0.0015

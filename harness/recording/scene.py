@@ -24,7 +24,7 @@ from harness.recording.summary import colours, summary
 LEAST_CIRCLE_POINTS, THIN_CIRCLE_POINTS, POINTS_OF_ALL = 12, 24, 400_000
 """Points of a circle at the least and in a thin recording, and of all circles together, which must fit into memory."""
 AIRCRAFT_SHARE = 0.022
-"""Wing span of the drawn aircraft as a share of the area, as its true size could not be seen."""
+"""Wing span of the drawn aircraft as a share of the area's longer side: its true size could not be seen."""
 
 STYLES: Final[tuple[tuple[str, Any, look.Colour | None, float, float | None], ...]] = (
     (f"{look.PLAN}/{look.SENSED}", rr.Points2D, look.EDGE_POINTS, 1.25, 12),

@@ -20,7 +20,7 @@ Change = tuple[float, str]
 """Simulated time in s, and the state from then on."""
 
 WAITING = "waiting for a plan"  # state of the planner before its first plan
-HOLDING = "holding"  # state of the planner while no plan leads on
+HOLDING = "holding"  # state of the planner on the turn that ends its plan
 AT_LIMIT, FREE = "bank command at its limit", "bank command below its limit"
 TRACKABLE = "trackable"  # state of a leg that was tracked
 CLEAR_AGAIN_FACTOR: Final = 1.05

@@ -33,7 +33,7 @@ LAST_PAGE_BYTES: Final = 528
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
 TRUE_AIRSPEED: Final = "true_airspeed_m_s"
 """Field of the topics `AIRSPEED_TOPICS` of PX4."""
-AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")
+AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")  # the first that a log has counts
 
 
 Series = tuple[FloatArray, dict[str, FloatArray]]

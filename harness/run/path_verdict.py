@@ -33,9 +33,9 @@ SPACING_SHARE: Final = 0.25
 WINDOW_RADII: Final = 4.0
 """Track and path are compared where they are no further apart than this along the path, in turn radii."""
 LEAST_LAYER_M: Final = 10.0
-"""Depth of a layer: what of a part reaches into it, and into the vertical clearance about it, is solid all through."""
+"""Least depth of a layer: what of a part reaches into it, or its clearance does, is solid all through."""
 MOST_ALTITUDE_LAYERS: Final = 40
-"""The altitudes of a flight are cut into at most this many layers; if these do not suffice, into deeper ones."""
+"""Layers are deeper than `LEAST_LAYER_M` where the altitudes of a flight would need more than this many."""
 WIDER, MOST_WIDER = 1.05, 3.0
 """A limit that does not hold far enough is made larger by the first factor, up to the second times the need."""
 MOST_LIMITS_TRIED: Final = 50

@@ -209,7 +209,7 @@ def _resolved_keys(section: str, spec: PartSpec, kind: Kind, told: Any) -> dict[
     return {name: getattr(config, name) for name in known}
 
 
-_BOUNDS = (("ge", "minimum"), ("le", "maximum"), ("gt", "above"))
+_BOUNDS = (("ge", "minimum"), ("le", "maximum"), ("gt", "above"))  # argument of `Field`, key of the metadata
 
 
 @cache

@@ -28,7 +28,7 @@ from planner.keys import MarginConfig
 BEARING_STEP_RAD = math.radians(5.0)
 """Angle between neighbouring bearings that are probed."""
 SECOND_OFFSETS_RAD = (0.0, math.radians(45.0), -math.radians(45.0))
-"""Bearings of the second line, from the bearing of the goal."""
+"""Bearings of the second lines, each from the end of a first one, relative to the bearing of the goal there."""
 LOOKAHEAD_RADII = 8.0
 """OA_BR_LOOKAHEAD, in turn radii: length of a probed line, at most the sensor range."""
 CONT_RATIO, CONT_ANGLE_RAD = 1.5, math.radians(75.0)

@@ -16,7 +16,7 @@ TAKEOFF, VTOL_TAKEOFF = 22, 84
 JUMP, JUMP_TO_TAG = 177, 601
 CHANGE_SPEED: Final = 178
 
-LOITERS: Final = (LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE)
+LOITERS: Final = (LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE)  # all that circle a place
 TAKEOFFS: Final = {
     TAKEOFF: "the roll is not flown: the flight begins at the altitude of the takeoff",
     VTOL_TAKEOFF: "the vertical takeoff is not flown: the flight begins at its altitude",
@@ -57,7 +57,7 @@ CORNERS: Final = {5001: True, 5002: False}
 HOME_CIRCLE: Final = 5005  # ArduPilot's fence about home
 CIRCLES: Final = {5003: True, 5004: False, HOME_CIRCLE: True}
 """Commands for a circular fence: True to stay inside of, False outside; the first parameter is the radius."""
-RALLY_POINT: Final = 5100
+RALLY_POINT: Final = 5100  # no item to fly to
 NO_MISSION_COMMANDS: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
 """Commands of items that are no part of a mission."""
 PX4: Final = 12
