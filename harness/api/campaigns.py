@@ -110,9 +110,10 @@ def sweep(
     runs = CampaignRuns(read_campaign(campaign_path(str(campaign))))
     runs.check()
     folder = Path(out) if out is not None else Path("runs") / runs.campaign.name
+    at_a_time = min(workers or os.cpu_count() or 1, len(runs))
     with (
         as_input_errors(),
-        dask_workers(scheduler) if scheduler else local_workers(workers or os.cpu_count() or 1) as flyers,
+        dask_workers(scheduler) if scheduler else local_workers(at_a_time) as flyers,
         CampaignFolder(folder, runs, resume=resume) as claimed,
     ):
         left = fly_missing(runs, claimed, flyers, progress)

@@ -25,7 +25,7 @@ from harness.files.spawning import open_standard_files, without_main
 from harness.files.strict_yaml import InputError
 from harness.files.versions import versions
 from harness.flight.signals import held_back
-from planner.compiled import own_this_process
+from planner.compiled import compile_all, own_this_process
 
 ONE_THREAD_ENVIRONMENT: Final = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_IO_THREADS"), "1"
@@ -114,6 +114,12 @@ class LocalWorkers(Workers):
         self._number = number
         self._again: deque[Job] = deque()
 
+    def begin(self) -> None:
+        """Begins all processes, which get ready to fly meanwhile."""
+        with without_main():
+            for _ in range(self._number):
+                self._executor.submit(_make_ready)
+
     def free(self) -> int:
         """Returns the room for jobs: for each process one that flies and one that waits."""
         return 0 if self._again else JOBS_EACH * self._number - len(self._flying)
@@ -164,13 +170,14 @@ def _died(future: Future[Answer | None]) -> bool:
 
 @contextmanager
 def local_workers(number: int) -> Iterator[LocalWorkers]:
-    """Starts processes of this machine, which end with the context, in mid-flight if need be."""
+    """Starts processes of this machine at once, which end with the context, in mid-flight if need be."""
     open_standard_files()
     before = set(multiprocessing.active_children())
     kept = {name: os.environ[name] for name in ONE_THREAD_ENVIRONMENT if name in os.environ}
     os.environ.update(ONE_THREAD_ENVIRONMENT)
     workers = LocalWorkers(number)
     try:
+        workers.begin()
         yield workers
     finally:
         for name in ONE_THREAD_ENVIRONMENT:
@@ -271,6 +278,13 @@ def _begin_process() -> None:
     os.dup2(2, 1)
     own_this_process()
     threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _make_ready() -> None:
+    """Loads what every flight needs."""
+    import harness.run.scenario_flight  # noqa: F401
+
+    compile_all()
 
 
 def _end_with_parent() -> None:

@@ -77,7 +77,6 @@ def certify(
     most = runs or DEFAULT_RUNS[rare]
     terms_of_days = {"most": most, "sources": given.sources, "purpose": "rare" if rare else "counted"}
     days = days_of(subject, given.keys, drawn, claim, place, **terms_of_days)
-    days.check()
     apart = told_apart([*given.keys, *((key, str(each)) for key, each in drawn.items())], named=())
     folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{'-rare' * rare}{apart}"
     found = _fly(days, folder, workers, terms, resume=resume, silent=quiet)
@@ -108,7 +107,6 @@ def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
     from harness.certification.certification import Terms
     from harness.run_files.run_folder import RECORDING
 
-    days.check()
     resume = (folder / "days" / "campaign.json").exists()
     found = _fly(days, folder / "days", None, Terms(), resume=resume, silent=silent)
     if not silent:
@@ -123,12 +121,17 @@ def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
 def _fly(
     days: Days, folder: Path, workers: int | None, terms: Terms, *, resume: bool, silent: bool
 ) -> Certificate:
-    """Flies days into a folder, with progress on standard error."""
+    """Checks days and flies them into a folder, with progress on standard error."""
     from harness.campaign.results import INDEX
     from harness.campaign.workers import local_workers
     from harness.certification.certification import certify as fly_days
 
-    with resumable(folder, INDEX), local_workers(at_a_time(workers)) as flyers, step_bar(silent) as bar:
+    with (
+        resumable(folder, INDEX),
+        local_workers(at_a_time(workers, len(days))) as flyers,
+        step_bar(silent) as bar,
+    ):
+        days.check()
 
         def report(tally: Tally) -> None:
             bar(tally.runs, len(days), f"held on {tally.held} of {tally.runs} days")

@@ -54,9 +54,9 @@ def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = FOLDE
     return f"-{sha256(json.dumps(others).encode()).hexdigest()[:8]}" if others else ""
 
 
-def at_a_time(workers: int | None) -> int:
+def at_a_time(workers: int | None, flights: int) -> int:
     """Returns the number of flights at a time: as many as were asked for, or one a processor."""
-    return workers or os.cpu_count() or 1
+    return min(workers or os.cpu_count() or 1, flights)
 
 
 def with_remedy(error: OSError) -> str:

@@ -55,7 +55,7 @@ def compare(
                 loaded,
                 folder,
                 recording=not no_recording,
-                workers=at_a_time(workers),
+                workers=at_a_time(workers, len(loaded)),
                 sources=(sources(*kinds), sources(*laws)),
                 progress=lambda told: bar(next(over), len(loaded), told),
             )

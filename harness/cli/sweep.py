@@ -68,7 +68,7 @@ def sweep(
     named = [each.strip() for each in planners.split(",")] if planners else []
     runs = checked(campaign_path(campaign), named, given.keys, given.sources[1])
     folder = out or Path("runs") / runs.campaign.name
-    local = partial(local_workers, at_a_time(workers))
+    local = partial(local_workers, at_a_time(workers, len(runs)))
 
     def warn(told: str) -> None:
         say(f"wayproof: {told}", err=True)
