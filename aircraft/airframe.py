@@ -142,7 +142,7 @@ class Airframe:
         return airspeed_mps * airspeed_mps / (lateral_mps2 * self.turn_rate_share)
 
     def level_bank_deg(self, airspeed_mps: float) -> float:
-        """Steepest bank at which an airspeed and the altitude are kept, interpolated between the speeds flown."""
+        """Steepest bank at which airspeed and altitude are kept, interpolated between the speeds flown, held beyond."""
         (before, bank), *rest = self.level_banks
         for speed, after in rest:
             if airspeed_mps <= speed:

@@ -172,7 +172,7 @@ class WaypointLaw:
         return self._leg
 
     def update(self, state: AircraftState) -> GuidanceOutput:
-        """Decides the roll command for the next update interval."""
+        """Begins the next leg where one is over, and decides the roll command for the next update interval."""
         if self._progress is None:
             raise RuntimeError("follow() a route before update()")
         while self._is_over(state) and self._leg < len(self._legs) - 1:  # a last circle is counted too

@@ -99,7 +99,7 @@ class Metric:
 
 
 def number(value: float | None, factor: float = 1.0) -> str:
-    """A value times a factor with three or four digits; empty where there is none."""
+    """A value times a factor with three or four digits, below 0.001 with two; empty where there is none."""
     if value is None:
         return ""
     scaled = value * factor

@@ -154,7 +154,7 @@ class _Flown:
         )
 
     def _cross_track_cause(self, leg: Track, first: int, row: int) -> str:
-        """Names the cause for which a leg is off its plan at a row of it."""
+        """Names the cause for which a leg is off its plan at a row of it: a navigation error, or else the flight."""
         most = self.limits.cross_track_threshold_m
         if _is_misled(leg.believed_cross_track_m, leg.cross_track_m, most, row):
             return NAVIGATION_ERROR
@@ -169,7 +169,7 @@ class _Flown:
         return altitude_cause(self.track, first + row, self.limits, self.given)
 
     def _speed_cause(self, first: int, rows: int, fast_mps: float) -> str:
-        """Names the cause for which the mean airspeed over some rows is too high by this."""
+        """Names the cause for a mean airspeed that is too high by this: the path's slope or speed, or the flight."""
         steep = self._steep(first, rows)
         if steep is not None:
             return steep

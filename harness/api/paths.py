@@ -114,7 +114,7 @@ def replay(
 
 
 def _world_file(scenario: Scenario | str | Path | None, folder: Path) -> Path | None:
-    """Returns the file of a scenario; an object is written into `folder`."""
+    """Returns the file of a scenario, None for none; an object is written into `folder`."""
     if scenario is None:
         return None
     if not isinstance(scenario, Scenario):

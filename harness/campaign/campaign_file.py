@@ -220,7 +220,7 @@ def _base_of(file: Path) -> Base:
 
 
 def is_a(what: Literal["campaign", "scenario"], path: Path) -> bool:
-    """Whether a file says that it is a campaign, or a scenario."""
+    """Whether a file says that it is a campaign, or a scenario; False for one that cannot be read."""
     try:
         said = strict_yaml.read(path).at(("schema",))
     except InputError:

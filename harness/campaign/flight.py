@@ -108,7 +108,7 @@ _imported = cache(registered_source)
 
 
 def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
-    """Flies a job and returns its metrics; keeps its run folder as the job says."""
+    """Flies a job and returns its metrics; keeps its run folder as the job says, for which a failure is flown again."""
     if job.recordings in ("failures", "none"):
         if job.path is not None:
             from harness.run.path_check import fly_check

@@ -210,7 +210,7 @@ def dask_workers(
 
 
 def _client(address: str, unencrypted: bool) -> Any:
-    """Connects to a scheduler."""
+    """Connects to a Dask scheduler, beyond this machine with TLS unless `unencrypted`; else an InputError."""
     if not re.fullmatch(r"[a-z]+://.+", address):
         raise InputError(
             f"wayproof: --scheduler {address}: is no address; give it as tcp://HOST:PORT, or beyond this machine as "
@@ -251,7 +251,7 @@ class DaskWorkers(Workers):
         self._known = set(client.nthreads())
 
     def free(self) -> int:
-        """Returns the room for jobs that fly and for as many that wait."""
+        """Returns the room for jobs that fly and for as many that wait; tells which workers have gone."""
         try:
             threads_of = self._client.nthreads()
         except OSError as error:

@@ -91,7 +91,7 @@ def _check_usage(views_nothing: bool, live: bool, speed: float | None, web: bool
 def _asked(
     scenario: str | None, results: Path | None, run: int | None, given: list[tuple[str, str]]
 ) -> tuple[Scenario, str | None]:
-    """Returns the scenario to fly, and the digest that a campaign's results have for exactly that flight."""
+    """Returns the scenario to fly, and the digest that a campaign's results have for exactly that flight, or None."""
     if (scenario is None) == (results is None):
         raise typer.BadParameter("give either a SCENARIO or --from with --run")
     if results is None or run is None:

@@ -103,7 +103,7 @@ def parsed_json(text: str, source: str, once: bool = True) -> Any:
 
 
 def finite(value: Any, where: str) -> float:
-    """Returns a finite number, from JSON or from text."""
+    """Returns a finite number, from JSON or from text; an InputError on anything else, true and false too."""
     try:
         number = math.nan if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):

@@ -177,7 +177,7 @@ class ClosedLoop:
         return True
 
     def _guide(self) -> Ending | None:
-        """Steers along the plan in effect, and logs a row of the track."""
+        """Takes up a plan that is due, steers along the one in effect, logs a row; returns an ending if a law fails."""
         believed = self.believed
         ending = self.plans.take_effect(believed, self._guidance) if self.plans.coming else None
         ending = ending or self._steer()
@@ -224,7 +224,7 @@ class ClosedLoop:
         return None
 
     def _advance(self, steps: int) -> Ending | None:
-        """Advances the flight model; a planner that wants more time is asked again half way."""
+        """Advances the flight model, half way asking a planner again that wants more time; that may end the flight."""
         if self.plans.wants_more_time:
             self._model.advance(steps // 2)
             steps -= steps // 2

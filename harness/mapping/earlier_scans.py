@@ -71,7 +71,7 @@ class EarlierScans:
         self._looks: deque[Look] = deque()
 
     def due(self, time_s: float) -> bool:
-        """Tells whether a scan is to be looked at now, and takes it as looked at if so."""
+        """Tells whether a scan is to be looked at now; if so takes it as looked at, and drops looks of long ago."""
         if time_s - self._looked_s < self._every_s:
             return False
         self._looked_s = time_s

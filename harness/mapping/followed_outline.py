@@ -115,7 +115,7 @@ class FollowedOutline:
         return abs(self.velocity) + SURE_SIGMAS * self.error_mps < LEAST_MPS
 
     def _measure(self) -> None:
-        """Sets the velocity to the slope of the shifts over time."""
+        """Sets the velocity to the slope of the shifts, up to `MOST_MPS`; where that is vague it stays, or is 0."""
         velocity, self.error_mps = _slope(*self._remembered())
         if self.error_mps > VAGUE_MPS:
             velocity = self.velocity if self.moves else 0j

@@ -54,7 +54,7 @@ LEAST_PERIOD_S = 2.0
 CELL_SHARE = 0.0015
 """Side of the cells in which sensed places are gathered, as a share of the area."""
 PIECE_SHARE = 0.001
-"""Length of a piece of the trail, which has one colour, as a share of the area."""
+"""Length of a piece of the trail, which has one colour, as a share of the area's longer side."""
 MARKER_STEP_ROWS, THIN_STEP_ROWS = 5, 20
 """Every this many rows of the track one is drawn: of the marker in the plan view, and of a thin recording."""
 THIN_CHORD_ERROR_SHARE = 1e-2

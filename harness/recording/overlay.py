@@ -142,7 +142,7 @@ def properties_of(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, dict[str, Any]]
 
 
 def frame_of(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
-    """Returns the area that a recording's views are framed on."""
+    """Returns the area that a recording's views are framed on; a RunFolderError if it is none of a flight."""
     kept = properties_of(chunks).get(look.FRAME)
     if kept is None:
         raise RunFolderError(f"{recording} is not a recording of a flight")

@@ -71,7 +71,7 @@ def outlines(shape: Circle | Polygon, points: int = CIRCLE_POINTS) -> list[Float
 
 
 def drawn_heights(scene: Scene, obstacle: Obstacle) -> tuple[float, float]:
-    """Returns the heights (m) of bottom and top at which an obstacle is drawn."""
+    """Returns the heights (m) of bottom and top at which an obstacle is drawn: its own, cut to what is shown."""
     if obstacle.heights_m is None:
         return scene.base_m, scene.obstacle_top_m
     low, high = obstacle.heights_m

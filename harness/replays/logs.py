@@ -175,7 +175,7 @@ def _dataflash(path: Path, notes: list[str]) -> Series:
 
 
 def _messages(path: Path, kinds: tuple[str, ...], notes: list[str]) -> Iterator[Any]:
-    """Yields the messages of some kinds in a DataFlash log, as pymavlink has them."""
+    """Yields the messages of some kinds in a DataFlash log, as pymavlink has them; notes where it is damaged."""
     from pymavlink.DFReader import DFReader_binary
 
     with path.open("rb") as file:

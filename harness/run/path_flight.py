@@ -186,7 +186,7 @@ def _planned_line(
 def _drawn_profile(
     given: PathAsGiven, way: FlyBy, frame: Airframe, speed_mps: float, ground: Ground | None
 ) -> VerticalProfile:
-    """Returns the altitudes along a drawn line that has some."""
+    """Returns the altitudes along a drawn line, the ground added to those above it; level if they hardly differ."""
     altitudes = given.altitudes_m
     if given.above_ground:
         remedy = "give --altitude-m"
@@ -298,7 +298,7 @@ class PathEnd:
         return self.length_m - self.where(state).arc_length_m
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
-        """Returns how the flight ends now; None while it goes on."""
+        """Returns how the flight ends now: control lost, at or far beside the path's end, or time up; else None."""
         if fault is not None:
             return Ending(Outcome.LOST_CONTROL, fault)
         after, nearest = f"after {state.time_s:.0f} s", self.where(state)

@@ -220,7 +220,7 @@ def _check_exists(path: Path) -> None:
 
 
 def recording_of(path: Path) -> Path:
-    """Returns the recording in a run folder, whose run may be incomplete."""
+    """Returns the recording in a run folder, whose run may be incomplete; a RunFolderError: none, or changed files."""
     recording = path / RECORDING
     if not recording.is_file():
         _check_exists(path)

@@ -155,7 +155,7 @@ def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float)
 def _deviation(
     given: DeviationSpec | None, uncertainty: UncertaintySpec | None, rng: _Draws
 ) -> DeviationSpec | None:
-    """Draws the deviations of one flight that the scenario does not give, of standard deviations `uncertainty`."""
+    """Returns the deviations of one flight: those given, others drawn with standard deviations `uncertainty`, or 0."""
     names = list(DeviationSpec.model_fields)
     if uncertainty is None:
         return given and given.filled(**dict.fromkeys(names, 0.0))

@@ -134,7 +134,7 @@ def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
 
 
 def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
-    """The law for one flight, from a section that `resolved_guidance` returned."""
+    """The law for one flight, along paths or to waypoints, from a section that `resolved_guidance` returned."""
     seal()  # before the laws' machine code is loaded
     kind, config = _kind_and_config(spec)
     limits = limits_of(aircraft)

@@ -84,7 +84,7 @@ class RangeSensor:
         self._listed_at = (math.nan, math.nan, math.nan)
 
     def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
-        """Takes a scan from a place at a time."""
+        """Takes a scan from a place at a time; ranges without errors are computed when they are first read."""
         faces = self._near(east_m, north_m, time_s).faces(time_s)
         seen = {
             **self._always,

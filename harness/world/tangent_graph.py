@@ -110,7 +110,7 @@ class TangentScene:
         return within
 
     def free_points(self, points: FloatArray) -> BoolArray:
-        """(k,) whether each of (k, 2) points may lie on a path."""
+        """(k,) whether each of (k, 2) points is in the area and keeps the clearance, as on a path."""
         import shapely
 
         free = self._inside_area(points)
@@ -122,7 +122,7 @@ class TangentScene:
         return free
 
     def free_segments(self, begin: FloatArray, end: FloatArray) -> BoolArray:
-        """(k,) whether each segment between (k, 2) points may be part of a path."""
+        """(k,) whether each segment between (k, 2) points is in the area and keeps the clearance."""
         import shapely
 
         free = self._inside_area(begin) & self._inside_area(end)

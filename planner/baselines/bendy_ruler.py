@@ -61,7 +61,7 @@ class BendyRuler(Steerer):
         return best
 
     def _second_clear(self, end: Point, points_m: FloatArray) -> bool:
-        """Step 2: whether a line onwards from the end of the first one is clear."""
+        """Step 2: whether a line onwards from the end of the first one is clear; always if that is the goal."""
         goal = self.mission.goal_m
         left_m = math.dist(end, goal)
         if left_m < 1.0:
@@ -82,7 +82,7 @@ class BendyRuler(Steerer):
         return last if keeps else bearing
 
     def _margin_along(self, a: Point, b: Point, points_m: FloatArray) -> float:
-        """Least distance of the line from a to b to an edge point, or of its end to the border of the area."""
+        """Least distance (m) from edge points of the line from a to b, infinite without any; negative: b is outside."""
         xmin, ymin, xmax, ymax = self.mission.bounds_m
         border = min(b[0] - xmin, xmax - b[0], b[1] - ymin, ymax - b[1])
         if border < 0.0 or not len(points_m):

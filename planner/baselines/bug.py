@@ -75,7 +75,7 @@ class Bug1(Walker[BugState]):
         return state
 
     def follows(self, place: Point, state: BugState) -> tuple[Point, ...]:
-        """The place beside the boundary, and the place where the way round or back ends."""
+        """The place beside the boundary, and the place where the way round or back ends; empty on a straight."""
         if isinstance(state, Circling | Returning):
             return place, (state.hit if isinstance(state, Circling) else state.q).place
         return ()
@@ -135,7 +135,7 @@ class Bug1(Walker[BugState]):
         return Straight()
 
     def _circled(self, state: Circling, flown: FloatArray) -> Circling:
-        """The state of circling after a further part of the boundary."""
+        """The state of circling after a further part of the boundary, with Q where that came nearer to the goal."""
         walked = state.walked_m + length_of(flown)
         if len(flown) < 2:
             return state
@@ -175,7 +175,7 @@ class Bug2(Bug1):
         return Enclosed(f"{self.enclosed()}: back at the hit point without a leave point")
 
     def _leaves(self, way: FloatArray, state: Circling | Returning) -> float:
-        """Arc length of the first leave point; infinite where there is none."""
+        """Arc length of the first leave point: on the M-line, nearer to the goal, way free; infinite without one."""
         assert isinstance(state, Circling)
         m_line = np.array(self.goal) - self._start
         off = (way - self._start) @ (-m_line[1], m_line[0])

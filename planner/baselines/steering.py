@@ -37,7 +37,7 @@ class Replanner(ABC):
         self._planned_s = -math.inf
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Keeps the path in effect, or plans a new one."""
+        """Keeps the path in effect, or plans a new one where it is cut or that is due."""
         self.memory.take_in(request.seen)
         path, at_m = request.flown.path if request.flown else None, request.arc_length_m
         left_m, cut = 0.0, False

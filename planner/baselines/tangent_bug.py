@@ -85,7 +85,7 @@ class TangentBug(Walker[TangentBugState]):
         return Toward(math.inf)
 
     def after(self, state: TangentBugState, flown: FloatArray) -> TangentBugState:
-        """Moves the anchor along with the aircraft."""
+        """Moves the anchor along with the aircraft, and notes d_followed and the length walked."""
         if not isinstance(state, BoundaryFollowing):
             return state
         followed = min(state.followed_m, self._nearest_m(state.anchor))
@@ -109,7 +109,7 @@ class TangentBug(Walker[TangentBugState]):
         return self.mission.sensor_range_m / LOOKS_PER_RANGE
 
     def prefers(self, new: tuple[WalkLeg[TangentBugState], ...], left_m: float) -> bool:
-        """Whether a new walk is better: a long straight to a boundary, or a way to the goal that is shorter or free."""
+        """Whether a new walk is better: far straight to a boundary, or to the goal if the old is longer or not free."""
         state = new[0].state
         if isinstance(state, BoundaryFollowing):
             return not state.on_boundary and length_of(new[0].way) > self.look_again_m()
@@ -202,7 +202,7 @@ class TangentBug(Walker[TangentBugState]):
         return min(self.known.nearest_to_goal_m(anchor), math.dist(anchor, self.goal))
 
     def _leave_node(self, place: Point, state: BoundaryFollowing) -> TangentNode | None:
-        """The node to leave the boundary for: d_reach < d_followed."""
+        """The node to leave the boundary for: d_reach < d_followed, of these the one soonest reached; None if none."""
         limit = state.followed_m - self._progress_m
         nearer = [node for node in self._nodes(place, state.anchor) if node.to_goal_m < limit]
         return min(nearer, key=lambda node: node.way_m, default=None)

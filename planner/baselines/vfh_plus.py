@@ -118,7 +118,7 @@ class VfhPlus(Steerer):
         return min(self._candidates(masked, goal), key=cost, default=None)
 
     def _candidates(self, masked: BoolArray, goal: float) -> list[float]:
-        """Step 4: the candidate directions (rad) of the free openings."""
+        """Step 4: the candidate directions (rad): middles of narrow openings, two in wide ones, and the goal's."""
         if not masked.any():
             return [goal]
         count, width = len(masked), WIDTH_RAD

@@ -171,7 +171,7 @@ class Walker(ABC, Generic[WalkState]):
         return self.after(leg.state, piece(leg.way, 0.0, arc_length_m - begin))
 
     def _found(self, walk: Iterable[WalkLeg[WalkState]], request: PlanRequest, place: Point) -> Plan:
-        """The plan that flies a walk; NO_PATH or UNREACHABLE where it leads nowhere."""
+        """The plan that flies a walk; if it leads nowhere NO_PATH, or UNREACHABLE if enclosed in a settled world."""
         legs = tuple(connected(walk, place))
         corners = np.concatenate([leg.way for leg in legs])
         apart = np.hypot(*np.diff(corners, axis=0).T) > SHORTEST_M

@@ -155,7 +155,7 @@ def turns_onto(pose: Pose, target: Point, radius_m: float) -> list[list[Segment]
 
 
 def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | None:
-    """The shorter of the turns from a pose onto a straight line that ends at a point, and that line."""
+    """The shorter turn from a pose onto a straight line that ends at a point, and that line; None if there is none."""
     ways = turns_onto(pose, target, radius_m)
     return ways[0] if ways else None
 

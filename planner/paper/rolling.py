@@ -38,7 +38,7 @@ class ImprovedBug:
         self._revision = -1
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Section 3.3: one step of the rolling window, where one is due."""
+        """Section 3.3: one step of the rolling window, where one is due; a holding turn without a candidate."""
         window, at_m = self.planning_window(request), request.arc_length_m
         path = request.flown.path if request.flown else None
         cut = False

@@ -100,7 +100,7 @@ class Commitment:
         return place_on(course.path, free_to_m)[0]
 
     def _to_goal(self, certifier: Certifier, course: Course, seen: MapView, cut_m: float) -> Certified | None:
-        """All of a course that can be flown into the goal circle, however far off it the aircraft may be."""
+        """All of a course to the goal, if it is certified up to where the goal is surely reached; else None."""
         mission = self._mission
         if not course.to_goal or course.nodes[-1] != mission.goal_m:
             return None

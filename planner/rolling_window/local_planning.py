@@ -179,7 +179,7 @@ class LocalPlanning:
         return next((route for route in routes if route is not None), None)
 
     def _reluctance_m(self, candidate: Candidate, course: Course | None) -> float:
-        """Length (m) added to a candidate that passes obstacles on another side than the course, or leads back."""
+        """Length (m) added to a candidate for leading back and for sides of obstacles other than the course's."""
         switching = 0.0
         if course is not None:
             self.work_count.add(4, POINT_WORK, 4 * len(candidate.nodes) * course.known)

@@ -152,7 +152,7 @@ class RollingWindow(CertifiedPlanner):
         return fresh_m
 
     def _due(self, request: PlanRequest, plan: CommittedPlan, here_m: float, newly_cut: bool) -> bool:
-        """Whether the window is to roll on now."""
+        """Whether the window is to roll on now: off the plan, as far on as is due, or something is in its way."""
         met = meets(plan, here_m, self._mission, self._threats)
         self._monitor.broken |= met
         if self._left_behind(request, plan, here_m):
@@ -192,7 +192,7 @@ class RollingWindow(CertifiedPlanner):
         return self._no_way_found(now)
 
     def _work(self, now: Situation, serves: bool) -> Work:
-        """The portion of search work before this answer."""
+        """The portion of search work before this answer: by what moves, whether the plan is safe, and if it serves."""
         if now.request.seen.moving:
             return Work.WHILE_MOVING
         if self._unsafe(now):

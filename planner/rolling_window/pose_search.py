@@ -33,7 +33,7 @@ def search_poses(
     terrain: Terrain,
     to_go: Callable[[Point], float],
 ) -> Generator[None, None, Route | None]:
-    """The cheapest flyable route over (x, y, course), in steps of one turn radius, with a straight between turns."""
+    """The cheapest flyable route over (x, y, course) in steps of a turn radius, a straight between turns; else None."""
     step_m = limits.radius_m
     largest = 2.0 * math.asin(step_m / (2.0 * limits.radius_m))
     course = math.atan2(start.tangent_north, start.tangent_east)

@@ -80,7 +80,7 @@ class RollingSearch:
         work: Work,
         threats: Threats | None,
     ) -> CommittedPlan | None:
-        """Searches with one portion of work, and returns the first certified plan that may be flown.
+        """Searches with one portion of work; returns the first certified plan that may be flown, None without one.
 
         `ahead` is what is left of the course in effect, and `serves` tells whether that can still be flown.
         """

@@ -130,7 +130,7 @@ class Certifier:
     def certify(
         self, path: Path, seen: MapView, terrain: Terrain, to_m: float = math.inf
     ) -> Certified | None:
-        """The longest part of a path that ends in a turn which is seen to be free, begun before the arc length `to_m`.
+        """The longest part of a path that ends in a turn seen to be free, begun before `to_m` along it; else None.
 
         Up to there the path keeps its distance from all edges seen; `terrain` has the distance that the turn keeps.
         """

@@ -81,7 +81,7 @@ def read_waypoints(text: str, source: str) -> Program:
 
 
 def _home_item(items: list[Item], notes: list[str]) -> Home:
-    """Takes the first item out of the items if it is home, and returns home."""
+    """Takes the first item out of the items if it is home, and returns home; else three times None."""
     above = FRAMES.get(items[0].frame, SEA) if items else HOME
     if not items or items[0].command != commands.WAYPOINT or (items[0].number != 0 and above != SEA):
         return None, None, None

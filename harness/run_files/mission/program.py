@@ -157,7 +157,7 @@ class _Run:
         return ItemFate(item.number, commands.name_of(item.command), NOT_REACHED, doubt)
 
     def _jump(self, item: Item, at: int) -> int:
-        """Returns the place in the items after a jump."""
+        """Returns the place in the items after a jump: its target while it is to be taken, else the next item."""
         wanted, repeats = item.params[0], int(item.params[1])
         if wanted not in self.index:
             first, last = min(self.index), max(self.index)

@@ -120,7 +120,7 @@ class _RouteBuilder:
         self._altitude_m = vertex.altitude_m
 
     def _heading(self) -> complex | None:
-        """Returns the direction at the end of the route so far."""
+        """Returns the direction at the end of the route so far; None before its first way."""
         for before, after in zip(self._run[-2::-1], self._run[::-1], strict=False):
             if abs(after.place - before.place) > SAME_PLACE_M:
                 return (after.place - before.place) / abs(after.place - before.place)
@@ -173,7 +173,7 @@ class _RouteBuilder:
         self._add(Vertex(pose[0], altitude, None))
 
     def _around_m(self, loiter: Loiter, circle: Circle, altitude: float) -> float:
-        """Returns the way (m) of a loiter round its circle."""
+        """Returns the way (m) of a loiter round its circle: by turns, by time, or as long as it climbs."""
         if loiter.turns is not None:
             return loiter.turns * math.tau * circle.radius_m
         return self._climbing_m(altitude) if loiter.time_s is None else loiter.time_s * self._mps
@@ -232,14 +232,14 @@ class _RouteBuilder:
         return abs(way) < turn_m * (PAST_RADII if angle > PAST_RAD else math.tan(0.5 * angle))
 
     def _turn(self, rows: Sequence[Row]) -> Pose | None:
-        """Adds a way that is flown as it is, whatever the law."""
+        """Adds a way that is flown as it is, whatever the law; returns the pose at the end of the route, if any."""
         if rows:
             along = (self._length_m, self._length_m + sum(row[5] for row in rows))
             self._legs.append(MissionLeg(Route(np.array(rows)), along))
         return self._append(rows)
 
     def _append(self, rows: Sequence[Row]) -> Pose | None:
-        """Adds lines and arcs as they are."""
+        """Adds lines and arcs as they are; returns the pose at the end of the route, if any."""
         for row in rows:
             self._given.append(np.add(sampled(row, math.ceil(row[5] / SAMPLE_M)), (0.0, 0.0, self._length_m)))
             self.rows.append(row)

@@ -27,7 +27,7 @@ WALL_SHARE: Final = 1e-9
 
 
 def read(spec: FileSpec) -> Contents:
-    """Reads the buildings and bridges of a CityJSON file."""
+    """Reads the buildings, bridges and other constructions of a CityJSON file; other objects are counted in a note."""
     content = json_of(spec.path)
     if not isinstance(content, dict) or not isinstance(content.get("CityObjects"), dict):
         raise InputError("has no CityObjects; must be CityJSON")

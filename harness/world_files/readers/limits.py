@@ -66,7 +66,7 @@ _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", 
 
 
 def _unit_and_datum(words: Sequence[str]) -> tuple[str | None, Datum | None]:
-    """Returns the unit and the datum that words name; ground goes before sea, and a flight level before other units."""
+    """Returns unit and datum that words name, or None; ground goes before sea, a flight level before other units."""
     unit = "FL" if "FL" in words else next((each for each in words if each in _UNIT_M), None)
     datums = [_DATUMS[each] for each in words if each in _DATUMS] + [Datum.SEA] * (unit == "FL")
     return unit, Datum.GROUND if Datum.GROUND in datums and unit != "FL" else next(iter(datums), None)
@@ -85,7 +85,7 @@ def limit_of(text: str, unit: str = "FT", datum: Datum = Datum.SEA) -> Limit | N
 
 
 def limit_told(value: Any, said: str, notes: list[str], name: str) -> Limit | None:
-    """Reads a limit whose unit and datum may stand in `said`; a missing one is metres, or sea level, with a note."""
+    """Reads a limit whose unit and datum `said` may name, else metres, sea level, and a note; None: not known."""
     text = str(value) if isinstance(value, str | int | float) else ""
     own_unit, own_datum = _unit_and_datum(_LIMIT_WORD.findall(text.upper()))
     unit, datum = _unit_and_datum(re.findall("[A-Z]+", said.upper()))

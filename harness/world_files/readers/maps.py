@@ -88,7 +88,7 @@ def read_kml_polygons(spec: FileSpec) -> Contents:
 
 
 def _kml_part(shape: Shape, notes: list[str]) -> Part:
-    """Returns a polygon of KML as a part."""
+    """Returns a polygon of KML as a part: with the limits in its data, else up to its highest corner, if in the air."""
     rings = [[(longitude, latitude) for latitude, longitude, _ in ring] for ring in shape.rings]
     name, datum = shape.name[:40], DATUMS.get(shape.mode)
     try:

@@ -26,7 +26,7 @@ TALL_MAN_MADE: Final = frozenset(
 
 
 def read_xml(spec: FileSpec) -> Contents:
-    """Reads an OpenStreetMap XML file."""
+    """Reads an OpenStreetMap XML file, its elements in any order; InputError: Overpass' `out geom`, JOSM's changes."""
     data = read_bytes(spec.path, MAX_BYTES)
     if re.search(rb"<nd [^>]*\blat=", data):
         raise InputError("has places inside its ways (`out geom`); ask for `out body; >; out skel`")
