@@ -111,7 +111,7 @@ class ObstacleMemory:
         )
 
     def _take_in(self, seen: MapView) -> FloatArray:
-        """Takes in the edge points of the map that stand still."""
+        """Takes in and returns the new edge points of the map that stand still; forgets those that it took away."""
         fresh = seen.edges_since(self._revision)
         if seen.last_removal_revision > self._revision >= 0:
             self.ever_cleared, known = True, seen.edges_since(-1)

@@ -36,7 +36,7 @@ class RouteLaw(ABC):
         """Roll (rad) and true airspeed (m/s; NaN: the mission's) that the law asks for, without limits."""
 
     def update(self, state: AircraftState) -> GuidanceOutput:
-        """Decides the roll command for the next update interval."""
+        """Decides the roll command: what the law wants, within the bank limit, changed as fast as the aircraft can."""
         place = self.progress.nearest(state.east_m, state.north_m)
         wanted, airspeed_mps = self.wanted(state, place)
         allowed = min(max(wanted, -self._limit_rad), self._limit_rad)

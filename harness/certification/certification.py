@@ -133,7 +133,7 @@ class Tally:
         self.runs, self.held, self.decided = 0, 0, False
 
     def add(self, run: int, held: bool) -> None:
-        """Counts a day that is over."""
+        """Counts a day that is over, once all before it are, and sees whether the claim is decided."""
         self._ahead[run] = held
         while not self.decided and self.runs in self._ahead:
             self.held += self._ahead.pop(self.runs)

@@ -154,7 +154,7 @@ class Navigator(StateEstimator):
         return tuple.__new__(AircraftState, values)  # a fifth of the time of `_replace`
 
     def _go_on(self, time_s: float, place: tuple[float, float]) -> None:
-        """Advances the errors from the call before to this time."""
+        """Advances the errors to this time; in an outage that of the position drifts on from what it was."""
         first, before_s = math.isnan(self._time_s), self._time_s
         noise = next(self._noise)
         if not first:

@@ -111,7 +111,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begins an episode."""
+        """Begins an episode; without a seed with the scenario's, or one drawn by the generator that a seed began."""
         super().reset(seed=seed)
         drawn = int(self.np_random.integers(2**31)) if self._seeded and seed is None else seed
         self._seeded |= seed is not None

@@ -86,7 +86,7 @@ class ObstacleMap(EdgePoints):
         self._taken_at, self._taken_nearest = complex(math.inf, math.inf), math.inf
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
-        """Takes in one scan except the rays that are `ignored`, (n,)."""
+        """Takes in a scan, if the view has changed, except the rays `ignored`, (n,); at times looks for points gone."""
         nearest = scan.nearest_m
         if nearest < math.inf:
             sensor = complex(scan.east_m, scan.north_m)

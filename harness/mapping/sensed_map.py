@@ -113,7 +113,7 @@ class SensedMap:
         return self._free.contains(points_m)
 
     def update(self, scan: RangeScan) -> None:
-        """Takes in one scan."""
+        """Takes in one scan: first what moves, then edge points, then free space."""
         ignored = self._moving.update(smoothed(scan, self._clearance) if self._noisy else scan)
         before = self.revision
         self._edges.update(scan, ignored)

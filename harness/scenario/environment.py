@@ -51,7 +51,7 @@ class GroundSpec(Section):
 
     @classmethod
     def of(cls, field: HeightField) -> GroundSpec:
-        """The section that holds a height field, to a tenth of a metre."""
+        """The section that holds a height field, to a tenth of a metre, or to 1 / 60,000 of what its heights span."""
         import numpy as np
 
         from harness.world_files.height_field import packed

@@ -118,7 +118,7 @@ class RelayProcess:
         self._sender = None
 
     def _send(self, pipe: Any, ready: threading.Event) -> None:
-        """Sends what is queued through the pipe, in a thread."""
+        """Sends what is queued through the pipe, each once the last was taken; tells when the viewer has gone."""
         try:
             while (message := self._waiting.get()) is not None:
                 pipe.send_bytes(message)

@@ -121,7 +121,7 @@ class RangeSensor:
         return listed
 
     def _degraded(self, ranges: FloatArray) -> FloatArray:
-        """Adds the imperfections of the sensor to ranges."""
+        """Adds the imperfections of the sensor to ranges: noise, lost returns, false returns."""
         config, n = self._config, len(ranges)
         if config.range_noise_m > 0:
             ranges = np.maximum(ranges + config.range_noise_m * self._noise.standard_normal(n), 0.0)

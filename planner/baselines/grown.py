@@ -98,7 +98,7 @@ class GrownObstacles:
         return shapely.box(*(bounds + inset * np.array((1.0, 1.0, -1.0, -1.0))))
 
     def _grown(self, fresh: FloatArray) -> Any:
-        """The union of the discs about (k, 2) points."""
+        """The union of discs about (k, 2) points, as wide as is kept, less wide where they would cover the goal."""
         # The goal itself may lie nearer to an edge than what is kept elsewhere.
         room = np.hypot(*(fresh - self._mission.goal_m).T) - 1e-3
         radii = np.clip(room, min(self._mission.clearance_m, self.keep_m), self.keep_m)

@@ -100,7 +100,7 @@ class Mppi(Replanner):
         return np.ascontiguousarray(near[np.sort(first)])
 
     def _optimise(self, pose: Pose, points_m: FloatArray) -> FloatArray:
-        """Steps 2 to 4; returns the rollouts of the last round, (K, steps, 2)."""
+        """Steps 2 to 4: moves the nominal controls; returns the rollouts of the last round, (K, steps, 2)."""
         count, steps = self._config.samples, self._config.steps
         for round_number in range(ROUNDS):
             drawn = self._random.normal(size=(count, steps))

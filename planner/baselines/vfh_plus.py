@@ -69,7 +69,7 @@ class VfhPlus(Steerer):
         return replace(super().picture(request), sectors=sectors)
 
     def _binary(self, pose: Pose, near: FloatArray) -> BoolArray:
-        """Which sectors are blocked: the primary histogram between two thresholds."""
+        """Which sectors are blocked: by the primary histogram, between two thresholds as before, or leading outside."""
         dx, dy = near[:, 0] - pose.east_m, near[:, 1] - pose.north_m
         distance = np.hypot(dx, dy)
         half = np.arcsin(np.minimum(self._keep_m / np.maximum(distance, 1e-9), 1.0))

@@ -51,7 +51,7 @@ class AnytimeSearch:
         self.candidates: list[Candidate] = []  # looked at so far
 
     def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
-        """Yields the courses found with one more portion of work."""
+        """Yields the courses found with one more portion of work; the search is `done` when there is no more to try."""
         done = self._local.work_count.done
         enough = done + max(work, min(LONG_SHARE * (done - self._begun), MOST_WORK))
         self._start, self._flown = start, flown

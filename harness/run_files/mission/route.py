@@ -80,7 +80,7 @@ class _RouteBuilder:
         self._altitude_m = math.nan
 
     def fly(self, number: int, step: MissionStep) -> None:
-        """Adds a step to the route."""
+        """Adds a step to the route, its airspeed first: a waypoint, a loiter, or the end of an approach."""
         if step.airspeed_mps is not None:
             self._change_speed(step, step.airspeed_mps or self._flying.airspeed_mps)
         at = step.place if step.place is not None else self._here()
