@@ -75,7 +75,7 @@ def fastest_mps(frame: Airframe, airspeed_mps: float, side: float) -> float:
 
 
 def holds(frame: Airframe, airspeed_mps: float, rate_mps: float) -> bool:
-    """Tells whether an aircraft climbs (sinks where negative) at a rate and keeps its airspeed."""
+    """Tells whether an aircraft climbs (sinks where negative) at a rate and keeps its airspeed, if it flies at all."""
     altitude = REFERENCE_ALTITUDE_M + max(-rate_mps, 0.0) * (SETTLING_S + JUDGED_S)
     start = StartConditions(0.0, 0.0, altitude, 0.0, airspeed_mps)
     try:

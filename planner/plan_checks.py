@@ -19,11 +19,11 @@ from planner.interface import UNIT_TOLERANCE, FloatArray, Mission, Path, Plan, P
 MOST_REASON_LETTERS = 2000
 """A reason is one sentence; a longer one than this is refused."""
 MOST_SEGMENTS = 100_000
-"""Most segments of a path and most waypoints of a plan: as many as a curve of 100 km sampled at 1 m has."""
+"""A path of more segments, or a plan of more waypoints, is refused: as many has a curve of 100 km at every metre."""
 LONGEST_M, MOST_TURNING_RAD = 1e7, 1e5
 """Greatest length of a path, five times across the largest area, and most that it may turn: 16,000 full turns."""
 FURTHEST_M = 1e8
-"""Largest coordinate of a waypoint, east, west, north or south of the origin."""
+"""A waypoint further than this east, west, north or south of the origin is refused."""
 START_S = 1.0
 """A path may begin this much flying time ahead of the aircraft or behind it; see `start_tolerance_m`."""
 JOIN_M = 0.1

@@ -34,7 +34,7 @@ NO_DEVIATIONS: Final = ("uncertainty", json.dumps(dict.fromkeys(UncertaintySpec.
 DRAW_FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KEY=A,B,... (each as likely)"
 
 LEAST_RARE_DAYS: Final = 500
-"""Fewest days of a subset simulation: each independent run then begins with 15."""
+"""A subset simulation of fewer days is refused: with as many each independent run begins with 15."""
 
 Settings = Sequence[tuple[str, str]]
 Vary = Mapping[str, Mapping[str, Any]]

@@ -52,7 +52,7 @@ SCAN_SHARE = 0.004
 LEAST_PERIOD_S = 2.0
 """Except before plans, scans are drawn no more often than this, so that an hour stays small in any area."""
 CELL_SHARE = 0.0015
-"""Side of the cells in which sensed places are gathered, as a share of the area."""
+"""Side of the cells in which sensed places are gathered, as a share of the area's longer side."""
 PIECE_SHARE = 0.001
 """Length of a piece of the trail, which has one colour, as a share of the area's longer side."""
 MARKER_STEP_ROWS, THIN_STEP_ROWS = 5, 20

@@ -100,7 +100,7 @@ def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: f
 
 
 INSIDE_M: Final = 1e-3
-"""A flight begins this far inside the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
+"""A flight from the boundary begins this far inside: the flight model keeps its place in degrees, to some 1e-9 m."""
 SURVEY_ALTITUDE_M: Final = 300.0
 """Altitude above the sea at which an aircraft's range of airspeeds is measured."""
 PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # between which the survey proves level flight

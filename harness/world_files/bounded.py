@@ -8,9 +8,9 @@ from typing import Any, Final
 from harness.files.input_file import InputError, parsed_json, read_data
 
 MAX_BYTES: Final = 400_000_000
-"""Largest file that is read in pieces, or whose numbers take little more room than its bytes."""
+"""A larger file is refused, of a kind that is read in pieces or that takes little more memory than its bytes."""
 MAX_TREE_BYTES: Final = 64_000_000
-"""Largest JSON or text file that is read whole: it takes about ten times its size in memory."""
+"""A larger JSON or text file is refused, of a kind that takes about ten times its size in memory."""
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES, first: int | None = None) -> bytes:

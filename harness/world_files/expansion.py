@@ -25,7 +25,7 @@ MARGIN: Final = 0.02
 DECIMALS: Final = 3
 """Decimals of a corner in metres: corners are rounded to a millimetre."""
 MAX_CORNERS: Final = 900_000
-"""Most corners of all files together: a scenario with more could not be read again."""
+"""Files with more corners together are refused: a scenario with them could not be read again."""
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
 """A polygon without a known bottom or top gets these, in metres above mean sea level."""
 

@@ -29,7 +29,7 @@ PROGRESS_SHARE = 0.05
 """A leave point is nearer to the goal than the hit point by more than this share of the kept distance."""
 
 LOST_SHARE = 1.5
-"""If Q is not met again within this share of a round, the obstacle has changed, and is gone round anew."""
+"""If Q is not met again within this many rounds of the obstacle, that has changed, and is gone round anew."""
 
 
 @dataclass(frozen=True)

@@ -87,7 +87,7 @@ class ImprovedBug:
         return self._sensed_m
 
     def local_planning(self, window: Window, start: Pose) -> list[Route]:
-        """Section 3.2: multi-step search, then route optimisation of each candidate; the shortest first."""
+        """Section 3.2: multi-step search, route optimisation of each candidate; the shortest first, none if blocked."""
         ahead = along((*start, 0.0, 0.0), 0.5 * self._config.resolved_step_m)
         course = math.atan2(start.tangent_north, start.tangent_east)
         if not window.free(start[:2], ahead[:2]):

@@ -23,7 +23,7 @@ MAX_CELLS: Final = 60_000_000
 CACHE_MB: Final = 64
 """Size of GDAL's cache, which is a twentieth of the machine's memory otherwise."""
 MAX_NUMPY_BYTES: Final = 500_000_000
-"""A ZIP archive with NumPy arrays unpacks to at most this many bytes."""
+"""A ZIP archive whose NumPy arrays unpack to more bytes than this is refused."""
 VOIDS: Final = (-9999.0, -32767.0, -32768.0)
 """In files that name no value for missing heights, these mean a cell without one."""
 HEIGHTS_M: Final = (-12_000.0, 9_000.0)
