@@ -293,7 +293,7 @@ class MovingObstacles:
     def _found_again(
         self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
     ) -> IntArray:
-        """Finds a track's outline in a scan; returns the indices of the places that belong to it."""
+        """Finds a track's outline in a scan and notes its shift; returns the indices of its places, if any."""
         unknown_mps = 0.0 if len(track.shifts) >= FEWEST_SHIFTS else MOST_MPS
         gate = self._gate + unknown_mps * (scan.time_s - track.outline_s)
         stiff = STIFF_IN_NOISE if self._is_free else STIFF

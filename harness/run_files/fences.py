@@ -38,7 +38,7 @@ class Fences:
 
 
 def in_plane(fences: Fences, plane: Callable[[Place], Place], source: str) -> Fences:
-    """Returns fences in the local plane, their rings without repeated and closing points."""
+    """Returns fences in the local plane, rings without repeated points; an InputError if no place is inside of all."""
     clean = replace(fences, every=tuple(_clean_fence(fence.moved(plane), source) for fence in fences.every))
     if clean.allowed is not None and clean.allowed.is_empty:
         names = ", ".join(fence.name for fence in clean.inclusions)

@@ -63,7 +63,7 @@ class Bug1(Walker[BugState]):
     """Bug1 for one flight."""
 
     def begin(self, place: Point) -> BugState:
-        """Straight to the goal."""
+        """The state that a walk begins in: straight to the goal."""
         return Straight()
 
     def after(self, state: BugState, flown: FloatArray) -> BugState:
