@@ -38,33 +38,28 @@ class Fences:
 
 
 def in_plane(fences: Fences, plane: Callable[[Place], Place], source: str) -> Fences:
-    """Returns fences in the local plane, rings without repeated points; an InputError if no place is inside of all."""
-    clean = replace(fences, every=tuple(_clean_fence(fence.moved(plane), source) for fence in fences.every))
-    if clean.allowed is not None and clean.allowed.is_empty:
-        names = ", ".join(fence.name for fence in clean.inclusions)
+    """Returns fences in the local plane; an InputError if one encloses no valid area, or no place is inside of all."""
+    moved = replace(fences, every=tuple(fence.moved(plane) for fence in fences.every))
+    for fence in moved.every:
+        _check_area(fence, source)
+    if moved.allowed is not None and moved.allowed.is_empty:
+        names = ", ".join(fence.name for fence in moved.inclusions)
         raise InputError(f"{source}: {names}: have no place in common; must have one to stay inside")
-    return clean
+    return moved
 
 
-def _clean_fence(fence: Fence, source: str) -> Fence:
-    """The fence without corners that come twice in a row; an InputError if it then encloses no valid area."""
+def _check_area(fence: Fence, source: str) -> None:
+    """Raises InputError if a fence encloses no valid area."""
     import shapely
 
-    # A ring is closed; a corner that comes twice in a row is one.
-    rings = tuple(
-        tuple(place for place, after in zip(ring, (*ring[1:], *ring[:1]), strict=True) if place != after)
-        for ring in fence.rings
-    )
-    clean = replace(fence, rings=rings)
-    if fence.center is None and min(map(len, rings), default=0) < 3:
+    if fence.center is None and any(len(set(ring)) < 3 for ring in fence.rings or ((),)):
         raise InputError(f"{source}: {fence.name}: has fewer than 3 distinct corners; must enclose an area")
-    if not clean.area.area > 0.0:
+    if not fence.area.area > 0.0:
         raise InputError(f"{source}: {fence.name}: encloses no area; must be a polygon or a circle")
-    if not clean.area.is_valid:
-        reason, _, where = shapely.is_valid_reason(clean.area).partition("[")
+    if not fence.area.is_valid:
+        reason, _, where = shapely.is_valid_reason(fence.area).partition("[")
         place = ", ".join(f"{float(number):.0f}" for number in where.rstrip("]").split()[:2])
         raise InputError(
             f"{source}: {fence.name}: {reason.lower()} at ({place}) m from the path's origin; give its "
             "corners in order round the area"
         )
-    return clean

@@ -195,14 +195,8 @@ def load_run(path: Path) -> Run:
 
 
 WRONG_CONTENT: Final = (
-    AttributeError,
-    LookupError,
-    TypeError,
-    ValueError,
-    ArithmeticError,
-    MemoryError,
-    RecursionError,
-)
+    AttributeError, LookupError, TypeError, ValueError, ArithmeticError, MemoryError, RecursionError
+)  # fmt: skip
 """Errors that come up when values are not what they should be."""
 
 

@@ -42,13 +42,6 @@ class HeightField:
         row = (np.asarray(north_m, dtype=np.float64) - self.corner_m[1]) / self.spacing_m[1]
         return bilinear(self.heights_m, column, row)
 
-    @property
-    def bounds_m(self) -> Box:
-        """xmin, ymin, xmax, ymax of the nodes."""
-        rows, columns = self.heights_m.shape
-        (east, north), (right, up) = self.corner_m, self.spacing_m
-        return east, north, east + (columns - 1) * right, north + (rows - 1) * up
-
 
 def bilinear(values: FloatArray, column: FloatArray, row: FloatArray) -> FloatArray:
     """(k,) values between the four nodes round places in columns and rows; NaN outside, and next to a NaN.

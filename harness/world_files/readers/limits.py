@@ -55,13 +55,8 @@ _LENGTHS_M: Final = {
 }
 """Metres of the units that OpenStreetMap has: https://wiki.openstreetmap.org/wiki/Map_features/Units."""
 _HEIGHTS: Final = (  # attributes with the height of a building
-    "height",
-    "building:height",
-    "building_height",
-    "measuredheight",
-    "render_height",
-    "est_height",
-)
+    "height", "building:height", "building_height", "measuredheight", "render_height", "est_height"
+)  # fmt: skip
 _LEVELS: Final = ("building:levels", "building_levels", "levels", "num_floors", "floors", "storeys")
 
 
