@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from aircraft.interface import FloatArray
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.files.strict_yaml import COMMAND_LINE, Loc, Node, node_of
@@ -26,7 +27,7 @@ from harness.run.scenario_flight import (
     jsbsim_aircraft,
     make_loop,
 )
-from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
+from harness.run_files.given_path import GIVEN, SAME_PLACE_M
 from harness.run_files.path_files import PathAsGiven, read_path
 from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of

@@ -16,14 +16,14 @@ from aircraft.climb import climb_rates
 from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat
 from aircraft.guidance.progress import PathPoint, RouteProgress
 from aircraft.guidance.waypoints import HEADING_FOR_CENTRES, Along, MissionLeg, WaypointLaw, straight
-from aircraft.interface import AircraftState, Route
+from aircraft.interface import AircraftState, FloatArray, Route
 from aircraft.route import route_length
 from harness.files.input_file import InputError
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.observer import Observer, Progress
 from harness.flight.record import Flight, Outcome
 from harness.flight.termination import Ending
-from harness.run_files.given_path import FloatArray, FlyBy, Tightest, fly_by
+from harness.run_files.given_path import FlyBy, Tightest, fly_by
 from harness.run_files.mission.route import CLIMB_SHARE, mission_route
 from harness.run_files.mission.vertices import Flying, Ground, corner_limit_m, without_steps
 from harness.run_files.path_files import PathAsGiven

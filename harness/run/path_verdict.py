@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from aircraft.guidance.altitude import slewed
+from aircraft.interface import FloatArray
 from harness.analysis.breaches import CONTACT, Breach, Kept, compared, crossings, inside_m
 from harness.analysis.deviation import Rows, Stations, deviation
 from harness.analysis.flight_limits import AsGiven, FlightLimits
@@ -20,7 +21,7 @@ from harness.analysis.metrics import error_figures, metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.wording import tallied
 from harness.flight.record import Flight, Outcome, Track
-from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray
+from harness.run_files.given_path import SAME_PLACE_M, CutCorner
 from harness.world.world import World
 
 if TYPE_CHECKING:

@@ -12,9 +12,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-Row = tuple[float, float, float, float, float, float]
-"""A segment, as in `planner.interface.Path`."""
+from aircraft.interface import FloatArray
+from aircraft.route import SHORTEST_M, SegmentRow
 
 GIVEN: Final = "path as given"
 """Stands in place of the planner's name for a flight without a planner."""
@@ -24,8 +23,6 @@ SAME_LINE_M: Final = 0.01
 """A point nearer than this to the line of its neighbours is taken to lie on it."""
 BATCH: Final = 10_000
 """This many segments are simplified at a time, since GEOS recurses once for each point that it keeps."""
-SHORTEST_M: Final = 1e-6
-"""A segment shorter than this is left out."""
 PAST_RAD: Final = np.radians(140.0)
 """A sharper corner is flown past and back, which keeps nearer to both legs from there on (flown: at 140 degrees 118 m
 off against 125 m, at 150 degrees 178 m against 128 m)."""
@@ -145,7 +142,7 @@ def fly_by(
     before, after = radius * shape.before, radius * shape.after
     straight = length - np.append(before, 0.0) - np.append(0.0, after)
     begins = place[:-1] + np.append(0.0, after) * ahead
-    rows: list[Row] = []
+    rows: list[SegmentRow] = []
     begun, station = np.zeros(len(turn)), 0.0
     for leg, long in enumerate(straight.tolist()):
         if long > SHORTEST_M:
@@ -312,7 +309,7 @@ def _least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> Float
     return least_m
 
 
-def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float) -> list[Row]:
+def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float) -> list[SegmentRow]:
     """Returns the turn at a corner: an arc, and where it goes too far another one back."""
     rows = []
     side = 1.0 if turn > 0.0 else -1.0

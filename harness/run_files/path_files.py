@@ -14,12 +14,13 @@ from typing import Any, Final
 import numpy as np
 
 from aircraft.frames import LocalPlane
+from aircraft.interface import FloatArray
 from harness.files.input_file import InputError, decoded, read_data
 from harness.files.mavlink.items import HOME, WPL, Place
 from harness.files.wording import counted
 from harness.run_files.drawn_lines import PathAsRead, read_csv, read_geojson, read_gpx, read_igc, read_kml
 from harness.run_files.fences import Fences, in_plane
-from harness.run_files.given_path import SAME_PLACE_M, FloatArray
+from harness.run_files.given_path import SAME_PLACE_M
 from harness.run_files.mission.mission_files import PLAN, read_plan, read_waypoints
 from harness.run_files.mission.program import Program
 from harness.scenario.sections import ALTITUDES_M

@@ -15,12 +15,13 @@ from typing import Final
 import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
+from aircraft.guidance.circle import Circle, Pose, end_of, onto, sampled, segment
 from aircraft.guidance.waypoints import MissionLeg
-from aircraft.interface import Route
+from aircraft.interface import FloatArray, Route
+from aircraft.route import SegmentRow
 from harness.files.input_file import InputError
 from harness.files.mavlink.items import GROUND
-from harness.run_files.given_path import PAST_RAD, SAME_PLACE_M, CutCorner, FloatArray, FlyBy, Row
-from harness.run_files.mission.circle import Circle, Pose, end_of, onto, sampled, segment
+from harness.run_files.given_path import PAST_RAD, SAME_PLACE_M, CutCorner, FlyBy
 from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.vertices import (
     Flying,
@@ -63,7 +64,7 @@ class _RouteBuilder:
 
     def __init__(self, mission: Program, flying: Flying) -> None:
         self._steps, self._flying, self._home_m = mission.steps, flying, mission.home_altitude_m
-        self.rows: list[Row] = []
+        self.rows: list[SegmentRow] = []
         self._length_m = 0.0
         self._pose: Pose | None = None
         self._run: list[Vertex] = []
@@ -231,14 +232,14 @@ class _RouteBuilder:
         angle = abs(cmath.phase(way / heading))
         return abs(way) < turn_m * (PAST_RADII if angle > PAST_RAD else math.tan(0.5 * angle))
 
-    def _turn(self, rows: Sequence[Row]) -> Pose | None:
+    def _turn(self, rows: Sequence[SegmentRow]) -> Pose | None:
         """Adds a way that is flown as it is, whatever the law; returns the pose at the end of the route, if any."""
         if rows:
             along = (self._length_m, self._length_m + sum(row[5] for row in rows))
             self._legs.append(MissionLeg(Route(np.array(rows)), along))
         return self._append(rows)
 
-    def _append(self, rows: Sequence[Row]) -> Pose | None:
+    def _append(self, rows: Sequence[SegmentRow]) -> Pose | None:
         """Adds lines and arcs as they are; returns the pose at the end of the route, if any."""
         for row in rows:
             self._given.append(np.add(sampled(row, math.ceil(row[5] / SAMPLE_M)), (0.0, 0.0, self._length_m)))

@@ -12,8 +12,9 @@ import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
 from aircraft.guidance.waypoints import MissionLeg, straight
+from aircraft.interface import FloatArray
 from harness.files.mavlink.items import GROUND, HOME, SEA
-from harness.run_files.given_path import SAME_PLACE_M, FloatArray, FlyBy, Tightest, fly_by
+from harness.run_files.given_path import SAME_PLACE_M, FlyBy, Tightest, fly_by
 from harness.run_files.mission.program import MissionStep
 
 Ground = Callable[[FloatArray, FloatArray], FloatArray]

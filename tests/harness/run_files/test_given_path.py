@@ -10,8 +10,9 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aircraft.interface import FloatArray
 from harness.flight.polylines import polylines
-from harness.run_files.given_path import FloatArray, Tightest, fly_by
+from harness.run_files.given_path import Tightest, fly_by
 from planner.geometry.curves import end_of
 from wayproof import Path
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.run_files.given_path import FloatArray
-from harness.run_files.mission.circle import end_of
+from aircraft.guidance.circle import end_of
+from aircraft.interface import FloatArray
 from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.route import LANDING_HEIGHT_M, mission_route
 from harness.run_files.mission.vertices import Flying, Ground, MissionRoute

@@ -1,4 +1,4 @@
-"""Lines and arcs onto the circle of a loiter and off it: rows of `planner.interface.Path`.
+"""Lines and arcs onto the circle of a loiter and off it: rows of `Route.segments`.
 
 The plane is one of complex numbers, east + i north, metres; a direction is a number of size 1.
 """
@@ -11,8 +11,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from aircraft.route import arc_point
-from harness.run_files.given_path import SHORTEST_M, FloatArray, Row
+from aircraft.interface import FloatArray
+from aircraft.route import SHORTEST_M, SegmentRow, arc_point
 
 Pose = tuple[complex, complex]
 """A place and a direction."""
@@ -65,32 +65,32 @@ class Circle(NamedTuple):
         return ((self.side * cmath.phase((leave - self.center) / here)) % math.tau) * self.radius_m
 
 
-def segment(pose: Pose, bend_1pm: float, length_m: float) -> list[Row]:
+def segment(pose: Pose, bend_1pm: float, length_m: float) -> list[SegmentRow]:
     """Returns a line, or an arc with a bend, positive to the left; nothing where it is too short."""
     begin, ahead = pose
     row = (begin.real, begin.imag, ahead.real, ahead.imag, bend_1pm, length_m)
     return [row] if length_m > SHORTEST_M else []
 
 
-def end_of(row: Row) -> Pose:
+def end_of(row: SegmentRow) -> Pose:
     """Returns the pose at the end of a segment."""
     east, north, ahead_east, ahead_north = arc_point(row, row[5])
     return complex(east, north), complex(ahead_east, ahead_north)
 
 
-def sampled(row: Row, pieces: int) -> FloatArray:
+def sampled(row: SegmentRow, pieces: int) -> FloatArray:
     """(pieces + 1, 3) east, north and distance along a segment, both ends among them."""
     along = np.linspace(0.0, row[5], pieces + 1)
     return np.array([(*arc_point(row, part)[:2], part) for part in along.tolist()])
 
 
-def onto(pose: Pose, circle: Circle, turn_m: float) -> list[Row]:
+def onto(pose: Pose, circle: Circle, turn_m: float) -> list[SegmentRow]:
     """Returns the shorter way from a pose onto a circle: straight on as needed, one turn, a line that touches it."""
     ways = (_onto(pose, circle, turn_m, turn) for turn in (1, -1))
     return min((way for way in ways if way is not None), key=lambda way: sum(row[5] for row in way))
 
 
-def _onto(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[Row] | None:
+def _onto(pose: Pose, circle: Circle, turn_m: float, turn: int) -> list[SegmentRow] | None:
     """Returns the way with a turn to one side; None if turn and circle have no common tangent."""
     begin, ahead = pose
     # A common tangent of both, outer where they turn alike and inner where not, needs so much between the centres.
