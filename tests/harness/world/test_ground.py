@@ -53,7 +53,7 @@ def test_a_text_that_holds_other_heights_is_refused(text: str, rows: int, senten
 def test_within_its_reach_nothing_is_ever_touched() -> None:
     field, rng = hills(), np.random.default_rng(5)
     ground = Ground(field)
-    xmin, ymin, xmax, ymax = field.bounds_m
+    xmin, ymin, xmax, ymax = -100.0, 50.0, -100.0 + 49 * 30.0, 50.0 + 39 * 30.0
     reaches = []
     for _ in range(300):
         position = rng.uniform(xmin, xmax), rng.uniform(ymin, ymax), rng.uniform(150.0, 700.0)
