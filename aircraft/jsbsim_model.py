@@ -109,7 +109,8 @@ class JsbsimModel:
 
         fdm = self._fdm = load(frame.files, step_rate_hz)
         trim(fdm, frame.name, plane, start, heading_rad + convergence_rad)
-        self._read = tuple(node(fdm, path).get_double_value for path in STATE_PROPERTIES)
+        read = [node(fdm, path).get_double_value for path in STATE_PROPERTIES]
+        self._read = read[:6], read[6:12], read[12:]
         self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
         self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
         self._write_terrain = node(fdm, "position/terrain-elevation-asl-ft").set_double_value
@@ -130,11 +131,10 @@ class JsbsimModel:
     def state(self) -> AircraftState:
         """The state now, in the local plane."""
         # The functions that read them: to collect what they return first takes half as long again.
-        latitude_rad, longitude_rad, read_up_ft, read_north_fps, read_east_fps, climb_fps, *others = (
-            self._read
-        )
-        true_heading_rad, read_roll_rad, pitch_rad, read_airspeed_fps, load_factor, throttle, *others = others
-        read_elevator, pitch_trim, read_aileron, roll_trim, read_rudder, yaw_trim, read_alpha_rad = others
+        place, motion, controls = self._read
+        latitude_rad, longitude_rad, read_up_ft, read_north_fps, read_east_fps, climb_fps = place
+        true_heading_rad, read_roll_rad, pitch_rad, read_airspeed_fps, load_factor, throttle = motion
+        read_elevator, pitch_trim, read_aileron, roll_trim, read_rudder, yaw_trim, read_alpha_rad = controls
         up_ft, north_fps, east_fps = read_up_ft(), read_north_fps(), read_east_fps()
         roll_rad, airspeed_fps, alpha_rad = read_roll_rad(), read_airspeed_fps(), read_alpha_rad()
         elevator, aileron = read_elevator() + pitch_trim(), read_aileron() + roll_trim()
@@ -283,7 +283,7 @@ class JsbsimModel:
         self, east_fps: float, north_fps: float, down_fps: float, turbulence: DrydenGusts, height_m: float
     ) -> tuple[float, float, float]:
         """Adds the turbulence of the next step to a wind."""
-        heading, airspeed_fps = self._read[6](), self._read[9]()
+        heading, airspeed_fps = self._read[1][0](), self._read[1][3]()
         gusts = turbulence.step(height_m, airspeed_fps * FOOT_M, 1.0 / self.step_rate_hz)
         ahead, right, down = (gust / FOOT_M for gust in gusts)
         return (

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 import time
-from contextlib import redirect_stdout
 from pathlib import Path
 from traceback import walk_tb
 from typing import Final, NamedTuple
@@ -74,22 +73,23 @@ class AskedPlanner:
             PlannerFailedError: the planner raised, or its answer cannot be flown.
             KeyboardInterrupt: as ever.
         """
-        begun, began = time.thread_time(), time.perf_counter()
+        output, begun, began = sys.stdout, time.thread_time(), time.perf_counter()
         try:
-            with redirect_stdout(sys.stderr):
-                own = self._planner.plan(request)
-                if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
-                    self.compute_ms = 1e3 * (time.thread_time() - begun)
-                    self.wall_ms = 1e3 * (time.perf_counter() - began)
-                return Answer(checked_plan(own, request.position_m, self._mission), own)
+            sys.stdout = sys.stderr
+            own = self._planner.plan(request)
+            if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
+                self.compute_ms = 1e3 * (time.thread_time() - begun)
+                self.wall_ms = 1e3 * (time.perf_counter() - began)
+            return Answer(checked_plan(own, request.position_m, self._mission), own)
         except KeyboardInterrupt:
             raise
         except WrongAnswerError as error:
             raise PlannerFailedError(str(error), trace(error)) from None
         except BaseException as error:  # whatever it is, it is no more than a plan that failed
-            with redirect_stdout(sys.stderr):
-                told = f"the planner raised {sentence(error)}{_where(error)}"
-                raise PlannerFailedError(told, trace(error)) from None
+            told = f"the planner raised {sentence(error)}{_where(error)}"
+            raise PlannerFailedError(told, trace(error)) from None
+        finally:
+            sys.stdout = output
 
 
 def _where(error: BaseException) -> str:
