@@ -131,7 +131,8 @@ class ClosedLoop:
         timetable = intervals(loop.model.step_rate_hz, loop.scan_rate_hz if loop.sensor else 0.0)
         self._intervals, self._first_steps = itertools.cycle(timetable), timetable[0][0].steps
         self._check_navigation()
-        ending = self._judge()
+        self._verdict = loop.termination.verdict
+        ending = self._verdict(self.true, self._model.fault())
         if ending is not None:
             self._finish(ending)
 
@@ -148,7 +149,7 @@ class ClosedLoop:
             if guidance and ending is None:
                 ending = self._guide()
             if ending is None:
-                ending = self._advance(steps) or self._judge()
+                ending = self._advance(steps)
             if ending is not None:
                 self._finish(ending)
                 return
@@ -224,7 +225,7 @@ class ClosedLoop:
         return None
 
     def _advance(self, steps: int) -> Ending | None:
-        """Advances the flight model, half way asking a planner again that wants more time; that may end the flight."""
+        """Advances and judges the flight, half way asking a planner again that wants more time; either may end it."""
         if self.plans.wants_more_time:
             self._model.advance(steps // 2)
             steps -= steps // 2
@@ -234,11 +235,7 @@ class ClosedLoop:
                 return ending
         self._model.advance(steps)
         self._read_state()
-        return None
-
-    def _judge(self) -> Ending | None:
-        """Returns how the flight ends at the true state; None while it goes on."""
-        return self._loop.termination.verdict(self.true, self._model.fault())
+        return self._verdict(self.true, self._model.fault())
 
     def _log_row(self) -> None:
         """Logs the state and the latest steering as a row of the track."""

@@ -35,7 +35,7 @@ class _LazyScan(RangeScan):
         """Makes a scan of its attributes by name; instead of the ranges there may be `_follow`, which computes them."""
         scan = cls.__new__(cls)
         # At once: a frozen dataclass would set them one by one, and that is most of the cost of a scan.
-        scan.__dict__.update(attributes)
+        object.__setattr__(scan, "__dict__", attributes)
         return scan
 
     def __getattr__(self, name: str) -> FloatArray:
