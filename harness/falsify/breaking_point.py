@@ -284,11 +284,12 @@ def falsify(
 
 
 def _write(out: Path, result: Mapping[str, Any], failing: Scenario | None) -> None:
-    """Replaces an earlier search, all of which goes; what fails comes before the index that names it."""
+    """Replaces an earlier search file by file; what fails comes before the index that names it, and goes after it."""
     try:
-        (out / FALSIFIED).unlink(missing_ok=True)
         if failing is not None:
             replace_text(out / FALSIFIED, dump_scenario(failing))
         replace_text(out / INDEX, json.dumps(result, indent=2, allow_nan=False) + "\n")
+        if failing is None:
+            (out / FALSIFIED).unlink(missing_ok=True)
     except OSError as error:
         raise WriteError(f"cannot write the search in {out}: {error.strerror or error}") from error
