@@ -126,11 +126,8 @@ def _fly(
     from harness.campaign.workers import local_workers
     from harness.certification.certification import certify as fly_days
 
-    with (
-        resumable(folder, INDEX),
-        local_workers(at_a_time(workers, len(days))) as flyers,
-        step_bar(silent) as bar,
-    ):
+    number = at_a_time(workers, len(days))
+    with resumable(folder, INDEX), local_workers(number) as flyers, step_bar(silent) as bar:
         days.check()
 
         def report(tally: Tally) -> None:

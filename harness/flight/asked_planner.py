@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 from traceback import walk_tb
-from typing import Final, NamedTuple
+from typing import Final
 
 from harness.files.errors import sentence, trace
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
@@ -28,15 +28,6 @@ class PlannerFailedError(RuntimeError):
     def __init__(self, said: str, trace: str) -> None:
         super().__init__(said)
         self.trace = trace
-
-
-class Answer(NamedTuple):
-    """A planner's answer to a request."""
-
-    plan: Plan
-    """The plan, checked."""
-    own: Plan
-    """The object that the planner itself returned, which it gets back as `PlanRequest.flown`."""
 
 
 class AskedPlanner:
@@ -66,8 +57,10 @@ class AskedPlanner:
         """Reason why the shield flies its backup; empty while it flies the planner's path, and without a shield."""
         return str(getattr(self._planner, "backup", "")) if self.shielded else ""
 
-    def plan(self, request: PlanRequest) -> Answer:
-        """Returns the answer to a request, whose `flown` is the `own` of the answer in effect.
+    def plan(self, request: PlanRequest) -> tuple[Plan, Plan]:
+        """Returns the answer to a request, checked, and the object that the planner itself returned.
+
+        The latter of the answer in effect is `PlanRequest.flown`.
 
         Raises:
             PlannerFailedError: the planner raised, or its answer cannot be flown.
@@ -80,7 +73,7 @@ class AskedPlanner:
             if type(own) is not Plan or own.status is not PlanStatus.KEPT:  # else nobody asks how long
                 self.compute_ms = 1e3 * (time.thread_time() - begun)
                 self.wall_ms = 1e3 * (time.perf_counter() - began)
-            return Answer(checked_plan(own, request.position_m, self._mission), own)
+            return checked_plan(own, request.position_m, self._mission), own
         except KeyboardInterrupt:
             raise
         except WrongAnswerError as error:

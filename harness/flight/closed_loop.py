@@ -142,8 +142,10 @@ class ClosedLoop:
         for guidance, scan, steps in next(self._intervals):
             if scan:
                 self._sensing.scan(self.true, self.believed)
-            scanned = bool(self._sensing.pending) and self._map()
-            ending = None
+            entered = self._sensing.enter(self.true.time_s) if self._sensing.pending else None
+            if entered is not None:
+                self.plans.scan_s = entered.time_s
+            ending, scanned = None, entered is not None
             if scanned or (guidance and self.plans.wants_more_time):
                 ending = self.plans.ask(self.believed, self.steering.arc_length_m, scanned)
             if guidance and ending is None:
@@ -168,14 +170,6 @@ class ClosedLoop:
         """
         if self._fixes.jumped(self.true.time_s):
             self._sensing.start_over(self.true.time_s)
-
-    def _map(self) -> bool:
-        """Enters a scan that has become available into the map; returns whether there was one."""
-        scan = self._sensing.enter(self.true.time_s)
-        if scan is None:
-            return False
-        self.plans.scan_s = scan.time_s
-        return True
 
     def _guide(self) -> Ending | None:
         """Takes up a plan that is due, steers along the one in effect, logs a row; returns an ending if a law fails."""

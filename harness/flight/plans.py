@@ -9,7 +9,7 @@ from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
 from harness.files.errors import in_a_line, sentence, trace
-from harness.flight.asked_planner import Answer, AskedPlanner, PlannerFailedError
+from harness.flight.asked_planner import AskedPlanner, PlannerFailedError
 from harness.flight.observer import NOMINAL, Caution, Observer, ShieldState
 from harness.flight.record import AcceptedPlan, Outcome
 from harness.flight.termination import Ending
@@ -29,8 +29,9 @@ class Plans:
     ) -> None:
         self._planner, self._seen = AskedPlanner(planner, mission), ReadOnlyMap(seen)
         self._latency_s, self._observers = mission.compute_latency_s, observers
-        self.coming: tuple[float, float, Answer, Route] | None = None
-        """The plan on its way: time of its search (ms) and of the scan that it used (s), answer and route."""
+        self.coming: tuple[float, float, Plan, Plan, Route] | None = None
+        """The plan on its way: time of its search (ms) and of the scan that it used (s), the plan checked and as the
+        planner gave it, and its route."""
         self._own: Plan | None = None  # the plan in effect, as the planner gave it
         self.scan_s = math.nan
         """When the latest scan that the map has was taken."""
@@ -81,11 +82,10 @@ class Plans:
         request = self._request(state, arc_length_m)
         self._scanned = False
         try:
-            answer = self._planner.plan(request)
+            plan, own = self._planner.plan(request)
         except PlannerFailedError as error:
             self.error = error.trace
             return Ending(Outcome.PLANNER_FAILED, str(error))
-        plan = answer.plan
         if self._planner.shielded:
             self._note_backup(state.time_s)
         self._told, self.wants_more_time = plan.reason, plan.wants_more_time
@@ -101,7 +101,7 @@ class Plans:
             self._stuck, self._in_vain = "", set()
             assert plan.path is not None
             route = Route(plan.path.segments, plan.path.loiter)
-            self.coming = (self._planner.compute_ms, self.scan_s, answer, route)
+            self.coming = (self._planner.compute_ms, self.scan_s, plan, own, route)
             self._due_s = state.time_s + self._latency_s - LATE_S
         return None
 
@@ -113,7 +113,7 @@ class Plans:
         """
         if self.coming is None or state.time_s < self._due_s:
             return None
-        compute_ms, scan_s, answer, route = self.coming
+        compute_ms, scan_s, plan, own, route = self.coming
         late_s = state.time_s - (self._due_s - self._latency_s)
         self.coming, self._due_s = None, math.inf
         try:
@@ -124,8 +124,8 @@ class Plans:
             return Ending(
                 Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)} when it was given a plan"
             )
-        accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, answer.plan, scan_s)
-        self._own = answer.own
+        accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan, scan_s)
+        self._own = own
         self.accepted.append(accepted)
         self.index = accepted.plan_index
         turn_m = float(route.segments[-1, 5]) if route.loiter else -math.inf

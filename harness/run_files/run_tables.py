@@ -77,6 +77,8 @@ def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
     def get(attribute: str) -> list[Any]:
         return list(map(attrgetter(attribute), plans))
 
+    # To cast numbers would import what takes longer than writing the tables.
+    loiter = pa.py_buffer(np.packbits(np.array(get("loiter"), dtype=np.bool_), bitorder="little"))
     return pa.table(
         {
             "plan_index": _numbers(get("plan_index"), np.int64),
@@ -87,7 +89,7 @@ def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
             "waypoints": _lists(get("plan.waypoints_m"), 2),
             "path": _lists(polylines(get("segments")), 2),
             "segments": _lists(get("segments"), 6),
-            "loiter": _flags(get("loiter")),
+            "loiter": pa.Array.from_buffers(pa.bool_(), len(plans), [None, loiter]),
             "length_m": _numbers(get("plan.path.length_m")),
             "max_curvature_1pm": _numbers(get("plan.path.max_curvature_1pm")),
         }
@@ -111,14 +113,6 @@ def _numbers(values: ArrayLike, dtype: DTypeLike = np.float64) -> pa.Array:
 
     array: NDArray[Any] = np.ascontiguousarray(values, dtype)
     return pa.Array.from_buffers(pa.from_numpy_dtype(array.dtype), len(array), [None, pa.py_buffer(array)])
-
-
-def _flags(values: Sequence[bool]) -> pa.Array:
-    """Returns a column of truth values; to cast numbers would import what takes longer than writing the tables."""
-    import pyarrow as pa
-
-    bits = pa.py_buffer(np.packbits(np.array(values, dtype=np.bool_), bitorder="little"))
-    return pa.Array.from_buffers(pa.bool_(), len(values), [None, bits])
 
 
 def _texts(values: Sequence[str]) -> pa.Array:
