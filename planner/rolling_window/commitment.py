@@ -69,10 +69,13 @@ class Commitment:
         to_goal = self._to_goal(certifier, course, seen, cut_m)
         return to_goal or certifier.certify_ahead(course.path, seen, terrain, cut_m) or certified
 
-    def leads_on(self, found: CommittedPlan, start: Start, effective: CommittedPlan | None) -> bool:
-        """Whether a certified plan gets anywhere: to the goal, or along its course to a hold elsewhere.
+    def leads_on(
+        self, found: CommittedPlan, start: Start, effective: CommittedPlan | None, elsewhere: bool = True
+    ) -> bool:
+        """Whether a certified plan gets anywhere: to the goal, or along its course to a hold.
 
-        Flying on round the hold that the plan in effect ends in is no progress along the course.
+        Flying on round the hold that the plan in effect ends in is no progress along the course. The hold has to be
+        `elsewhere` than that one, or may be the same while that is ahead.
         """
         if not found.path.loiter:
             return True
@@ -80,19 +83,18 @@ class Commitment:
         before_m = sum(segment[5] for segment in start.prefix)
         if effective is not None and effective.path.loiter:
             circle = hold_centre(effective.path.segments[-1])
-            if math.dist(hold_centre(found.path.segments[-1]), circle) < hold_m:
+            circled_m = self._circled_m(found.path, circle)
+            same = math.dist(hold_centre(found.path.segments[-1]), circle) < hold_m
+            if same and (elsewhere or circled_m):
                 return False
-            before_m = max(before_m, self._circled_m(found.path, circle))
+            before_m = max(before_m, circled_m)
         return found.loiter_entry_m - before_m >= hold_m
 
     def _circled_m(self, path: Path, circle: Point) -> float:
-        """Length (m) of the beginning of a path that lies on a hold's circle."""
-        circled_m, off_m = 0.0, CONCENTRIC_SHARE * self._mission.hold_radius_m
-        for segment in path.segments.tolist():
-            if not segment[4] or math.dist(hold_centre(segment), circle) > off_m:
-                break
-            circled_m += segment[5]
-        return circled_m
+        """Length (m) of what lies on a hold's circle of a path that ends in a full turn, without that turn."""
+        off_m = CONCENTRIC_SHARE * self._mission.hold_radius_m
+        arcs = (segment for segment in path.segments[:-1].tolist() if segment[4])
+        return math.fsum(arc[5] for arc in arcs if math.dist(hold_centre(arc), circle) <= off_m)
 
     def unseen(self, course: Course, seen: MapView) -> Pose:
         """The first place of a course that has not been seen to be free."""

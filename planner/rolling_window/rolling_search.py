@@ -20,6 +20,10 @@ from planner.shield.evasion import Threats
 BETTER_SHARE = 0.005
 """A course to the goal that can still be flown is replaced only by one shorter by this share of its rest."""
 
+DETOUR_SHARE = 0.15
+"""A way to another hold is flown rather than one to the hold ahead only where it is longer by less than this share of
+the way to that hold: seen from there, what is unseen now is mostly open."""
+
 
 class Work(Enum):
     """Counted work (about 1 us a unit) of a search when it begins, and each further time that the planner is asked."""
@@ -88,6 +92,7 @@ class RollingSearch:
         begins = self.running is None
         search = self.last = self.running or self._begun(request.position_m)
         self.running, nearest_m = search, -math.inf
+        same: CommittedPlan | None = None  # leads to the hold of the plan in effect, which is ahead
         for course in search.courses(start, ahead, first if begins else more):
             # Only the beginning of a way: a whole one that serves is not left for it.
             length_m = course.path.length_m if course.nodes[-1] == self._mission.goal_m else math.inf
@@ -98,15 +103,28 @@ class RollingSearch:
             if found is not None and self._commitment.leads_on(found, start, self._monitor.plan):
                 keeps_m = room_m(found.path, threats)
                 if keeps_m >= self._mission.clearance_m:
-                    self._end(search, ahead, course)
-                    return found
+                    return self._end(search, ahead, nearer(same, found))
                 if keeps_m > nearest_m:  # what moves may come to what is free now
                     nearest_m, self.nearer = keeps_m, found
+            else:
+                same = same or self._to_hold_ahead(found, start, threats)
             search.stuck = search.stuck or course
             self.refused += 1
-        if search.done:
-            self.running, self.known, self.anew = None, search.known, False
+        if not search.done:
+            return None
+        if same is not None:
+            return self._end(search, ahead, same)
+        self.running, self.known, self.anew = None, search.known, False
         return None
+
+    def _to_hold_ahead(
+        self, found: CommittedPlan | None, start: Start, threats: Threats | None
+    ) -> CommittedPlan | None:
+        """A plan that leads on to the hold of the plan in effect, while that is ahead; None if it does not."""
+        if found is None or room_m(found.path, threats) < self._mission.clearance_m:
+            return None
+        leads_on = self._commitment.leads_on(found, start, self._monitor.plan, elsewhere=False)
+        return found if leads_on else None
 
     def _begun(self, position: Point) -> AnytimeSearch:
         """Begins a search, with the effort and the order that searches in vain have led to."""
@@ -114,15 +132,24 @@ class RollingSearch:
         effort, widest_first = self._giving_up.effort, self._giving_up.tried_again
         return AnytimeSearch(self._local, effort, lambda: self._no_way.closed(position), widest_first)
 
-    def _end(self, search: AnytimeSearch, ahead: Course | None, course: Course) -> None:
-        """Ends a search that has found a course."""
+    def _end(self, search: AnytimeSearch, ahead: Course | None, found: CommittedPlan) -> CommittedPlan:
+        """Ends a search that has found a plan, and returns that."""
         self.running, self.known, self.anew = None, search.known, False
         self._giving_up.effort = 0
         before_m = -math.inf if ahead is None else ahead.path.length_m
-        self._monitor.lengthened_m = course.path.length_m - before_m
+        self._monitor.lengthened_m = found.course.path.length_m - before_m
+        return found
 
     def _worth_m(self, ahead: Course | None) -> float:
         """Greatest length (m) of a course that the one in effect is left for; infinite if that leads to no goal."""
         if ahead is None or not ahead.to_goal or ahead.nodes[-1] != self._mission.goal_m:
             return math.inf
         return ahead.path.length_m * (1.0 - BETTER_SHARE)
+
+
+def nearer(same: CommittedPlan | None, other: CommittedPlan) -> CommittedPlan:
+    """Of a plan to the hold ahead, if there is one, and one to another hold the one to be flown."""
+    if same is None:
+        return other
+    longer_m = other.course.path.length_m - same.course.path.length_m
+    return same if longer_m > DETOUR_SHARE * same.loiter_entry_m else other

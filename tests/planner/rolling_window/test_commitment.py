@@ -17,6 +17,7 @@ from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequ
 from planner.memory import ObstacleMemory
 from planner.rolling_window.commitment import Commitment, explanation
 from planner.rolling_window.local_planning import LocalPlanning
+from planner.rolling_window.rolling_search import nearer
 from planner.shield.certificate import hold_centre
 from planner.shield.committed_plan import CommittedPlan, Start
 
@@ -53,11 +54,11 @@ def test_a_new_plan_has_to_gain_a_quarter_of_a_hold_and_to_end_in_another(known:
     round_100 = (1.0, 0.0, 1.0 / 100.0, math.tau * 100.0)
     flown = held((0.0, 0.0, *round_100), entry_m=0.0)
 
-    def leads_on(length_m: float, effective: CommittedPlan | None) -> bool:
-        line = (0.0, 0.0, 1.0, 0.0, 0.0, length_m)
-        return commitment.leads_on(
-            held(line, (length_m, 0.0, *round_100), entry_m=length_m), AT_ORIGIN, effective
-        )
+    def ahead(length_m: float) -> CommittedPlan:
+        return held((0.0, 0.0, 1.0, 0.0, 0.0, length_m), (length_m, 0.0, *round_100), entry_m=length_m)
+
+    def leads_on(length_m: float, effective: CommittedPlan | None, elsewhere: bool = True) -> bool:
+        return commitment.leads_on(ahead(length_m), AT_ORIGIN, effective, elsewhere)
 
     assert [leads_on(length_m, None) for length_m in (24.0, 26.0)] == [False, True]
     assert [leads_on(length_m, flown) for length_m in (24.0, 26.0)] == [False, True]
@@ -66,6 +67,16 @@ def test_a_new_plan_has_to_gain_a_quarter_of_a_hold_and_to_end_in_another(known:
         line = (0.0, 0.0, 1.0, 0.0, 0.0, line_m)
         found = held(whole_turn, line, (line_m, 0.0, *round_100), entry_m=math.tau * 100.0 + line_m)
         assert commitment.leads_on(found, AT_ORIGIN, flown) is gets_on
+    # Another way to the hold ahead leads on, if it may, as far as that is ahead.
+    assert [leads_on(length_m, ahead(length_m), False) for length_m in (24.0, 300.0)] == [False, True]
+    assert not leads_on(300.0, ahead(300.0))
+
+
+def test_another_hold_than_the_one_ahead_is_flown_to_only_on_a_way_that_is_hardly_longer() -> None:
+    turn = held((0.0, 0.0, 1.0, 0.0, 1.0 / 100.0, math.tau * 100.0), entry_m=400.0)
+    ahead, *others = (replace(turn, course=to_goal(length_m)) for length_m in (1000.0, 1059.0, 1061.0))
+    assert [nearer(ahead, each) is each for each in others] == [True, False]
+    assert nearer(None, others[1]) is others[1]
 
 
 def to_goal(length_m: float = 1000.0) -> Course:

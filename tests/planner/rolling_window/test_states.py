@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from planner.geometry.course import Course
 from planner.geometry.curves import Pose, on_loiter
-from planner.interface import BoolArray, FloatArray, Mission, NoWayToBegin, Path, Plan, PlanStatus
+from planner.interface import (
+    BoolArray,
+    FloatArray,
+    Mission,
+    NoWayToBegin,
+    Path,
+    Plan,
+    PlanRequest,
+    PlanStatus,
+)
 from planner.memory import ObstacleMemory
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
 from planner.rolling_window.planner import NO_BETTER, THINKING_ON, RollingWindow
@@ -178,18 +187,30 @@ def test_a_search_that_is_not_done_goes_on_while_the_plan_is_flown() -> None:
     assert pilot.state is before
 
 
+def east_to(east_m: float) -> Course:
+    return Course(Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, east_m)])), ((east_m, 0.0),), 0, False)
+
+
+def found_of(pilot: RollingWindow, course: Course, now: PlanRequest, serves: bool = False) -> bool:
+    """Whether a search that finds one course leads to a plan."""
+    search = SimpleNamespace(courses=lambda *_: [course], done=True, stuck=None, candidates=[], known=0)
+    pilot._search._begun = lambda _: search  # type: ignore[assignment, method-assign, return-value]
+    start, ahead = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0)), east_to(MISSION.goal_m[0])
+    return pilot._search.go_on(now, start, ahead, serves, Work.WHILE_CUT, None) is not None
+
+
+def test_where_no_other_hold_is_found_another_way_to_the_one_ahead_is_flown() -> None:
+    seen, pilot = HalfOpen(nothing()), planner()
+    now = request_on(flown(pilot, seen), 100.0, seen)
+    pilot.plan(now)
+    assert pilot._monitor.plan is not None
+    assert found_of(pilot, pilot._monitor.plan.course, now)
+
+
 def test_a_course_that_serves_is_not_left_for_the_beginning_of_another() -> None:
     seen, pilot = Seen(nothing()), planner()
     now = request_on(flown(pilot, seen), 0.0, seen)
-    assert pilot._monitor.proposed is not None
-    ahead = pilot._monitor.proposed.course
-    beginning = replace(ahead, path=Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 900.0)])), nodes=((900.0, 0.0),))
-    search = SimpleNamespace(courses=lambda *_: [beginning], done=False, stuck=None, candidates=[], known=0)
-    pilot._search._begun = lambda _: search  # type: ignore[assignment, method-assign, return-value]
-    start = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
-    for serves in (True, False):
-        found = pilot._search.go_on(now, start, ahead, serves, Work.WHILE_SERVING, None)
-        assert (found is None) is serves
+    assert [found_of(pilot, east_to(900.0), now, serves) for serves in (True, False)] == [False, True]
 
 
 @pytest.mark.parametrize(("turns", "given_up"), [(0.9, False), (1.1, True)])
