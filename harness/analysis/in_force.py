@@ -42,23 +42,26 @@ class InForce:
         if commanded_mps is None:
             known = math.isfinite(limits.airspeed_mps)
             commanded_mps = np.full(len(track), limits.airspeed_mps) if known else track.airspeed_mps
-        climb = np.gradient(track.up_m, track.time_s) if len(track) > 1 else np.zeros(len(track))
-        level = np.sqrt(np.maximum(track.airspeed_mps**2 - climb**2, 0.0))
-        wind = track.groundspeed_mps * np.exp(1j * np.radians(track.course_deg))
-        wind -= level * np.exp(1j * np.radians(track.heading_deg))
-        rows = (
-            1 if len(track) < 2 else max(round(WIND_AVERAGED_S / float(np.median(np.diff(track.time_s)))), 1)
-        )
-        rows = min(rows, len(track))
-        around = np.convolve(np.ones(len(track)), np.ones(rows), "same")
-        mean = np.convolve(wind, np.ones(rows), "same") / around
-        mean[(np.abs(mean) < LEAST_WIND_MPS) | limits.no_wind] = 0.0
-        east_north = np.column_stack((mean.imag, mean.real))
-        return cls(commanded_mps, east_north, limits.bank_limit_rad, limits.roll_rate_radps)
+        wind_mps = np.zeros((len(track), 2)) if limits.no_wind else _wind_mps(track)
+        return cls(commanded_mps, wind_mps, limits.bank_limit_rad, limits.roll_rate_radps)
 
     def part(self, first: int, stop: int) -> InForce:
         """Returns what was in force in the rows from `first` up to `stop`."""
         return replace(self, commanded_mps=self.commanded_mps[first:stop], wind_mps=self.wind_mps[first:stop])
+
+
+def _wind_mps(track: Track) -> FloatArray:
+    """(n, 2) the wind along a track, averaged, from groundspeed, course, airspeed and heading."""
+    climb = np.gradient(track.up_m, track.time_s) if len(track) > 1 else np.zeros(len(track))
+    level = np.sqrt(np.maximum(track.airspeed_mps**2 - climb**2, 0.0))
+    wind = track.groundspeed_mps * np.exp(1j * np.radians(track.course_deg))
+    wind -= level * np.exp(1j * np.radians(track.heading_deg))
+    rows = 1 if len(track) < 2 else max(round(WIND_AVERAGED_S / float(np.median(np.diff(track.time_s)))), 1)
+    rows = min(rows, len(track))
+    around = np.convolve(np.ones(len(track)), np.ones(rows), "same")
+    mean = np.convolve(wind, np.ones(rows), "same") / around
+    mean[np.abs(mean) < LEAST_WIND_MPS] = 0.0
+    return np.column_stack((mean.imag, mean.real))
 
 
 @dataclass(frozen=True)

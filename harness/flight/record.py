@@ -165,9 +165,15 @@ class Track:
     @staticmethod
     def joined(blocks: Sequence[Track]) -> Track:
         """One track of consecutive blocks; an empty sequence gives an empty track."""
-        return Track(
-            **{name: np.concatenate([[], *(getattr(b, name) for b in blocks)]) for name in TRACK_COLUMNS}
-        )
+        if not blocks:
+            none: Any = np.zeros(0)
+            return Track(**dict.fromkeys(TRACK_COLUMNS, none))
+        joined = object.__new__(Track)
+        for name in TRACK_COLUMNS:
+            column = np.concatenate([getattr(each, name) for each in blocks])
+            column.setflags(write=False)
+            object.__setattr__(joined, name, column)
+        return joined
 
 
 TRACK_COLUMNS: Mapping[str, Column] = {each.name: each.metadata["column"] for each in fields(Track)}
