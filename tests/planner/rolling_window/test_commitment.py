@@ -64,8 +64,7 @@ def test_a_new_plan_has_to_gain_a_quarter_of_a_hold_and_to_end_in_another(known:
     assert [leads_on(length_m, flown) for length_m in (24.0, 26.0)] == [False, True]
     whole_turn = (0.0, 0.0, 1.0, 0.0, 1.0 / 100.0, math.tau * 100.0)
     for line_m, gets_on in ((20.0, False), (30.0, True)):  # a turn in the hold before the line is no progress
-        line = (0.0, 0.0, 1.0, 0.0, 0.0, line_m)
-        found = held(whole_turn, line, (line_m, 0.0, *round_100), entry_m=math.tau * 100.0 + line_m)
+        found = held(whole_turn, *map(tuple, ahead(line_m).path.segments), entry_m=math.tau * 100.0 + line_m)
         assert commitment.leads_on(found, AT_ORIGIN, flown) is gets_on
     # Another way to the hold ahead leads on, if it may, as far as that is ahead.
     assert [leads_on(length_m, ahead(length_m), False) for length_m in (24.0, 300.0)] == [False, True]
@@ -82,9 +81,8 @@ def test_another_hold_than_the_one_ahead_is_flown_to_only_on_a_way_that_is_hardl
 def to_goal(length_m: float = 1000.0) -> Course:
     """Straight east to the goal."""
     east, north = MISSION.goal_m
-    return Course(
-        Path(np.array([(east - length_m, north, 1.0, 0.0, 0.0, length_m)])), (MISSION.goal_m,), 0, True
-    )
+    path = Path(np.array([(east - length_m, north, 1.0, 0.0, 0.0, length_m)]))
+    return Course(path, (MISSION.goal_m,), 0, True)
 
 
 def committed(
@@ -115,8 +113,7 @@ def test_a_turn_keeps_the_clearance_and_the_tracking_error(
         centre = hold_centre(found.path.segments[-1])
         assert centre[1] == pytest.approx(0.0, abs=1e-6)
         assert found.loiter_entry_m < centre[0]
-        joints = found.path.segments
-        for before, after in pairwise(joints.tolist()):
+        for before, after in pairwise(found.path.segments.tolist()):
             np.testing.assert_allclose(along(before, before[5]), after[:4], atol=1e-6)
 
 
@@ -159,13 +156,8 @@ def test_nor_nearer_to_the_border_than_an_aircraft_may_be_off_it(side: int, know
         assert (found is not None) is flown
 
 
-@pytest.mark.parametrize(
-    ("first", "told"),
-    [
-        ([(3000.0, 400.0)], "obstacle ahead at 3.0 km, passing left"),
-        ([(3000.0, -400.0)], "obstacle ahead at 3.0 km, passing right"),
-        ([], "way to the goal in view, 10.0 km to go"),
-    ],
-)
-def test_a_plan_says_what_is_ahead_and_on_which_side_it_is_passed(first: list[Point], told: str) -> None:
-    assert explanation((0.0, 0.0), (10_000.0, 0.0), [*first, (10_000.0, 0.0)]) == told
+def test_a_plan_says_what_is_ahead_and_on_which_side_it_is_passed() -> None:
+    goal, ahead = (10_000.0, 0.0), "obstacle ahead at 3.0 km, passing"
+    nodes: list[list[Point]] = [[(3000.0, 400.0), goal], [(3000.0, -400.0), goal], [goal]]
+    told = [explanation((0.0, 0.0), goal, each) for each in nodes]
+    assert told == [f"{ahead} left", f"{ahead} right", "way to the goal in view, 10.0 km to go"]

@@ -113,7 +113,6 @@ def test_what_was_given_up_is_tried_again_a_minute_after_something_was_in_the_wa
     pilot, seen, plan, flown_m = circling(MISSION, 3000.0)
     begin_s = flown_m / 25.0 + 1.0
     refused = given_up(pilot)
-    assert len(refused) > 0
     if change == "moves":
         seen.moving = (MovingEdges(3.0, np.array([(9000.0, 9000.0)]), (1.0, 0.0)),)
         far_on(pilot, seen, plan, flown_m, begin_s)
