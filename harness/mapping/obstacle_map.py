@@ -208,7 +208,7 @@ class ObstacleMap(EdgePoints):
 
     def _fine_keys(self, places: ComplexArray, finer: int) -> NDArray[np.int64]:
         """Returns the numbers of the cells at places on a grid with `finer` cells along a usual one."""
-        cells = _pairs(places * (finer / self._cell)).astype(np.int64).tolist()
+        cells = (places * (finer / self._cell)).view(np.float64).reshape(-1, 2).astype(np.int64).tolist()
         keys = [self._fine.setdefault((finer, x, y), self._coarse + len(self._fine)) for x, y in cells]
         if self._coarse + len(self._fine) > len(self._score):
             size = self._coarse + 2 * len(self._fine)
@@ -239,8 +239,3 @@ class ObstacleMap(EdgePoints):
                 # What was seen from afar to be somewhere in a beam is elsewhere: the next scan tells where.
                 self._taken_at = complex(math.inf, math.inf)
         return len(weaker) > 0
-
-
-def _pairs(points: ComplexArray) -> FloatArray:
-    """(k, 2) east and north of complex points."""
-    return points.view(np.float64).reshape(-1, 2)
