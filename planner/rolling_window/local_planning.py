@@ -13,7 +13,7 @@ from planner.geometry.course import Course, Route
 from planner.geometry.curves import Limits, Point, onward_in_turn
 from planner.geometry.terrain import POINT_WORK, TANGENT_WORK, Terrain, WorkCount
 from planner.interface import FloatArray, Mission, Path
-from planner.memory import ObstacleMemory
+from planner.memory import NO_POINTS, ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, Width, search_candidates
 from planner.rolling_window.pose_search import search_poses
@@ -108,6 +108,8 @@ class LocalPlanning:
         self._hug_m = LEAST_HUG_SHARE * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN_SHARE * margin_m)
         self.limits = Limits.of(mission)
+        self._laid: tuple[Start | None, FloatArray, FloatArray] = None, NO_POINTS, NO_POINTS
+        self._terrains: dict[float, Terrain] = {}  # for the start and points of `_laid`, by distance kept
         self.room = Room(mission, memory, mission.clearance_m + PATH_SHARE * margin_m, self.work_count)
 
     @property
@@ -139,9 +141,8 @@ class LocalPlanning:
         points = self.memory.points_m
         room = self._room_m(start, points)
         keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
-        labels = self.memory.labels
+        memory, labels = self.memory, self.memory.labels
         self.work_count.add(0, TANGENT_WORK, len(points))
-        memory = self.memory
         window = Window(
             start.pose[:2], points, labels, memory.cell_m, keep, self.work_count, memory.sorted_before
         )
@@ -255,14 +256,17 @@ class LocalPlanning:
         """The terrain for the curves of an attempt among (m, 2) points."""
         keep = self._mission.clearance_m + PATH_SHARE * attempt.margin_m
         room = self._room_m(start, points)
-        return Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.work_count)
+        terrain = Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.work_count)
+        return self._terrains.setdefault(keep, terrain)
 
     def _room_m(self, start: Start, points: FloatArray) -> FloatArray:
         """(m,) most distance that can be kept from each point: its distance from the nearer of start and goal."""
-        ends = (start.pose[:2], self._mission.goal_m)
-        east, north = points.T
-        away: FloatArray = np.minimum(*(np.hypot(east - x, north - y) for x, y in ends)) - 1e-3
-        return away
+        if start is not self._laid[0] or points is not self._laid[1]:
+            ends = (start.pose[:2], self._mission.goal_m)
+            east, north = points.T
+            away: FloatArray = np.minimum(*(np.hypot(east - x, north - y) for x, y in ends)) - 1e-3
+            self._laid, self._terrains = (start, points, away), {}
+        return self._laid[2]
 
     def _searches(
         self,
