@@ -11,10 +11,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
-
-import numpy as np
 
 from planner.geometry.curves import Point
 from planner.paper.sectors import distance_left_m
@@ -32,8 +29,7 @@ APART_SHARE, WIDE_APART_SHARE = 0.06, 0.25
 share of the shortest step about a corner counts instead: that step has to lead on."""
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """A candidate of the search, or the beginning of one: a polyline, and the edge that the last step hugged."""
 
     nodes: tuple[Point, ...]
@@ -113,7 +109,7 @@ def search_candidates(
             continue
         beside = [int(labels[entry_m.argmin()]), *(around if not depth else ())]
         if wide:  # whatever lies towards the goal, not only what comes first; and on round what it hugs
-            beside += np.unique(labels).tolist() + candidate.hugged
+            beside += sorted(set(labels.tolist())) + candidate.hugged
         edges = window.sector_edges(here, beside, outer_m)
         for child in _steps(candidate, edges, goal, bounds_m, outer_m, wide):
             count += 1
@@ -137,10 +133,11 @@ def _steps(
 ) -> Iterator[Candidate]:
     """Yields the candidate lengthened by a step along each edge, inside the area; those away or back only if wanted."""
     xmin, ymin, xmax, ymax = bounds_m
+    guide = guide_vector(candidate.nodes[-1], goal)
     for edge in edges:
         if not back_too and _leads_away(candidate, edge):
             continue
-        child = _step(candidate, edge, goal, outer_m)
+        child = _step(candidate, edge, guide, outer_m)
         if child is not None and xmin <= child.nodes[-1][0] <= xmax and ymin <= child.nodes[-1][1] <= ymax:
             yield child
 
@@ -156,14 +153,16 @@ def _leads_away(candidate: Candidate, edge: SectorEdge) -> bool:
     return abs(turn) > MOST_TURN_RAD or turn * candidate.last.side > MOST_AWAY_RAD
 
 
-def _step(candidate: Candidate, edge: SectorEdge, goal: Point, outer_m: float) -> Candidate | None:
+def _step(
+    candidate: Candidate, edge: SectorEdge, guide: tuple[float, float, float], outer_m: float
+) -> Candidate | None:
     """The candidate lengthened by one step along the edge of a free sector; None where that is too short."""
     here = candidate.nodes[-1]
     length = min(edge.hugged_m, edge.clear_m - SHORT_OF_SHARE * outer_m)
     if length < 1e-2 * outer_m:
         return None
     x, y = here[0] + edge.ux * length, here[1] + edge.uy * length
-    gx, gy, left = guide_vector(here, goal)
+    gx, gy, left = guide
     off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
     left = distance_left_m(left, length, off_guide)
     hugged = edge if length == edge.hugged_m else None
