@@ -61,7 +61,7 @@ class Sensed:
     def new(self, points_m: FloatArray) -> FloatArray:
         """(k, 2) those of a scan's returns (n, 2) that lie in a cell for the second time."""
         cells = (np.round(points_m / self._cell_m).astype(np.int64) @ (1 << 32, 1)).tolist()
-        rows = {cell: row for row, cell in reversed([*enumerate(cells)])}  # the first of each cell
+        rows = dict(zip(cells[::-1], range(len(cells))[::-1], strict=True))  # the first of each cell
         fresh = (rows.keys() & self._once) - self._known
         self._once |= rows.keys()
         self._known |= fresh
