@@ -7,7 +7,8 @@ tangent north, curvature (1/m, positive = left turn), length (m).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -126,12 +127,12 @@ def turn_centres(path: Path, arc_lengths_m: FloatArray, radius_m: float, roll_m:
     return kernel.turn_centres(path.segments, np.ascontiguousarray(arc_lengths_m), radius_m, roll_m)
 
 
-def turns_onto(pose: Pose, target: Point, radius_m: float) -> list[list[Segment]]:
-    """Turns from a pose onto a straight line that ends at a point, each with that line, the shorter first.
+def turns_onto(pose: Pose, target: Point, radius_m: float) -> Iterator[list[Segment]]:
+    """Yields turns from a pose onto a straight line that ends at a point, each with that line, the shorter first.
 
     There is one to the left and one to the right, except where the point lies inside the turning circle.
     """
-    ways: list[tuple[float, list[Segment]]] = []
+    ways: list[tuple[float, Segment, float]] = []
     for side in (1.0, -1.0):  # left, right
         cx = pose.east_m - side * radius_m * pose.tangent_north
         cy = pose.north_m + side * radius_m * pose.tangent_east
@@ -146,18 +147,18 @@ def turns_onto(pose: Pose, target: Point, radius_m: float) -> list[list[Segment]
         if math.tau - turn < 1e-9:
             turn = 0.0
         arc: Segment = (*pose, side / radius_m, turn * radius_m)
+        ways.append((turn * radius_m + straight, arc, straight))
+    for _, arc, straight in sorted(ways, key=lambda each: each[0]):
         way = [arc] if arc[5] > SHORTEST_M else []
         if straight > SHORTEST_M:
             way.append((*along(arc, arc[5]), 0.0, straight))
         if way:
-            ways.append((turn * radius_m + straight, way))
-    return [way for _, way in sorted(ways, key=lambda each: each[0])]
+            yield way
 
 
 def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | None:
     """The shorter turn from a pose onto a straight line that ends at a point, and that line; None if there is none."""
-    ways = turns_onto(pose, target, radius_m)
-    return ways[0] if ways else None
+    return next(turns_onto(pose, target, radius_m), None)
 
 
 class Limits(NamedTuple):
@@ -231,8 +232,7 @@ def fillet(
             last_turn = turn
             at = (node[0] - ux * trim, node[1] - uy * trim)
             segments.append((*at, ux, uy, math.copysign(1.0 / radius, turn), radius * abs(turn)))
-        corner = Pose(node[0], node[1], ux, uy)
-        used = trim
+        corner, used = Pose(node[0], node[1], ux, uy), trim
     return Path(np.array(segments)) if segments else None
 
 
@@ -257,13 +257,12 @@ def _first_turn(
 ) -> list[Segment] | None:
     """The turn towards the first corner, after a straight to roll where the other way is turned before."""
     segments: list[Segment] = []
-    ways = turns_onto(start, node, radius_m)[longer_turn:]
-    if ways and ways[0][0][4] * start_curvature < 0.0:
-        if limits.roll_m > SHORTEST_M:
-            segments.append((*start, 0.0, limits.roll_m))
-            start = along(segments[0], limits.roll_m)
-        ways = turns_onto(start, node, radius_m)[longer_turn:]
-    return [*segments, *(segment for segment in ways[0] if segment[4])] if ways else None
+    way = next(islice(turns_onto(start, node, radius_m), longer_turn, None), None)
+    if way and way[0][4] * start_curvature < 0.0 and limits.roll_m > SHORTEST_M:
+        segments.append((*start, 0.0, limits.roll_m))
+        start = along(segments[0], limits.roll_m)
+        way = next(islice(turns_onto(start, node, radius_m), longer_turn, None), None)
+    return [*segments, *(segment for segment in way if segment[4])] if way else None
 
 
 def onward(path: Path, arc_length_m: float, length_m: float) -> list[Segment]:
