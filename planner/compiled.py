@@ -141,13 +141,20 @@ def compile_all(rare: bool = False) -> None:
                 _second = None
             _compile(_functions())
         _compile(list(_waiting) if rare else ())
-        # The compiler stays for good. Once it is counted among the old objects, garbage is looked for there only when
-        # as many new ones have come as would be a quarter of it: that would hold a flight up for a tenth of a second.
-        if not _process_is_ours or any(each.anew for each in waiting):
-            gc.collect()
-        if _process_is_ours:
-            gc.freeze()
-            gc.set_threshold(*_usual_threshold)
+        _let_stay(any(each.anew for each in waiting))
+
+
+def _let_stay(anew: bool) -> None:
+    """Counts the compiler, which stays for good, among the old objects; collects what compiling `anew` left behind.
+
+    Garbage is then looked for there only when as many new objects have come as would be a quarter of it: that would
+    hold a flight up for a tenth of a second.
+    """
+    if anew or not _process_is_ours:
+        gc.collect()
+    if _process_is_ours:
+        gc.freeze()
+        gc.set_threshold(*_usual_threshold)
 
 
 def begin_compiling(busy_bytes: int) -> None:
