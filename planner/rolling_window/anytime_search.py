@@ -38,9 +38,15 @@ class AnytimeSearch:
     """One search for ways to the goal, those that are wanted most first."""
 
     def __init__(
-        self, local: LocalPlanning, effort: int, closed: Callable[[], bool], widest_first: bool = False
+        self,
+        local: LocalPlanning,
+        effort: int,
+        closed: Callable[[], bool],
+        widest_first: bool = False,
+        open_to_m: Callable[[Course], float] | None = None,
     ) -> None:
         self._local, self._effort, self._closed, self._widest_first = local, effort, closed, widest_first
+        self._open_to_m = open_to_m  # m along a course; None: no room is asked for
         self._start: Start | None = None
         self._flown: Course | None = None
         self._steps = self._searched()
@@ -91,7 +97,7 @@ class AnytimeSearch:
             narrower_may_lead_on = i == 0 and route is not None and self._switches(route)
             if narrower_may_lead_on or self._passed_over(waiting):
                 continue
-            yield from self._courses(waiting)
+            yield from self._offered(waiting)
             waiting = []
         yield from self._courses(waiting)
         if not found:
@@ -100,6 +106,28 @@ class AnytimeSearch:
                 route = yield from self._local.beginning(self._now, self.candidates[0])
             if route is not None:
                 yield self._course(route, memory.known, shortest=False)
+
+    def _offered(self, found: list[_Found]) -> Generator[Course | None, None, None]:
+        """Yields courses along routes; before the first of a search, the one with room for holds if that goes first."""
+        if found and self._open_to_m is not None:
+            open_to_m, self._open_to_m = self._open_to_m, None
+            yield from self._courses((yield from self._roomier(found, open_to_m)))
+        yield from self._courses(found)
+
+    def _roomier(
+        self, found: list[_Found], open_to_m: Callable[[Course], float]
+    ) -> Generator[None, None, list[_Found]]:
+        """The way with room for holds, if it is to be flown before the shortest of those found; else an empty list."""
+        narrow = min(found, key=lambda each: each.route.path.length_m)
+        course = self._course(narrow.route, narrow.known, shortest=False)
+        leads_on_m = open_to_m(course)
+        if leads_on_m >= course.path.length_m:
+            return []
+        known, points, roomy = self._local.memory.known, self._local.memory.points_m, self._local.roomy
+        route = yield from self._local.route(roomy, self._effort, self._now, [], self._closed)
+        if route is None or not self._local.is_worth_room(route, course, leads_on_m):
+            return []
+        return [_Found(route, self._now()[0], roomy, points, known, shortest=False)]
 
     def _courses(self, found: list[_Found]) -> Iterator[Course]:
         """Yields courses along routes, the shorter first, from where a plan would begin now."""

@@ -98,8 +98,11 @@ class Commitment:
 
     def unseen(self, course: Course, seen: MapView) -> Pose:
         """The first place of a course that has not been seen to be free."""
-        free_to_m = self._certifier(seen.spacing_m).seen_free_to_m(course.path, seen)
-        return place_on(course.path, free_to_m)[0]
+        return place_on(course.path, self.in_view_m(course, seen))[0]
+
+    def in_view_m(self, course: Course, seen: MapView) -> float:
+        """Arc length (m) up to which a course has been seen to be free."""
+        return self._certifier(seen.spacing_m).seen_free_to_m(course.path, seen)
 
     def _to_goal(self, certifier: Certifier, course: Course, seen: MapView, cut_m: float) -> Certified | None:
         """All of a course to the goal, if it is certified up to where the goal is surely reached; else None."""

@@ -9,10 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from planner.geometry.clearance import distances
 from planner.geometry.course import Course, Route
 from planner.geometry.curves import Limits, Point, onward_in_turn
 from planner.geometry.terrain import POINT_WORK, TANGENT_WORK, Terrain, WorkCount
 from planner.interface import FloatArray, Mission, Path
+from planner.kernels.fans import encircled
 from planner.memory import NO_POINTS, ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, Width, search_candidates
@@ -51,16 +53,23 @@ TRAIL_CLEARANCES = 4.0
 TURN_EXITS = 8
 """A held turn may be left at this many places of it: from some no curve fits the way on."""
 
+ROOM_WORTH_HOLDS = 0.5
+"""A way with room for holds may be longer by this many of them than a narrow one that is not seen to lead on."""
+
 NINE_SQUARES = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1))
 """Offsets in columns and rows of a square and the eight around it."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """Distance kept from every edge point, and a margin beyond it: shares are given up for steps and curves; m."""
+    """Distance kept from every edge point, and a margin beyond it: shares are given up for steps and curves; m.
+
+    Track points lie `inside_m` inside the area.
+    """
 
     distance_m: float
     margin_m: float
+    inside_m: float = 0.0
 
 
 Now = Callable[[], tuple[Start, Course | None]]
@@ -129,6 +138,12 @@ class LocalPlanning:
             attempts.append(Attempt(radius, margin))
         return [*attempts, Attempt(clearance + radius, margin)]
 
+    @property
+    def roomy(self) -> Attempt:
+        """Distances at which a hold can be flown everywhere on the way, inside the area."""
+        radius = self._mission.hold_radius_m
+        return Attempt(self._mission.clearance_m + radius, self._margin_m, inside_m=radius)
+
     def route(
         self, attempt: Attempt, effort: int, now: Now, candidates: list[Candidate], closed: Callable[[], bool]
     ) -> Generator[None, None, Route | None]:
@@ -188,6 +203,23 @@ class LocalPlanning:
                 return 0.0
             switching = SWITCH_SHARE * candidate.cost_m
         return switching + RETRACE_SHARE * self.trail.retraced_m(candidate.nodes)
+
+    def is_worth_room(self, wide: Route, narrow: Course, open_to_m: float) -> bool:
+        """Whether a way with room for holds is to be flown before a shorter one, which leads on up to `open_to_m`.
+
+        It is where the shorter one passes on another side of something further on: the aircraft may have to turn there.
+        """
+        hold_m = math.tau * self._mission.hold_radius_m
+        if wide.path.length_m > narrow.path.length_m + ROOM_WORTH_HOLDS * hold_m:
+            return False
+        points = self.memory.points_m[: narrow.known]
+        self.work_count.add(4, POINT_WORK, 4 * len(wide.nodes) * len(points))
+        start: Point = tuple(narrow.path.segments[0, :2].tolist())
+        between = points[encircled(np.array([start, *wide.nodes, *narrow.nodes[-2::-1]]), points)]
+        if not len(between):
+            return False
+        away_m, at_m = distances(narrow.path, between)
+        return open_to_m < float(at_m[away_m.argmin()])
 
     def fitted(
         self,
@@ -301,10 +333,11 @@ class LocalPlanning:
             to_go = CostToGo(*ends, self._mission.bounds_m, window.points_m, window.keep_m, self.work_count)
             yield from to_go.spread()
         found = steps_since = 0
+        off_m, (xmin, ymin, xmax, ymax) = attempt.inside_m, self._mission.bounds_m
         for candidate in search_candidates(
             window,
             self._mission.goal_m,
-            self._mission.bounds_m,
+            (xmin + off_m, ymin + off_m, xmax - off_m, ymax - off_m),
             Width(self._steps * widening, self._candidates * widening, MOST_TRACKS * widening, widening > 1),
             attempt.distance_m + max(attempt.margin_m, SEARCH_SHARE * attempt.margin_m + self._hug_m),
             around,

@@ -4,15 +4,16 @@ A course is searched N steps deep among the free sectors (`multi_step_search`, `
 ends in a turn seen to be free, or in the goal circle, is put into effect (`commitment`) and flown until the window
 rolls on. What is done about the plan in effect is one of five states (`PlanningState`), each entered by one method.
 
-Why it converges. The search takes unseen space as free, so the course is a shortest one through what is known, and is
+Why it converges. The search takes unseen space as free, so the course is a shortest one through what is known, or,
+until the aircraft has come to turn in a hold, one with room for holds that is longer by at most half a hold. It is
 flown until something seen contradicts it. Edge points lie on a finite grid, so that happens finitely often, and a
 course that nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
 searches (`dead_ends`), with a disc of the clearance or more about it: these are finitely many as well. They are tried
 again only where no other way is left, the widest first. A search in vain is repeated with twice the effort. Where no
-way is left, a closed chain of edges proves it (`barrier`); where none is left but those given up, one with room to turn
-everywhere must remain, or such a chain shows that there is none, and the flight ends. Assumed: a world that stands
-still, a sensor that sees every gap narrower than twice the clearance as one wall, and a way to the goal along which a
-disc of the turn radius can be moved at the clearance, within the area.
+way is left, a closed chain of edges proves it (`barrier`); where none is left but those given up, one with room to
+turn everywhere must remain, or such a chain shows that there is none, and the flight ends. Assumed: a world that
+stands still, a sensor that sees every gap narrower than twice the clearance as one wall, and a way to the goal along
+which a disc of the turn radius can be moved at the clearance, within the area.
 """
 
 from __future__ import annotations
@@ -229,6 +230,7 @@ class RollingWindow(CertifiedPlanner):
     def _loiter(self, now: Situation, plan: CommittedPlan) -> None:
         """FOLLOWING -> LOITERING: the aircraft is in its turn. A place that was turned before twice is given up."""
         self.state = PlanningState.LOITERING
+        self._search.prefers_room = False  # among pockets, the shortest ways first leave none out
         first, self._loitered = plan is not self._loitered, plan
         if not plan.course.to_goal or not first:
             return

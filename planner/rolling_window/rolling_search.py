@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import Enum
+from functools import partial
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Point
@@ -23,6 +24,9 @@ BETTER_SHARE = 0.005
 DETOUR_SHARE = 0.15
 """A way to another hold is flown rather than one to the hold ahead only where it is longer by less than this share of
 the way to that hold: seen from there, what is unseen now is mostly open."""
+
+IN_VIEW_RADII = 4.0
+"""A course counts as leading on up to this many hold radii before the first place of it that is out of sight."""
 
 
 class Work(Enum):
@@ -49,10 +53,12 @@ class RollingSearch:
         self._mission, self._memory = mission, local.memory
         self._local, self._commitment = local, commitment
         self._monitor, self._giving_up, self._no_way = monitor, giving_up, no_way
+        self._asked: tuple[PlanRequest, Start] | None = None  # the last request, and where a plan would begin
         self.running: AnytimeSearch | None = None  # the search that is not done yet
         self.last: AnytimeSearch | None = None  # the one that was at work last
         self.known = 0  # how many edge points the last search that ended began with
         self.gone = 0  # how many edge points had been let go of when the last search began
+        self.prefers_room = True  # a way with room for holds may go first
         self.anew = False  # a search is to be made though the course serves: a way may have become free
         self.refused = 0  # how many courses were found of which no part that leads on could be certified
         self.nearer: CommittedPlan | None = None  # certified, but too near to what moves
@@ -89,6 +95,7 @@ class RollingSearch:
         `ahead` is what is left of the course in effect, and `serves` tells whether that can still be flown.
         """
         first, more = work.value
+        self._asked = request, start
         begins = self.running is None
         search = self.last = self.running or self._begun(request.position_m)
         self.running, nearest_m = search, -math.inf
@@ -110,10 +117,10 @@ class RollingSearch:
                 same = same or self._to_hold_ahead(found, start, threats)
             search.stuck = search.stuck or course
             self.refused += 1
-        if not search.done:
-            return None
         if same is not None:
             return self._end(search, ahead, same)
+        if not search.done:
+            return None
         self.running, self.known, self.anew = None, search.known, False
         return None
 
@@ -130,7 +137,21 @@ class RollingSearch:
         """Begins a search, with the effort and the order that searches in vain have led to."""
         self.gone = self._memory.cleared
         effort, widest_first = self._giving_up.effort, self._giving_up.tried_again
-        return AnytimeSearch(self._local, effort, lambda: self._no_way.closed(position), widest_first)
+        closed = partial(self._no_way.closed, position)
+        open_to_m = self._open_to_m if self.prefers_room and not widest_first else None
+        return AnytimeSearch(self._local, effort, closed, widest_first, open_to_m)
+
+    def _open_to_m(self, course: Course) -> float:
+        """Arc length (m) up to which a course is seen to lead on now: to a certified hold, or well in sight."""
+        assert self._asked is not None
+        request, start = self._asked
+        in_view_m = (
+            self._commitment.in_view_m(course, request.seen) - IN_VIEW_RADII * self._mission.hold_radius_m
+        )
+        found = self._commitment.commit(request, start, course, [], self.cut_m(course))
+        if found is None or not self._commitment.leads_on(found, start, self._monitor.plan):
+            return in_view_m
+        return max(found.loiter_entry_m, in_view_m)
 
     def _end(self, search: AnytimeSearch, ahead: Course | None, found: CommittedPlan) -> CommittedPlan:
         """Ends a search that has found a plan, and returns that."""

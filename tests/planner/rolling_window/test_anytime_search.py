@@ -13,7 +13,7 @@ import pytest
 from planner import contract
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose, places_along
-from planner.interface import FloatArray, MapView
+from planner.interface import FloatArray, MapView, Mission
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.local_planning import LocalPlanning
@@ -42,12 +42,18 @@ def trap(wall: MakePoints, known: Known) -> MapView:
 
 
 def planning(
-    seen: MapView, closed: Callable[[], bool] = lambda: False, memory: ObstacleMemory | None = None
+    seen: MapView,
+    closed: Callable[[], bool] = lambda: False,
+    memory: ObstacleMemory | None = None,
+    mission: Mission = MISSION,
+    open_to_m: float | None = None,
 ) -> tuple[LocalPlanning, AnytimeSearch]:
-    memory = memory or ObstacleMemory(MISSION.clearance_m)
+    memory = memory or ObstacleMemory(mission.clearance_m)
     memory.take_in(seen)
-    local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
-    return local, AnytimeSearch(local, 0, closed)
+    local = LocalPlanning(mission, memory, margin_m=20.0, steps=16, candidates=12)
+    return local, AnytimeSearch(
+        local, 0, closed, open_to_m=None if open_to_m is None else lambda course: open_to_m
+    )
 
 
 def all_courses(thinking: AnytimeSearch, work: int, start: Callable[[], Start]) -> tuple[list[Course], int]:
@@ -157,6 +163,43 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
             local.trail.add((6000.0 * share, -2200.0 * share))
     course = next(iter(thinking.courses(START, None, 10**6)))
     assert (course.nodes[0][1] > 0.0) is flown_before
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "off_m", "border_m", "open_to_m", "aside"),
+    [
+        (500.0, 1200.0, 8000.0, 0.0, True),
+        (500.0, 1200.0, 8000.0, 6000.0, False),  # the gap, 3.1 km ahead, is seen to lead on
+        (500.0, 1200.0, 8000.0, None, False),  # room is not asked for
+        (500.0, 2000.0, 8000.0, 0.0, False),  # longer by more than half a hold, which is 471 m
+        (900.0, 1200.0, 8000.0, 0.0, False),  # a hold has room in the gap
+        (500.0, 1200.0, 1300.0, 0.0, False),  # and none between the end of the wall and the border
+    ],
+)
+def test_a_way_with_room_for_holds_may_be_longer_by_half_a_hold(
+    gap_m: float,
+    off_m: float,
+    border_m: float,
+    open_to_m: float | None,
+    aside: bool,
+    wall: MakePoints,
+    known: Known,
+) -> None:
+    """A wall across with a gap 900 m north of the way straight on, and an end south of it; 200 m clear."""
+    parts = [
+        ((3000.0, 900.0 + 0.5 * gap_m), (3000.0, 8000.0)),
+        ((3000.0, 370.0 - off_m), (3000.0, 900.0 - 0.5 * gap_m)),
+    ]
+    seen = known(np.concatenate([wall(*part, 50.0) for part in parts]))
+    mission = replace(MISSION, bounds_m=(-4000.0, -border_m, 16_000.0, 8000.0))
+    thinking = planning(seen, mission=mission, open_to_m=open_to_m)[1]
+    course = next(iter(thinking.courses(START, None, 10**9)))
+    assert (course.nodes[0][1] < -500.0) is aside
+    around_m, through_m = (
+        math.hypot(3000.0, y) + math.hypot(9000.0, y) for y in (off_m, 1120.0 - 0.5 * gap_m)
+    )
+    assert course.path.length_m == pytest.approx(around_m if aside else through_m, abs=60.0)
+    assert not aside or through_m < around_m < through_m + math.pi * MISSION.hold_radius_m
 
 
 @pytest.mark.parametrize("gap_m", [0.0, 600.0])
