@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from enum import Enum
 from functools import partial
+from typing import TypeGuard
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Point
@@ -97,32 +98,37 @@ class RollingSearch:
         first, more = work.value
         self._asked = request, start
         begins = self.running is None
-        search = self.last = self.running or self._begun(request.position_m)
-        self.running, nearest_m = search, -math.inf
+        search = self.last = self.running = self.running or self._begun(request.position_m)
         same: CommittedPlan | None = None  # leads to the hold of the plan in effect, which is ahead
         for course in search.courses(start, ahead, first if begins else more):
-            # Only the beginning of a way: a whole one that serves is not left for it.
-            length_m = course.path.length_m if course.nodes[-1] == self._mission.goal_m else math.inf
-            if serves and length_m > self._worth_m(ahead):
+            if serves and self._as_good(ahead, course):
                 search.done = True
                 break
             found = self._commitment.commit(request, start, course, search.candidates, self.cut_m(course))
-            if found is not None and self._commitment.leads_on(found, start, self._monitor.plan):
-                keeps_m = room_m(found.path, threats)
-                if keeps_m >= self._mission.clearance_m:
-                    return self._end(search, ahead, nearer(same, found))
-                if keeps_m > nearest_m:  # what moves may come to what is free now
-                    nearest_m, self.nearer = keeps_m, found
-            else:
-                same = same or self._to_hold_ahead(found, start, threats)
+            if self._may_be_flown(found, start, threats):
+                return self._end(search, ahead, nearer(same, found))
+            to_hold_ahead = self._to_hold_ahead(found, start, threats)
+            same = same or to_hold_ahead
             search.stuck = search.stuck or course
-            self.refused += 1
+            self.refused += to_hold_ahead is None
         if same is not None:
             return self._end(search, ahead, same)
-        if not search.done:
-            return None
-        self.running, self.known, self.anew = None, search.known, False
+        if search.done:
+            self.running, self.known, self.anew = None, search.known, False
         return None
+
+    def _may_be_flown(
+        self, found: CommittedPlan | None, start: Start, threats: Threats | None
+    ) -> TypeGuard[CommittedPlan]:
+        """Whether a plan leads on to a hold elsewhere, clear of what moves; of those too near the furthest is kept."""
+        if found is None or not self._commitment.leads_on(found, start, self._monitor.plan):
+            return False
+        keeps_m = room_m(found.path, threats)
+        if keeps_m >= self._mission.clearance_m:
+            return True
+        if self.nearer is None or keeps_m > room_m(self.nearer.path, threats):
+            self.nearer = found  # what moves may come to what is free now
+        return False
 
     def _to_hold_ahead(
         self, found: CommittedPlan | None, start: Start, threats: Threats | None
@@ -161,11 +167,13 @@ class RollingSearch:
         self._monitor.lengthened_m = found.course.path.length_m - before_m
         return found
 
-    def _worth_m(self, ahead: Course | None) -> float:
-        """Greatest length (m) of a course that the one in effect is left for; infinite if that leads to no goal."""
-        if ahead is None or not ahead.to_goal or ahead.nodes[-1] != self._mission.goal_m:
-            return math.inf
-        return ahead.path.length_m * (1.0 - BETTER_SHARE)
+    def _as_good(self, ahead: Course | None, course: Course) -> bool:
+        """Whether what is left of a whole way is as good as a course: hardly longer, or that is only a beginning."""
+        goal = self._mission.goal_m
+        if ahead is None or not ahead.to_goal or ahead.nodes[-1] != goal:
+            return False
+        least_m = ahead.path.length_m * (1.0 - BETTER_SHARE)
+        return course.nodes[-1] != goal or course.path.length_m > least_m
 
 
 def nearer(same: CommittedPlan | None, other: CommittedPlan) -> CommittedPlan:

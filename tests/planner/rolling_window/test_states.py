@@ -205,6 +205,9 @@ def test_where_no_other_hold_is_found_another_way_to_the_one_ahead_is_flown() ->
     pilot.plan(now)
     assert pilot._monitor.plan is not None
     assert found_of(pilot, pilot._monitor.plan.course, now)
+    assert pilot._search.refused == 0
+    assert not found_of(pilot, east_to(10.0), now)
+    assert pilot._search.refused == 1
 
 
 def test_a_course_that_serves_is_not_left_for_the_beginning_of_another() -> None:
