@@ -5,9 +5,9 @@ ends in a turn seen to be free, or in the goal circle, is put into effect (`comm
 rolls on. What is done about the plan in effect is one of five states (`PlanningState`), each entered by one method.
 
 Why it converges. The search takes unseen space as free, so the course is a shortest one through what is known, or,
-until the aircraft has come to turn in a hold, one with room for holds that is longer by at most half a hold. It is
-flown until something seen contradicts it. Edge points lie on a finite grid, so that happens finitely often, and a
-course that nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
+until the aircraft has turned in a hold, one with room for holds that is longer by about half a turn. It is flown
+until something seen contradicts it. Edge points lie on a finite grid, so that happens finitely often, and a course
+that nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
 searches (`dead_ends`), with a disc of the clearance or more about it: these are finitely many as well. They are tried
 again only where no other way is left, the widest first. A search in vain is repeated with twice the effort. Where no
 way is left, a closed chain of edges proves it (`barrier`); where none is left but those given up, one with room to
