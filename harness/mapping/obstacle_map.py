@@ -196,7 +196,7 @@ class ObstacleMap(EdgePoints):
         return hits, scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
 
     def _count_hits(self, cells: IntArray, places: ComplexArray) -> None:
-        """Counts one hit in each of the cells; the first place in a cell is its point, and an edge once believed."""
+        """Counts one hit in each cell; its point, an edge once believed, is the first place, from the grid's corner."""
         if not len(cells):
             return
         self._make_room(self._count + len(cells), "_points", "_key", "_since")

@@ -61,7 +61,7 @@ class DubinsTree(Replanner):
         self._random = np.random.default_rng(config.tree_seed)
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Plans a new path, but in a turn that a shield holds no sooner than `HOLD_REGROW_S` after the last."""
+        """Keeps the path or plans a new one; in a turn that a shield holds, `HOLD_REGROW_S` or more after the last."""
         if request.committed and not request.flown and request.time_s - self._planned_s < HOLD_REGROW_S:
             return Plan(PlanStatus.NO_PATH, "no new tree is due")
         return super().plan(request)

@@ -285,7 +285,7 @@ class LocalPlanning:
         return None
 
     def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:
-        """The terrain for the curves of an attempt among (m, 2) points."""
+        """The terrain of an attempt among (m, 2) points: of each no more is kept than it lies from start and goal."""
         keep = self._mission.clearance_m + PATH_SHARE * attempt.margin_m
         room = self._room_m(start, points)
         terrain = Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.work_count)
