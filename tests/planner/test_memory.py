@@ -10,49 +10,32 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from planner.interface import BoolArray, FloatArray, MovingEdges
+from planner.interface import FloatArray
 from planner.memory import ObstacleMemory
-from planner.nearest_edge import distance_to_edges
 from planner.rolling_window.window import Window
 from tests.examples import examples
+from tests.planner.rolling_window.test_rolling_window import Seen
 
 CLEARANCE = 100.0
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-class Batches:
+class Batches(Seen):
     """A seen world whose edge points come in batches and may be taken back."""
 
-    spacing_m = CLEARANCE / 4.0
-    moving: tuple[MovingEdges, ...] = ()
-    last_contradiction_s = -math.inf
-    distance_m = distance_to_edges
-
     def __init__(self) -> None:
-        self.revision = 0
-        self.last_removal_revision = 0
-        self._points: list[tuple[int, FloatArray]] = []
-
-    def add(self, points: FloatArray) -> None:
-        self.revision += 1
-        self._points.append((self.revision, points))
+        super().__init__(np.zeros((0, 2)))
 
     def take_back(self, keep: FloatArray) -> None:
         self.revision += 1
         self.last_removal_revision = self.revision
-        self._points = [(1, keep)]
+        self._shown = [(1, keep)]
 
     def thin_out(self, rng: np.random.Generator) -> None:
         """Takes back some points, one by one."""
         self.revision += 1
         self.last_removal_revision = self.revision
-        self._points = [(at, points[rng.random(len(points)) < 0.95]) for at, points in self._points]
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return np.concatenate([np.zeros((0, 2)), *(p for at, p in self._points if at > revision)])
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return np.zeros(len(points_m), dtype=np.bool_)
+        self._shown = [(at, points[rng.random(len(points)) < 0.95]) for at, points in self._shown]
 
 
 def components(points: FloatArray, link_m: float) -> NDArray[np.intp]:
@@ -74,7 +57,7 @@ def is_finer(fine: NDArray[np.intp], coarse: NDArray[np.intp]) -> bool:
 def memory_of(*batches: FloatArray) -> ObstacleMemory:
     seen, memory = Batches(), ObstacleMemory(CLEARANCE)
     for batch in batches:
-        seen.add(batch)
+        seen.show(batch)
         memory.take_in(seen)
     return memory
 
@@ -105,7 +88,7 @@ def test_point_by_point_gives_the_same_obstacles_as_at_once(seed: int, count: in
 @pytest.mark.parametrize("known_before", [True, False])
 def test_what_is_taken_back_is_forgotten(known_before: bool) -> None:
     seen, memory = Batches(), ObstacleMemory(CLEARANCE)
-    seen.add(np.array([(0.0, 0.0), (60.0, 0.0), (120.0, 0.0), (180.0, 0.0), (240.0, 0.0)]))
+    seen.show(np.array([(0.0, 0.0), (60.0, 0.0), (120.0, 0.0), (180.0, 0.0), (240.0, 0.0)]))
     if known_before:
         memory.take_in(seen)
         assert len(set(memory.labels.tolist())) == 1
@@ -125,7 +108,7 @@ def ring(east_m: float, north_m: float, count: int = 12) -> FloatArray:
 def test_what_moves_comes_last_and_is_an_obstacle_of_its_own_each() -> None:
     seen, memory = Batches(), ObstacleMemory(CLEARANCE)
     still, first, second = scattered(1, 30, 500.0), ring(10.0, 20.0), ring(30.0, 20.0, 5)
-    seen.add(still)
+    seen.show(still)
     fresh = memory.take_in(seen, [first, second])
     np.testing.assert_array_equal(fresh, np.concatenate((still, first, second)))
     np.testing.assert_array_equal(memory.points_m, fresh)
@@ -169,7 +152,7 @@ def test_taken_back_bit_by_bit_all_that_is_new_lies_behind_what_was_known_but_fo
         if rng.random() < 0.7:
             seen.thin_out(rng)
         if rng.random() < 0.7:
-            seen.add(rng.uniform(-900.0, 900.0, (int(rng.integers(1, 40)), 2)))
+            seen.show(rng.uniform(-900.0, 900.0, (int(rng.integers(1, 40)), 2)))
         told = memory.take_in(seen)
         np.testing.assert_array_equal(memory.genuine_m, seen.edges_since(-1))
         if known_at:
@@ -186,7 +169,7 @@ def test_taken_back_bit_by_bit_all_that_is_new_lies_behind_what_was_known_but_fo
 
 def test_what_was_refused_outlasts_what_is_taken_back_until_it_is_forgiven() -> None:
     seen, memory = Batches(), ObstacleMemory(CLEARANCE)
-    seen.add(scattered(1, 30, 500.0))
+    seen.show(scattered(1, 30, 500.0))
     memory.take_in(seen)
     memory.refuse((900.0, 900.0))
     left = scattered(1, 7, 500.0)

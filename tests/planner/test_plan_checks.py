@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from planner.contract import MISSION
-from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanStatus
+from planner.interface import Mission, Path, Plan, PlanPicture, PlanStatus
 from planner.plan_checks import (
     JOIN_M,
     MOST_REASON_LETTERS,
@@ -202,11 +202,8 @@ class Own(Plan):
 
 
 def test_a_class_of_the_planners_own_is_read_once_and_left_behind() -> None:
-    plan = checked_plan(
-        Own(PlanStatus.FOUND, Talkative("a way"), np.zeros((1, 2)), Path(np.array([EAST]))),
-        (0.0, 0.0),
-        MISSION,
-    )
+    own = Own(PlanStatus.FOUND, Talkative("a way"), np.zeros((1, 2)), Path(np.array([EAST])))
+    plan = checked_plan(own, (0.0, 0.0), MISSION)
     assert type(plan) is Plan
     assert type(plan.reason) is str
     assert type(checked_plan(Own(PlanStatus.KEPT, "goes on"), (0.0, 0.0), MISSION)) is Plan
@@ -272,10 +269,8 @@ def test_the_segments_of_a_path_are_those_that_were_checked() -> None:
                     return np.full((1, 6), math.nan)
             return super().__getattribute__(name)
 
-    plan = found([EAST])
     changing = Changing(np.array([EAST]))
     Changing.reads = 0
-    plan = checked_plan(spoilt(plan, path=changing), (0.0, 0.0), MISSION)
+    plan = checked_plan(spoilt(found([EAST]), path=changing), (0.0, 0.0), MISSION)
     assert plan.path is not None
-    rows: FloatArray = plan.path.segments
-    np.testing.assert_array_equal(rows, [EAST])
+    np.testing.assert_array_equal(plan.path.segments, [EAST])

@@ -70,7 +70,5 @@ def test_a_turn_against_the_one_being_flown_begins_after_the_room_to_roll(
 def test_without_room_there_is_none(wall: MakePoints) -> None:
     points = np.concatenate([wall((-900.0, y), (3000.0, y), 12.0) for y in (-120.0, 120.0)])
     assert divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, terrain(points)) is None
-    assert (
-        divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, terrain(np.zeros((0, 2)), (-10.0, -190.0, 2e3, 190.0)))
-        is None
-    )
+    narrow = terrain(np.zeros((0, 2)), (-10.0, -190.0, 2e3, 190.0))
+    assert divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, narrow) is None

@@ -51,9 +51,8 @@ def planning(
     memory = memory or ObstacleMemory(mission.clearance_m)
     memory.take_in(seen)
     local = LocalPlanning(mission, memory, margin_m=20.0, steps=16, candidates=12)
-    return local, AnytimeSearch(
-        local, 0, closed, open_to_m=None if open_to_m is None else lambda course: open_to_m
-    )
+    asked = None if open_to_m is None else lambda course: open_to_m
+    return local, AnytimeSearch(local, 0, closed, open_to_m=asked)
 
 
 def all_courses(thinking: AnytimeSearch, work: int, start: Callable[[], Start]) -> tuple[list[Course], int]:
@@ -177,27 +176,16 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
     ],
 )
 def test_a_way_with_room_for_holds_may_be_longer_by_half_a_hold(
-    gap_m: float,
-    off_m: float,
-    border_m: float,
-    open_to_m: float | None,
-    aside: bool,
-    wall: MakePoints,
-    known: Known,
-) -> None:
+    gap_m: float, off_m: float, border_m: float, open_to_m: float | None, aside: bool, wall: MakePoints, known: Known
+) -> None:  # fmt: skip
     """A wall across with a gap 900 m north of the way straight on, and an end south of it; 200 m clear."""
-    parts = [
-        ((3000.0, 900.0 + 0.5 * gap_m), (3000.0, 8000.0)),
-        ((3000.0, 370.0 - off_m), (3000.0, 900.0 - 0.5 * gap_m)),
-    ]
-    seen = known(np.concatenate([wall(*part, 50.0) for part in parts]))
+    south, north = 900.0 - 0.5 * gap_m, 900.0 + 0.5 * gap_m
+    parts = [wall((3000.0, a), (3000.0, b), 50.0) for a, b in ((north, 8000.0), (370.0 - off_m, south))]
     mission = replace(MISSION, bounds_m=(-4000.0, -border_m, 16_000.0, 8000.0))
-    thinking = planning(seen, mission=mission, open_to_m=open_to_m)[1]
+    _, thinking = planning(known(np.concatenate(parts)), mission=mission, open_to_m=open_to_m)
     course = next(iter(thinking.courses(START, None, 10**9)))
     assert (course.nodes[0][1] < -500.0) is aside
-    around_m, through_m = (
-        math.hypot(3000.0, y) + math.hypot(9000.0, y) for y in (off_m, 1120.0 - 0.5 * gap_m)
-    )
+    around_m, through_m = (math.hypot(3000.0, y) + math.hypot(9000.0, y) for y in (off_m, south + 220.0))
     assert course.path.length_m == pytest.approx(around_m if aside else through_m, abs=60.0)
     assert not aside or through_m < around_m < through_m + math.pi * MISSION.hold_radius_m
 

@@ -117,20 +117,16 @@ def test_a_turn_keeps_the_clearance_and_the_tracking_error(
             np.testing.assert_allclose(along(before, before[5]), after[:4], atol=1e-6)
 
 
-def test_where_no_turn_leads_on_the_goal_is_flown_to(known: Known) -> None:
-    commitment, found = committed(known(np.zeros((0, 2))), NARROW, to_goal())
-    assert found is not None
-    assert commitment.leads_on(found, AT_ORIGIN, None)
-    assert not found.path.loiter
-    assert found.loiter_entry_m == pytest.approx(OVER_M)
-    assert found.plan.wants_more_time is False
-
-
-def test_near_the_goal_a_turn_is_kept_in_reserve_where_there_is_room(known: Known) -> None:
-    commitment, found = committed(known(np.zeros((0, 2))), MISSION, to_goal(0.5 * LEAST_M))
-    assert found is not None
-    assert commitment.leads_on(found, AT_ORIGIN, None)
-    assert found.path.loiter
+def test_the_goal_is_flown_to_where_no_turn_leads_on_and_near_it_a_turn_is_kept_in_reserve(
+    known: Known,
+) -> None:
+    for mission, length_m, entry_m in ((NARROW, 1000.0, OVER_M), (MISSION, 0.5 * LEAST_M, None)):
+        commitment, found = committed(known(np.zeros((0, 2))), mission, to_goal(length_m))
+        assert found is not None
+        assert commitment.leads_on(found, AT_ORIGIN, None)
+        assert found.path.loiter is (entry_m is None)
+        assert entry_m is None or found.loiter_entry_m == pytest.approx(entry_m)
+        assert found.plan.wants_more_time is False
 
 
 @pytest.mark.parametrize(("cut_m", "flown"), [(OVER_M - 0.1, False), (OVER_M + 0.1, True)])

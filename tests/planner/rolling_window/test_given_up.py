@@ -115,11 +115,10 @@ def test_what_was_given_up_is_tried_again_a_minute_after_something_was_in_the_wa
     refused = given_up(pilot)
     if change == "moves":
         seen.moving = (MovingEdges(3.0, np.array([(9000.0, 9000.0)]), (1.0, 0.0)),)
-        far_on(pilot, seen, plan, flown_m, begin_s)
-        seen.moving = ()
     else:
         seen.last_contradiction_s = begin_s
-        far_on(pilot, seen, plan, flown_m, begin_s)
+    far_on(pilot, seen, plan, flown_m, begin_s)
+    seen.moving = ()
     far_on(pilot, seen, plan, flown_m, begin_s + RETRY_S - 1.0)
     np.testing.assert_array_equal(given_up(pilot), refused)
     far_on(pilot, seen, plan, flown_m, begin_s + RETRY_S + 1.0)

@@ -98,14 +98,9 @@ def test_turns_into_an_opening_that_has_to_be_met_right(
     wall: MakePoints, assert_flyable: AssertFlyable
 ) -> None:
     # A way out to the left that a turn at once would miss, and that a corner in its middle has no room for.
-    points = np.concatenate(
-        (
-            wall((-400.0, 150.0), (450.0, 150.0), 15.0),
-            wall((900.0, 150.0), (900.0, -150.0), 15.0),
-            wall((800.0, 150.0), (900.0, 150.0), 15.0),
-            wall((-400.0, -150.0), (900.0, -150.0), 15.0),
-        )
-    )
+    ends = [(-400.0, 150.0, 450.0, 150.0), (900.0, 150.0, 900.0, -150.0)]
+    ends += [(800.0, 150.0, 900.0, 150.0), (-400.0, -150.0, 900.0, -150.0)]
+    points = np.concatenate([wall(end[:2], end[2:], 15.0) for end in ends])
     start, goal = Pose(0.0, 0.0, 1.0, 0.0), (0.0, 1500.0)
     assert optimise(start, 0.0, [(0.0, 0.0), goal], LIMITS, 50.0, terrain(points)) is None
     assert found_way(start, goal, points, assert_flyable) is not None

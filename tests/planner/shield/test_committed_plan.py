@@ -58,12 +58,8 @@ def test_what_is_left_has_the_straight_on_which_it_rolls() -> None:
     turn = (x + roll * ux, y + roll * uy, ux, uy, -0.01, 2.0 * math.pi * 100.0)
     path = Path(np.array([way, (x, y, ux, uy, 0.0, roll), turn]), loiter=True)
     flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=path), path, committed(3).course, 400.0)
-    for arc_length_m, lengths in (
-        (100.0, [300.0, roll, turn[5]]),
-        (410.0, [30.0, turn[5]]),
-        (450.0, [turn[5]]),
-    ):
-        left = flown.left(arc_length_m)
+    for at_m, lengths in ((100.0, [300.0, roll, turn[5]]), (410.0, [30.0, turn[5]]), (450.0, [turn[5]])):
+        left = flown.left(at_m)
         assert left.segments[:, 5].tolist() == pytest.approx(lengths)
         for before, after in itertools.pairwise(left.segments):
             assert pose_at(Path(before[None]), before[5])[:2] == pytest.approx(after[:2])

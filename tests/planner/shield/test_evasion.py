@@ -105,9 +105,8 @@ def test_from_what_has_just_appeared_it_keeps_further(place: tuple[float, float]
 def test_round_a_loiter_circle_room_is_that_of_the_place_it_will_be_at() -> None:
     """What comes to a circle is met only where it comes while the aircraft is there."""
     circle = Path(np.array([(0.0, 0.0, 1.0, 0.0, 1 / 100.0, math.tau * 100.0)]), loiter=True)
-    assert threats(np.array([(0.0, 200.0)])).room_m(circle) == pytest.approx(
-        DISCOUNT * 100.0 * math.pi, abs=2.0
-    )
+    half_round_m = 100.0 * math.pi
+    assert threats(np.array([(0.0, 200.0)])).room_m(circle) == pytest.approx(DISCOUNT * half_round_m, abs=2.0)
     # 200 m to the north after half a turn, 12.6 s: what is there by then, and what has gone by then.
     comes = moving(np.array([(400.0, 200.0)]), (-400.0 / 12.6, 0.0))
     goes = moving(np.array([(0.0, 200.0)]), (0.0, 20.0))
@@ -185,12 +184,9 @@ def test_it_gives_way_to_what_will_be_in_the_way(ring: MakePoints) -> None:
     here = 25.0 * time_s
 
     def nearest_m(path: Path, from_m: float) -> float:
-        return min(
-            float(
-                np.hypot(*(outline + np.array(velocity) * s - pose_at(path, from_m + SPEED * s)[:2]).T).min()
-            )
-            for s in np.arange(0.0, 25.0, 0.25)
-        )
+        at_s = np.arange(0.0, 25.0, 0.25)[:, None, None]
+        there = poses_at(path, from_m + SPEED * at_s.ravel())[:, None, :2]
+        return float(np.hypot(*(outline + np.array(velocity) * at_s - there).transpose(2, 0, 1)).min())
 
     assert nearest_m(plan.path, here) < 60.0
     answer = pilot.plan(request_on(plan, here, seen))
