@@ -146,6 +146,9 @@ class ContractFlight:
             arc_length_m += mission.speed_mps * ASKED_EVERY_S
 
 
+flown_once = cache(ContractFlight)  # a flight that several tests look at
+
+
 def circle_outline(east_m: float, north_m: float, radius_m: float) -> FloatArray:
     """(k, 2) edge points of a circle."""
     angle = np.arange(0.0, math.tau, SPACING_M / radius_m)
@@ -155,12 +158,6 @@ def circle_outline(east_m: float, north_m: float, radius_m: float) -> FloatArray
 def make(kind: PlannerKind, mission: Mission) -> Planner:
     """A planner for one flight, with the defaults of its keys."""
     return kind.make(kind.config().resolved(mission), mission)
-
-
-@cache
-def _among_circles(kind: PlannerKind, mission: Mission) -> ContractFlight:
-    """A flight among `CIRCLES`, made once for a kind."""
-    return ContractFlight(kind, mission, CIRCLES, AMONG_CIRCLES_S)
 
 
 def arrays_in(value: Any) -> list[FloatArray]:
@@ -224,7 +221,7 @@ class PlannerContract:
 
     def test_two_instances_give_the_same_plans_bit_for_bit(self) -> None:
         """No clock, no randomness of its own, nothing shared between planners."""
-        first = _among_circles(self.kind, self.mission)
+        first = flown_once(self.kind, self.mission, CIRCLES, AMONG_CIRCLES_S)
         again = ContractFlight(self.kind, self.mission, CIRCLES, AMONG_CIRCLES_S)
         assert [bits(answer) for _, answer in again.answers] == [bits(answer) for _, answer in first.answers]
         assert len({answer.status for _, answer in first.answers}) > 1, "it never changes its answer"
@@ -234,9 +231,8 @@ class PlannerContract:
 
         What the closed loop asks of an answer (`planner.plan_checks`) holds: else the flight would end there.
         """
-        xmin, ymin, xmax, ymax = self.mission.bounds_m
-        found = 0
-        for request, answer in _among_circles(self.kind, self.mission).answers:
+        found, bounds_m = 0, np.array(self.mission.bounds_m)
+        for request, answer in flown_once(self.kind, self.mission, CIRCLES, AMONG_CIRCLES_S).answers:
             plan = checked_plan(answer, request.position_m, self.mission)
             assert plan.reason
             assert (plan.path is not None) == (len(plan.waypoints_m) > 0) == (plan.status is PlanStatus.FOUND)
@@ -252,8 +248,7 @@ class PlannerContract:
             for row, following in pairwise(rows):
                 np.testing.assert_allclose(along(row, float(row[5]))[:meet], following[:meet], atol=1e-4)
             points = sample(plan.path, 100.0, 0.1)
-            assert (points >= (xmin - 1e-6, ymin - 1e-6)).all()
-            assert (points <= (xmax + 1e-6, ymax + 1e-6)).all()
+            assert ((points >= bounds_m[:2] - 1e-6) & (points <= bounds_m[2:] + 1e-6)).all()
         assert found, "no plan was found among a few circles"
 
     def test_plans_and_what_they_are_made_from_stay_as_they_are(self) -> None:

@@ -127,7 +127,10 @@ class Bug1(Walker[BugState]):
     def _after_boundary(self, place: Point, state: Circling | Returning, flown: FloatArray) -> BugState:
         """The state at the end of a boundary: on the way back to Q, or there on to the goal, or enclosed."""
         if isinstance(state, Circling):
-            return self._returning(self._circled(state, flown))
+            state = self._circled(state, flown)
+            onward = state.q_at_m <= 0.5 * state.walked_m  # the shorter way back
+            q, side = (state.q, ON_RIGHT) if onward else (state.q.reversed(), -ON_RIGHT)
+            return Returning(q, side, state.walked_m)
         if state.walked_m > LOST_SHARE * state.round_m:
             return self._begin_circling(place)
         if self.known.leads_inside(place, self.goal):
@@ -145,12 +148,6 @@ class Bug1(Walker[BugState]):
             return replace(state, walked_m=walked)
         q = mark_at(flown, float(at[i]))
         return Circling(state.hit, q, float(away[i]), state.walked_m + float(at[i]), walked)
-
-    def _returning(self, state: Circling) -> Returning:
-        """The state on the shorter way back to Q."""
-        onward = state.q_at_m <= 0.5 * state.walked_m
-        q, side = (state.q, ON_RIGHT) if onward else (state.q.reversed(), -ON_RIGHT)
-        return Returning(q, side, state.walked_m)
 
 
 class Bug2(Bug1):

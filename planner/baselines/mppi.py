@@ -69,26 +69,26 @@ class Mppi(Replanner):
         """A path by the mean of the sampled controls, optimised anew; a turn to hold in where it is blocked."""
         mission, pose = self.mission, start.pose
         lead_m = sum(row[5] for row in start.before)
-        self._move_on(request.arc_length_m + lead_m - self._begins_m if start.before else math.inf)
-        self._begins_m = lead_m
+        # Step 1: the nominal controls from a place on their rollout on; beyond it, straight.
+        flown_m = request.arc_length_m + lead_m - self._begins_m if start.before else math.inf
+        steps = np.arange(self._config.steps)
+        at = steps + min(flown_m / self._step_m, self._config.steps)
+        self._nominal, self._begins_m = np.interp(at, steps, self._nominal, right=0.0), lead_m
         rollouts = self._optimise(pose, self._nearby(pose))
-        rows = self._path(pose)
+        rows: list[Segment] = []
+        for curvature in self._nominal.tolist():
+            rows.append((*pose, curvature, self._step_m))
+            pose = along(rows[-1], self._step_m)
         found = Path(np.array([*start.before, *rows]))
         breach_m = first_breach(Path(np.array(rows)), self.memory.points_m, 0.5 * mission.clearance_m)
         if math.isfinite(breach_m) or not inside_bounds(found, mission.bounds_m):
             self._nominal[:] = 0.0
             return self.stuck("the best rollout is blocked", request)
         here = request.position_m
-        waypoints = np.array([here, *(row[:2] for row in rows), along(rows[-1], rows[-1][5])[:2]])
+        waypoints = np.array([here, *(row[:2] for row in rows), pose[:2]])
         drawn = tuple(np.array([here, *each]) for each in rollouts[:ROLLOUTS_DRAWN])
         picture = partial(PlanPicture, np.array([here, mission.goal_m]), candidates=drawn)
         return Plan(PlanStatus.FOUND, f"mean of {self._config.samples} rollouts", waypoints, found, picture)
-
-    def _move_on(self, flown_m: float) -> None:
-        """Step 1: the nominal controls from a place on their rollout on; beyond it, straight."""
-        steps = self._config.steps
-        at = np.arange(steps) + min(flown_m / self._step_m, steps)
-        self._nominal = np.interp(at, np.arange(steps), self._nominal, right=0.0)
 
     def _nearby(self, pose: Pose) -> FloatArray:
         """(m, 2) edge points that a rollout may meet, one for each square of half the clearance."""
@@ -133,9 +133,7 @@ class Mppi(Replanner):
         last = np.argmin(np.where(left < mission.goal_radius_m / self._step_m, way - 1e6, way), axis=1)
         last = np.where(left.min(axis=1) > 1.0, places.shape[1] - 1, last)
         room = to_nearest(np.ascontiguousarray(places.reshape(-1, 2)), points_m).reshape(places.shape[:2])
-        xmin, ymin, xmax, ymax = mission.bounds_m
-        x, y = places[:, :, 0], places[:, :, 1]
-        outside = (x < xmin) | (x > xmax) | (y < ymin) | (y > ymax)
+        outside = ((places < mission.bounds_m[:2]) | (places > mission.bounds_m[2:])).any(axis=2)
         # Between the ends of a step, half a step apart from them, the way comes nearer by no more than this.
         sagitta = keep - math.sqrt(max(keep * keep - 0.25 * self._step_m**2, 0.25 * keep * keep))
         penalty = np.where(room < keep + sagitta, TOO_NEAR_COST, 0.0)
@@ -143,11 +141,3 @@ class Mppi(Replanner):
         before = np.arange(places.shape[1]) <= last[:, None]
         whole = np.take_along_axis(way, last[:, None], axis=1)[:, 0]
         return np.asarray(whole + (penalty * before).sum(axis=1))
-
-    def _path(self, pose: Pose) -> list[Segment]:
-        """The nominal controls as arcs."""
-        rows: list[Segment] = []
-        for curvature in self._nominal.tolist():
-            rows.append((*pose, curvature, self._step_m))
-            pose = along(rows[-1], self._step_m)
-        return rows

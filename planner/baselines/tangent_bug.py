@@ -64,15 +64,6 @@ class BoundaryFollowing:
 TangentBugState = Toward | BoundaryFollowing | Enclosed
 
 
-@dataclass(frozen=True)
-class TangentNode:
-    """A node V of the local tangent graph."""
-
-    at: Tangent
-    to_goal_m: float  # d(V, T)
-    way_m: float  # d(x, V) + d(V, T)
-
-
 class TangentBug(Walker[TangentBugState]):
     """The planner for one flight."""
 
@@ -120,10 +111,10 @@ class TangentBug(Walker[TangentBugState]):
     def walk(self, place: Point, state: TangentBugState) -> Iterator[WalkLeg[TangentBugState]]:
         """Yields the legs of steps 1 and 2, as they follow one another."""
         if isinstance(state, BoundaryFollowing) and (node := self._leave_node(place, state)) is not None:
-            way, _ = self.straight(place, node.at.place)
+            way, _ = self.straight(place, node.place)
             state = Toward(state.followed_m)
             yield WalkLeg(state, way)
-            place = node.at.place
+            place = node.place
         while isinstance(state, Toward):
             line, met = self.straight(place, self.goal)
             if not met or length_of(line) >= self.mission.sensor_range_m:
@@ -140,8 +131,8 @@ class TangentBug(Walker[TangentBugState]):
         if isinstance(state, BoundaryFollowing):
             yield from self._follow(place, state)
 
-    def _nodes(self, place: Point, also: Point | None = None) -> list[TangentNode]:
-        """The local tangent graph about the obstacle that blocks the goal, and the one at another place (`also`)."""
+    def _nodes(self, place: Point, also: Point | None = None) -> list[Tangent]:
+        """The nodes in sight of the graph, about the obstacle that blocks the goal and the one at a place `also`."""
         reach = self.mission.sensor_range_m
         clear, blocking = self.known.first_hit(place, self.goal)
         ahead = min(clear, reach, math.dist(place, self.goal))
@@ -153,30 +144,29 @@ class TangentBug(Walker[TangentBugState]):
         # Where something hides an edge, the edges of that are taken as well.
         hiding = self.known.hiding(place, [each.place for each in touched if not each.seen])
         touched += self.known.tangents(place, hiding - parts, reach)
-        nodes = []
-        for touch in [free, *touched]:
-            to_goal_m = math.dist(touch.place, self.goal)
-            way_m = math.dist(place, touch.place) + to_goal_m
-            nodes += [TangentNode(touch, to_goal_m, way_m)] if touch.seen else []
-        return nodes
+        return [node for node in (free, *touched) if node.seen]
 
-    def _best(self, place: Point, nodes: list[TangentNode], limit_m: float) -> TangentNode | None:
+    def _way_m(self, place: Point, node: Tangent) -> float:
+        """d(x, V) + d(V, T): length (m) of the way from a place to a node and on to the goal."""
+        return math.dist(place, node.place) + math.dist(node.place, self.goal)
+
+    def _best(self, place: Point, nodes: list[Tangent], limit_m: float) -> Tangent | None:
         """The node to move to, past an obstacle rather than into a dent of it; None at a local minimum."""
         here = math.dist(place, self.goal)
         nearer = []
         for node in nodes:
-            to, goal = np.subtract(node.at.place, place), np.subtract(self.goal, place)
-            nearer_m = math.inf if math.dist(place, node.at.place) < self.keep_m else here
-            if node.at.side and to @ goal > 0.0 and node.to_goal_m < min(limit_m, nearer_m):
+            to, goal = np.subtract(node.place, place), np.subtract(self.goal, place)
+            nearer_m = math.inf if math.dist(place, node.place) < self.keep_m else here
+            if node.side and to @ goal > 0.0 and math.dist(node.place, self.goal) < min(limit_m, nearer_m):
                 nearer.append(node)
-        return min(nearer, key=lambda node: (node.at.dent, node.way_m), default=None)
+        return min(nearer, key=lambda node: (node.dent, self._way_m(place, node)), default=None)
 
-    def _slide(self, place: Point, node: TangentNode) -> FloatArray:
+    def _slide(self, place: Point, node: Tangent) -> FloatArray:
         """The way to a node, then along the obstacle while that leads nearer to the goal and hides it."""
-        way, met = self.straight(place, node.at.place)
-        if met and length_of(way) < math.dist(place, node.at.place) - self._progress_m:
+        way, met = self.straight(place, node.place)
+        if met and length_of(way) < math.dist(place, node.place) - self._progress_m:
             return way
-        along = self.known.boundary(node.at.place, node.at.side, self.horizon_m)
+        along = self.known.boundary(node.place, node.side, self.horizon_m)
         to_goal = np.hypot(*(along - self.goal).T).tolist()
         last = 0
         while last < len(along) - 1 and to_goal[last + 1] <= to_goal[last]:
@@ -191,8 +181,8 @@ class TangentBug(Walker[TangentBugState]):
 
         d_followed is of this boundary alone: else a round of it would prove nothing.
         """
-        nodes = [node for node in self._nodes(place) if node.at.side]
-        side = min(nodes, key=lambda node: node.way_m).at.side if nodes else ON_RIGHT
+        nodes = [node for node in self._nodes(place) if node.side]
+        side = min(nodes, key=lambda node: self._way_m(place, node)).side if nodes else ON_RIGHT
         first = mark_at(self.known.boundary(hit, side, self.keep_m), 0.0)
         on_boundary = math.dist(place, hit) < self._progress_m
         return BoundaryFollowing(first, side, hit, 0.0, on_boundary, self._nearest_m(hit))
@@ -201,11 +191,12 @@ class TangentBug(Walker[TangentBugState]):
         """Least distance (m) from the goal of the sensed boundary at a place."""
         return min(self.known.nearest_to_goal_m(anchor), math.dist(anchor, self.goal))
 
-    def _leave_node(self, place: Point, state: BoundaryFollowing) -> TangentNode | None:
+    def _leave_node(self, place: Point, state: BoundaryFollowing) -> Tangent | None:
         """The node to leave the boundary for: d_reach < d_followed, of these the one soonest reached; None if none."""
         limit = state.followed_m - self._progress_m
-        nearer = [node for node in self._nodes(place, state.anchor) if node.to_goal_m < limit]
-        return min(nearer, key=lambda node: node.way_m, default=None)
+        nodes = self._nodes(place, state.anchor)
+        nearer = [node for node in nodes if math.dist(node.place, self.goal) < limit]
+        return min(nearer, key=lambda node: self._way_m(place, node), default=None)
 
     def _follow(self, place: Point, state: BoundaryFollowing) -> Iterator[WalkLeg[TangentBugState]]:
         """Yields legs along the boundary; its first part is cut short by a straight line to a place in sight."""

@@ -83,11 +83,9 @@ class VfhPlus(Steerer):
 
     def _outside(self, pose: Pose) -> BoolArray:
         """Which directions leave the area within two turn radii."""
-        xmin, ymin, xmax, ymax = self.mission.bounds_m
-        reach = 2.0 * self.mission.turn_radius_m
-        x = pose.east_m + reach * np.cos(self._bearings)
-        y = pose.north_m + reach * np.sin(self._bearings)
-        return np.asarray((x < xmin) | (x > xmax) | (y < ymin) | (y > ymax))
+        reach, bounds_m = 2.0 * self.mission.turn_radius_m, self.mission.bounds_m
+        ends = pose[:2] + reach * np.column_stack((np.cos(self._bearings), np.sin(self._bearings)))
+        return np.asarray(((ends < bounds_m[:2]) | (ends > bounds_m[2:])).any(axis=1))
 
     def _mask(self, pose: Pose, near: FloatArray, blocked: BoolArray) -> BoolArray:
         """Which sectors are blocked or lie behind an obstacle that a turn there would touch."""

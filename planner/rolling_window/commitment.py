@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from functools import partial
+from collections.abc import Sequence
 
 import numpy as np
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, place_on
-from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.window import guide_vector
@@ -47,13 +46,19 @@ class Commitment:
             certified = self._certified(request.seen, course, cut_m)
         if certified is None:
             return None
-        goal, nodes, met = self._mission.goal_m, course.nodes, self._local.memory.met_m
+        goal, nodes, met_m = self._mission.goal_m, course.nodes, self._local.memory.met_m
+
+        def picture() -> PlanPicture:
+            ways = ((start.position, *nodes), *(candidate.nodes for candidate in candidates))
+            guide_m = np.array([start.position, goal])
+            return PlanPicture(guide_m, candidates=tuple(np.array(way) for way in ways), met_m=met_m)
+
         plan = Plan(
             PlanStatus.FOUND,
             explanation(request.position_m, goal, nodes),
             waypoints_m=np.array([start.position, *nodes]),
             path=certified.path,
-            picture=partial(picture_of, start.position, goal, nodes, candidates, met),
+            picture=picture,
             wants_more_time=wants_more_time,
         )
         return CommittedPlan(plan, certified.path, course, certified.loiter_entry_m)
@@ -130,14 +135,3 @@ def explanation(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
     x, y = nodes[0][0] - position[0], nodes[0][1] - position[1]
     side = "left" if ux * y - uy * x > 0.0 else "right"
     return f"obstacle ahead at {math.hypot(x, y) / 1000:.1f} km, passing {side}"
-
-
-def picture_of(
-    position: Point, goal: Point, nodes: Sequence[Point], candidates: Iterable[Candidate], met_m: FloatArray
-) -> PlanPicture:
-    """The picture of a plan: guide vector, candidates with the chosen course first, moving obstacles where met."""
-    return PlanPicture(
-        guide_m=np.array([position, goal]),
-        candidates=(np.array([position, *nodes]), *(np.array(candidate.nodes) for candidate in candidates)),
-        met_m=met_m,
-    )
