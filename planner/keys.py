@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
-from planner.geometry.clearance import margin_of
 from planner.interface import Mission
+
+MARGIN_SHARE = 0.1
+"""The default margin beyond the clearance is at least this share of the clearance."""
+MARGIN_ERRORS = 2.0
+"""The default margin is at least this many times the tracking error of the aircraft in tight turns."""
 
 
 def key(default: object, doc: str, unit: str = "1", **bounds: float) -> Any:
@@ -27,7 +31,8 @@ class MarginConfig:
 
     def margin(self, mission: Mission) -> float:
         """The margin (m), derived where none is given."""
-        return margin_of(mission) if self.margin_m is None else self.margin_m
+        default_m = max(MARGIN_SHARE * mission.clearance_m, MARGIN_ERRORS * mission.tracking_error_m)
+        return default_m if self.margin_m is None else self.margin_m
 
     def resolved(self, mission: Mission) -> Self:
         """This config with every None replaced by its default for the mission."""

@@ -29,7 +29,7 @@ from harness.scenario.performance import (
 )
 from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec, Point
 from harness.scenario.validation import KeyFault
-from planner.geometry.clearance import MARGIN_SHARE
+from planner.keys import MARGIN_SHARE
 
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe

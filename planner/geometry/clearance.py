@@ -1,4 +1,4 @@
-"""Distances between paths and sensed edge points, and the margin that plans keep."""
+"""Distances between paths and sensed edge points."""
 
 from __future__ import annotations
 
@@ -7,14 +7,8 @@ import math
 import numpy as np
 
 from planner.geometry.curves import Point
-from planner.interface import BoolArray, FloatArray, Mission, Path
+from planner.interface import BoolArray, FloatArray, Path
 from planner.kernels import segments
-
-MARGIN_SHARE = 0.1
-"""The default margin beyond the clearance is at least this share of the clearance."""
-
-MARGIN_ERRORS = 2.0
-"""The default margin is at least this many times the tracking error of the aircraft in tight turns."""
 
 
 def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -57,8 +51,3 @@ def behind(places_m: FloatArray, eye_m: Point, edges_m: FloatArray, beside_m: fl
     # The shadow is a fan: at twice the distance it is twice as wide.
     hidden: BoolArray = ((along_m > away_m) & (aside_m < beside_m * along_m / away_m)).any(axis=1)
     return hidden
-
-
-def margin_of(mission: Mission) -> float:
-    """Planned distance beyond the clearance where none is given (m)."""
-    return max(MARGIN_SHARE * mission.clearance_m, MARGIN_ERRORS * mission.tracking_error_m)

@@ -172,11 +172,6 @@ class Limits(NamedTuple):
         """The limits of a mission."""
         return cls(mission.turn_radius_m, mission.ground_speed_mps * mission.roll_in_s)
 
-    @classmethod
-    def of_holds(cls, mission: Mission) -> Limits:
-        """The limits of the full turns that plans of a mission end in."""
-        return cls(mission.hold_radius_m, mission.ground_speed_mps * mission.roll_in_s)
-
 
 def fillet(
     start: Pose,

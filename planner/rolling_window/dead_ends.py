@@ -28,14 +28,14 @@ MOST_RETRIES = 8
 class GivingUp:
     """Gives up places that the aircraft turned away from, and decides what follows a search in vain."""
 
-    def __init__(self, mission: Mission, memory: ObstacleMemory) -> None:
+    def __init__(self, mission: Mission, memory: ObstacleMemory, stability: WorldStability) -> None:
         self._mission, self._memory = mission, memory
         self.whole_turn_m = math.tau * mission.turn_radius_m
         self._turned_before: list[Point] = []
         self._retry_s = math.inf
-        self._retries = 0
+        self.retries = 0  # how often all given-up places have been tried again
         self.given_up_at_m = 0.0  # arc length of the plan in effect at which a place was given up last
-        self.stability = WorldStability()
+        self._stability = stability
         self.effort = 0  # how often the work of a wide search is doubled; grows with every search in vain
         self.tried_again = False  # what was given up has been tried again for want of another way
 
@@ -51,8 +51,8 @@ class GivingUp:
 
     def note_change(self, time_s: float, seen: MapView) -> None:
         """Forgets the given-up places some time after something moved or appeared, which may have left the way."""
-        if self.stability.note(time_s, seen):
-            self._retry_s = self.stability.changed_s + RETRY_S
+        if self._stability.note(time_s, seen):
+            self._retry_s = self._stability.changed_s + RETRY_S
         if time_s > self._retry_s:
             self._retry_s, self._turned_before = math.inf, []
             self._memory.forgive()
@@ -75,39 +75,25 @@ class GivingUp:
             self._memory.refuse((east - aside_m * along_north, north + aside_m * along_east))
 
     @property
-    def certain(self) -> bool:
-        """Whether all that was seen still stands, and nothing has contradicted seen-free space."""
-        return not (self._memory.ever_cleared or self.stability.ever_changed)
-
-    @property
     def out_of_effort(self) -> bool:
         """Whether the search has been repeated with all the effort that there is."""
         return self.effort == MOST_EFFORT
-
-    def turned_since(self, loiter_entry_m: float, arc_length_m: float) -> bool:
-        """Whether more than a whole turn has been flown since the loiter was entered or a place was given up."""
-        return arc_length_m - max(loiter_entry_m, self.given_up_at_m) > self.whole_turn_m
 
     def effort_spent(self, edges_went: bool, only_given_up: bool) -> bool:
         """Whether all searches have been made that a proof for want of room to turn has to wait for."""
         needed = MOST_EFFORT if edges_went else 1
         return self.effort >= needed or (only_given_up and self.tried_again)
 
-    @property
-    def out_of_retries(self) -> bool:
-        """Whether all given-up places have been tried again as often as allowed."""
-        return self._retries == MOST_RETRIES
-
     def narrow(self, no_room: bool, time_s: float) -> bool:
         """Tells whether it is certain that only ways without room to turn are left; `no_room` is proved."""
         # What moved may have closed the way. Where edge points were taken back the sensor errs, and a place that was
         # given up may be seen to be free at another look.
-        doubtful = self.stability.ever_changed or self._memory.ever_cleared
-        return no_room and self.stability.settled(time_s) and not (doubtful and len(self._memory.refused_m))
+        doubtful = self._stability.ever_changed or self._memory.ever_cleared
+        return no_room and self._stability.settled(time_s) and not (doubtful and len(self._memory.refused_m))
 
     def try_again(self, narrow: bool, at_end: bool, arc_length_m: float) -> None:
         """After a search in vain: more effort (`narrow`: none); forgives the refused if that or `at_end`."""
-        self._retries += narrow
+        self.retries += narrow
         if narrow or at_end:
             self.given_up_at_m = arc_length_m
             self._memory.forgive()

@@ -30,7 +30,7 @@ from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proofs
 from planner.rolling_window.commitment import Commitment
 from planner.rolling_window.config import RollingWindowConfig
-from planner.rolling_window.dead_ends import GivingUp
+from planner.rolling_window.dead_ends import MOST_RETRIES, GivingUp
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.rolling_search import RollingSearch, Work
 from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
@@ -42,8 +42,6 @@ from planner.shield.intervention_log import ShieldReport
 KEPT_PLAN = Plan(PlanStatus.KEPT, "the plan in effect serves")  # answer when nothing needs a search
 NO_BETTER = "the plan in effect serves as well as any other"
 THINKING_ON = "thinking on; the plan in effect goes on"
-CHAIN = "a closed chain of obstacles lies between the aircraft and the goal"
-NO_WAY_UNSHIELDED = "no way is found"
 NO_WAY_ON = "no way on can be seen to be safe; the plan in effect goes on"
 
 
@@ -72,7 +70,7 @@ class RollingWindow(CertifiedPlanner):
         self._start_tolerance_m = start_tolerance_m(mission)
         self._commitment = Commitment(mission, self._local, lead_m + 2.0 * widest_m, shielded)
         self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
-        self._giving_up = GivingUp(mission, memory)
+        self._giving_up = GivingUp(mission, memory, self._stability)
         parts = (self._local, self._commitment, self._monitor, self._giving_up, self._proofs.no_way)
         self._search = RollingSearch(mission, *parts)
         self._loitered: CommittedPlan | None = None  # the plan whose turn was entered last
@@ -267,14 +265,8 @@ class RollingWindow(CertifiedPlanner):
         """Any state -> ESCAPING: nothing is certified; a turn that keeps clear is flown, or what does so longest."""
         self.state = PlanningState.ESCAPING
         if not self._shielded:
-            return Plan(PlanStatus.NO_PATH, NO_WAY_UNSHIELDED)
-        return self._escaped(
-            now.request,
-            now.here_m,
-            certain=self._giving_up.certain,
-            to_m=self._monitor.cut_m,
-            nearer=self._search.nearer,
-        ).plan
+            return Plan(PlanStatus.NO_PATH, "no way is found")
+        return self._escaped(now.request, now.here_m, self._monitor.cut_m, self._search.nearer).plan
 
     def _proved(self, now: Situation) -> tuple[bool, bool]:
         """Whether no way has room to turn, asked once enough was tried; whether no way is left but given-up ones."""
@@ -286,7 +278,7 @@ class RollingWindow(CertifiedPlanner):
 
     def _proved_closed(self, request: PlanRequest) -> bool:
         """Whether the world stands still and the edge points seen leave no way at all."""
-        settled = self._giving_up.stability.settled(request.time_s)
+        settled = self._stability.settled(request.time_s)
         return settled and self._proofs.no_way.closed(request.position_m)
 
     def _give_up(
@@ -299,14 +291,15 @@ class RollingWindow(CertifiedPlanner):
         """
         self.state = PlanningState.GIVING_UP
         giving_up, arc_length_m = self._giving_up, now.request.arc_length_m
-        turned = giving_up.turned_since(plan.loiter_entry_m, arc_length_m)
+        # More than a whole turn has been flown since the loiter was entered or a place was given up.
+        turned = arc_length_m - max(plan.loiter_entry_m, giving_up.given_up_at_m) > giving_up.whole_turn_m
         if search.stuck is not None:
             if turned:
                 giving_up.given_up_at_m = arc_length_m
                 giving_up.refuse(self._commitment.unseen(search.stuck, now.request.seen))
             return Plan(PlanStatus.NO_PATH, NO_WAY_ON)
         narrow = giving_up.narrow(no_room, now.request.time_s)
-        if narrow and giving_up.out_of_retries:
+        if narrow and giving_up.retries == MOST_RETRIES:
             return self._end_without_room_to_turn(now)
         # No way is left but those given up, or one that takes more looking for. Or none that can be flown from here:
         # elsewhere on the turn there may be one.
@@ -317,8 +310,9 @@ class RollingWindow(CertifiedPlanner):
     def _prove_no_way(self) -> Plan:
         """Any state -> PROVING: a closed chain of edges with no gap that any vehicle could pass."""
         self.state = PlanningState.PROVING
-        gap_m = self._proofs.no_way_gap_m
-        return Plan(PlanStatus.UNREACHABLE, f"{CHAIN}: no gap in it is wider than {gap_m:.0f} m")
+        chain = "a closed chain of obstacles lies between the aircraft and the goal"
+        told = f"{chain}: no gap in it is wider than {self._proofs.no_way_gap_m:.0f} m"
+        return Plan(PlanStatus.UNREACHABLE, told)
 
     def _end_without_room_to_turn(self, now: Situation) -> Plan:
         """GIVING_UP -> PROVING: a closed chain of edges with no gap that is seen to have room for a turn.

@@ -12,6 +12,7 @@ from planner.shield.encounters import encounters
 from planner.shield.escape import Escape, Escapes, PlanInEffect, Room
 from planner.shield.evasion import Threats
 from planner.shield.intervention_log import InterventionLog, ShieldReport
+from planner.world_stability import WorldStability
 
 
 class CertifiedPlanner:
@@ -22,6 +23,7 @@ class CertifiedPlanner:
         self._lead_m = lead_of(mission)
         self._escapes = Escapes(mission, memory, room)
         self._threats: Threats | None = None  # while something moves or has just appeared
+        self._stability = WorldStability()
         self._log = InterventionLog()
 
     @property
@@ -54,13 +56,7 @@ class CertifiedPlanner:
         return start_of(self._monitor.plan, request, here_m, self._lead_m, self._mission, to_m)
 
     def _escaped(
-        self,
-        request: PlanRequest,
-        here_m: float,
-        *,
-        certain: bool,
-        to_m: float = math.inf,
-        nearer: CommittedPlan | None = None,
+        self, request: PlanRequest, here_m: float, to_m: float = math.inf, nearer: CommittedPlan | None = None
     ) -> Escape:
         """The escape where nothing is certified: a turn that keeps clear, or the way that keeps clear longest.
 
@@ -72,6 +68,7 @@ class CertifiedPlanner:
         else:
             until_m = min(monitor.cut_m, effective.loiter_entry_m)
             left = PlanInEffect(effective, here_m, until_m, self._start(request, here_m, to_m).prefix)
+            certain = not (self._memory.ever_cleared or self._stability.ever_changed)
             escape = self._escapes.from_plan(request, self._threats, left, certain=certain, nearer=nearer)
         monitor.broken = escape.broken
         monitor.proposed = escape.committed or monitor.proposed

@@ -57,7 +57,8 @@ class Room:
     ) -> None:
         self._mission, self._memory, self._work_count = mission, memory, work_count
         self.path_keeps_m = path_keeps_m
-        self.limits, self.holds = Limits.of(mission), Limits.of_holds(mission)
+        self.limits = Limits.of(mission)
+        self.holds = self.limits._replace(radius_m=mission.hold_radius_m)
 
     def terrain(self, keep_m: float, standing: bool = False) -> Terrain:
         """Where a curve may lie that keeps one distance from all edge points, or from those that were seen to stand."""

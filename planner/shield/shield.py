@@ -71,12 +71,11 @@ class Shield(CertifiedPlanner):
         self._refused: Refused | None = None
         self._places: list[tuple[int, Point]] = []  # refused, the map's revision before each
         self._shown_s = -math.inf  # when the last of them was put on the inner planner's map
-        self._ever_changed = False
 
     def plan(self, request: PlanRequest) -> Plan:
         """The longest part of the inner planner's path that is certified, or the backup."""
         fresh_m = self._sense(request)
-        self._ever_changed |= bool(request.seen.moving) or math.isfinite(request.seen.last_contradiction_s)
+        self._stability.note(request.time_s, request.seen)
         if self._takes_effect(request):
             self._adopted = self._proposed
         effective, here_m = self._monitor.plan, request.arc_length_m
@@ -231,8 +230,7 @@ class Shield(CertifiedPlanner):
         effective, time_s = self._monitor.plan, request.time_s
         why = self._refused.reason if self._refused is not None else answer.reason
         if effective is None or self._monitor.broken:
-            certain = not (self._memory.ever_cleared or self._ever_changed)
-            escape = self._escaped(request, here_m, certain=certain)
+            escape = self._escaped(request, here_m)
             if escape.committed is not None:
                 self._proposed = None
             if effective is not None:

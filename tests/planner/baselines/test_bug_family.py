@@ -19,7 +19,6 @@ from planner.baselines.bug import Bug1, Bug2
 from planner.baselines.tangent_bug import TangentBug
 from planner.baselines.walk import WalkLeg, connected
 from planner.contract import GivenMap
-from planner.geometry.clearance import margin_of
 from planner.geometry.curves import Point, pose_at
 from planner.interface import BoolArray, FloatArray, Mission, Plan, Planner, PlanRequest, PlanStatus
 from planner.keys import MarginConfig
@@ -36,7 +35,7 @@ MISSION = replace(
     bounds_m=(0.0, 0.0, 20_000.0, 10_000.0),
     sensor_range_m=3000.0,
 )
-KEEP = MISSION.clearance_m + margin_of(MISSION)
+KEEP = MISSION.clearance_m + MarginConfig().margin(MISSION)
 START = (3000.0, 5000.0)
 SPACING = 50.0
 
@@ -165,7 +164,7 @@ def test_the_way_round_a_circle_has_the_length_that_geometry_gives(kind: str, ri
     assert flight.reason == "reached"
     expected = around_a_circle(kind, 1500.0 + KEEP, 7000.0, 14_000.0) - MISSION.goal_radius_m
     assert flight.length_m == pytest.approx(expected, abs=0.004 * expected + 50.0)
-    assert nearest_m(flight.track_m, points) > MISSION.clearance_m + 0.5 * margin_of(MISSION)
+    assert nearest_m(flight.track_m, points) > MISSION.clearance_m + 0.5 * MarginConfig().margin(MISSION)
     if kind in OF_CONTACT:  # it knows the circle on contact only
         east, north = flight.track_m[flight.track_m[:, 0] < 10_000.0 - 1500.0 - KEEP - 50.0].T
         assert len(east) > 100

@@ -29,6 +29,7 @@ from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situat
 from planner.shield.certificate import CertificateBroken
 from planner.shield.committed_plan import Start
 from planner.shield.escape import Escape
+from planner.world_stability import WorldStability
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
     SPACING,
@@ -259,7 +260,7 @@ def test_want_of_room_to_turn_is_proved_after_all_was_tried_again() -> None:
 
 def test_no_room_to_turn_is_no_verdict_while_a_place_is_given_up_that_the_sensor_may_err_about() -> None:
     memory = ObstacleMemory(MISSION.clearance_m)
-    giving_up = GivingUp(MISSION, memory)
+    giving_up = GivingUp(MISSION, memory, WorldStability())
     giving_up.try_again(narrow=False, at_end=True, arc_length_m=0.0)
     memory.refuse((500.0, 0.0))
     assert giving_up.narrow(no_room=True, time_s=0.0)
