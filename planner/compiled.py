@@ -213,7 +213,8 @@ def _start_second(busy_bytes: int) -> None:
     _compile([first])
     if not first.anew:
         return
-    _tell("wayproof: compiling for this machine, once; this takes some seconds")
+    if sys.stderr is not None and sys.stderr.isatty():
+        sys.stderr.write("wayproof: compiling for this machine, once; this takes some seconds\n")
     names = _share(_functions(), busy_bytes) if first.kept and os.cpu_count() != 1 else frozenset()
     with suppress(OSError):  # All are then compiled here.
         _second = _SecondProcess(names) if names else None
@@ -256,9 +257,3 @@ def own_this_process() -> None:
     global _process_is_ours
     _process_is_ours = True
     gc.set_threshold(STARTING_OBJECTS)
-
-
-def _tell(line: str) -> None:
-    """Writes a line to standard error where that is a terminal."""
-    if sys.stderr is not None and sys.stderr.isatty():
-        sys.stderr.write(f"{line}\n")

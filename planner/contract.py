@@ -37,8 +37,7 @@ from planner.nearest_edge import distance_to_edges
 from planner.plan_checks import checked_plan
 from planner.registry import PlannerKind
 
-Disc = tuple[float, float, float]
-"""East and north of the centre, and radius (m)."""
+Disc = tuple[float, float, float]  # east and north of the centre, radius (m)
 
 MISSION = Mission(  # every planner is tested on it
     goal_m=(18_000.0, 12_000.0),
@@ -52,15 +51,13 @@ MISSION = Mission(  # every planner is tested on it
     sensor_range_m=6000.0,
 )
 START: Point = (1000.0, 1000.0)  # where a test flight begins
-AHEAD: Point = (math.sqrt(0.5), math.sqrt(0.5))
-"""Unit vector of the course at `START`."""
+AHEAD: Point = (math.sqrt(0.5), math.sqrt(0.5))  # unit vector of the course there
 CIRCLES: tuple[Disc, ...] = ((7000.0, 5000.0, 1500.0), (12_000.0, 8200.0, 900.0), (15_500.0, 9000.0, 800.0))
 
 ASKED_EVERY_S = 0.5  # simulated time between two calls of `plan`
 AMONG_CIRCLES_S, IN_THE_OPEN_S = 300.0, 1500.0
 """Longest flights of the tests, among `CIRCLES` and in an empty world."""
-SPACING_M = 50.0
-"""Distance between neighbouring edge points."""
+SPACING_M = 50.0  # between neighbouring edge points
 
 
 class GivenMap:

@@ -48,16 +48,11 @@ def _drawn(name: str, points: FloatArray, columns: int) -> FloatArray:
 class PlanStatus(Enum):
     """How a call to a planner ended."""
 
-    FOUND = "found"
-    """A new path to fly."""
-    KEPT = "kept"
-    """The path being flown still serves; nothing was searched."""
-    NO_BETTER = "no_better"
-    """A search found nothing better than the path being flown, which still serves."""
-    NO_PATH = "no_path"
-    """A search found no path; the path being flown goes on."""
-    UNREACHABLE = "unreachable"
-    """The edges seen so far leave no way: the goal is proved unreachable."""
+    FOUND = "found"  # a new path to fly
+    KEPT = "kept"  # the path being flown still serves; nothing was searched
+    NO_BETTER = "no_better"  # a search found nothing better than the path being flown, which still serves
+    NO_PATH = "no_path"  # a search found no path; the path being flown goes on
+    UNREACHABLE = "unreachable"  # the edges seen so far leave no way: the goal is proved unreachable
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +64,7 @@ class MovingEdges:
 
     time_s: float
     points_m: FloatArray
-    velocity_mps: tuple[float, float]
-    """East, north; (0, 0) if it has just appeared and is not known yet."""
+    velocity_mps: tuple[float, float]  # east, north; (0, 0) if it has just appeared and is not known yet
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points_m", _frozen(self.points_m))
@@ -113,30 +107,18 @@ class MapView(Protocol):
 class Mission:
     """What a planner is told once for a whole flight: goal, area, aircraft and sensor."""
 
-    goal_m: tuple[float, float]
-    """(east, north) of the goal."""
-    goal_radius_m: float
-    """Reached when inside this circle."""
-    bounds_m: tuple[float, float, float, float]
-    """(xmin, ymin, xmax, ymax) of the area; must not be crossed."""
-    clearance_m: float
-    """Wanted distance from every obstacle edge."""
-    turn_radius_m: float
-    """Smallest radius a path may have."""
-    speed_mps: float
-    """Wanted airspeed."""
-    roll_in_s: float
-    """From wings level to 90 % of 30 degrees, or of the bank limit if that is less."""
-    tracking_error_m: float
-    """Largest expected distance of the aircraft from its path."""
-    sensor_range_m: float
-    """Radius of the sensing range (the paper's r)."""
-    compute_latency_s: float = 0.0
-    """A plan takes effect this long after the request."""
-    sensor_latency_s: float = 0.0
-    """A scan is known this long after it was taken."""
-    wind_mps: float = 0.0
-    """The strongest steady wind to expect."""
+    goal_m: tuple[float, float]  # (east, north) of the goal
+    goal_radius_m: float  # reached when inside this circle
+    bounds_m: tuple[float, float, float, float]  # (xmin, ymin, xmax, ymax) of the area; must not be crossed
+    clearance_m: float  # wanted distance from every obstacle edge
+    turn_radius_m: float  # smallest radius a path may have
+    speed_mps: float  # wanted airspeed
+    roll_in_s: float  # time from wings level to 90 % of 30 degrees, or of the bank limit if that is less
+    tracking_error_m: float  # largest expected distance of the aircraft from its path
+    sensor_range_m: float  # radius of the sensing range (the paper's r)
+    compute_latency_s: float = 0.0  # a plan takes effect this long after the request
+    sensor_latency_s: float = 0.0  # a scan is known this long after it was taken
+    wind_mps: float = 0.0  # the strongest steady wind to expect
     least_hold_radius_m: float | None = None
     """Smallest radius of a full turn that ends a plan; None: that of any turn."""
     least_spaced_radius_m: float | None = None
@@ -175,8 +157,7 @@ class Path:
     """
 
     segments: FloatArray
-    loiter: bool = False
-    """The last segment is a full circle to be flown for ever."""
+    loiter: bool = False  # the last segment is a full circle to be flown for ever
 
     def __post_init__(self) -> None:
         rows = np.array(self.segments, dtype=np.float64, order="C").reshape(-1, 6)
@@ -224,24 +205,15 @@ class Refused(NamedTuple):
 class PlanRequest(NamedTuple):
     """One question to a planner."""
 
-    time_s: float
-    """Simulated time."""
-    position_m: tuple[float, float]
-    """(east, north) of the aircraft."""
-    direction: tuple[float, float]
-    """Unit vector of its ground velocity."""
-    seen: MapView
-    """The map so far."""
-    flown: Plan | None = None
-    """The plan in effect, None before the first."""
-    arc_length_m: float = 0.0
-    """Distance of the aircraft along `flown.path`, from its start."""
-    scanned: bool = True
-    """A scan has come in since the last request."""
-    refused: Refused | None = None
-    """Why the shield refused the planner's last path; None while it is flown."""
-    committed: Path | None = None
-    """Under a shield: what is left of the certified path, and its turn."""
+    time_s: float  # simulated time
+    position_m: tuple[float, float]  # (east, north) of the aircraft
+    direction: tuple[float, float]  # unit vector of its ground velocity
+    seen: MapView  # the map so far
+    flown: Plan | None = None  # the plan in effect, None before the first
+    arc_length_m: float = 0.0  # distance of the aircraft along `flown.path`, from its start
+    scanned: bool = True  # a scan has come in since the last request
+    refused: Refused | None = None  # why the shield refused the planner's last path; None while it is flown
+    committed: Path | None = None  # under a shield: what is left of the certified path, and its turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,18 +250,13 @@ class Plan:
         ValueError: the path has a tangent that is no unit vector: nothing could be flown or judged by it.
     """
 
-    status: PlanStatus
-    """How the call ended."""
-    reason: str
-    """One sentence for the event log."""
+    status: PlanStatus  # how the call ended
+    reason: str  # one sentence for the event log
     waypoints_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     """(k, 2) fixed-altitude waypoints, anything that numpy makes such an array of; empty unless FOUND."""
-    path: Path | None = None
-    """The curve through them; None unless FOUND."""
-    picture: Callable[[], PlanPicture] | None = None
-    """Draws how the plan was found; called once if accepted."""
-    wants_more_time: bool = False
-    """The search goes on: the planner wants to be asked before the next scan."""
+    path: Path | None = None  # the curve through the waypoints; None unless FOUND
+    picture: Callable[[], PlanPicture] | None = None  # draws how the plan was found; called once if accepted
+    wants_more_time: bool = False  # the search goes on: the planner wants to be asked before the next scan
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "waypoints_m", _frozen(self.waypoints_m))

@@ -72,8 +72,12 @@ class DubinsTree(Replanner):
 
     def replanned(self, request: PlanRequest, start: Start) -> Plan:
         """A way to the goal, straight there where that is free, else by a tree."""
+        points, ends = self.memory.points_m, (start.pose[:2], self.mission.goal_m)
+        # Start and goal may be nearer to an edge than what is kept elsewhere.
+        room_m = np.minimum(*(np.hypot(*(points - end).T) - 1e-3 for end in ends))
         for share in MARGIN_SHARES:
-            terrain = self._terrain(start.pose, self.mission.clearance_m + share * self._margin_m)
+            keep_m = np.minimum(self.mission.clearance_m + share * self._margin_m, room_m)
+            terrain = Terrain(points, keep_m, self.mission.bounds_m)
             found = self.grown(start.pose, terrain)
             if found is None:
                 continue
@@ -87,12 +91,6 @@ class DubinsTree(Replanner):
                 partial(PlanPicture, guide, self.mission.sensor_range_m, candidates=(nodes,)),
             )
         return self.stuck("the tree found no way", request)
-
-    def _terrain(self, pose: Pose, keep_m: float) -> Terrain:
-        """Where branches may lie; start and goal may be nearer to an edge than what is kept elsewhere."""
-        points = self.memory.points_m
-        ends = [np.hypot(*(points - end).T) - 1e-3 for end in (pose[:2], self.mission.goal_m)]
-        return Terrain(points, np.minimum(keep_m, np.minimum(*ends)), self.mission.bounds_m)
 
     def grown(self, start: Pose, terrain: Terrain) -> Node | None:
         """The goal as a node: straight from the start where that is free, else of a tree; None where none is found."""

@@ -19,8 +19,7 @@ class RollingWindowConfig(MarginConfig):
     candidates: int = key(12, "n, how many candidates are kept at every step", minimum=1, maximum=100)
     rolling_step_m: float | None = key(
         None,
-        "distance flown before the window rolls, unless the plan is cut near by; default: 1/16 "
-        "of the sensor range",
+        "distance flown before the window rolls, unless the plan is cut near by; default: 1/16 of the sensor range",
         "m",
         above=0.0,
     )

@@ -39,8 +39,6 @@ PROGRESS_SHARE = 0.25
 HOLD_WITHIN_RADII = 1.0
 """A path of a planner that begins its full turn within this many turn radii only asks to circle."""
 
-GOES_ON = "the certified plan in effect goes on"
-
 
 @dataclass(frozen=True, eq=False)
 class Adopted:
@@ -238,7 +236,7 @@ class Shield(CertifiedPlanner):
             return escape.plan
         if not effective.holds(here_m) or not effective.path.loiter:
             self._log.note(time_s, "")
-            return Plan(PlanStatus.KEPT, GOES_ON)
+            return Plan(PlanStatus.KEPT, "the certified plan in effect goes on")
         self._log.note(time_s, why)
         if answer.status is PlanStatus.UNREACHABLE and self._refused is None and not self._places:
             return answer
