@@ -8,17 +8,7 @@ from itertools import product
 import numpy as np
 
 from planner.geometry.clearance import first_breach
-from planner.geometry.curves import (
-    Limits,
-    Pose,
-    Segment,
-    along,
-    between,
-    full_turn,
-    place_on,
-    pose_at,
-    sample,
-)
+from planner.geometry.curves import Limits, Pose, Segment, along, between, full_turn, place_on, sample
 from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 
@@ -93,7 +83,7 @@ def branch_off(request: PlanRequest, mission: Mission) -> tuple[Pose, list[Segme
     here = Pose(*request.position_m, *request.direction)
     if path is None or path.loiter or arc_length_m >= path.length_m:
         return here, []
-    if math.dist(pose_at(path, arc_length_m)[:2], here[:2]) > mission.off_path_m:
+    if math.dist(place_on(path, arc_length_m)[0][:2], here[:2]) > mission.off_path_m:
         return here, []
     leave = arc_length_m + lead_of(mission)
-    return pose_at(path, leave), between(path, arc_length_m, leave)
+    return place_on(path, leave)[0], between(path, arc_length_m, leave)
