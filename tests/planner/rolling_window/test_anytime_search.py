@@ -6,14 +6,15 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from planner import contract
 from planner.geometry.course import Course
-from planner.geometry.curves import Pose, places_along
-from planner.interface import FloatArray, MapView, Mission
+from planner.geometry.curves import Point, Pose, places_along
+from planner.interface import FloatArray, MapView, Mission, Path
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.local_planning import LocalPlanning
@@ -106,33 +107,37 @@ def test_portions_grow_in_a_search_that_goes_on_for_minutes(
     assert asked == pytest.approx(portions, rel=0.005)
 
 
-def test_what_is_found_late_begins_where_the_aircraft_has_got_to(trap: MapView) -> None:
-    flown = 0.0
-
-    def start() -> Start:
-        nonlocal flown
-        flown += 12.5
-        return Start((flown, 0.0), Pose(flown, 0.0, 1.0, 0.0))
-
+@pytest.mark.parametrize("other_way", [False, True])
+def test_what_is_found_late_begins_where_the_aircraft_has_got_to(other_way: bool, trap: MapView) -> None:
+    """So does a way that waited for a wider one, for it passes obstacles on the other side than the course flown."""
+    nodes: tuple[Point, ...] = ((1800.0, -2300.0), (6200.0, -2300.0), (8000.0, -5300.0), MISSION.goal_m)
+    course = Course(Path.through(np.array([(0.0, 0.0), *nodes])), nodes, len(trap.edges_since(-1)), False)
     _, thinking = planning(trap)
+    flown_m = found = 0.0
     while not thinking.done:
-        begin = start()
-        for course in thinking.courses(begin, None, 5):
-            assert course.path.segments[0, :2].tolist() == list(begin.pose[:2])
-    assert flown > 50.0
+        flown_m += 12.5
+        begin = Start((flown_m, 0.0), Pose(flown_m, 0.0, 1.0, 0.0))
+        for each in thinking.courses(begin, course if other_way else None, 5):
+            assert each.path.segments[0, :2].tolist() == list(begin.pose[:2])
+            found += 1
+    assert flown_m > 50.0
+    assert found
+
+
+def test_a_curve_is_judged_by_the_points_and_the_start_that_it_is_asked_for_with(known: Known) -> None:
+    post, goal = np.array([(3000.0, 0.0)]), MISSION.goal_m
+    local, _ = planning(known(post))
+    wanted, beside = local.attempts()[0], Start((3000.0, 100.0), Pose(3000.0, 100.0, 1.0, 0.0))
+    asked = [(START, post[:0]), (START, post), (beside, post)]  # no more is kept than a start lies away
+    found = [local.fitted(start, wanted, [start.position, goal], points) for start, points in asked]
+    assert [each is not None for each in found] == [True, False, True]
 
 
 def test_walled_in_the_proof_ends_it(ring: MakePoints, known: Known) -> None:
-    asked = 0
-
-    def closed() -> bool:
-        nonlocal asked
-        asked += 1
-        return True
-
+    closed = Mock(return_value=True)
     _, thinking = planning(known(ring(0.0, 0.0, 3000.0, 50.0)), closed)
     assert all_courses(thinking, 40, lambda: START)[0] == []
-    assert asked
+    assert closed.called
 
 
 def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(wall: MakePoints) -> None:

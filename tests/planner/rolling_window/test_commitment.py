@@ -66,6 +66,8 @@ def test_a_new_plan_has_to_gain_a_quarter_of_a_hold_and_to_end_in_another(known:
     for line_m, gets_on in ((20.0, False), (30.0, True)):  # a turn in the hold before the line is no progress
         found = held(whole_turn, *map(tuple, ahead(line_m).path.segments), entry_m=math.tau * 100.0 + line_m)
         assert commitment.leads_on(found, AT_ORIGIN, flown) is gets_on
+    back = held(whole_turn, (0.0, 0.0, 1.0, 0.0, 0.0, 300.0), (0.0, 0.0, *round_100), entry_m=928.0)
+    assert not commitment.leads_on(back, AT_ORIGIN, flown, elsewhere=False)
     # Another way to the hold ahead leads on, if it may, as far as that is ahead.
     assert [leads_on(length_m, ahead(length_m), False) for length_m in (24.0, 300.0)] == [False, True]
     assert not leads_on(300.0, ahead(300.0))

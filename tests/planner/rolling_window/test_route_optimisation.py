@@ -62,9 +62,8 @@ def test_shortcuts_are_clear_and_never_longer(seed: int, count: int, nodes: int)
         if track.index(b) > track.index(a) + 1:
             near = room([a, b], points)
             # Ends inside a disc may lead out of it.
-            assert near >= KEEP - 1e-6 or near == pytest.approx(
-                min(room([a, a], points), room([b, b], points))
-            )
+            at_ends = min(room([a, a], points), room([b, b], points))
+            assert near >= KEEP - 1e-6 or near == pytest.approx(at_ends)
 
 
 @given(seed=SEEDS, count=st.integers(0, 6), nodes=st.integers(0, 6))

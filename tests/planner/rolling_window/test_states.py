@@ -108,7 +108,9 @@ def test_a_plan_that_serves_is_prolonged_and_followed_on() -> None:
 
 def test_in_its_turn_the_aircraft_loiters_and_gives_up_a_place_that_was_turned_before_twice() -> None:
     pilot, seen, plan, entry_m = loitering()
+    before = pilot._search.prefers_room
     pilot.plan(request_on(plan, entry_m + 10.0, seen))
+    assert (before, pilot._search.prefers_room) == (True, False)
     assert pilot.state in (PlanningState.LOITERING, PlanningState.GIVING_UP)
     pilot.plan(request_on(plan, entry_m + 11.0, seen))
     assert pilot.state is PlanningState.LOITERING
@@ -209,6 +211,18 @@ def test_where_no_other_hold_is_found_another_way_to_the_one_ahead_is_flown() ->
     assert pilot._search.refused == 0
     assert not found_of(pilot, east_to(10.0), now)
     assert pilot._search.refused == 1
+
+
+def test_a_course_leads_on_to_a_hold_elsewhere_or_four_radii_short_of_what_is_in_sight() -> None:
+    seen, pilot = HalfOpen(nothing()), planner()
+    plan = flown(pilot, seen)
+    assert plan.path is not None
+    assert pilot._monitor.proposed is not None
+    course, entry_m = pilot._monitor.proposed.course, plan.path.length_m - float(plan.path.segments[-1, 5])
+    in_sight_m = HalfOpen.to_m - 4.0 * MISSION.hold_radius_m
+    assert in_sight_m + SPACING < pilot._search._open_to_m(course) == pytest.approx(entry_m)
+    pilot.plan(request_on(plan, 100.0, seen))  # it is in effect: the hold is no other
+    assert pilot._search._open_to_m(course) == pytest.approx(in_sight_m, abs=SPACING)
 
 
 def test_a_course_that_serves_is_not_left_for_the_beginning_of_another() -> None:

@@ -91,9 +91,8 @@ def test_a_planner_that_asks_to_circle_where_the_shield_does_so_is_not_refused(
     x, y = east + straight_m * ux, north + straight_m * uy
     ahead = [(east, north, ux, uy, 0.0, straight_m)] if straight_m else []
     circle = np.array([*ahead, (x, y, ux, uy, other_way, math.tau * 100.0)])
-    wish = Plan(
-        PlanStatus.FOUND, "no way; holding", np.array([(east, north), (x, y)]), Path(circle, loiter=True)
-    )
+    ends = np.array([(east, north), (x, y)])
+    wish = Plan(PlanStatus.FOUND, "no way; holding", ends, Path(circle, loiter=True))
     inner.plan = lambda _: wish  # type: ignore[method-assign,assignment]
     told = shield.plan(
         request._replace(
