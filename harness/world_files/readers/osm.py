@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import shapely
@@ -26,13 +28,21 @@ TALL_MAN_MADE: Final = frozenset(
 def read_xml(spec: FileSpec) -> Contents:
     """Reads an OpenStreetMap XML file, its elements in any order; InputError: Overpass' `out geom`, JOSM's changes."""
     data = read_bytes(spec.path, MAX_BYTES)
-    if re.search(rb"<nd [^>]*\blat=", data) or 0 <= data.find(b"<way ") < data.rfind(b"<node "):
-        raise InputError(
-            "has places in or behind its ways; ask Overpass for `(._; >;); out;`, or use `osmium sort`"
-        )
+    if re.search(rb"<nd [^>]*\blat=", data):
+        raise InputError("has places inside its ways (`out geom`); ask for `out body; >; out skel`")
     if re.search(rb"<way id=['\"]-|action=['\"]delete", data):
         raise InputError("has ways of JOSM that are new or deleted; give a file without them")
-    return read_pbf(spec)
+    osmium = _imported_osmium()
+    if data.rfind(b"<node ") < data.find(b"<way "):
+        return read_pbf(spec)
+    # Written again with nodes before ways before relations, as osmium needs them and Overpass does not.
+    with TemporaryDirectory() as folder:
+        ordered = Path(folder) / "ordered.osm.pbf"
+        with _osmium_errors(), osmium.SimpleWriter(str(ordered)) as writer:
+            for kind in (osmium.osm.NODE, osmium.osm.WAY, osmium.osm.RELATION):
+                for each in osmium.FileProcessor(str(spec.path), kind):
+                    writer.add(each)
+        return read_pbf(replace(spec, path=ordered))
 
 
 @contextmanager

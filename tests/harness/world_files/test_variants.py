@@ -80,9 +80,9 @@ WAY = (
 )
 
 
-def test_a_building_of_openstreetmap_has_its_outline_and_height(tmp_path: Path) -> None:
-    text = f'<?xml version="1.0"?>\n<osm version="0.6">{nodes()}{WAY}</osm>'
-    found = read_any(written(tmp_path / "a.osm", text))
+@pytest.mark.parametrize("body", [nodes() + WAY, WAY + nodes()], ids=["nodes first", "nodes last"])
+def test_openstreetmap_in_any_order(body: str, tmp_path: Path) -> None:
+    found = read_any(written(tmp_path / "a.osm", f'<?xml version="1.0"?>\n<osm version="0.6">{body}</osm>'))
     (part,) = found.parts
     assert part.footprint.area == pytest.approx(1e-6)
     assert part.top == Limit(12.0, Datum.GROUND)
