@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
@@ -35,6 +35,8 @@ class Shape(NamedTuple):
     """Its altitudeMode; empty where there is none."""
     rings: tuple[tuple[Point, ...], ...]
     """Points of the line; of a polygon those of its outer boundary, then of the inner ones."""
+    data: Mapping[str, str]
+    """Names and values of the ExtendedData of its Placemark."""
 
 
 class Kml(NamedTuple):
@@ -66,16 +68,18 @@ def read_kml(data: bytes, source: str, most: int) -> Kml:
 
 
 def _shapes(number: int, placemark: Element, source: str, kind: str) -> list[Shape]:
-    """Returns the lines or polygons of a Placemark."""
+    """Returns the lines or polygons of a Placemark, with the names and values of its ExtendedData."""
     name = shown(text_of(placemark, "name") or f"Placemark {number}")
     where = f"{source}: {name}" if source else name
+    kept = {item.get("name", ""): text_of(item, "value") for item in named(placemark, "Data")}
+    kept |= {item.get("name", ""): (item.text or "").strip() for item in named(placemark, "SimpleData")}
     found = []
     for each in named(placemark, kind):
         bounds = [ring for side in ("outerBoundaryIs", "innerBoundaryIs") for ring in named(each, side)]
         if kind == "Polygon" and not bounds:
             raise InputError(f"{where}: is a Polygon without a boundary; must have outerBoundaryIs")
         rings = tuple(_points(ring, where, "corner" if bounds else "point") for ring in bounds or [each])
-        found.append(Shape(name, text_of(each, "altitudeMode"), rings))
+        found.append(Shape(name, text_of(each, "altitudeMode"), rings, kept))
     return found
 
 

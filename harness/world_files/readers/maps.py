@@ -12,7 +12,7 @@ from harness.files.input_file import InputError
 from harness.files.kml import Shape, read_kml
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, json_of, read_bytes
-from harness.world_files.parts import NO_TOP, WGS84, Contents, Datum, FileSpec, Limit, Part
+from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Datum, FileSpec, Limit, Part
 from harness.world_files.readers import limits
 
 DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
@@ -73,27 +73,29 @@ def polygon_of(geometry: dict[str, Any]) -> Any:
 
 
 def read_kml_polygons(spec: FileSpec) -> Contents:
-    """Reads the polygons of a KML file, or of a KMZ archive with one, by their altitudes."""
+    """Reads the polygons of a KML file, or of a KMZ archive with one, by limits in their ExtendedData or altitudes."""
     found = read_kml(read_bytes(spec.path, MAX_TREE_BYTES), "", MAX_TREE_BYTES)
     notes: list[str] = []
-    parts = tuple(_kml_part(each) for each in found.polygons)
-    if flat := sum(part.top == NO_TOP for part in parts):
+    parts = tuple(_kml_part(each, notes) for each in found.polygons)
+    if flat := sum((part.bottom, part.top) == (NO_BOTTOM, NO_TOP) for part in parts):
         notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
-    if len(parts) > flat:
+    if any(each.mode in DATUMS and not limits.has_limits(each.data) for each in found.polygons):
         notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
     others = {"LineString": len(found.lines), **found.others}
     notes += [f"{counted(count, kind)} passed over" for kind, count in others.items() if count > 0]
     return Contents(spec.crs or WGS84, parts, notes=tuple(notes))
 
 
-def _kml_part(shape: Shape) -> Part:
-    """Returns a polygon of KML as a part, up to its highest corner if it is in the air."""
+def _kml_part(shape: Shape, notes: list[str]) -> Part:
+    """Returns a polygon of KML as a part: between its limits, or up to its highest corner if it is in the air."""
     rings = [[(longitude, latitude) for latitude, longitude, _ in ring] for ring in shape.rings]
     name, datum = shape.name[:40], DATUMS.get(shape.mode)
     try:
         footprint = shapely.Polygon(rings[0], [ring for ring in rings[1:] if ring])
     except ValueError as error:  # of one or two corners
         raise InputError(f"{name}: has a ring that encloses no area ({error})") from error
+    if limits.has_limits(shape.data):
+        return Part(footprint, *limits.limits(shape.data, notes, name), name=name)
     if datum is None:
         return Part(footprint, name=name)
     top_m = max((altitude or 0.0 for ring in shape.rings for *_, altitude in ring), default=0.0)

@@ -90,7 +90,7 @@ def _driver(path: Path) -> str:
         return "GTiff"
     if path.suffix.lower() != ".hgt" and begin != b"PK":
         return "AAIGrid"
-    if not re.fullmatch(r"[NS]\d{2}[EW]\d{3}\.hgt(\.zip)?", path.name, re.IGNORECASE):
+    if not re.fullmatch(r"[NS]\d{2}[EW]\d{3}(\.SRTMGL\d)?\.hgt(\.zip)?", path.name, re.IGNORECASE):
         raise InputError(
             "is an SRTM tile; its name must say where it lies, as N46E009.hgt, or N46E009.hgt.zip"
         )

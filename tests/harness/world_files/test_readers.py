@@ -44,7 +44,7 @@ def test_an_srtm_tile_lies_where_its_name_says(packed: str, tmp_path: Path) -> N
     tile = np.full((1201, 1201), 7, dtype=">i2")
     tile[0, 0], tile[-1, -1] = 100, -32768
     data = tile.tobytes()
-    path = tmp_path / {"plain": "S36E149.hgt", "zip": "S36E149.hgt.zip"}[packed]
+    path = tmp_path / {"plain": "S36E149.hgt", "zip": "S36E149.SRTMGL3.hgt.zip"}[packed]
     if packed == "zip":
         zipped(path, S36E149__hgt=data)
     else:
@@ -233,6 +233,10 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
     path.with_name("b.kml").write_text(lifted)
     with pytest.raises(InputError, match="has gx:altitudeOffset, which is not read"):
         scenario_with(path.with_name("b.kml"))
+    limits = '<ExtendedData><Data name="upper"><value>2500 ft AMSL</value></Data></ExtendedData>'
+    path.with_name("c.kml").write_text(path.read_text().replace("<Polygon>", f"{limits}<Polygon>"))
+    limited = read_any(path.with_name("c.kml"))
+    assert ([part.top for part in limited.parts], limited.notes) == ([Limit(2500 * FOOT_M)] * 3, ())
     packed = zipped(tmp_path / "a.kmz", doc__kml=path.read_bytes())
     assert [part.top for part in read_any(packed).parts] == [part.top for part in found.parts]
 
