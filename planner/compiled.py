@@ -17,7 +17,7 @@ import subprocess
 import sys
 import threading
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from typing import Any, Generic, ParamSpec, TypeVar
 
@@ -166,12 +166,12 @@ def begin_compiling(busy_bytes: int) -> None:
         _start_second(busy_bytes)
 
 
-def compile_modules(names: Sequence[str]) -> None:
-    """Compiles the functions of some modules, so that they are on disk."""
+def compile_modules(names: Sequence[str], parent: int) -> None:
+    """Compiles the functions of some modules, so that they are on disk, as long as the parent process lives."""
     for name in names:
         importlib.import_module(name)
     with _compiling:
-        _compile([each for each in _functions() if each.__module__ in names])
+        _compile(each for each in _functions() if each.__module__ in names and os.getppid() == parent)
 
 
 class _SecondProcess:
@@ -180,7 +180,7 @@ class _SecondProcess:
     def __init__(self, names: frozenset[str]) -> None:
         self.names = names
         code = f"import sys; sys.path[:] = {sys.path!r}; from planner.compiled import compile_modules; "
-        command = [sys.executable, "-c", code + f"compile_modules({sorted(names)!r})"]
+        command = [sys.executable, "-c", code + f"compile_modules({sorted(names)!r}, {os.getpid()})"]
         nobody = subprocess.DEVNULL
         self._process = subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody)
         atexit.register(self._end)
@@ -220,7 +220,7 @@ def _start_second(busy_bytes: int) -> None:
         _second = _SecondProcess(names) if names else None
 
 
-def _compile(functions: Sequence[Compiled[..., Any]]) -> None:
+def _compile(functions: Iterable[Compiled[..., Any]]) -> None:
     collects = gc.isenabled()
     gc.disable()  # Else a fifth of the time is spent looking for garbage among what the compiler keeps.
     try:

@@ -116,7 +116,7 @@ class LocalWorkers(Workers):
 
     def begin(self) -> None:
         """Begins all processes, which get ready to fly meanwhile."""
-        with without_main():
+        with held_back(), without_main():
             for _ in range(self._number):
                 self._executor.submit(_make_ready)
 
