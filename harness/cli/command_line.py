@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
 
 FAILED: Final = 1
-"""Exit status of a command that ran but whose answer is no, or in which the software failed."""
+"""Exit status of a command that ran but whose answer is no, that could not write, or in which the software failed."""
 BAD_INPUT: Final = 2
 """Exit status of bad input or usage."""
 FOLDER_KEYS: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")

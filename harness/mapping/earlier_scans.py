@@ -104,7 +104,7 @@ class EarlierScans:
         return any(np.count_nonzero(come(each.scan, places, self._sure)) >= fewest for each in self._looks)
 
     def met(self, places: ComplexArray) -> BoolArray:
-        """(k,) which places are near to what the first of the scans met."""
+        """(k,) which places are within `own_m` of the line through what the oldest of the scans met."""
         return near_line(places, self._looks[0].places, self.own_m, self._clearance)
 
     def of_it(self, track: FollowedOutline, places: ComplexArray, now: RangeScan) -> IntArray:

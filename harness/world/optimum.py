@@ -25,6 +25,7 @@ from harness.world.tangent_graph import ANGLE_SLACK_RAD, Tangents, TangentScene
 from planner.interface import FloatArray
 
 DRAWN_STEP_RAD = math.radians(1.0)  # between points of a drawn arc
+SHORTER_M = 1e-9  # a way shorter by less counts as no shorter: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +124,7 @@ def _search(scene: TangentScene) -> Optimum:
         sweep = _sweep(arrival, out.leaves_at)
         way = way_m + sweep * scene.radii[disc] + out.length_m
         open_ = (sweep <= _free_sweep(arrival, blocked[disc]) + ANGLE_SLACK_RAD) | (disc == scene.start)
-        for k in np.flatnonzero(open_ & (way < out.best_m - ANGLE_SLACK_RAD)).tolist():
+        for k in np.flatnonzero(open_ & (way < out.best_m - SHORTER_M)).tolist():
             out.best_m[k] = way[k]
             heapq.heappush(queue, (float(way[k] + out.to_go_m[k]), len(arrivals), float(way[k])))
             arrivals.append(

@@ -32,7 +32,7 @@ ANY_PLACE: Final = Place(47.0, 8.0)
 LARGEST_RADII, LARGEST_M = 400.0, 400_000.0
 """Longest side of an area in turn radii, and in metres; of a larger file a part is taken."""
 PAD_RADII: Final = 12.0
-"""The area reaches this many turn radii beyond buildings and zones."""
+"""The area reaches this many turn radii beyond buildings and zones; at least as many beyond a start and goal given."""
 
 
 @dataclass(frozen=True)
