@@ -108,9 +108,8 @@ class Campaign(Section):
 
 def _check_entries(section: str, entries: Sequence[Section], taken: Mapping[Loc, str]) -> None:
     """Refuses an entry that is there twice, its default shield named or not, or with a key of `grid` or `random`."""
-    if index := _repeated(
-        [(getattr(each, "label", ""), each.model_dump(exclude={"shield"})) for each in entries]
-    ):
+    told = [(getattr(each, "label", ""), each.model_dump(exclude={"shield"})) for each in entries]
+    if index := _repeated(told):
         raise KeyFault((section, index), "is there already; leave it out or give it another key")
     for index, entry in enumerate(entries):
         for name in entry.model_fields_set | (entry.model_extra or {}).keys():
@@ -167,9 +166,8 @@ class CampaignFile:
             given = [(Path(each["file"]).name, dict(each["keys"])) for each in plain["scenarios"]]
             first, *more = (Base(name, f"{name} in {source}", node_of(keys, 1)) for name, keys in given)
         except (KeyError, TypeError, ValueError):
-            raise InputError(
-                f"{source}: holds no campaign, or only a part of it; give another copy"
-            ) from None
+            told = f"{source}: holds no campaign, or only a part of it; give another copy"
+            raise InputError(told) from None
         return cls(validated(root, source), source, root, (first, *more))
 
 
@@ -256,9 +254,8 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
         raise fault(f"is {shown(entry)}: {error.strerror}") from error
     if entry in shipped:
         return [shipped[entry]]
-    raise fault(
-        f"is {entry[:200]!r}; must be a scenario file, a folder of them or one of {', '.join(shipped)}"
-    )
+    told = f"a scenario file, a folder of them or one of {', '.join(shipped)}"
+    raise fault(f"is {entry[:200]!r}; must be {told}")
 
 
 def absolute_paths(node: Node, folder: Path, keys: str = "") -> Node:

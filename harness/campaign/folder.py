@@ -68,9 +68,8 @@ class CampaignFolder:
                     os.truncate(path / JOURNAL, end)
                 self._journal: IO[bytes] = stack.enter_context(append_to(path / JOURNAL))
             except OSError as error:
-                raise RunFolderError(
-                    f"cannot write the campaign {path}: {error.strerror or error}"
-                ) from error
+                told = f"cannot write the campaign {path}: {error.strerror or error}"
+                raise RunFolderError(told) from error
             self._stack = stack.pop_all()
 
     def append(self, over: Answer) -> None:
@@ -122,9 +121,8 @@ class CampaignFolder:
         if self.over or (self.path / RESULTS).exists():
             held = counted(len(self.over), "run") if self.over else RESULTS
             if not resume:
-                raise RunFolderError(
-                    f"{self.path} holds {held}: go on with --resume, or choose another folder"
-                )
+                told = f"{self.path} holds {held}: go on with --resume, or choose another folder"
+                raise RunFolderError(told)
             now["grown"] = self._check_same(before or now, now)
         self.grown: bool = now["grown"]
         if beyond := [run for run in self.over if run >= len(self._runs)]:

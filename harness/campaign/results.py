@@ -53,9 +53,8 @@ Of the legs of `trackability` there are their number, that of those not trackabl
 `wanted_clearance_m` is the planner's `clearance_m`; `optimum_m` is the shortest path of a point that knows the world
 and keeps the clearance, `length_ratio` the flown length over it where the goal was reached; `error` is a traceback.
 """
-TIMES: Final = {"run": "int"} | {
-    each.path.removeprefix("timing."): each.kind for each in FIGURES if each.timed
-}
+TIMED: Final = {each.path.removeprefix("timing."): each for each in FIGURES if each.timed}
+TIMES: Final = {"run": "int"} | {name: each.kind for name, each in TIMED.items()}
 """Columns of `timings.parquet`."""
 
 
@@ -74,7 +73,7 @@ def metric_cells(
 
 def time_cells(metrics: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the wall-clock times of `metrics.json` as cells of a row, by column."""
-    return {each.path.removeprefix("timing."): each.value(metrics) for each in FIGURES if each.timed}
+    return {name: each.value(metrics) for name, each in TIMED.items()}
 
 
 def fly_again(results: Path, run: int, planner: str = "", law: str = "") -> str:

@@ -26,7 +26,15 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError, Loc, Node, Scalar, fault_line, key_path, loc_of, node_of
 from harness.run_files.run_folder import SCENARIO
 from harness.scenario.generators import generated
-from harness.scenario.scenario import Scenario, overridden, packed, scenario_from, unpacked, with_key
+from harness.scenario.scenario import (
+    Scenario,
+    load_scenario,
+    overridden,
+    packed,
+    scenario_from,
+    unpacked,
+    with_key,
+)
 from harness.scenario.sections import PlannerSpec
 from harness.scenario.validation import KeyFaults, in_lines
 
@@ -315,8 +323,6 @@ def flown_run(
         kept = results.parent / RUNS / str(run) / SCENARIO
         if not kept.is_file():
             raise InputError(f"{results}: run {run} of a subset simulation was not kept: there is no {kept}")
-        from harness.scenario.scenario import load_scenario
-
         return load_scenario(kept, overrides), None if overrides else digests.get(run)
     runs = CampaignRuns(CampaignFile.from_plain(about, str(results)))
     if not 0 <= run < len(runs):

@@ -142,12 +142,8 @@ class PathDays(Days):
         """Prepares the days; nothing is flown. `terms` are those of `Days`; the root seed is the scenario's."""
         self._path = path
         scenario = path.prepared().scenario
-        keys = {
-            "schema": "wayproof/scenario/1",
-            "name": scenario.name,
-            "aircraft": {"model": scenario.aircraft.model},
-            "planner": {"kind": "given"},
-        }
+        keys = {"schema": "wayproof/scenario/1", "name": scenario.name, "planner": {"kind": "given"}}
+        keys["aircraft"] = {"model": scenario.aircraft.model}
         super().__init__(
             Base(scenario.name, "command line", node_of(keys, COMMAND_LINE)),
             vary,
@@ -243,9 +239,8 @@ def days_of(
     if world is not None:
         raise InputError("wayproof: a world goes with a path; a scenario is one already")
     if claim == "as-given":
-        raise InputError(
-            "wayproof: the claim as-given is of a given path; give one, or reached, no-contact or trackable"
-        )
+        told = "the claim as-given is of a given path"
+        raise InputError(f"wayproof: {told}; give one, or reached, no-contact or trackable")
     path = scenario_path(subject)
     root = overridden(strict_yaml.read(path), settings)
     seed = root.at(("seed",))

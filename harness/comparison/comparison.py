@@ -113,14 +113,11 @@ def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
         planner, law = each.planner.label, each.guidance.kind if by_law else ""
         folder = (how.folder / each.name / (f"{planner}-{law}" if law else planner)).resolve()
         if folder in flights:
-            raise InputError(
-                f"wayproof: {planner} is to fly {each.name} twice{law and f' under {law}'}; leave one out or "
-                "rename the scenario"
-            )
+            twice = f"{planner} is to fly {each.name} twice{law and f' under {law}'}"
+            raise InputError(f"wayproof: {twice}; leave one out or rename the scenario")
         if each.name in (INDEX, CSV, REPORT):
-            raise InputError(
-                f"wayproof: a scenario is called {each.name}, as a file of the comparison; rename it"
-            )
+            called = f"a scenario is called {each.name}, as a file of the comparison"
+            raise InputError(f"wayproof: {called}; rename it")
         job = replace(how, run=number, packed=packed(each), folder=folder)
         flights[folder] = _Flight(each, planner, law, job)
     return [*flights.values()]

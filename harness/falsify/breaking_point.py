@@ -31,13 +31,12 @@ from harness.scenario.scenario import Scenario, dump_scenario
 SCHEMA: Final = "wayproof/falsify/4"
 INDEX: Final = "falsify.json"
 FALSIFIED: Final = "falsified.yaml"
-FIGURES: Final = (
-    *("outcome", "reason", "trackable", "min_clearance_m", "flown_length_m", "flight_time_s", "digest"),
-)
+FIGURES = ("outcome", "reason", "trackable", "min_clearance_m", "flown_length_m", "flight_time_s", "digest")
 """Figures of `metrics.json` that are kept of every flight."""
 
 Load: TypeAlias = Callable[[Sequence[tuple[str, str]]], Scenario]
 """Makes the scenario with keys replaced, as `harness.scenario.scenario.load_scenario` takes them."""
+Found: TypeAlias = Literal["found", "not_found", "fails_at_the_mild_end"]
 Values: TypeAlias = tuple[float, ...]
 """A condition: the value of each key."""
 
@@ -56,9 +55,8 @@ class Vary:
         """Its value at a displacement from 0 (mild) to 1 (hard)."""
         if displacement in (0.0, 1.0):
             return self.hard if displacement else self.mild
-        return round(
-            self.mild + displacement * (self.hard - self.mild), None if self.whole else self.decimals
-        )
+        between = self.mild + displacement * (self.hard - self.mild)
+        return round(between, None if self.whole else self.decimals)
 
 
 class Effort(NamedTuple):
@@ -146,7 +144,7 @@ class Breaking:
     conditions: int
     steps: int
     settled: bool
-    verdict: Literal["found", "not_found", "fails_at_the_mild_end"]
+    verdict: Found
     displacement: float | None
     """Displacement of the mildest failure, from the mild end (0) to the hard one (1); None: nothing failed."""
     found: Trial | None
@@ -257,23 +255,12 @@ def falsify(
     try:
         fails = search.run().fails
         found = None if fails is None else trials[condition(vary, fails)]
-        result = Breaking(
-            base.name,
-            base.planner.label,
-            Path(base.aircraft.model).name,
-            base.seed,
-            claim,
-            tuple(vary),
-            effort.tolerance,
-            len(trials),
-            search.steps,
-            search.settled,
-            "not_found" if fails is None else "found" if fails else "fails_at_the_mild_end",
-            fails,
-            found,
-            None if fails is None or search.passes is None else condition(vary, search.passes),
-            tuple(trials.values()),
-        )
+        flew = base.name, base.planner.label, Path(base.aircraft.model).name, base.seed
+        tried = effort.tolerance, len(trials), search.steps, search.settled
+        said: Found = "not_found" if fails is None else "found" if fails else "fails_at_the_mild_end"
+        passes = None if fails is None or search.passes is None else condition(vary, search.passes)
+        every = tuple(trials.values())
+        result = Breaking(*flew, claim, tuple(vary), *tried, said, fails, found, passes, every)
         _write(out, result.plain(), scenario_at(load, vary, found.values) if found else None)
     finally:
         lock.release()
