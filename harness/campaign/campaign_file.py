@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field, Strict, ValidationError, model_validator
 
@@ -33,6 +33,8 @@ GIVEN_ELSEWHERE: Final[dict[Loc, str]] = {
 }
 """Keys of a scenario that a campaign must not replace, and what to write in place of that."""
 
+Settings: TypeAlias = Sequence[tuple[str, str]]
+"""Key paths and their values as YAML."""
 Values = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 
 
@@ -171,13 +173,11 @@ class CampaignFile:
         return cls(validated(root, source), source, root, (first, *more))
 
 
-def load_campaign(
-    path: Path, planners: Sequence[str] = (), settings: Sequence[tuple[str, str]] = ()
-) -> CampaignFile:
+def load_campaign(path: Path, planners: Sequence[str] = (), settings: Settings = ()) -> CampaignFile:
     """Reads a campaign file and the scenario files that it names, unchecked; an InputError where a file is none.
 
     `planners`: kinds that fly in place of those that the file names.
-    `settings`: keys that are added to `set`, and their values as YAML; `seed` replaces that of the campaign.
+    `settings`: keys that are added to `set`; `seed` replaces that of the campaign.
     """
     source, root = str(path), strict_yaml.read(path)
     if planners:

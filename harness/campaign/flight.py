@@ -88,8 +88,7 @@ def fly_job(job: Job) -> Answer | None:
     except Exception as error:
         if _is_out_of_memory(error):
             return None
-        row = {"outcome": ERROR, "reason": sentence(error), "error": trace(error)}
-        return Answer(job.run, row, {})
+        return Answer(job.run, {"outcome": ERROR, "reason": sentence(error), "error": trace(error)}, {})
     cells["margin"] = margin(job.claim, metrics)
     return Answer(job.run, cells, time_cells(metrics), holds(job.claim, metrics))
 

@@ -126,9 +126,8 @@ class CampaignFolder:
             now["grown"] = self._check_same(before or now, now)
         self.grown: bool = now["grown"]
         if beyond := [run for run in self.over if run >= len(self._runs)]:
-            raise RunFolderError(
-                f"{self.path / JOURNAL}: tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
-            )
+            told = f"tells of run {beyond[0]} where the last is {len(self._runs) - 1}"
+            raise RunFolderError(f"{self.path / JOURNAL}: {told}")
         if before != now:
             replace_text(self.path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
 
@@ -145,11 +144,9 @@ class CampaignFolder:
                 shorter = (textwrap.shorten(each, 60, placeholder="...") for each in texts)
                 told.append("{} was {}, is {}".format(name, *shorter))
         if told:
-            more = "; and more" if len(told) > MAX_CHANGES else ""
-            raise RunFolderError(
-                f"{self.path} is of another campaign: {'; '.join(told[:MAX_CHANGES])}{more}; change it back or choose "
-                "another folder"
-            )
+            listed = "; ".join([*told[:MAX_CHANGES], *(["and more"] if len(told) > MAX_CHANGES else [])])
+            way = "change it back or choose another folder"
+            raise RunFolderError(f"{self.path} is of another campaign: {listed}; {way}")
         return grows or bool(before["grown"])
 
 
@@ -201,10 +198,8 @@ def told_left(runs: Sequence[int]) -> str:
     """Returns a sentence on the runs that the machine kept from their ends."""
     first = ", ".join(map(str, runs[:5])) + (", ..." if len(runs) > 5 else "")
     were, them = ("was", "it") if len(runs) == 1 else ("were", "them")
-    return (
-        f"{counted(len(runs), 'run')} {were} not flown to the end ({first}): the process died, or had no memory, each "
-        f"time that it was tried; --resume flies {them}"
-    )
+    why = "the process died, or had no memory, each time that it was tried"
+    return f"{counted(len(runs), 'run')} {were} not flown to the end ({first}): {why}; --resume flies {them}"
 
 
 def _read_journal(path: Path) -> tuple[dict[int, Answer], int]:
@@ -225,9 +220,8 @@ def _read_journal(path: Path) -> tuple[dict[int, Answer], int]:
         except (ValueError, RecursionError, KeyError, TypeError):
             told = "no run"
         if told:
-            raise RunFolderError(
-                f"{path}:{number}: is damaged: it tells of {told}; delete that line, and what it told of is flown again"
-            )
+            way = "delete that line, and what it told of is flown again"
+            raise RunFolderError(f"{path}:{number}: is damaged: it tells of {told}; {way}")
     return runs, sum(len(each) + 1 for each in lines)
 
 

@@ -134,10 +134,8 @@ def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     except (OSError, pa.ArrowException, ValueError) as error:
         raise InputError(f"{path}: is damaged: {str(error).splitlines()[0]}") from error
     if _sha256(content, about) != digest:
-        raise InputError(
-            f"{path}: is not as it was written: its sha256 is another; `wayproof sweep` with --resume makes it anew "
-            "from the journal"
-        )
+        way = "`wayproof sweep` with --resume makes it anew from the journal"
+        raise InputError(f"{path}: is not as it was written: its sha256 is another; {way}")
     return content, about
 
 

@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from harness.analysis.metric import Claim
-from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
+from harness.campaign.campaign_file import MAX_RUNS, CampaignFile, Settings
 from harness.campaign.flight import Job
 from harness.campaign.results import LAW_KEY, RESULTS, RUN, RUNS, fly_again, read_table
 from harness.campaign.sampling import takes_whole_numbers
@@ -46,8 +46,6 @@ MOST_KEPT_BYTES: Final = 100_000_000
 KIND, MODEL = ("planner", "kind"), ("aircraft", "model")
 """The key of a scenario that a bare entry of `planners`, and one of `aircraft`, replaces."""
 SHIELD: Final = ("planner", "shield")  # key of a scenario
-LIST_OF_SECTION: Final = {"planner": "planners", "aircraft": "aircraft"}
-"""The list of a campaign whose entries replace a section of the scenario."""
 
 
 class _Change(NamedTuple):
@@ -91,7 +89,7 @@ class CampaignRuns:
             [[self._change(loc_of(name), ("grid", name, index))] for index in range(len(values))]
             for name, values in campaign.grid.items()
         ]
-        self._entries = [self._entry_axis(*each) for each in (KIND, MODEL)]
+        self._entries = [self._entry_axis("planners", *KIND), self._entry_axis("aircraft", *MODEL)]
         self._pairs = [len(axis) for axis in self._entries]
         self._sizes = [len(bases), len(campaign.worlds) or 1, *(len(axis) for axis in self._grid)]
         self.planners = _labels(file)
@@ -146,7 +144,7 @@ class CampaignRuns:
     def _varied(self, row: Mapping[str, Any]) -> dict[str, Scalar]:
         return {name: row.get(name) for name in self.varied}
 
-    def scenario(self, number: int, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+    def scenario(self, number: int, overrides: Settings = ()) -> Scenario:
         """Returns the scenario of run `number`, keys replaced as by `load_scenario`; an InputError names its fault."""
         if number in self._made and not overrides:
             return unpacked(self._made[number])
@@ -239,9 +237,8 @@ class CampaignRuns:
         line = self.file.root.line_of(origin)
         return [_Change(loc, node_of(plain, line), origin) for loc, plain in made.items()]
 
-    def _entry_axis(self, section: str, first: str) -> _Axis:
+    def _entry_axis(self, listed: str, section: str, first: str) -> _Axis:
         """Returns the changes for each entry of `planners` or `aircraft`: bare text, or keys of that section."""
-        listed = LIST_OF_SECTION[section]
         entries = self.file.root.plain().get(listed, ())
         axis = []
         for index, each in enumerate(entries):
@@ -307,9 +304,7 @@ def _cell(node: Node) -> Scalar:
     return json.dumps(node.plain()) if isinstance(node.value, tuple | dict) else node.value
 
 
-def flown_run(
-    results: Path, run: int, overrides: Sequence[tuple[str, str]] = ()
-) -> tuple[Scenario, str | None]:
+def flown_run(results: Path, run: int, overrides: Settings = ()) -> tuple[Scenario, str | None]:
     """Returns the scenario that a run flew, and the digest of its row, from `results.parquet` alone; or an InputError.
 
     There is no digest where the row is missing, or `overrides` change what is flown.

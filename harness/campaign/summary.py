@@ -114,9 +114,9 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
         runs.check_columns(each)
     why = zip(runs.texts("trackability.causes"), runs.values("trackable"), strict=True)
     untracked = Counter(causes or "no plan" for causes, tracked in why if tracked is False)
-    figures = {
-        each.name: runs.numbers("length_ratio" if each.name == "ratio" else each.path) for each in TESTED
-    }
+    columns = {each.name: "length_ratio" if each.name == "ratio" else each.path for each in TESTED}
+    figures = {name: runs.numbers(column) for name, column in columns.items()}
+    pairs = list(zip(runs.values("case"), runs.texts("aircraft"), strict=True))
     return Summary(
         name=folder.resolve().name,
         varied=tuple(runs.varied),
@@ -125,12 +125,7 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
         tables=tuple(_table(runs, *each) for each in (_default_choice(runs) if by is None else by)),
         worst=_worst(runs, folder),
         untracked=dict(untracked.most_common()),
-        duels=duels(
-            runs.texts("planner"),
-            list(zip(runs.values("case"), runs.texts("aircraft"), strict=True)),
-            runs.reached.tolist(),
-            figures,
-        ),
+        duels=duels(runs.texts("planner"), pairs, runs.reached.tolist(), figures),
         planned=runs.planned,
     )
 
@@ -194,20 +189,13 @@ def write_summary(summary: Summary, folder: Path) -> Path:
     try:
         plain = {"schema": SCHEMA, **asdict(summary)}
         replace_text(folder / SUMMARY_JSON, json.dumps(plain, indent=2, allow_nan=False) + "\n")
-        text = rendered(
-            "campaign.html",
-            summary=summary,
-            questions=QUESTIONS,
-            pictures=_pictures(folder, summary.varied) if summary.total.runs else [],
-            findings=FINDINGS,
-        )
-        replace_text(folder / PAGE, text)
+        drawn = _pictures(folder, summary.varied) if summary.total.runs else []
+        page = {"summary": summary, "questions": QUESTIONS, "pictures": drawn, "findings": FINDINGS}
+        replace_text(folder / PAGE, rendered("campaign.html", **page))
     except OSError as error:
         again = shlex.join(["wayproof", "report", str(folder)])
-        raise WriteError(
-            f"cannot write the summary in {folder}: {error.strerror or error}; the results are whole, and "
-            f"`{again}` makes it from them"
-        ) from error
+        told = f"cannot write the summary in {folder}: {error.strerror or error}"
+        raise WriteError(f"{told}; the results are whole, and `{again}` makes it from them") from error
     return folder / PAGE
 
 

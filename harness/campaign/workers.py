@@ -212,10 +212,8 @@ def dask_workers(
 def _client(address: str, unencrypted: bool) -> Any:
     """Connects to a Dask scheduler, beyond this machine with TLS unless `unencrypted`; else an InputError."""
     if not re.fullmatch(r"[a-z]+://.+", address):
-        raise InputError(
-            f"wayproof: --scheduler {address}: is no address; give it as tcp://HOST:PORT, or beyond this machine as "
-            "tls://HOST:PORT"
-        )
+        way = "give it as tcp://HOST:PORT, or beyond this machine as tls://HOST:PORT"
+        raise InputError(f"wayproof: --scheduler {address}: is no address; {way}")
     try:
         from distributed import Client
         from distributed.comm.addressing import parse_address, parse_host_port

@@ -184,8 +184,7 @@ def certify(
             kept = (out / RUNS / str(run) for run in range(tally.runs))
             write_band(out, [each for each in kept if (each / TRACK).is_file()])
         _keep_failing(days, out, certificate.failing_runs, workers)
-        content = json.dumps(certificate.plain(), indent=2, allow_nan=False) + "\n"
-        replace_text(out / CERTIFICATE, content)
+        replace_text(out / CERTIFICATE, json.dumps(certificate.plain(), indent=2, allow_nan=False) + "\n")
     return certificate
 
 
@@ -303,9 +302,8 @@ def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]
 def differing(days: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
     """Finds keys of plain scenarios, no lists, that differ between days; returns the values, one a day, by key path."""
     flat = [dict(leaf for name in SECTIONS for leaf in _leaves(day.get(name), name)) for day in days]
-    columns = {
-        key: [each.get(key) for each in flat] for key in dict.fromkeys(key for each in flat for key in each)
-    }
+    keys = dict.fromkeys(key for each in flat for key in each)
+    columns = {key: [each.get(key) for each in flat] for key in keys}
     return {key: values for key, values in columns.items() if len({*map(json.dumps, values)}) > 1}
 
 

@@ -16,7 +16,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from harness.analysis.metric import Claim
-from harness.campaign.campaign_file import Base, CampaignFile, absolute_paths, is_a, validated
+from harness.campaign.campaign_file import Base, CampaignFile, Settings, absolute_paths, is_a, validated
 from harness.campaign.flight import Job
 from harness.campaign.runs import SEED_STREAM, CampaignRuns
 from harness.files import strict_yaml
@@ -36,7 +36,6 @@ DRAW_FORMS: Final = "KEY=LO:HI (evenly between), KEY=MEAN~SIGMA (Gaussian) or KE
 LEAST_RARE_DAYS: Final = 500
 """A subset simulation of fewer days is refused: with as many each independent run begins with 15."""
 
-Settings = Sequence[tuple[str, str]]
 Vary = Mapping[str, Mapping[str, Any]]
 
 
@@ -144,12 +143,8 @@ class PathDays(Days):
         scenario = path.prepared().scenario
         keys = {"schema": "wayproof/scenario/1", "name": scenario.name, "planner": {"kind": "given"}}
         keys["aircraft"] = {"model": scenario.aircraft.model}
-        super().__init__(
-            Base(scenario.name, "command line", node_of(keys, COMMAND_LINE)),
-            vary,
-            seed=scenario.seed,
-            **{**terms, "sources": ((), path.laws)},
-        )
+        base = Base(scenario.name, "command line", node_of(keys, COMMAND_LINE))
+        super().__init__(base, vary, seed=scenario.seed, **{**terms, "sources": ((), path.laws)})
         self._fixed = scenario.normals is not None
 
     def _settings(self, number: int) -> list[tuple[str, str]]:

@@ -162,14 +162,8 @@ def _written(
     versions = {name: version for name, version in flown.items() if version}
     done = replace(begun, versions=versions, rows=tuple(each.row for each in every))
     replace_text(out / CSV, to_csv(done.rows))
-    page = rendered(
-        "comparison.html",
-        duels=_duels(done.rows),
-        chapters=chapters,
-        command=done.command,
-        versions=done.versions,
-        written=done.started_utc,
-    )
+    about = {"command": done.command, "versions": done.versions, "written": done.started_utc}
+    page = rendered("comparison.html", duels=_duels(done.rows), chapters=chapters, **about)
     replace_text(out / REPORT, page)
     done.write(out, complete=True)
     return done
@@ -205,8 +199,6 @@ def _duels(rows: Sequence[Row]) -> tuple[Duel, ...]:
     """Planners in pairs over the scenarios; none with a single scenario, of which the table says it all."""
     if len({row.scenario for row in rows}) < 2:
         return ()
-    figures = {
-        each.name: np.array([row.figures[each.name] for row in rows], dtype=np.float64) for each in TESTED
-    }
+    figures = {each.name: np.array([row.figures[each.name] for row in rows], dtype=float) for each in TESTED}
     reached = [row.outcome == "reached" for row in rows]
     return duels([row.label for row in rows], [(row.scenario,) for row in rows], reached, figures)
