@@ -49,7 +49,9 @@ def load(folders: Sequence[Path]) -> pd.DataFrame:
         ]
     )
     rows["case"] = rows.world + rows[WIND].astype(str)
+    order = list(rows.planner.unique())
     rows = rows.drop_duplicates(["case", "planner"], keep="last")
+    rows = rows.sort_values("planner", key=lambda names: names.map(order.index), kind="stable")
     planners = rows.groupby("case").planner.nunique()
     rows = rows[rows.case.map(planners) == rows.planner.nunique()].copy()
     rows["reached"] = rows.outcome == "reached"
