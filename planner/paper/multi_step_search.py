@@ -22,6 +22,9 @@ from planner.paper.sectors import (
     whole_units,
 )
 
+BACK_RAD = math.radians(135.0)
+"""A direction further off the guide vector leads back: it is taken only where nothing near leaves another."""
+
 
 @dataclass(frozen=True, eq=False)
 class Window:
@@ -134,8 +137,8 @@ def directions(
 def sectors_at(window: Window, track: Track, guide_rad: float, most_rad: float) -> list[Sector]:
     """Section 3.2, (1): the parts of free sectors at the end of a track that a step can turn to by a whole Delta.
 
-    Where every direction meets something in the window or leads away from the goal, only obstacles count that a step,
-    or a turn at R after it, can meet; the paper is silent on that.
+    Where every direction meets something in the window or leads back, more than `BACK_RAD` off the guide vector, only
+    obstacles count that a step, or a turn at R after it, can meet; the paper is silent on that.
     """
     here, course, config = track.nodes[-1], track.course_rad, window.config
     near_m = config.resolved_step_m + window.mission.turn_radius_m + window.keep_m
@@ -144,7 +147,7 @@ def sectors_at(window: Window, track: Track, guide_rad: float, most_rad: float) 
         free = fan_shaped_sectors(within(window.points_m, here, reach_m), window.keep_m, here)
         parts = [part for sector in free for part in clip(sector, course, most_rad)]
         parts = [part for part in parts if whole_units(part, course, course, config.unit_rad) is not None]
-        if any(off_guide(part, guide_rad) <= 0.5 * math.pi for part in parts):
+        if any(off_guide(part, guide_rad) <= BACK_RAD for part in parts):
             break
     return parts
 

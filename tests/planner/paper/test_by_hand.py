@@ -200,21 +200,27 @@ def test_one_obstacle_is_passed_beside_its_tangents() -> None:
         assert np.hypot(*(line - (400.0, 0.0)).T).min() >= 60.0 - 1e-9
 
 
-@pytest.mark.parametrize("open_to_deg", [130.0, 170.0])
-def test_where_all_directions_are_closed_or_lead_away_only_what_a_step_can_meet_counts(
-    open_to_deg: float,
+@pytest.mark.parametrize(("open_from_deg", "open_to_deg"), [(132.0, 132.0), (132.0, 170.0), (100.0, 170.0)])
+def test_where_all_directions_are_closed_or_lead_back_only_what_a_step_can_meet_counts(
+    open_from_deg: float, open_to_deg: float
 ) -> None:
-    """On a course of 90 deg in a ring of 700 m, closed or open from 130 to 170 deg: the goal is east.
+    """On a course of 90 deg in a ring of 700 m, closed or open up to 170 deg: the goal is east, 135 deg leads back.
 
     Steps of 100 m turn to the goal, lead to the far side, and no further. The ring's points are 70 m apart: in between
-    a disc of 60 m reaches sqrt(60^2 - 35^2) inwards.
+    a disc of 60 m reaches sqrt(60^2 - 35^2) inwards. Beside an opening it takes asin(60 / 700), 4.9 deg.
     """
     angle = np.arange(0.0, math.tau, 0.1)
     ring = 700.0 * np.column_stack((np.cos(angle), np.sin(angle)))
-    ring = ring[(angle <= math.radians(130.0)) | (angle >= math.radians(open_to_deg))]
+    ring = ring[(angle <= math.radians(open_from_deg)) | (angle >= math.radians(open_to_deg))]
     free = fan_shaped_sectors(ring, 60.0, (0.0, 0.0))
-    assert all(math.radians(130.0) < right < left < math.radians(170.0) for right, left in free)
-    assert len(free) == (open_to_deg > 130.0)
+    assert all(math.radians(open_from_deg) < right < left < math.radians(170.0) for right, left in free)
+    assert len(free) == (open_to_deg > open_from_deg)
+    if open_from_deg == 100.0:
+        x, y = multi_step_search(window(ring), (0.0, 0.0), 0.5 * math.pi)[0].nodes[1]
+        assert 102.3 < math.degrees(math.atan2(y, x)) < 139.0, (
+            "from 1.7 rad and 4.9 deg, as far as a step can turn"
+        )
+        return
     best = multi_step_search(window(ring), (0.0, 0.0), 0.5 * math.pi)[0]
     np.testing.assert_allclose(best.nodes[:6], [(100.0 * k, 0.0) for k in range(6)], atol=1e-9)
     assert max(math.hypot(*node) for node in best.nodes) <= 700.0 * math.cos(0.05) - math.sqrt(
