@@ -58,8 +58,13 @@ class Given:
         """
         named = {name.replace("__", "."): value for name, value in keys.items() if value is not None}
         more = [(name, json.dumps(value)) for name, value in named.items()]
+        told = [
+            (f"{name}.{part}" if part else name, json.dumps(of))
+            for name, value in named.items()
+            for part, of in (value.items() if isinstance(value, dict) else [("", value)])
+        ]
         for name, value in self.settings:
-            for key, other in more:
+            for key, other in told:
                 if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
                     raise typer.BadParameter(
                         f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",

@@ -81,7 +81,7 @@ def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[s
     middle = np.array((worst["east_m"], worst["north_m"]))
     half_m = WORST_SPANS * max(worst["off_m"], worst["allowed_m"])
     axes.plot(*given_m.T / 1e3, **GIVEN_STYLE)
-    axes.plot(run.track.east_m / 1e3, run.track.north_m / 1e3, color=colour(0), lw=1.5)
+    axes.plot(run.track.east_m / 1e3, run.track.north_m / 1e3, color=colour(0), lw=1.5, zorder=5)
     close_up(axes, middle, (2 * half_m, half_m))
     axes.plot(*middle / 1e3, **WORST_MARK)
     axes.set_title(

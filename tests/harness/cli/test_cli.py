@@ -119,6 +119,10 @@ print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
             "seed=4 beside an option that gives seed as 5; leave one of them out",
         ),
         (
+            "fly paper_circles --wind 3,90 --set environment.wind.speed_mps=8",
+            "speed_mps=8 beside an option that gives environment.wind.speed_mps as 3.0; leave one of them out",
+        ),
+        (
             "falsify paper_circles --vary seed=1:2 --planner bug2 --set planner={}",
             'planner={} beside an option that gives planner.kind as "bug2"',
         ),
