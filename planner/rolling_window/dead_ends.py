@@ -92,7 +92,7 @@ class GivingUp:
         return no_room and self._stability.settled(time_s) and not (doubtful and len(self._memory.refused_m))
 
     def try_again(self, narrow: bool, at_end: bool, arc_length_m: float) -> None:
-        """After a search in vain: more effort (`narrow`: none); forgives the refused if that or `at_end`."""
+        """After a search in vain: doubles the effort (`narrow`: none again); either flag forgives what was given up."""
         self.retries += narrow
         if narrow or at_end:
             self.given_up_at_m = arc_length_m
