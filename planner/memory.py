@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from planner.interface import FloatArray, IntArray, MapView
-from planner.kernels.buckets import SortedBefore, cells_of, joined
+from planner.kernels.buckets import cells_of, joined
 
 FIRST_MOVING_LABEL = -1000
 """Label of the first moving obstacle; further ones have the numbers below it."""
@@ -40,8 +40,6 @@ class ObstacleMemory:
         self._points, self._genuine = NO_POINTS, np.zeros(0, dtype=np.bool_)
         self._labels: IntArray | None = None
         self._with_moving: FloatArray | None = None
-        self.sorted_before: SortedBefore = {}
-        """Obstacles by squares, as searches left them; a new one where an index means another point."""
 
     @property
     def known(self) -> int:
@@ -99,7 +97,7 @@ class ObstacleMemory:
         outlines = [each.points_m for each in seen.moving] if met is None else met
         if not (outlines or self._outlines) or self._unmoved(outlines):
             return fresh
-        self._outlines, self._with_moving, self.sorted_before = tuple(outlines), None, {}
+        self._outlines, self._with_moving = tuple(outlines), None
         return np.concatenate((fresh, *outlines))
 
     def _unmoved(self, outlines: Sequence[FloatArray]) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from planner.geometry.curves import Point
@@ -29,13 +27,6 @@ def first_breach(path: Path, points_m: FloatArray, keep_m: float | FloatArray, f
 def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bool:
     """Whether a path stays inside a rectangle xmin, ymin, xmax, ymax."""
     return segments.inside_bounds(path.segments, *bounds_m)
-
-
-def admits(
-    path: Path, points_m: FloatArray, keep_m: float, bounds_m: tuple[float, float, float, float]
-) -> bool:
-    """Whether a path keeps its distance from (m, 2) points, and stays inside a rectangle."""
-    return inside_bounds(path, bounds_m) and math.isinf(first_breach(path, points_m, keep_m))
 
 
 def behind(places_m: FloatArray, eye_m: Point, edges_m: FloatArray, beside_m: float) -> BoolArray:

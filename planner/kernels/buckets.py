@@ -19,36 +19,69 @@ Cells = tuple[IntArray, IntArray, IntArray, IntArray]
 """(c,) where each square begins among gathered points; (c,) how many it has; (p,) twice: squares that touch each other,
 diagonally too, each pair once."""
 
-SortedBefore = dict[int, tuple[IntArray, tuple[IntArray, Cells]]]
-"""By label of an obstacle: (m,) the indices of its points, and what `cells_of` returned for them."""
-
 Buckets = tuple[FloatArray, IntArray, FloatArray]
 """(3, m) east and north of points by squares and the distance to be kept from each; (b + 1,) where each square begins
 among them, and the end; (3, b) centre and radius of a circle about each that holds what is to be kept from them. m."""
 
 
+@compiled(INTS, INTS, inner=True)
+def _sorted_by(keys: IntArray, order: IntArray) -> IntArray:
+    """The (m,) indices of an order, those of lesser keys first and else as they were: a counting sort."""
+    least = most = keys[0] if len(keys) else 0
+    for key in keys:
+        least, most = min(least, key), max(most, key)
+    begins, indices = np.zeros(most - least + 2, dtype=np.intp), np.empty(len(order), dtype=np.intp)
+    for key in keys:
+        begins[key - least + 1] += 1
+    for k in range(1, len(begins)):
+        begins[k] += begins[k - 1]
+    for i in order:
+        indices[begins[keys[i] - least]] = i
+        begins[keys[i] - least] += 1
+    return indices
+
+
+@compiled(INTS, INTS, inner=True)
+def _by_squares(columns: IntArray, rows: IntArray) -> tuple[IntArray, IntArray]:
+    """(m,) indices of points, column by column and row by row; (c + 1,) where each square begins, and the end."""
+    order, first, count = np.empty(len(rows), dtype=np.intp), np.empty(len(rows) + 1, dtype=np.intp), 0
+    for k in range(len(order)):
+        order[k] = k
+    order = _sorted_by(columns, _sorted_by(rows, order))
+    for k in range(len(order)):
+        if not k or columns[order[k]] != columns[order[k - 1]] or rows[order[k]] != rows[order[k - 1]]:
+            first[count] = k
+            count += 1
+    first[count] = len(order)
+    return order, first[: count + 1]
+
+
+@compiled(ROWS, INTS, FLOAT)
 def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray, Cells]:
     """Sorts the points of some indices into squares of `side`; those in one square count as one piece of wall.
 
     Returns:
         (m,) the indices, square by square; the squares.
     """
-    squares = np.floor(points.take(some, axis=0) / side).astype(np.int64)
-    squares -= [squares[:, 0].min() - 1, squares[:, 1].min() - 1]
-    width = int(squares[:, 1].max()) + 2
-    keys = squares @ (width, 1)
-    order = np.argsort(keys, kind="stable")
-    return some[order], _touching(keys[order], width)
-
-
-def _touching(keys: IntArray, width: int) -> Cells:
-    """Returns the `Cells` of (m,) sorted keys; a key is column times `width` (rows + 1) plus row."""
-    first = np.flatnonzero(np.concatenate(((True,), keys[1:] != keys[:-1])))
-    squares, counts = keys[first], np.concatenate((first[1:], (len(keys),))) - first
-    beside = squares + np.array(((1,), (width - 1,), (width,), (width + 1,)))
-    there = np.searchsorted(squares, beside)
-    touched = squares[np.minimum(there, len(squares) - 1)] == beside
-    return first, counts, np.flatnonzero(touched) % len(squares), there[touched]
+    columns, rows = np.empty(len(some), dtype=np.intp), np.empty(len(some), dtype=np.intp)
+    for k in range(len(some)):
+        columns[k], rows[k] = math.floor(points[some[k], 0] / side), math.floor(points[some[k], 1] / side)
+    order, first = _by_squares(columns, rows)
+    count, touching, right = len(first) - 1, 0, 0
+    one, other = np.empty(4 * count, dtype=np.intp), np.empty(4 * count, dtype=np.intp)
+    column, row, counts = np.empty_like(first), np.empty_like(first), np.empty(count, dtype=np.intp)
+    for square in range(count):
+        column[square], row[square] = columns[order[first[square]]], rows[order[first[square]]]
+        counts[square] = first[square + 1] - first[square]
+    for square in range(count):
+        east = column[square] + 1
+        while right < count and (column[right], row[right]) < (east, row[square] - 1):
+            right += 1
+        for beside in (square + 1 if square + 1 < right else count, right, right + 1, right + 2):
+            if beside < count and column[beside] <= east and abs(row[beside] - row[square]) <= 1:
+                one[touching], other[touching] = square, beside
+                touching += 1
+    return some[order], (first[:count], counts, one[:touching], other[:touching])
 
 
 @compiled(COUNT, INTS, INTS)
@@ -78,59 +111,31 @@ def gathered(points: FloatArray, keep: FloatArray, some: IntArray) -> FloatArray
     return rows
 
 
+@compiled(ROWS, FLOATS, FLOAT)
 def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, Buckets]:
     """Sorts points into squares at least `side` wide; `keep` is the (n,) distance to be kept from each.
 
     Returns:
         (n,) indices, square by square; the points in this order.
     """
-    order, first, circles = _in_squares(points, keep, side)
-    return order, (gathered(points, keep, order), first, circles)
-
-
-@compiled(ROWS, FLOATS, FLOAT)
-def _in_squares(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, IntArray, FloatArray]:
-    """Returns the indices and the buckets of `bucketed`, without its points."""
-    count, order = len(points), np.empty(len(points), dtype=np.intp)
     west, south, east, north = math.inf, math.inf, -math.inf, -math.inf
-    for i in range(count):
+    for i in range(len(points)):
         west, east = min(west, points[i, 0]), max(east, points[i, 0])
         south, north = min(south, points[i, 1]), max(north, points[i, 1])
-    if not count:
-        west = south = east = north = 0.0
     east, north = east - west, north - south
     side = max(side, (east + north) / TARGET_BUCKETS, math.sqrt(east * north / TARGET_BUCKETS))
-    width = int(north / side) + 1
-    begins = np.zeros((int(east / side) + 1) * width + 1, dtype=np.intp)
-    key = np.empty(count, dtype=np.intp)
-    for i in range(count):
-        key[i] = int((points[i, 0] - west) / side) * width + int((points[i, 1] - south) / side)
-        begins[key[i] + 1] += 1
-    used = 0
-    for square in range(1, len(begins)):
-        used += begins[square] > 0
-        begins[square] += begins[square - 1]
-    first, circles = np.empty(used + 1, dtype=np.intp), np.empty((3, used))
-    at = np.empty(len(begins), dtype=np.intp)
-    for square in range(len(begins)):
-        at[square] = begins[square]
-    for i in range(count):
-        order[at[key[i]]] = i
-        at[key[i]] += 1
-    used = 0
-    for square in range(len(begins) - 1):
-        if begins[square] == begins[square + 1]:
-            continue
-        x, y = points[order[begins[square]], 0], points[order[begins[square]], 1]
-        xmin, xmax, ymin, ymax, kept = x, x, y, y, 0.0
-        for j in range(begins[square], begins[square + 1]):
-            i = order[j]
-            xmin, xmax = min(xmin, points[i, 0]), max(xmax, points[i, 0])
-            ymin, ymax = min(ymin, points[i, 1]), max(ymax, points[i, 1])
-            kept = max(kept, keep[i])
-        circles[0, used], circles[1, used] = 0.5 * (xmin + xmax), 0.5 * (ymin + ymax)
-        circles[2, used] = kept + 0.5 * math.hypot(xmax - xmin, ymax - ymin)
-        first[used] = begins[square]
-        used += 1
-    first[used] = count
-    return order, first, circles
+    columns, rows = np.empty(len(points), dtype=np.intp), np.empty(len(points), dtype=np.intp)
+    for i in range(len(points)):
+        columns[i], rows[i] = int((points[i, 0] - west) / side), int((points[i, 1] - south) / side)
+    order, first = _by_squares(columns, rows)
+    places, circles = np.empty((3, len(points))), np.empty((3, len(first) - 1))
+    for square in range(len(first) - 1):
+        xmin, xmax, ymin, ymax, kept = math.inf, -math.inf, math.inf, -math.inf, 0.0
+        for j in range(first[square], first[square + 1]):
+            x, y, keeps = points[order[j], 0], points[order[j], 1], keep[order[j]]
+            places[0, j], places[1, j], places[2, j] = x, y, keeps
+            xmin, xmax, ymin, ymax = min(xmin, x), max(xmax, x), min(ymin, y), max(ymax, y)
+            kept = max(kept, keeps)
+        circles[0, square], circles[1, square] = 0.5 * (xmin + xmax), 0.5 * (ymin + ymax)
+        circles[2, square] = kept + 0.5 * math.hypot(xmax - xmin, ymax - ymin)
+    return order, (places, first, circles)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from planner.geometry.clearance import admits
+from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.course import Route
 from planner.geometry.curves import Limits, Point, Pose, fillet
 from planner.paper.model import guide_vector, track_cost_m
@@ -51,9 +51,10 @@ def flyable(nodes: tuple[Point, ...], start: Pose, window: Window) -> Route | No
     """
     mission = window.mission
     path = fillet(start, nodes, Limits.of(mission), window.keep_m - mission.clearance_m)
-    if path is None or not admits(path, window.points_m, mission.clearance_m, mission.bounds_m):
+    if path is None or not inside_bounds(path, mission.bounds_m):
         return None
-    return Route(nodes, path)
+    keeps_clear = math.isinf(first_breach(path, window.points_m, mission.clearance_m))
+    return Route(nodes, path) if keeps_clear else None
 
 
 def optimise(track: Track, start: Pose, window: Window) -> Route | None:

@@ -97,10 +97,10 @@ class Trail:
         for (ax, ay), (bx, by) in pairwise(nodes):
             length = math.hypot(bx - ax, by - ay)
             count = max(math.ceil(length / self._side), 1)
-            share = (np.arange(count) + 0.5) / count
-            x = np.floor((ax + share * (bx - ax)) / self._side).astype(np.int64).tolist()
-            y = np.floor((ay + share * (by - ay)) / self._side).astype(np.int64).tolist()
-            back_m += length / count * sum(place in self._flown for place in zip(x, y, strict=True))
+            shares = ((i + 0.5) / count for i in range(count))
+            places = ((ax + share * (bx - ax), ay + share * (by - ay)) for share in shares)
+            squares = ((math.floor(x / self._side), math.floor(y / self._side)) for x, y in places)
+            back_m += length / count * sum(square in self._flown for square in squares)
         return back_m
 
 
@@ -156,11 +156,9 @@ class LocalPlanning:
         points = self.memory.points_m
         room = self._room_m(start, points)
         keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
-        memory, labels = self.memory, self.memory.labels
         self.work_count.add(0, TANGENT_WORK, len(points))
-        window = Window(
-            start.pose[:2], points, labels, memory.cell_m, keep, self.work_count, memory.sorted_before
-        )
+        labels, cell_m = self.memory.labels, self.memory.cell_m
+        window = Window(start.pose[:2], points, labels, cell_m, keep, self.work_count)
         begun = start
         fitted: list[tuple[float, Route]] = []
 

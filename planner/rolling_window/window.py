@@ -19,7 +19,7 @@ import numpy as np
 from planner.geometry.curves import Point
 from planner.geometry.terrain import HUG_WORK, POINT_WORK, TANGENT_WORK, WorkCount
 from planner.interface import FloatArray, IntArray
-from planner.kernels.buckets import Buckets, Cells, SortedBefore, bucketed, cells_of, gathered
+from planner.kernels.buckets import Buckets, Cells, bucketed, cells_of, gathered
 from planner.kernels.fans import entered, fan_edges
 
 MOST_OBSTACLES = 12
@@ -65,7 +65,6 @@ class Window:
     cell_m: float
     keep_m: FloatArray
     work_count: WorkCount = field(default_factory=WorkCount)
-    sorted_before: SortedBefore = field(default_factory=dict)
     _obstacles: dict[int, _Obstacle] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
@@ -79,11 +78,7 @@ class Window:
         if label not in self._obstacles:
             members = np.flatnonzero(self.labels == label)
             self.work_count.add(4, TANGENT_WORK, len(members))
-            before = self.sorted_before.get(label)
-            if before is None or not np.array_equal(before[0], members):
-                before = members, cells_of(self.points_m, members, self.cell_m)
-                self.sorted_before[label] = before
-            members, squares = before[1]
+            members, squares = cells_of(self.points_m, members, self.cell_m)
             self._obstacles[label] = gathered(self.points_m, self.keep_m, members), squares
         return self._obstacles[label]
 

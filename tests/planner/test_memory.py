@@ -130,12 +130,11 @@ def test_edges_of_an_obstacle_are_those_of_its_points_where_others_had_their_ind
         seen.take_back(np.zeros((0, 2)) if moves else points)
         memory.take_in(seen, [points] if moves else None)
         labels, keep = memory.labels, np.full(len(points), CLEARANCE)
-        window = Window((0.0, 0.0), points, labels, memory.cell_m, keep, sorted_before=memory.sorted_before)
+        window = Window((0.0, 0.0), points, labels, memory.cell_m, keep)
         edges = window.sector_edges((0.0, 0.0), labels[:1].tolist())
         half = 0.5 - math.asin(CLEARANCE / 900.0)
         bearings = sorted(math.atan2(edge.uy, edge.ux) - way for edge in edges)
         np.testing.assert_allclose(bearings, (-half, half), atol=0.05)
-        assert len(memory.sorted_before) == 1, "the next search finds it"
 
 
 @settings(max_examples=examples(25))
