@@ -12,7 +12,7 @@ CORNER_LEVELS = (2, 4)
 between the true length of a way and 0.92 of it."""
 
 
-@compiled(BOOLS_OUT, ROWS, FLOATS, POINT, FLOAT, COUNT, COUNT, rare=True)
+@compiled(BOOLS_OUT, ROWS, FLOATS, POINT, FLOAT, COUNT, COUNT)
 def close_cells(
     open_: BoolArray,
     points: FloatArray,
@@ -35,7 +35,7 @@ def close_cells(
                     open_[(column + 1) * rows + row + 1] = False
 
 
-@compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT, rare=True)
+@compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT)
 def spread_wave(
     levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int
 ) -> None:
