@@ -123,17 +123,15 @@ def test_what_moves_comes_last_and_is_an_obstacle_of_its_own_each() -> None:
 @pytest.mark.parametrize("moves", [False, True])
 def test_edges_of_an_obstacle_are_those_of_its_points_where_others_had_their_indices(moves: bool) -> None:
     """In a ring that is open to the north, then in one open to the east: M and N lie beside the way out."""
-    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
-    angle = np.arange(0.5, math.tau - 0.5, 0.05)
+    seen, memory, angle = Batches(), ObstacleMemory(CLEARANCE), np.arange(0.5, math.tau - 0.5, 0.05)
     for way, turned in ((0.5 * math.pi, angle), (0.0, np.random.default_rng(1).permutation(angle))):
         points = 900.0 * np.column_stack((np.cos(way + turned), np.sin(way + turned)))
         seen.take_back(np.zeros((0, 2)) if moves else points)
         memory.take_in(seen, [points] if moves else None)
-        labels, keep = memory.labels, np.full(len(points), CLEARANCE)
-        window = Window((0.0, 0.0), points, labels, memory.cell_m, keep)
-        edges = window.sector_edges((0.0, 0.0), labels[:1].tolist())
-        half = 0.5 - math.asin(CLEARANCE / 900.0)
+        window = Window((0.0, 0.0), points, memory.labels, memory.cell_m, np.full(len(points), CLEARANCE))
+        edges = window.sector_edges((0.0, 0.0), memory.labels[:1].tolist())
         bearings = sorted(math.atan2(edge.uy, edge.ux) - way for edge in edges)
+        half = 0.5 - math.asin(CLEARANCE / 900.0)
         np.testing.assert_allclose(bearings, (-half, half), atol=0.05)
 
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from planner.geometry.clearance import behind, distances, first_breach, inside_bounds
 from planner.geometry.curves import Pose, along, full_turn, pose_at
+from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, Path
 from tests.examples import examples
 
@@ -68,8 +69,10 @@ def test_a_breach_is_told_where_and_only_where_there_is_one(
     arc_length_m = first_breach(path, points, radius)
     assert math.isfinite(arc_length_m) == (nearest < radius).any()
     if math.isfinite(arc_length_m):
-        place = np.array(pose_at(path, arc_length_m)[:2])
-        assert np.hypot(*(points - place).T).min() < radius
+        assert np.hypot(*(points - pose_at(path, arc_length_m)[:2]).T).min() < radius
+    terrain = Terrain(points, np.full(6, radius), (-math.inf, -math.inf, math.inf, math.inf))
+    assert len(terrain.squares[0][0]) == 6
+    assert terrain.admits(path) == (nearest >= radius).all()
     for i, each in enumerate(points):
         alone = first_breach(path, each[None], radius)
         assert math.isfinite(alone) == (nearest[i] < radius)
