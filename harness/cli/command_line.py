@@ -30,13 +30,14 @@ FOLDER_KEYS: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraf
 
 def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
     """Loads a scenario by file or shipped name, with keys replaced; the error on a campaign names its command."""
-    from harness.campaign.campaign_file import is_a
     from harness.scenario.scenario import load_scenario
-    from harness.scenario.shipped import shipped_campaigns
 
     try:
         return load_scenario(scenario, overrides)
     except InputError as error:
+        from harness.campaign.campaign_file import is_a
+        from harness.scenario.shipped import shipped_campaigns
+
         if scenario in shipped_campaigns() or (os.path.isfile(scenario) and is_a("campaign", Path(scenario))):
             use = shlex.join(["wayproof", "sweep", scenario])
             raise InputError(f"{scenario}: this is a campaign: use `{use}`") from error

@@ -8,7 +8,6 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
 from types import ModuleType
 
 _starting = threading.Lock()
@@ -20,6 +19,8 @@ def without_main() -> Iterator[None]:
 
     An interrupt, which reaches the whole process group, is blocked in them from their first moment on.
     """
+    from multiprocessing import resource_tracker  # few commands need it
+
     with _starting:
         resource_tracker.ensure_running()  # unblocks the interrupt when it begins its own process
         main = sys.modules["__main__"]
