@@ -78,8 +78,12 @@ def _functions_for(
     """Finds the functions that these axes read and no other axis does; drag does not count, for it follows lift."""
     others = [each for each in aerodynamics.findall("axis") if each not in axes]
     others = [each for each in others if each.get("name") not in DRAG_AXES]
+    functions = aerodynamics.findall("function")
     read, elsewhere = ({text for axis in some for text in _texts(axis)} for some in (axes, others))
-    return [each for each in aerodynamics.findall("function") if each.get("name") in read - elsewhere]
+    for each in reversed(functions):  # one that is read may read others, which stand before it
+        for names in (read, elsewhere):
+            names |= _texts(each) if each.get("name") in names else set()
+    return [each for each in functions if each.get("name") in read - elsewhere]
 
 
 def _texts(element: ElementTree.Element) -> set[str]:
