@@ -114,7 +114,9 @@ class JsbsimModel:
         self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
         self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
         self._write_terrain = node(fdm, "position/terrain-elevation-asl-ft").set_double_value
-        self._enable = node(fdm, "wayproof/enable").set_double_value
+        self._enable, self._hold = (
+            node(fdm, f"wayproof/{name}").set_double_value for name in ("enable", "hold")
+        )
         servos = [name for name, servo in frame.files.actuators if servo.rate_limit_1ps is not None]
         self._limited, self._vertical_limited = (
             tuple(node(fdm, f"wayproof/{name}-limited").get_double_value for name in names)
@@ -218,6 +220,7 @@ class JsbsimModel:
     def engage(self, on: bool = True) -> None:
         """Switches the inner loops on, or off: the controls then stay where they are."""
         self._enable(1.0 if on else 0.0)
+        self._hold(0.0 if on else -1.0)
 
     def _set_up_autopilot(self, climb_limit_mps: float | None) -> None:
         """Gives the autopilot its gains and limits, and the trim at which they hold."""
