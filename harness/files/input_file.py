@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import stat
 from pathlib import Path
 from typing import Any, BinaryIO, Final, NoReturn
 
 MAX_JSON_BYTES: Final = 16_000_000  # a larger JSON file is refused
+_JSON_TOKEN: Final = re.compile(r'("(?:[^"\\]|\\.)*")\s*:|"(?:[^"\\]|\\.)*"|[{}]|NaN|-?Infinity')
 
 
 class InputError(ValueError):
@@ -42,7 +44,8 @@ def read_data(path: Path, max_bytes: int, what: str, first: int | None = None) -
 def decoded(data: bytes, source: str, what: str) -> str:
     """Decodes the bytes of a file as UTF-8; arguments and faults are those of `read_text`."""
     if b"\0" in data:
-        raise InputError(f"{source}: is not a text file; must be {what}, as UTF-8")
+        told = "UTF-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "not a text file"
+        raise InputError(f"{source}: is {told}; must be {what}, as UTF-8")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -72,26 +75,27 @@ def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict
     return index if isinstance(index, dict) and index.get("schema") == schema else None
 
 
-def parsed_json(text: str, source: str, once: bool = True) -> Any:
-    """Parses JSON; where `once`, a key may come only once in a mapping. `source`, or nothing, begins an InputError."""
+def parsed_json(text: str, source: str) -> Any:
+    """Parses JSON; a key may come only once in a mapping. `source`, or nothing, begins an InputError."""
 
     def fault(sentence: str, line: int | None = None) -> InputError:
         where = source if line is None else f"{source}:{line}" if source else f"line {line}"
         return InputError(f"{where}: {sentence}" if where else sentence)
 
     def refuse(name: str) -> NoReturn:
-        raise fault(f"has the number {name}; must be finite")
+        begin = next(token.start() for token in _JSON_TOKEN.finditer(text) if token[0] == name)
+        raise fault(f"has the number {name}; must be finite", text.count("\n", 0, begin) + 1)
 
     def single(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
-            names = [name for name, _ in pairs]
-            again = next(name for name in names if names.count(name) > 1)
-            raise fault(f"has the key {shown(again)!r} twice in one place; must have it once")
+        if len(found := dict(pairs)) < len(pairs):
+            key, line, first = _key_twice(text)
+            raise fault(
+                f"has the key {shown(key)!r} twice in one place, first in line {first}; keep one", line
+            )
         return found
 
     try:
-        return json.loads(text, parse_constant=refuse, object_pairs_hook=single if once else None)
+        return json.loads(text, parse_constant=refuse, object_pairs_hook=single)
     except json.JSONDecodeError as error:
         raise fault(f"is not whole JSON ({error.msg}); it may be torn", error.lineno) from error
     except (RecursionError, MemoryError) as error:
@@ -102,21 +106,40 @@ def parsed_json(text: str, source: str, once: bool = True) -> Any:
         raise fault("has a number that is too long; must be shorter") from error
 
 
-def finite(value: Any, where: str) -> float:
-    """Returns a finite number, from JSON or from text; an InputError on anything else, true and false too."""
+def _key_twice(text: str) -> tuple[str, int, int]:
+    """Returns the first key of a JSON that comes again in its mapping, its line, and that where it came first."""
+    opened: list[dict[str, int]] = []
+    for token in _JSON_TOKEN.finditer(text):
+        if token[0] == "{":
+            opened.append({})
+        elif token[0] == "}":
+            opened.pop()
+        elif token[1]:
+            key, line = json.loads(token[1]), text.count("\n", 0, token.start()) + 1
+            if key in opened[-1]:
+                return key, line, opened[-1][key]
+            opened[-1][key] = line
+    raise AssertionError("no key comes twice")
+
+
+def finite(value: Any, where: str, text: bool = False) -> float:
+    """Returns a finite number of JSON, or as `text` from other files; an InputError on anything else, true too."""
+    is_text = isinstance(value, str)
+    fits = is_text and value.isascii() and "_" not in value if text else type(value) in (int, float)
     try:
-        number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError, OverflowError):
+        number = float(value) if fits else math.nan
+    except (ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
         told = "missing, or null" if value is None else repr(shown(str(value)))
-        raise InputError(f"{where}: is {told}; must be a finite number")
+        quoted = " without quotes" if is_text and not text else ""
+        raise InputError(f"{where}: is {told}; must be a finite number{quoted}")
     return number
 
 
-def whole(value: Any, where: str) -> int:
-    """Returns a whole number, from JSON or from text."""
-    number = finite(value, where)
+def whole(value: Any, where: str, text: bool = False) -> int:
+    """Returns a whole number, as `finite` does."""
+    number = finite(value, where, text)
     if number != int(number):
         raise InputError(f"{where}: is {number:g}; must be a whole number")
     return int(number)

@@ -17,8 +17,7 @@ from harness.files.zip_archive import unpacked
 COUNTED_ELEMENTS: Final = frozenset(  # told, since they are not read
     ["Point", "Model", "NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay", "LinearRing"]
 )
-REFUSED_ELEMENTS: Final = ("altitudeOffset", "Track", "MultiTrack")
-"""Elements of Google's extension that are refused by name."""
+REFUSED_ELEMENTS: Final = ("altitudeOffset", "Track", "MultiTrack")  # of Google's extension
 COMMA: Final = re.compile(r"\s*,\s*")  # blanks about it are dropped
 
 Element = ElementTree.Element
@@ -27,16 +26,15 @@ Point = tuple[float, float, float | None]
 
 
 class Shape(NamedTuple):
-    """A line or a polygon of KML."""
+    """A line or a polygon of KML, with the name, or number, and the ExtendedData of its Placemark.
+
+    The mode is its altitudeMode or empty. Rings are the points of the line, or of the outer and the inner boundaries.
+    """
 
     name: str
-    """Name of its Placemark, or the Placemark's number."""
     mode: str
-    """Its altitudeMode; empty where there is none."""
     rings: tuple[tuple[Point, ...], ...]
-    """Points of the line; of a polygon those of its outer boundary, then of the inner ones."""
     data: Mapping[str, str]
-    """Names and values of the ExtendedData of its Placemark."""
 
 
 class Kml(NamedTuple):
@@ -127,6 +125,6 @@ def _points(element: Element, where: str, what: str) -> tuple[Point, ...]:
         at, cells = f"{where}: {what} {number}", text.split(",")
         if len(cells) not in (2, 3):
             raise InputError(f"{at}: is {shown(text)!r}; must be longitude,latitude[,altitude]")
-        longitude, latitude, *altitude = (finite(each, at) for each in cells)
+        longitude, latitude, *altitude = (finite(each, at, text=True) for each in cells)
         points.append((latitude, longitude, altitude[0] if altitude else None))
     return tuple(points)

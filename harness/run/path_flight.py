@@ -139,7 +139,14 @@ def planned(
     if altitude_m is not None:
         profile = replace(profile, altitude_m=np.full_like(profile.altitude_m, altitude_m))
     elif profile.altitude_m.min() < lowest or profile.altitude_m.max() > highest:
-        profile = replace(profile, altitude_m=np.clip(profile.altitude_m, lowest, highest))
+        held_m = np.clip(profile.altitude_m, lowest, highest)
+        worst = int(np.abs(held_m - profile.altitude_m).argmax())
+        if abs(held_m[worst] - profile.altitude_m[worst]) > scenario.trackability.altitude_m:
+            told = (
+                f"goes to {profile.altitude_m[worst]:g} m above the sea; must be {lowest:g} to {highest:g} m"
+            )
+            raise InputError(f"{given.source}: {told}, or give --altitude-m")
+        profile = replace(profile, altitude_m=held_m)
         notes.append(f"altitudes below {lowest:g} m or above {highest:g} m above the sea: flown at these")
     if altitude_m is None and ground is None:
         notes += _above_home(given.mission.above_ground)

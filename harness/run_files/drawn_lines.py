@@ -21,14 +21,16 @@ from harness.files.kml import Point
 from harness.files.wording import counted
 from planner.interface import BoolArray, FloatArray
 
-LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))
-"""Pairs of CSV columns that hold a place in the local plane."""
+LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))  # CSV columns of a place in the local plane
 DEGREES: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), ("lat", "lon"))
 """Pairs of columns that hold a place in degrees."""
-ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")
-"""Columns that hold an altitude above mean sea level."""
-ABOVE_GROUND: Final = "altitude_agl_m"
-"""Column that holds an altitude above ground."""
+ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")  # above mean sea level
+ABOVE_GROUND: Final = "altitude_agl_m"  # column that holds an altitude above ground
+ALTITUDE_WORD: Final = re.compile(
+    r"(?<![a-z])(alt|altitudes?|elev?|elevation|height|hgt|agl|a?msl)(?![a-z])|^(up|z|fl)(?![a-z])"
+)
+"""Occurs in the name of a column that holds an altitude, as `alt_ft`, whether or not it is read."""
+SPEED_WORD: Final = re.compile(r"speed|velocity|(?<![a-z])[tic]as(?![a-z])")  # in the name of a column
 SINGLE_TYPE: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
 """The type of the single parts of a geometry with several."""
 MEMBERS_KEY: Final = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
@@ -40,8 +42,7 @@ FLYING_MPS: Final = 12.0
 FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
 """No glider is faster than these over the ground, and up or down: a fix that would need it from both its neighbours is
 an error of the receiver."""
-MOST_BROKEN_SHARE: Final = 0.05
-"""A file in which more than this share of the fixes cannot be read is refused."""
+MOST_BROKEN_SHARE: Final = 0.05  # a file in which more than this share of the fixes cannot be read is refused
 DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)  # begins an IGC file's line with the date
 EARTH_RADIUS_M: Final = 6_371_000.0
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
@@ -78,10 +79,15 @@ def read_csv(text: str, source: str) -> PathAsRead:
         if len(row) != len(header):
             raise InputError(f"{source}:{number}: has {len(row)} cells, the header {len(header)}")
         cells = dict(zip(header, row, strict=True))
-        first, second, *height = (finite(cells[name].strip(), f"{source}:{number}: {name}") for name in names)
+        first, second, *height = (
+            finite(cells[name], f"{source}:{number}: {name}", text=True) for name in names
+        )
         points.append((first, second, height[0] if height else None))
     others = ", ".join(name or "one without a name" for name in header if name not in names)
     notes = [f"columns passed over: {shown(others)}"] if others else []
+    if speeds := [name for name in header if SPEED_WORD.search(name)]:
+        told = "not flown: the airspeed is --airspeed-mps, else the aircraft's cruise"
+        notes.append(f"{shown(', '.join(speeds))} {told}")
     return PathAsRead(source, points, notes, names[2:] == [ABOVE_GROUND], tuple(names[:2]) in LOCAL)
 
 
@@ -103,6 +109,10 @@ def _columns(header: list[str], where: str) -> list[str]:
             "latitude_deg,longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas"
         )
     names = [*pair, *[name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]]
+    unread = next(filter(ALTITUDE_WORD.search, header), None) if len(names) == 2 else None
+    if unread is not None:
+        wanted = f"metres as altitude_m (above the sea) or {ABOVE_GROUND}, or no such column"
+        raise InputError(f"{where}: {shown(unread)}: is no altitude that is read; must be {wanted}")
     for name in names:
         if header.count(name) > 1:
             raise InputError(f"{where}: {name}: stands {header.count(name)} times; must stand once")
@@ -175,9 +185,9 @@ def read_gpx(text: str, source: str) -> PathAsRead:
     points: list[Point] = []
     for number, each in enumerate(kml.named(lines[0], tag)):
         where = f"{source}: {tag} {number}"
-        latitude, longitude = (finite(each.get(key), f"{where}: {key}") for key in ("lat", "lon"))
+        latitude, longitude = (finite(each.get(key), f"{where}: {key}", text=True) for key in ("lat", "lon"))
         height = kml.text_of(each, "ele")
-        points.append((latitude, longitude, finite(height, f"{where}: ele") if height else None))
+        points.append((latitude, longitude, finite(height, f"{where}: ele", text=True) if height else None))
     segments = sum(1 for _ in kml.named(lines[0], "trkseg"))
     notes = [f"{segments} segments of the track joined by straight lines"] if segments > 1 else []
     waypoints = sum(1 for _ in kml.named(root, "wpt"))

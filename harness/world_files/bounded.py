@@ -32,5 +32,5 @@ def text_of(data: bytes) -> str:
 
 
 def json_of(path: Path) -> Any:
-    """Parses a JSON file, in which a key may come more than once in a mapping: the last one counts."""
-    return parsed_json(text_of(read_bytes(path, MAX_TREE_BYTES)), "", once=False)
+    """Parses a JSON file, in which a key may come only once in a mapping."""
+    return parsed_json(text_of(read_bytes(path, MAX_TREE_BYTES)), "")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
-from harness.files.input_file import InputError, finite, listed, numbers, whole
+from harness.files.input_file import InputError, finite, listed, numbers, shown, whole
 from harness.files.mavlink import commands
 from harness.files.mavlink.commands import CIRCLES, CORNERS, HOME_CIRCLE
 
@@ -22,8 +22,7 @@ MISSION: Final = 2
 """MAV_FRAME of commands without a place. ArduPilot takes an altitude in it as above the sea; PX4 refuses it."""
 FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11: GROUND}
 """The datum of the altitude for each MAV_FRAME. Autopilots load no item to fly to in any other global frame."""
-NOWHERE_DEG: Final = 1e-7
-"""A position with less than this in both is no position; ArduPilot writes zeros where none is meant."""
+NOWHERE_DEG: Final = 1e-7  # no position has less in both; ArduPilot writes zeros where none is meant
 WPL: Final = "QGC WPL"  # begins a mission file in plain text
 WPL_FIELDS: Final = 12  # of a line of such a file
 COMMENT: Final = "#"  # begins a line to skip
@@ -31,20 +30,18 @@ COMMENT: Final = "#"  # begins a line to skip
 
 @dataclass(frozen=True)
 class Item:
-    """One mission item."""
+    """One mission item: its place in its file for messages, number in the mission, MAV_CMD, MAV_FRAME, parameters.
+
+    The last three of seven parameters are latitude, longitude, altitude; one that is left to the autopilot is 0. With
+    `autocontinue_off` the autopilot waits after the item to be told to go on.
+    """
 
     place: str
-    """Its place for messages: file, and line or key."""
     number: int
-    """Its number in the mission."""
     command: int
-    """Its command, a number of MAV_CMD."""
     frame: int
-    """Its frame, a number of MAV_FRAME."""
     params: tuple[float, ...]
-    """Its seven parameters, the last three latitude, longitude, altitude; 0 for one that is left to the autopilot."""
     autocontinue_off: bool = False
-    """Whether the autopilot waits after this item to be told to go on."""
 
     def __post_init__(self) -> None:
         for name, value, most in (("command", self.command, 65_535), ("frame", self.frame, 255)):
@@ -93,29 +90,41 @@ def wpl_items(text: str, source: str) -> list[Item]:
 def _item(cells: list[str], place: str) -> Item:
     if len(cells) != WPL_FIELDS:
         raise InputError(f"{place}: has {len(cells)} fields; a mission item has {WPL_FIELDS}")
-    number, frame, command = (whole(cells[field], place) for field in (0, 2, 3))
+    number, frame, command = (
+        whole(cells[field], f"{place}: field {field + 1}", text=True) for field in (0, 2, 3)
+    )
     # What is left to the autopilot is 0, or no number; the first parameter is field 5, counted from 1.
-    given = [None if cell.lower() == "nan" else finite(cell, place) for cell in cells[4:11]]
-    params = filled(given, command, frame, lambda index: f"{place}: field {5 + index} is nan")
-    return Item(place, number, command, frame, params, finite(cells[11], place) == 0.0)
+    given = [
+        None if cell.lower() == "nan" else finite(cell, f"{place}: field {field}", text=True)
+        for field, cell in enumerate(cells[4:], start=5)
+    ]
+    params = filled(given[:7], command, frame, lambda index: f"{place}: field {5 + index} is nan")
+    return Item(place, number, command, frame, params, given[7] == 0.0)
 
 
+GEOFENCE_KEYS: Final = (
+    "polygons",
+    "circles",
+    "breachReturn",
+    "version",
+    "polygon",
+)  # of a plan, the last of old ones
 Place = tuple[float, float]
 Keys = dict[str, Any]
 
-CIRCLE_SIDES: Final = 720
-"""A circle is compared as a polygon of this many sides: one of 10 km is off by 0.1 m."""
+CIRCLE_SIDES: Final = 720  # a circle is compared as a polygon of so many sides: one of 10 km is off by 0.1 m
 
 
 @dataclass(frozen=True)
 class Fence:
-    """An area to stay inside of, or out of; its places are east and north in metres, or degrees while it is read."""
+    """An area to stay inside of, or out of; its places are east and north in metres, or degrees while it is read.
+
+    The name is its place in its file. Rings are the outer one and its holes, none for a circle.
+    """
 
     name: str
-    """Its place in its file, for messages."""
     inclusion: bool
     rings: tuple[tuple[Place, ...], ...] = ()
-    """The outer ring and its holes; empty for a circle."""
     center: Place | None = None
     radius_m: float = 0.0
 
@@ -155,10 +164,12 @@ class Fence:
 
 def plan_fences(geofence: Any, source: str) -> tuple[Fence, ...]:
     """Returns the fences in a plan's geoFence, in degrees; `source`, as `path: ` or nothing, begins an InputError."""
-    if geofence is None:
-        return ()
     if not isinstance(geofence, dict):
         raise InputError(f"{source}geoFence: must be a mapping")
+    for key in (key for key, value in geofence.items() if value and key not in GEOFENCE_KEYS):
+        raise InputError(
+            f"{source}geoFence.{shown(key)}: is not known; must be one of {', '.join(GEOFENCE_KEYS)}"
+        )
     found = []
     if old := geofence.get("polygon"):  # before version 2: one, to stay inside of
         found.append(_polygon({"polygon": old, "inclusion": True}, source, "geoFence"))

@@ -27,8 +27,7 @@ from harness.run_files.mission.program import Program, program
 
 LANDING_PATTERNS: Final = {"fwLandingPattern": commands.LAND, "vtolLandingPattern": commands.VTOL_LAND}
 """Command to land at for complex items that are written as a place to descend at and a place to land."""
-TRANSECTS: Final = "TransectStyleComplexItem"
-"""Key of the mapping in which a survey has its items."""
+TRANSECTS: Final = "TransectStyleComplexItem"  # key of the mapping in which a survey has its items
 RELATIVE, ABSOLUTE = 3, 0
 """MAV_FRAME of altitudes above home and above the sea."""
 PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')
@@ -118,11 +117,14 @@ def read_plan(text: str, source: str) -> Program:
     notes: list[str] = []
     home = _home(mission.get("plannedHomePosition"), f"{source}: mission.plannedHomePosition", notes)
     items = _every_item(mission["items"], f"{source}: mission.items", notes)
-    geofence, rally = plan.get("geoFence") or {}, plan.get("rallyPoints") or {}
-    fences = Fences(plan_fences(geofence, f"{source}: "), mission.get("firmwareType") != commands.PX4)
+    geofence, rally = (plan[key] if plan.get(key) is not None else {} for key in ("geoFence", "rallyPoints"))
+    firmware = whole(mission.get("firmwareType", 0), f"{source}: mission.firmwareType")
+    fences = Fences(plan_fences(geofence, f"{source}: "), firmware != commands.PX4)
     if geofence.get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
-    return _mission(source, items, home, fences, len(rally.get("points") or ()), notes)
+    points = (rally.get("points") or []) if isinstance(rally, dict) else None
+    every_rally = listed(points, f"{source}: rallyPoints.points")
+    return _mission(source, items, home, fences, len(every_rally), notes)
 
 
 def _home(home: Any, where: str, notes: list[str]) -> Home:
@@ -152,6 +154,9 @@ def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
         raise InputError(f"{where}: must be a mission item")
     if item.get("type", "SimpleItem") in ("SimpleItem", None) and not item.get("complexItemType"):
         return [_simple(item, where, number)]
+    if item.get("type", "ComplexItem") != "ComplexItem" and not item.get("complexItemType"):
+        told = f"is {shown(str(item['type']))!r}; must be 'SimpleItem' or 'ComplexItem'"
+        raise InputError(f"{where}.type: {told}")
     kind = shown(str(item.get("complexItemType") or item.get("type")))
     if kind in LANDING_PATTERNS:
         return _landing(item, where, number, LANDING_PATTERNS[kind])
@@ -177,8 +182,11 @@ def _simple(item: Any, where: str, number: int) -> Item:
     given = [None if each is None else finite(each, f"{where}.params[{k}]") for k, each in enumerate(params)]
     command, frame = (whole(item.get(name), f"{where}.{name}") for name in ("command", "frame"))
     values = filled(given, command, frame, lambda index: f"{where}.params[{index}]: is null")
-    number = item["doJumpId"] if type(item.get("doJumpId")) is int else number
-    return Item(where, number, command, frame, values, item.get("autoContinue") is False)
+    if item.get("doJumpId") is not None:
+        number = whole(item["doJumpId"], f"{where}.doJumpId")
+    if not isinstance(goes_on := item.get("autoContinue", True), bool):
+        raise InputError(f"{where}.autoContinue: is {shown(str(goes_on))!r}; must be true or false")
+    return Item(where, number, command, frame, values, not goes_on)
 
 
 def _landing(item: dict[str, Any], where: str, number: int, land: int) -> list[Item]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import shapely
 
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, finite, listed
 from harness.files.mavlink import commands
 from harness.files.mavlink.items import WPL, Fence, item_fences, plan_fences, wpl_items
 from harness.files.wording import counted
@@ -23,7 +23,7 @@ def read_plan(spec: FileSpec) -> Contents:
         raise InputError("has no geoFence; must be a QGroundControl plan with one")
     mission, rally = content.get("mission"), content.get("rallyPoints")
     firmware = mission.get("firmwareType") if isinstance(mission, dict) else None
-    points = rally.get("points") if isinstance(rally, dict) else None
+    points = listed(rally.get("points") or [], "rallyPoints.points") if isinstance(rally, dict) else None
     fences = plan_fences(content["geoFence"], "")
     return _contents(fences, firmware == commands.PX4, len(points or ()))
 
@@ -36,11 +36,10 @@ def read_ardupilot(spec: FileSpec) -> Contents:
         home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
         rally = [item.command for item in items].count(commands.RALLY_POINT)
         return _contents(item_fences(items, home), False, rally)
-    rows = filter(None, (line.partition("#")[0].split() for line in text.splitlines()))
-    try:
-        places = [(float(north), float(east)) for north, east in rows]
-    except ValueError as error:
-        raise InputError("has a line that is not latitude and longitude; must be a fence") from error
+    rows = [(f"line {n}", line.partition("#")[0].split()) for n, line in enumerate(text.splitlines(), 1)]
+    if wrong := next((at for at, row in rows if len(row) not in (0, 2)), None):
+        raise InputError(f"{wrong}: is not latitude and longitude; must be a fence")
+    places = [(finite(row[0], at, text=True), finite(row[1], at, text=True)) for at, row in rows if row]
     if len(places) < 4:
         raise InputError(f"has {len(places)} lines; must be a return point and at least three corners")
     # Mission Planner saves polygons as fences, without a return point.

@@ -8,13 +8,14 @@ from typing import Any, Final
 
 import shapely
 
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, listed, numbers, shown
 from harness.files.kml import Shape, read_kml
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, json_of, read_bytes
 from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Datum, FileSpec, Limit, Part
 from harness.world_files.readers import limits
 
+WITHOUT_AREA: Final = ("Point", "MultiPoint", "LineString", "MultiLineString")
 DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
 """Datum of a KML altitude by its altitudeMode; an altitude that is clamped to the ground has none."""
 
@@ -23,7 +24,9 @@ def read_geojson(spec: FileSpec) -> Contents:
     """Reads the polygons of a GeoJSON file; points and lines are passed over and counted."""
     content = json_of(spec.path)
     shapes = [
-        (tags, polygon_of(each)) for tags, geometry in features_of(content) for each in simple(geometry)
+        (tags, polygon_of(*each))
+        for tags, geometry, key in features_of(content)
+        for each in simple(geometry, key)
     ]
     notes: list[str] = []
     parts = limits.parts_of([each for each in shapes if each[1] is not None], spec, notes)
@@ -35,41 +38,63 @@ def read_geojson(spec: FileSpec) -> Contents:
     return Contents(crs, parts, notes=tuple(notes))
 
 
-def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any]]:
-    """Yields attributes and geometry of each feature; its `id` is the attribute `identifier`."""
+def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:
+    """Yields attributes, geometry and the geometry's key of each feature; its `id` is the attribute `identifier`."""
     kind = content.get("type") if isinstance(content, dict) else None
-    features = content.get("features") if kind == "FeatureCollection" else [content]
+    is_collection = kind == "FeatureCollection"
+    features = content.get("features") if is_collection else [content]
     if not isinstance(features, list) or not all(isinstance(each, dict) for each in features):
         raise InputError("has no list of features; must be GeoJSON")
-    for feature in features:
+    for number, feature in enumerate(features):
+        key = f"features[{number}]." if is_collection else ""
         if feature.get("type") == "Feature":
-            tags = feature.get("properties")
-            named = {"identifier": feature.get("id")}
-            yield {**named, **(tags if isinstance(tags, dict) else {})}, feature.get("geometry")
+            if not isinstance(tags := feature.get("properties") or {}, dict):
+                raise InputError(f"{key}properties: is {shown(str(tags))!r}; must be a mapping or null")
+            yield {"identifier": feature.get("id"), **tags}, feature.get("geometry"), f"{key}geometry"
         else:
-            yield {}, feature
+            yield {}, feature, key.rstrip(".")
 
 
-def simple(geometry: Any) -> Iterator[dict[str, Any]]:
-    """Yields the geometries of a collection one after the other, and an empty one for what is no geometry."""
-    if not isinstance(geometry, dict):
-        yield {}
-    elif geometry.get("type") == "GeometryCollection":
-        for each in geometry.get("geometries") or ():
-            yield from simple(each)
+def simple(geometry: Any, key: str) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yields the geometries of a collection one after the other with their keys, and an empty one for null."""
+    if isinstance(geometry, dict) and geometry.get("type") == "GeometryCollection":
+        key = f"{key}.geometries".lstrip(".")
+        for number, each in enumerate(listed(geometry.get("geometries"), key)):
+            yield from simple(each, f"{key}[{number}]")
+    elif geometry is not None and not isinstance(geometry, dict):
+        raise InputError(f"{key}: is {shown(str(geometry))!r}; must be a GeoJSON geometry")
     else:
-        yield geometry
+        yield geometry or {}, key
 
 
-def polygon_of(geometry: dict[str, Any]) -> Any:
-    """Returns the shapely geometry of a Polygon or MultiPolygon, None for any other type."""
-    if geometry.get("type") not in ("Polygon", "MultiPolygon"):
+def polygon_of(geometry: dict[str, Any], key: str) -> Any:
+    """Returns the shapely geometry of a Polygon or MultiPolygon at a key, None for a point, a line or nothing."""
+    if not geometry or (kind := geometry.get("type")) in WITHOUT_AREA:
         return None
-    try:
-        return shapely.force_2d(shapely.geometry.shape(geometry))
-    except (TypeError, ValueError, LookupError, AttributeError, shapely.GEOSException) as error:
-        said = " ".join(str(error).split())[:60]
-        raise InputError(f"has a polygon whose rings are not lists of positions ({said})") from error
+    if kind not in ("Polygon", "MultiPolygon"):
+        raise InputError(
+            f"{f'{key}.type'.lstrip('.')}: is {shown(str(kind))!r}; must be that of a GeoJSON geometry"
+        )
+    key, given = f"{key}.coordinates".lstrip("."), geometry.get("coordinates")
+    if kind == "Polygon":
+        return _polygon(given, key)
+    return shapely.MultiPolygon([_polygon(each, f"{key}[{k}]") for k, each in enumerate(listed(given, key))])
+
+
+def _polygon(given: Any, key: str) -> Any:
+    rings = [_ring(ring, f"{key}[{number}]") for number, ring in enumerate(listed(given, key, " of rings"))]
+    return shapely.Polygon(*rings[:1], rings[1:])
+
+
+def _ring(given: Any, key: str) -> list[list[float]]:
+    """Returns the places of a ring; an InputError names the key of what is none."""
+    places = enumerate(listed(given, key, " of [longitude, latitude]"))
+    ring = [
+        numbers(place, f"{key}[{number}]", "[longitude, latitude]", (2, 3, 4))[:2] for number, place in places
+    ]
+    if len(ring) < 3:
+        raise InputError(f"{key}: has {counted(len(ring), 'place')}; a ring has at least 3")
+    return ring
 
 
 def read_kml_polygons(spec: FileSpec) -> Contents:
@@ -92,8 +117,8 @@ def _kml_part(shape: Shape, notes: list[str]) -> Part:
     name, datum = shape.name[:40], DATUMS.get(shape.mode)
     try:
         footprint = shapely.Polygon(rings[0], [ring for ring in rings[1:] if ring])
-    except ValueError as error:  # of one or two corners
-        raise InputError(f"{name}: has a ring that encloses no area ({error})") from error
+    except ValueError as error:
+        raise InputError(f"{name}: has a ring of one or two corners; must have at least 3") from error
     if limits.has_limits(shape.data):
         return Part(footprint, *limits.limits(shape.data, notes, name), name=name)
     if datum is None:

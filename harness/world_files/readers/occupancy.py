@@ -20,8 +20,7 @@ FREE_CELLS, BLOCKED_CELLS = b".GS", b"@OTW"
 """Ground and shallow water are free; out of bounds, trees and deep water block (MovingAI format, Sturtevant, 2012)."""
 MODES: Final = ("trinary", "scale")
 """Modes of ROS map_server that tell occupied, free and unknown from a grey; `raw` is not read."""
-IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}
-"""GDAL's driver of an image by its first byte."""
+IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}  # GDAL's driver of an image by its first byte
 
 
 def read_moving_ai(spec: FileSpec) -> Contents:
@@ -33,9 +32,11 @@ def read_moving_ai(spec: FileSpec) -> Contents:
         raise InputError("has no height, width and `map`; must be a MovingAI map")
     sizes = {head[1]: int(head[2]), head[3]: int(head[4])}
     rows, columns = sizes["height"], sizes["width"]
-    body = [line.encode("latin-1", "replace") for line in text[head.end() :].splitlines()[:rows]]
-    wrong = next((number for number, line in enumerate(body) if len(line) != columns), len(body))
-    if wrong < rows or not rows * columns:
+    body = [line.encode("latin-1", "replace") for line in text[head.end() :].rstrip().splitlines()]
+    wrong = next(
+        (number for number, line in enumerate(body) if len(line) != columns or number == rows), len(body)
+    )
+    if wrong != rows or len(body) > rows or not rows * columns:
         line = text.count("\n", 0, head.end()) + wrong + 1
         raise InputError(f"has no row of {columns} cells in line {line}, of {rows} rows: it may be torn")
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
@@ -68,10 +69,12 @@ def read_ros(spec: FileSpec) -> Contents:
     if not _are_numbers((size, over, under), least=0.0) or size == 0 or max(over, under) > 1:
         told = f"the resolution {size} and the thresholds {over}, {under}"
         raise InputError(f"has {told}; must be metres above 0, and shares between 0 and 1")
+    if (negate := keys.get("negate", 0)) not in (0, 1):
+        raise InputError(f"has negate {str(negate)[:20]!r}; must be 0 or 1")
     if not isinstance(origin, tuple) or len(origin) not in (2, 3) or not _are_numbers(origin):
         raise InputError("has an origin that is not [x, y, yaw]")
     greys = _greys(spec.path.parent / keys["image"])
-    share = np.abs(greys - (not keys.get("negate", 0)))
+    share = np.abs(greys - (not negate))
     solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
     # The lower left corner is given, and the map is turned counter-clockwise about it by `yaw` radians.
     x, y, yaw = (*origin, 0.0)[:3]
@@ -94,7 +97,7 @@ def _greys(path: Path) -> FloatArray:
         if "pip install" in str(error):
             raise
         said = str(error).partition(";")[0]
-        raise InputError(f"names the image {path.name}, which {said}; must be grey PGM or PNG") from error
+        raise InputError(f"names the image {path.name}: {said}; must be grey PGM or PNG") from error
 
 
 def _are_numbers(values: Sequence[Any], least: float = -math.inf) -> bool:

@@ -50,6 +50,8 @@ def _osmium_errors() -> Iterator[None]:
     """Turns whatever osmium raises, for XML entities too, into an InputError that names the fault of the file."""
     try:
         yield
+    except InputError:
+        raise
     except Exception as error:  # of kinds of its own, too
         said = " ".join(str(error).split())[:120].rstrip(".")
         raise InputError(
@@ -72,7 +74,10 @@ def read_pbf(spec: FileSpec) -> Contents:
     found = _Found(limits.Buildings(spec), osmium.geom.WKBFactory())
     with _osmium_errors():
         for each in osmium.FileProcessor(str(spec.path)).with_locations().with_areas().with_filter(keys):
-            found.take(each, {tag.k: tag.v for tag in each.tags})
+            if len(tags := {tag.k: tag.v for tag in each.tags}) < len(each.tags):
+                twice = next(k for k in tags if [tag.k for tag in each.tags].count(k) > 1)
+                raise InputError(f"{each.type_str()}{each.id}: has the tag {twice!r} twice; keep one")
+            found.take(each, tags)
     return found.contents()
 
 

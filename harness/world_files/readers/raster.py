@@ -18,10 +18,8 @@ from harness.world_files.bounded import read_bytes
 from harness.world_files.parts import WGS84, Contents, FileSpec, Raster
 from harness.world_files.plane import check_metres
 
-MAX_CELLS: Final = 60_000_000
-"""A raster with more cells, half a gigabyte of heights, is refused."""
-CACHE_MB: Final = 64
-"""Size of GDAL's cache, which is a twentieth of the machine's memory otherwise."""
+MAX_CELLS: Final = 60_000_000  # a raster with more cells, half a gigabyte of heights, is refused
+CACHE_MB: Final = 64  # size of GDAL's cache, which is a twentieth of the machine's memory otherwise
 MAX_NUMPY_BYTES: Final = 500_000_000
 """A ZIP archive whose NumPy arrays unpack to more bytes than this is refused."""
 VOIDS: Final = (-9999.0, -32767.0, -32768.0)
@@ -106,8 +104,8 @@ def _check_grid(path: Path, source: Any) -> None:
                 found += len(line.split())
                 if line.translate(None, b"0123456789+-.eE \t\r\n\x1a"):
                     raise InputError("has something that is no number among its heights")
-    if not source.transform.determinant:
-        raise InputError("has cells of no size; must be terrain")
+    if not source.transform.a > 0.0 > source.transform.e:
+        raise InputError("has a cellsize that is not above 0; must be terrain")
     if found != (cells := source.height * source.width):
         raise InputError(f"has {found:,} heights; nrows times ncols are {cells:,}: it may be torn")
 

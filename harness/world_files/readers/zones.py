@@ -93,7 +93,11 @@ def _add_volume(found: _Zones, volume: Any, name: str) -> None:
     unit, is_round = _unit(volume.get("uomDimensions")), projection.get("type") == "Circle"
     if is_round and unit != "m":
         found.notes.append(f"{name}: its radius is taken as metres, its limits as feet")
-    shape = _disc(projection, "center") if is_round else polygon_of(projection)
+    shape = (
+        _disc(projection, "center")
+        if is_round
+        else polygon_of(projection, f"zone {name!r}: horizontalProjection")
+    )
     if shape is None:
         raise InputError(f"has zone {name!r} whose projection is neither a circle nor a polygon with an area")
     found.add(shape, volume, unit, name)
@@ -102,17 +106,17 @@ def _add_volume(found: _Zones, volume: Any, name: str) -> None:
 def read_ed318(spec: FileSpec) -> Contents:
     """Reads the zones of an ED-318 file: each geometry has a layer, and a circle is a point with an extent."""
     found = _Zones(("", "Reference"))
-    for tags, geometry in features_of(json_of(spec.path)):
+    for tags, geometry, key in features_of(json_of(spec.path)):
         name, at_times = limits.name_of(tags), bool(tags.get("limitedApplicability"))
         passed = found.passes(str(tags.get("type", "")).upper(), geometry, at_times)
-        for one in () if passed else simple(geometry):
+        for one, at in () if passed else simple(geometry, key):
             extent, layer = one.get("extent"), one.get("layer") or {}
             if not isinstance(layer, dict):
                 raise InputError(f"has zone {name!r} whose layer is no mapping; must be ED-318")
             if isinstance(extent, dict) and one.get("type") == "Point":
                 shape = _disc({**extent, **one}, "coordinates")
             else:
-                shape = polygon_of(one)
+                shape = polygon_of(one, at)
             if shape is None:
                 found.told["flat"] += 1
             else:

@@ -57,6 +57,14 @@ def test_other_columns_are_named(tmp_path: Path) -> None:
     assert read_path(path).notes == ("columns passed over: a, b, one without a name, d",)
 
 
+def with_keys(**keys: Any) -> str:
+    return json.dumps({**json.loads(plan(item(47.0, 8.0), item(47.1, 8.0, doJumpId=2))), **keys})
+
+
+def fenced(*ring: list[float]) -> str:
+    return with_keys(geoFence={"polygons": [{"inclusion": False, "polygon": ring}]})
+
+
 def geojson(coordinates: Any, kind: str = "LineString") -> str:
     feature = {"type": "Feature", "properties": {}, "geometry": {"type": kind, "coordinates": coordinates}}
     return json.dumps({"type": "FeatureCollection", "features": [feature]})
@@ -132,6 +140,9 @@ BROKEN = {
     "no header": ("a.csv", "0,0\n1,1\n", ":1: has the columns 0, 0; must have x_m,y_m"),
     "text in csv": ("a.csv", "x_m,y_m\n0,0\n1,far\n", ":3: y_m: is 'far'; must be a finite number"),
     "nan in csv": ("a.csv", "x_m,y_m\n0,0\n1,nan\n", ":3: y_m: is 'nan'; must be a finite number"),
+    "digits of Arabic": ("a.csv", "x_m,y_m\n0,0\n1,\u0669\n", ":3: y_m: is '\u0669'; must be a finite number"),
+    "feet": ("a.csv", "x_m,y_m,alt_ft\n0,0,9\n9,9,9\n", ":1: alt_ft: is no altitude that is read; must be metres as"),
+    "text for numbers": ("a.geojson", geojson([["8", 47], [8.1, 47]]), "coordinates[0]: is '8'; must be a finite"),
     "column twice": ("a.csv", "x_m,x_m,y_m\n0,0,0\n1,1,1\n", ":1: x_m: stands 2 times"),
     "short row": ("a.csv", "x_m,y_m\n0,0\n1\n", ":3: has 1 cells, the header 2"),
     "one point": ("a.csv", "x_m,y_m\n0,0\n", ": has 1 point; a path has at least 2"),
@@ -165,7 +176,7 @@ BROKEN = {
     "jumps without number": ("a.waypoints", wpl(*wpl_items(), line(4, 0, 3, 177, 1, 30000, 0, 0, 0, 0, 0, 1)),
         "jumps make it more than 20,000 legs"),
     "a key twice": ("a.plan", plan(item(47.0, 8.0), item(47.1, 8.0)).replace('"items"', '"items": [], "items"'),
-        ": has the key 'items' twice in one place; must have it once"),
+        ":1: has the key 'items' twice in one place, first in line 1; keep one"),
     "half a place": ("a.plan", plan(item(47.0, 8.0), item(0.0, 8.0, params=[0, 0, 0, 0, None, 8.0, 100])),
         ": mission.items[1].params[4]: is null; a place must have latitude and longitude"),
     "nothing to fly": ("a.plan", plan(item(0, 0, command=183), item(0, 0, command=2000, doJumpId=2)),
@@ -177,18 +188,14 @@ BROKEN = {
         plan(item(47.0, 8.0), {"type": "ComplexItem", "complexItemType": "fwLandingPattern", "altitudesAreRelative": 0,
             "landingApproachCoordinate": [47, 8, 500], "landCoordinate": [47, 8.1, 400]}),
         ": mission.items[1].altitudesAreRelative: must be true or false"),
-    "a fence of two corners": ("a.plan",
-        json.dumps({
-            **json.loads(plan(item(47.0, 8.0), item(47.1, 8.0, doJumpId=2))),
-            "geoFence": {"polygons": [{"inclusion": False, "polygon": [[47.0, 8.0], [47.1, 8.0]]}]},
-        }),
-        ": geoFence.polygons[0]: has fewer than 3 distinct corners"),
-    "a fence that crosses itself": ("a.plan",
-        json.dumps({
-            **json.loads(plan(item(47.0, 8.0), item(47.1, 8.0, doJumpId=2))),
-            "geoFence": {"polygons": [{"inclusion": False, "polygon": [[47, 8], [48, 9], [47, 9], [48, 8]]}]},
-        }),
-        ": geoFence.polygons[0]: self-intersection at ("),
+    "a fence of two corners": ("a.plan", fenced([47, 8], [47.1, 8]), ": geoFence.polygons[0]: has fewer than 3"),
+    "a fence that crosses itself": ("a.plan", fenced([47, 8], [48, 9], [47, 9], [48, 8]), "self-intersection at ("),
+    "a fence of words": ("a.plan", with_keys(geoFence=[]), ": geoFence: must be a mapping"),
+    "a fence under another key": ("a.plan", with_keys(geoFence={"circle": [1]}), ": geoFence.circle: is not known; m"),
+    "rally points that are none": ("a.plan", with_keys(rallyPoints={"points": 5}), ": rallyPoints.points: must be"),
+    "an item of no type": ("a.plan", plan(item(47, 8, type="Simple")), ".items[0].type: is 'Simple'; must be"),
+    "a number in quotes": ("a.plan", plan(item(47, 8, doJumpId="1")), ".doJumpId: is '1'; must be a finite number"),
+    "far below the sea": ("a.waypoints", wpl(*wpl_items(altitude=-900)), ": goes to -500 m above the sea; must be 5"),
     "only home": ("a.waypoints", wpl(), ": has no mission items; there is nothing to fly"),
 }  # fmt: skip
 
@@ -205,10 +212,10 @@ def test_says_where_and_what_is_wrong(name: str, text: str, sentence: str, tmp_p
     assert len(str(fault.value).splitlines()) == 1
 
 
-@pytest.mark.parametrize(
-    ("name", "sentence"),
-    [("missing.csv", "no such file; give"), ("folder.csv", "is a folder, not a file; give")],
-)
+UNREADABLE = [("missing.csv", "no such file; give"), ("folder.csv", "is a folder, not a file; give")]
+
+
+@pytest.mark.parametrize(("name", "sentence"), UNREADABLE)
 def test_says_what_cannot_be_read(name: str, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(InputError, match=sentence):

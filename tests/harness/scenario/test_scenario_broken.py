@@ -170,7 +170,7 @@ BYTES = {
     "a list": (b"- 1\n- 2\n", ":1: is a list of 2; must be a mapping"),
     "two documents": (GOOD.encode() + b"---\nseed: 2\n", ":28: a second document begins here"),
     "Latin-1": (GOOD.replace("good", "gut\xe9").encode("latin-1"), ":2: byte 0xe9 is not UTF-8"),
-    "UTF-16": (GOOD.encode("utf-16"), ": is not a text file"),
+    "UTF-16": (GOOD.encode("utf-16"), ": is UTF-16; must be a scenario"),
     "binary": (bytes(range(256)) * 50, ": is not a text file"),
     "deep flow": (b"a: " + b"[" * 200_000, ":1: a[0][0]: is nested deeper"),
     "deep block": (b"".join(b" " * n + b"a:\n" for n in range(500)), ":22: a.a.a: is nested deeper"),

@@ -28,17 +28,9 @@ from wayproof import InputError
 BOMB = '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "lol"><!ENTITY b "&a;&a;">]><osm>&b;</osm>'
 
 
-def text(name: str, content: str) -> Callable[[Path], Path]:
+def text(name: str, content: str | bytes) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
-        (folder / name).write_text(content)
-        return folder / name
-
-    return make
-
-
-def data(name: str, content: bytes) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        (folder / name).write_bytes(content)
+        (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
         return folder / name
 
     return make
@@ -61,33 +53,30 @@ def _torn_tiff(folder: Path) -> Path:
     return path
 
 
-def _nan_json(folder: Path) -> Path:
-    path = geojson(folder / "a.geojson", feature({}))
-    path.write_text(path.read_text().replace("47.01", "NaN", 1))
-    return path
-
-
 def _no_building(folder: Path) -> Path:
     return osm(folder / "a.osm", [({"highway": "x"}, [(8, 47), (8, 48), (9, 47)])])
 
 
+RING = [(8.0, 47.0), (8.01, 47.0), (8.01, 47.01)]
 GRID = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
 HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "empty": (text("a.tif", ""), "is empty"),
-    "a picture": (data("a.png", b"\x89PNG\r\n\x1a\n" + bytes(50)), "is an image; give the YAML file"),
-    "a program": (data("a.out", b"\x7fELF" + bytes(200)), "is of no kind that is known; give terrain"),
+    "a picture": (text("a.png", b"\x89PNG\r\n\x1a\n" + bytes(50)), "is an image; give the YAML file"),
+    "a program": (text("a.out", b"\x7fELF" + bytes(200)), "is of no kind that is known; give terrain"),
     "prose": (text("a.txt", "Once upon a time\n"), "is of no kind that is known"),
-    "UTF-16": (data("a.txt", "AC R".encode("utf-16")), "is UTF-16; save it as UTF-8"),
-    "the crs of an old CityJSON": (
-        text("a.json", '{"CityObjects": {}, "metadata": {"crs": {"epsg": 28992}}}'),
+    "UTF-16": (text("a.txt", "AC R".encode("utf-16")), "is UTF-16; save it as UTF-8"),
+    "the crs of an old CityJSON": (text("a.json", '{"CityObjects": {}, "metadata": {"crs": {"epsg": 28992}}}'),
         "has its crs as CityJSON before 1.0 has it, which is not read; give crs"),
     "torn JSON": (text("a.geojson", '{"type": "FeatureCollection", "features": [{"ty'), "is not whole JSON"),
     "deep JSON": (text("a.json", "[" * 100_000), "is nested too deeply"),
-    "NaN": (_nan_json, "has the number NaN"),
+    "NaN": (text("a.json", '{"type": "Polygon",\n"coordinates": [[[NaN, 1]]]}'), "line 2: has the number NaN"),
+    "a key twice": (text("a.json", '{"type": "Polygon",\n"type": "Feature"}'), "line 2: has the key 'type' twice in"),
+    "no such shape": (text("a.json", '{"type": "Feature", "geometry": {"type": "x"}}'), "geometry.type: is 'x'; must"),
     "no features": (text("a.json", '{"type": "FeatureCollection", "features": []}'), "has no polygon"),
     "words for numbers": (
-        lambda folder: geojson(folder / "a.json", feature({}, [["a", "b"], ["c", "d"], ["e", "f"]])),  # type: ignore[list-item]
-        "rings are not lists of positions"),
+        lambda folder: geojson(folder / "a.json", feature({}, [["8.0", "47.0"], *SQUARE[1:]])),  # type: ignore[list-item]
+        r"features\[0\].geometry.coordinates\[0\]\[0\]\[0\]: is '8.0'; must be a finite number without quotes"),
+    "a ring of two": (lambda folder: geojson(folder / "a.json", feature({}, SQUARE[:2])), "has 2 places; a ring has"),
     "entities": (text("a.osm", BOMB), "cannot be read by osmium: XML entities are not supported"),
     "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "cannot be read by osmium: Can not read file"),
     "a place that is no number": (text("a.osm", "<osm version='0.6'><node id='1' lat='47x' lon='8'/></osm>"),
@@ -96,27 +85,30 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "a ZIP bomb": (_zip_bomb, "cannot be read as a raster"),
     "a ZIP of something": (lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
         "is a ZIP archive with 'readme.txt'"),
-    "a torn tile": (data("N46E009.hgt", bytes(1000)), "it may be torn"),
-    "a nameless tile": (data("tile.hgt", bytes(2 * 1201 * 1201)), "its name must say where it lies"),
+    "a torn tile": (text("N46E009.hgt", bytes(1000)), "it may be torn"),
+    "a nameless tile": (text("tile.hgt", bytes(2 * 1201 * 1201)), "its name must say where it lies"),
     "a nameless ZIP": (lambda folder: zipped(folder / "a.zip", N46E009__hgt=b"\0"), "must say where it lies"),
-    "a tile packed by gzip": (data("N46E009.hgt.gz", b"\x1f\x8b\0"), "is a packed file; unpack it"),
+    "a tile packed by gzip": (text("N46E009.hgt.gz", b"\x1f\x8b\0"), "is a packed file; unpack it"),
     "a sequence of cities": (text("a.city.jsonl", '{"CityObjects": {}}\n{"type": "CityJSONFeature"}'),
         "is a sequence of CityJSON features; make CityJSON of it"),
     "a torn TIFF": (_torn_tiff, "cannot be read"),
     "a torn grid": (text("a.asc", GRID + "1 2 3\n"), "it may be torn"),
-    "a grid of 10^12 cells": (
-        text("a.asc", GRID.replace("ncols 2", "ncols 1000000").replace("nrows 2", "nrows 1000000")),
-        "cannot be read as a raster"),
+    "a grid of 10^12 cells": (text("a.asc", GRID.replace("s 2", "s 1000000")), "cannot be read as a raster"),
     "a grid of nothing": (text("a.asc", GRID + "-9999 " * 4), "has no cell with a height"),
+    "cells below 0": (text("a.asc", GRID.replace("cellsize 1", "cellsize -1") + "1 2 3 4\n"), "is not above 0"),
+    "a row too many": (text("a.map", "type octile\nheight 1\nwidth 2\nmap\n..\n@@\n"), "in line 6, of 1 rows"),
+    "half negated": (text("a.yaml", "image: a.pgm\nresolution: 1\nnegate: maybe\n"), "negate 'maybe'; must be 0"),
+    "no properties": (text("a.json", '{"type": "Feature", "properties": "x"}'), "properties: is 'x'; must be"),
+    "a tag twice": (lambda folder: osm(folder / "a.osm", [({"building": "yes", "a": '1"/><tag k="a" v="2'}, RING)]),
+        "has the tag 'a' twice; keep one"),
+    "a fence of words": (text("a.txt", "47.0 8.0\n47.0 8.1\n47.1 8.1\n47.1 east\n"), "line 4: is 'east'; must be"),
     "a NumPy archive": (lambda folder: zipped(folder / "a.npz", elevation__npy=npy(np.array([1.0]))),
         "must have numbers `elevation`"),
     "a vector file": (text("a.gpkg", "SQLite"), "is a vector file; make GeoJSON of it"),
     "a Gazebo world": (text("a.world", "<sdf><world/></sdf>"), "is a Gazebo world; give its footprints as GeoJSON"),
     "a torn map": (text("a.map", "type octile\nheight 3\nwidth 3\nmap\n...\n..\n"), "line 6, of 3 rows"),
-    "a map of a height of 5,000 digits": (
-        text("a.map", f"type octile\nheight {'9' * 5000}\nwidth 3\nmap\n...\n"),
-        "has no height, width and `map`",
-    ),
+    "a map of a height of 5,000 digits": (text("a.map", f"type octile\nheight {'9' * 5000}\nwidth 3\nmap\n...\n"),
+        "has no height, width and `map`"),
     "an arc about nothing": (text("a.txt", "AC R\nDA 5,0,90\n"), "line 2: has an arc or circle before its centre"),
     "a place of words": (text("a.txt", "AC R\nDP here\n"), "line 2: has 'here'; must be a place"),
     "an airspace of nothing": (text("a.txt", "AC R\nAN x\n"), "has no airspace with an area"),
