@@ -125,6 +125,10 @@ def _report(error: Exception) -> int:
         # typer checks with pydantic
         text = " ".join(error.format_message().split()).replace("Value error, ", "")
         whose = getattr(getattr(error, "ctx", None), "command_path", "wayproof")
+        if text.startswith("Missing") and getattr(getattr(error, "param", None), "name", "") == "aircraft":
+            from aircraft.airframes import aircraft_names
+
+            text = f"{text.rstrip('.')}: one of {', '.join(aircraft_names())}, or a folder"
         told = f"wayproof: {text} (see {whose} --help)"
     elif isinstance(error, WriteError):
         status = FAILED

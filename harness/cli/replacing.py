@@ -112,7 +112,7 @@ def given_by(
     from harness.scenario.sections import SHIELDED
 
     is_shielded = planner is not None and planner.endswith(SHIELDED)
-    begun = Given((), tuple(_setting(text) for text in settings or ()), planner, guidance)
+    begun = Given((), _settings(settings or ()), planner, guidance)
     return begun.plus(
         planner__kind=planner and kind_of(planner).removesuffix(SHIELDED),
         planner__shield="loiter" if is_shielded else None,
@@ -140,12 +140,27 @@ def _turbulence(text: str) -> dict[str, str]:
     return {"model": model if colon else "tustin", "intensity": intensity}
 
 
-def _setting(text: str) -> tuple[str, str]:
-    """Splits KEY.PATH=VALUE into its two parts."""
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
-    return name.strip(), value
+def _settings(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """Splits each KEY.PATH=VALUE into its two parts; a BadParameter says that one replaces another before it."""
+    from harness.scenario.sections import GuidanceSpec, PlannerSpec
+
+    shared = {"planner.kind": PlannerSpec.model_fields, "guidance.kind": GuidanceSpec.model_fields}
+    found: list[tuple[str, str]] = []
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
+        name, place = name.strip(), name.strip().replace("[", ".").replace("]", "")
+        for other, before in found:
+            there = other.replace("[", ".").replace("]", "")
+            section, _, key = there.partition(".")
+            own = place in shared and place == f"{section}.kind" and key not in shared[place]
+            same = there == place and value.strip() == before.strip()
+            if own or (f"{there}.".startswith(f"{place}.") and not same):
+                told = f"{name}={value[:60]} replaces {other}={before[:60]}, which stands before it"
+                raise typer.BadParameter(f"{told}; leave one of them out", param_hint="--set")
+        found.append((name, value))
+    return tuple(found)
 
 
 def kind_of(text: str, name: Literal["planner", "guidance"] = "planner") -> str:

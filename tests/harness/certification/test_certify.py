@@ -128,8 +128,13 @@ def test_a_day_whose_drawn_aircraft_cannot_fly_fails_with_its_cause(
     assert found["failing_runs"] == refused
     assert {each["outcome"] for each in found["failures"]} == {"lost_control"}
     assert found["failures"][0]["cause"].startswith("aerosonde cannot be trimmed for level flight at 18 m/s")
-    more = ["--set", "aircraft.airspeed_mps=19", "--set", "uncertainty.mass=0.2", "--conditions", "typical"]
-    _, found = certify(place, *words, *more, "--runs", "14", out="as the flight begins")
+    more = (
+        " ".join(words)
+        .replace("mps=18", "mps=19")
+        .replace("mass=0.3", "mass=0.2")
+        .replace("--runs 6", "--runs 14")
+    )
+    _, found = certify(place, *more.split(), "--conditions", "typical", out="as the flight begins")
     assert [each["outcome"] for each in found["failures"]] == ["lost_control"] * len(found["failures"])
     assert "JSBSim finds no trim" in found["failures"][-1]["cause"]
     assert certify(place, *words, "--set", "aircraft.deviation.mass=0.5", out="written")[0] == 2
