@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.frames import LocalPlane
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, read_data
 from harness.flight.record import FloatArray
-from harness.replays.logs import READERS, read_log, reading
+from harness.replays.logs import MAX_BYTES, READERS, read_log, reading
 from harness.run_files.drawn_lines import ALTITUDES, DEGREES, LOCAL
 
 if TYPE_CHECKING:
@@ -61,11 +61,9 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     suffix = path.suffix.lower()
     if suffix in TABLES:
         columns, notes = _of_table(path, plane), list[str]()
-    elif suffix in READERS:
-        columns, notes = read_log(path, plane or LocalPlane(0.0, 0.0))
     else:
-        told = ", ".join((*TABLES, *READERS))
-        raise InputError(f"{path}: is no flight log that is read; must end in {told}")
+        check_kind(path)
+        columns, notes = read_log(path, plane or LocalPlane(0.0, 0.0))
     if len(columns["time_s"]) < 3 or not (np.diff(columns["time_s"]) > 0.0).all():
         raise InputError(f"{path}: time_s: must have at least 3 rows, each later than the one before")
     if "ve_mps" not in columns or "vn_mps" not in columns:
@@ -79,6 +77,14 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     if not by_autopilot.any():
         raise InputError(f"{path}: autonomous, lap: no row is flown by the autopilot")
     return FlownFlight(path, columns, tuple(notes)).rows(np.flatnonzero(by_autopilot))
+
+
+def check_kind(path: Path) -> None:
+    """Raises InputError for a file that cannot be opened, or whose name has not the ending of a log."""
+    read_data(path, MAX_BYTES, "a flight log", first=1)
+    if path.suffix.lower() not in (*TABLES, *READERS):
+        told = ", ".join((*TABLES, *READERS))
+        raise InputError(f"{path}: is no flight log that is read; must end in {told}")
 
 
 def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from aircraft.frames import LocalPlane
-from harness.files.input_file import InputError
+from harness.files.input_file import InputError, read_data
 from harness.flight.record import FloatArray
 from harness.run_files.drawn_lines import NEEDS_LOGS
 
@@ -95,12 +95,7 @@ def logged_mission(path: Path) -> tuple[list[Command], dict[str, float]]:
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     """Turns whatever a library says of a file, also in machine code, into a one-line InputError."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(
-            f"{path}: has {path.stat().st_size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:g} MB are read"
-        )
+    read_data(path, MAX_BYTES, "a flight log", first=1)
     kept, before = io.StringIO(), os.dup(2)
     try:
         with open(os.devnull, "wb") as nothing, redirect_stdout(kept), redirect_stderr(kept):

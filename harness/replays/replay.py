@@ -11,10 +11,9 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.files.errors import RunFolderError
-from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
-from harness.replays.flown import TABLES, FlownFlight, read_flown
+from harness.replays.flown import TABLES, FlownFlight, check_kind, read_flown
 from harness.replays.measures import Replay, Side, compared, legs_of, rows_of
 from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, read_mission
 from harness.replays.simulated import Task, fly_anew, scenario_for
@@ -84,8 +83,7 @@ def replay(
 
 def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, list[str]]:
     """Returns the mission, the flown flight, and a note on the mission if it is from the log."""
-    if not log.is_file():
-        raise InputError(f"{log}: no such file")
+    check_kind(log)
     if mission is None and log.suffix.lower() in TABLES:
         flight = read_flown(log)
         found, note = mission_of_targets(flight)

@@ -230,12 +230,13 @@ def test_a_log_that_lacks_a_column_or_goes_straight_is_told(
     pq.write_table(table.drop_columns(["north_m"]), log)
     assert main(["replay", str(log), *arguments]) == 2
     assert "has no column north_m" in capsys.readouterr().err
-    straight = {
-        **{name: table[name] for name in table.column_names},
-        "ve_mps": pa.array(np.full(len(table), 9.0)),
+    straight = {name: table[name] for name in table.column_names} | {
+        "ve_mps": pa.array(np.full(len(table), 9.0))
     }
     pq.write_table(pa.table({**straight, "vn_mps": pa.array(np.full(len(table), 9.0))}), log)
     assert main(["replay", str(log), *arguments]) == 2
     assert "the wind cannot be told" in capsys.readouterr().err
     assert main(["replay", str(log), "--aircraft", "aerosonde"]) == 2
     assert "give --mission FILE" in capsys.readouterr().err
+    assert main(["replay", str(mission), "--aircraft", "aerosonde"]) == 2
+    assert "is no flight log that is read; must end in .parquet, .csv" in capsys.readouterr().err
