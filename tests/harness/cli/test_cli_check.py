@@ -65,6 +65,7 @@ def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
         assert f"<td>{corner['flown_cut_m']:.0f}</td><td>{corner['allowed_cut_m']:.0f}</td>" in page
     assert page.index(told["verdict"]) < page.index("at the end of the path")
     assert "for a planner to fly" in page
+    assert "clairvoyant" not in page
     scenario = scenario_of(run.scenario_yaml)
     assert scenario.name == "strip-1"
     assert (scenario.mission.start_m, scenario.mission.goal_m) == ((0.0, 0.0), (60.0, 2000.0))
