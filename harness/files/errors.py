@@ -20,8 +20,7 @@ class WriteError(OSError):
         return cls(f"cannot write {what} in {folder} ({reason}); it is marked incomplete")
 
 
-MOST_CHARACTERS = 2000
-"""A text from other code is cut to this many characters before it stands in a sentence."""
+MOST_CHARACTERS = 2000  # a text from other code is cut to this many characters before it stands in a sentence
 
 
 class PlannerError(RuntimeError):

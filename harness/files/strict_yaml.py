@@ -26,8 +26,7 @@ MAX_KEYS: Final = 1000  # of one mapping; more are refused
 MAX_KEY_LENGTH: Final = 100  # letters; a longer key is refused
 COMMAND_LINE: Final = 0
 """The `line` of a value that came from the command line."""
-IN_PYTHON: Final = -1
-"""The `line` of a value that was given in Python, to `Scenario.with_`."""
+IN_PYTHON: Final = -1  # the `line` of a value that was given in Python, to `Scenario.with_`
 
 Scalar: TypeAlias = str | int | float | bool | None
 Loc: TypeAlias = tuple[str | int, ...]

@@ -14,8 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, Final
 
-PARTIAL: Final = ".partial"
-"""A file that is being written has a name with this ending until it is whole."""
+PARTIAL: Final = ".partial"  # a file that is being written has a name with this ending until it is whole
 
 
 def replace_text(path: Path, text: str) -> None:

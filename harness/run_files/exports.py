@@ -25,8 +25,7 @@ TOLERANCE_M: Final = 0.25
 """A point is left out only if it is nearer than this to the remaining path, seen from above."""
 DIGITS: Final = 9
 """Degrees in files have this many decimal places, a tenth of a millimetre."""
-MISSIONS: Final = ("plan", "waypoints")
-"""Formats that an autopilot flies."""
+MISSIONS: Final = ("plan", "waypoints")  # formats that an autopilot flies
 ABOVE_SEA: Final = 0
 """MAV_FRAME_GLOBAL: latitude and longitude, altitude above mean sea level."""
 ABSOLUTE: Final = 2

@@ -15,12 +15,9 @@ from numpy.typing import NDArray
 from aircraft.interface import FloatArray
 from aircraft.route import SHORTEST_M, SegmentRow
 
-GIVEN: Final = "path as given"
-"""Stands in place of the planner's name for a flight without a planner."""
-SAME_PLACE_M: Final = 0.01
-"""Points no further apart than this are one point."""
-SAME_LINE_M: Final = 0.01
-"""A point nearer than this to the line of its neighbours is taken to lie on it."""
+GIVEN: Final = "path as given"  # stands in place of the planner's name for a flight without a planner
+SAME_PLACE_M: Final = 0.01  # points no further apart than this are one point
+SAME_LINE_M: Final = 0.01  # a point nearer than this to the line of its neighbours is taken to lie on it
 BATCH: Final = 10_000
 """This many segments are simplified at a time, since GEOS recurses once for each point that it keeps."""
 PAST_RAD: Final = np.radians(140.0)
@@ -28,13 +25,11 @@ PAST_RAD: Final = np.radians(140.0)
 off against 125 m, at 150 degrees 178 m against 128 m)."""
 LEAST_CUT: Final = 1e-12
 """A corner's distance from its arc counts as at least this many radii, so that a straight one divides by no zero."""
-LIMIT_SHARE: Final = 0.9
-"""A corner is cut by at most this share of its limit, if the aircraft turns so tightly."""
+LIMIT_SHARE: Final = 0.9  # a corner is cut by at most this share of its limit, if the aircraft turns so
 CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
 """Only this share of a corner's limit is used if the arc then has at least this many least radii, which leaves the rest
 of both for gusts."""
-SAME_TURN_RAD: Final = 0.01
-"""Legs whose directions differ by less have no apex."""
+SAME_TURN_RAD: Final = 0.01  # legs whose directions differ by less have no apex
 WIND_SAMPLES: Final = 9
 """The ground speed is computed in this many directions of a turn."""
 

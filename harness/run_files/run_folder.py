@@ -44,8 +44,7 @@ OVERLAY: Final = "overlay.rrd"
 REPORT = "report.html"
 REPORT_FILES = ("report.html", "report.csv", "path.svg", "path.png", "profiles.svg", "profiles.png")
 """Files that `wayproof report` adds to a run folder."""
-MAX_BYTES = 64_000_000
-"""A larger scenario file in the folder is refused."""
+MAX_BYTES = 64_000_000  # a larger scenario file in the folder is refused
 
 HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)
 """Files whose SHA-256 stands in the manifest of a complete run."""

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 Spacing = Annotated[float, Field(gt=0, le=MAX_COORDINATE_M)]
 
-HEIGHT_STEP_M = 0.1
-"""Heights of the ground are rounded to this, or coarser where they span more than 6.5 km."""
+HEIGHT_STEP_M = 0.1  # heights of the ground are rounded to this, or coarser where they span more than 6.5 km
 
 
 class GroundSpec(Section):

@@ -42,8 +42,7 @@ class TrackabilitySpec(Section):
     """Load factor, averaged over 1 s. Default: 2.1 + 24000 / (weight in lb + 10000), at most 3.8 (14 CFR 23.337)."""
 
 
-DEFAULT_RATES_HZ: Final = (STEP_RATE_HZ, 120)
-"""Where no step rate is given, the first of these is taken that the sensor's rate divides."""
+DEFAULT_RATES_HZ: Final = (STEP_RATE_HZ, 120)  # the first that the sensor's rate divides is the default
 LEAST_RATE_HZ: Final = 30
 """A lower rate is refused: at this one the Aerosonde's track on 14 turns is 0.07 m from that at 480 steps a second."""
 

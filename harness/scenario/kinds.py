@@ -37,12 +37,9 @@ class LoopPart:
     noun: str
     kind: type[Any]
     built_in: tuple[Any, ...]
-    group: str
-    """Group of the entry points by which other distributions add kinds."""
-    methods: tuple[str, ...]
-    """Methods that an object must have to be such a part."""
-    factory_parameter: str
-    """Name of the one parameter that a function which makes such a part may have."""
+    group: str  # group of the entry points by which other distributions add kinds
+    methods: tuple[str, ...]  # methods that an object must have to be such a part
+    factory_parameter: str  # name of the one parameter that a function which makes such a part may have
     registered: dict[str, Any] = field(default_factory=dict)
     """Kinds by name that this process, and no other, knows."""
 

@@ -241,10 +241,6 @@ def _choice(shared: dict[str, Any], kind: Kind) -> dict[str, Any]:
     usual = kind.kind == named["default"]
     if not usual:
         del named["default"]
-    keys = {
-        "properties": {**shared["properties"], "kind": named, **own},
-        "required": [] if usual else ["kind"],
-    }
-    return {
-        "title": kind.kind, "description": kind.summary, "type": "object", "additionalProperties": False, **keys
-    }  # fmt: skip
+    about = {"title": kind.kind, "description": kind.summary, "type": "object", "additionalProperties": False}
+    keys = {**shared["properties"], "kind": named, **own}
+    return {**about, "properties": keys, "required": [] if usual else ["kind"]}

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from aircraft.model_files import ModelFiles
     from planner.interface import Mission
 
-LEAST_CLEARANCE_RADII: Final = 0.02
-"""Planners keep at least this share of the turn radius from obstacles, also where less is wanted."""
+LEAST_CLEARANCE_RADII: Final = 0.02  # planners keep at least this share of the turn radius from obstacles
 MAX_WIND_FRACTION: Final = 0.9
 """Wind from this fraction of the airspeed on is refused: against it an aircraft makes hardly any way."""
 
@@ -101,15 +100,13 @@ def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: f
 
 INSIDE_M: Final = 1e-3
 """A flight from the boundary begins this far inside: the flight model keeps its place in degrees, to some 1e-9 m."""
-SURVEY_ALTITUDE_M: Final = 300.0
-"""Altitude above the sea at which an aircraft's range of airspeeds is measured."""
+SURVEY_ALTITUDE_M: Final = 300.0  # above the sea; there an aircraft's range of airspeeds is measured
 PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # between which the survey proves level flight
 PROVEN_FACTOR: Final = 1.05
 """The survey proves level flight at airspeeds this factor within its range: there the air's density differs by 7 %."""
 PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01
 """It does so for deviations up to these: shares, and the shift over the cube root of the mass (m/kg^1/3)."""
-ALTITUDE_STEP_M: Final = 50.0
-"""A limit of the altitude of level flight is told as a multiple of this."""
+ALTITUDE_STEP_M: Final = 50.0  # a limit of the altitude of level flight is told as a multiple of this
 
 
 def start_conditions(scenario: ScenarioKeys) -> StartConditions:

@@ -36,8 +36,7 @@ if TYPE_CHECKING:
 
 POUND_KG: Final = 0.45359237
 
-TOLERANCE_M: Final = 10.0
-"""A flight may be this far off in altitude, and off its path where no clearance is written."""
+TOLERANCE_M: Final = 10.0  # allowed error of altitude, and off the path where no clearance is written
 
 
 def resolve(
@@ -146,8 +145,7 @@ PLANE_REACH_M: Final = 400_000.0
 """Up to this distance from any origin within 85 degrees of the equator the local plane is right to 0.9 m (`pyproj`)."""
 COURSE_STEP_DEG: Final = 5
 """Step in which courses, and places on an arc, are tested for a start that leads out of the area."""
-ROUNDING_M: Final = 1e-3
-"""A place outside of the area by at most this counts as inside."""
+ROUNDING_M: Final = 1e-3  # a place outside of the area by at most this counts as inside
 
 
 def check_local_plane(area: Area) -> None:

@@ -175,9 +175,6 @@ def scenario_from(
         raise KeyFaults.of(error, ScenarioKeys) from error
     complete = resolve(keys, folder, ends_checked, as_flown)
     scenario = Scenario.model_construct(keys.model_fields_set, **dict(complete))
-    object.__setattr__(
-        scenario,
-        "_given",
-        Given({name: value for name, value in keys if name in keys.model_fields_set}, folder),
-    )
+    given = {name: value for name, value in keys if name in keys.model_fields_set}
+    object.__setattr__(scenario, "_given", Given(given, folder))
     return scenario

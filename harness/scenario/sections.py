@@ -17,10 +17,8 @@ from harness.scenario.validation import KeyFault
 
 MAX_COORDINATE_M, ALTITUDES_M = 1e6, (5, 20_000)
 """Largest coordinate or length in a scenario, and the range of altitudes of a mission."""
-SHIELDED: Final = "+shield"
-"""Ending of the name of a planner that is flown with the shield."""
-DERIVED: Final[Any] = None
-"""The default of a key that follows from others, as its docstring says; `resolving.resolve` fills it in."""
+SHIELDED: Final = "+shield"  # ending of the name of a planner that is flown with the shield
+DERIVED: Final[Any] = None  # default of a key that follows from others: `resolving.resolve` fills it in
 
 
 class Section(BaseModel):
@@ -187,10 +185,8 @@ class AutopilotSpec(Section):
     """Age of the attitude, airspeed and height that the autopilot flies by. Default: navigation.latency_s."""
 
 
-MOST_SHARE: Final = 0.5
-"""Largest deviation that is a share of a figure of the model, drawn or given."""
-MOST_SHIFT_M: Final = 10.0
-"""Largest shift of the centre of gravity from that of the model."""
+MOST_SHARE: Final = 0.5  # largest deviation that is a share of a figure of the model, drawn or given
+MOST_SHIFT_M: Final = 10.0  # largest shift of the centre of gravity from that of the model
 Deviation = Annotated[float, Field(ge=-MOST_SHARE, le=MOST_SHARE)]
 
 

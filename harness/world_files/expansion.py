@@ -24,8 +24,7 @@ MARGIN: Final = 0.02
 """Parts of a file that lie outside the area by more than this share of its longer side are left out."""
 DECIMALS: Final = 3
 """Decimals of a corner in metres: corners are rounded to a millimetre."""
-MAX_CORNERS: Final = 900_000
-"""Files with more corners together are refused: a scenario with them could not be read again."""
+MAX_CORNERS: Final = 900_000  # more in all files are refused: such a scenario could not be read again
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
 """A polygon without a known bottom or top gets these, in metres above mean sea level."""
 

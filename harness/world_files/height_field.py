@@ -17,10 +17,8 @@ from harness.world_files.parts import Box, FloatArray, Raster
 if TYPE_CHECKING:
     from harness.world_files.plane import Mapping
 
-NO_HEIGHT: Final = 65_535
-"""This number stands for a height that is not known."""
-MAX_NODES: Final = 4_000_000
-"""A field with more heights than this is refused."""
+NO_HEIGHT: Final = 65_535  # this number stands for a height that is not known
+MAX_NODES: Final = 4_000_000  # a field with more heights than this is refused
 COARSER_NODES: Final = 1_000_000
 """A field that would have more heights than this is made coarser than its file, and a note says so."""
 

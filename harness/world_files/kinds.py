@@ -64,8 +64,7 @@ REFUSED: Final = {
 }
 """What a file that is not read is, by its ending or kind, and what to give instead."""
 FAMILIES: Final = "; ".join(f"{group} ({', '.join(kinds)})" for group, kinds in GROUPS.items())
-HEAD_BYTES: Final = 65_536
-"""The kind of a file that is not JSON is told from this many bytes at its begin."""
+HEAD_BYTES: Final = 65_536  # the kind of a file that is not JSON is told from this many bytes at its begin
 _BINARY_BEGINS: Final = (
     ("geotiff", re.compile(rb"II[*+]\0|MM\0[*+]")),
     ("osm_pbf", re.compile(rb"(?s).{0,53}OSMHeader")),

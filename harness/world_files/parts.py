@@ -23,8 +23,7 @@ Box = tuple[float, float, float, float]
 
 WGS84: Final = "EPSG:4326"  # latitude and longitude
 FOOT_M: Final = 0.3048
-LEVEL_M: Final = 3.0
-"""Height of a storey (m), for a building whose file gives only the number of storeys."""
+LEVEL_M: Final = 3.0  # height of a storey (m), for a building whose file gives only the number of storeys
 
 
 class Datum(Enum):
@@ -42,8 +41,7 @@ class Limit:
     datum: Datum = Datum.SEA
 
 
-NO_BOTTOM: Final = Limit(-math.inf)
-"""A part without a bottom begins at the ground, or below."""
+NO_BOTTOM: Final = Limit(-math.inf)  # a part without a bottom begins at the ground, or below
 NO_TOP: Final = Limit(math.inf)  # a part without a top has no end upwards
 
 

@@ -27,8 +27,7 @@ from harness.world_files.parts import WGS84, Box, Contents, FileSpec, FloatArray
 from harness.world_files.plane import CIRCLE_DEG, Mapping, Place, geodetic, short_way
 from harness.world_files.solids import placed_cells
 
-ANY_PLACE: Final = Place(47.0, 8.0)
-"""Origin of the plane for files that name no place on earth."""
+ANY_PLACE: Final = Place(47.0, 8.0)  # origin of the plane for files that name no place on earth
 LARGEST_RADII, LARGEST_M = 400.0, 400_000.0
 """Longest side of an area in turn radii, and in metres; of a larger file a part is taken."""
 PAD_RADII: Final = 12.0

@@ -19,15 +19,12 @@ from harness.world_files.height_field import HeightField, window_of
 from harness.world_files.parts import BoolArray, Box, Datum, FloatArray, Part, Raster
 from harness.world_files.plane import Mapping
 
-MAX_RUNS: Final = 400_000
-"""A mask of cells with more runs of solid cells along its rows than this is refused."""
+MAX_RUNS: Final = 400_000  # a mask of cells with more runs of solid cells along its rows than this is refused
 LONGEST_EDGE_CELLS: Final = 64
 """Edges of cells' outlines longer than this get points between, which keeps them within 0.01 cell in the plane."""
-MOST_GROWTH: Final = 0.005
-"""Filling a polygon's notches may add at most this share of its area."""
+MOST_GROWTH: Final = 0.005  # filling a polygon's notches may add at most this share of its area
 NOTCH_PASSES: Final = 3  # in which a polygon's notches are filled
-STRAIGHT_M: Final = 1e-9
-"""A corner no further than this from the line through its neighbours is dropped."""
+STRAIGHT_M: Final = 1e-9  # a corner no further than this from the line through its neighbours is dropped
 
 
 class Solid(NamedTuple):

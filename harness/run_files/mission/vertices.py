@@ -22,8 +22,7 @@ Ground = Callable[[FloatArray, FloatArray], FloatArray]
 
 CORNER_M: Final = 90.0
 """A waypoint without an acceptance radius may be passed this far off: ArduPilot Plane's default WP_RADIUS."""
-FOLLOWED_M: Final = 50.0
-"""Along a leg above ground, the ground is looked up at this spacing."""
+FOLLOWED_M: Final = 50.0  # along a leg above ground, the ground is looked up at this spacing
 
 
 def corner_limit_m(acceptance_m: float, corner_m: float | None) -> float:

@@ -20,8 +20,7 @@ SOLID_TYPES: Final = ("Building", "Bridge", "OtherConstruction")
 """CityJSON objects whose type begins with one of these are taken as solid."""
 INSTANCE: Final = "GeometryInstance"
 """The type of a geometry that places a template of the file; such geometries are passed over and counted."""
-LOW_M: Final = 0.1
-"""An object lower than this is a footprint whose height its attributes may give."""
+LOW_M: Final = 0.1  # an object lower than this is a footprint whose height its attributes may give
 WALL_SHARE: Final = 1e-9
 """A surface is a wall if its area seen from above is less than this share of its length squared."""
 

@@ -18,8 +18,7 @@ from harness.world_files.plane import CIRCLE_DEG, in_degrees
 
 CIRCLE_POINTS: Final = 96
 """A circle becomes a polygon round it with this many corners, whose area is 0.04 % larger."""
-LARGEST_M: Final = 2_000_000.0
-"""A circle with a larger radius is refused."""
+LARGEST_M: Final = 2_000_000.0  # a circle with a larger radius is refused
 
 GEOD: Final = Geod(ellps="WGS84")
 Place = tuple[float, float]
