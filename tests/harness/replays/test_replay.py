@@ -129,9 +129,7 @@ def test_corners_are_found_of_the_targets_alone(tmp_path: Path) -> None:
     from_ten = pa.array(table["target_index"].to_numpy() + 10)
     place = table.column_names.index("target_index")
     pq.write_table(table.set_column(place, "target_index", from_ten), tmp_path / "ten.parquet")
-    with pytest.raises(
-        wayproof.InputError, match="target_index: is changed from 10, 11, 12, 13; must be from 0"
-    ):
+    with pytest.raises(wayproof.InputError, match="target_index: is changed from 10, 11, 12, 13; must be"):
         wayproof.replay(tmp_path / "ten.parquet", "ultrastick25e", out=tmp_path / "ten")
 
 
@@ -213,10 +211,8 @@ def test_a_wrong_mission_is_told(
     log, mission = circles(tmp_path, (0.0, 1.0), laps=2)
     mission.write_text(json.dumps(change))
     out = tmp_path / "out"
-    assert (
-        main(["replay", str(log), "--aircraft", "aerosonde", "--mission", str(mission), "--out", str(out)])
-        == 2
-    )
+    words = ["--aircraft", "aerosonde", "--mission", str(mission), "--out", str(out)]
+    assert main(["replay", str(log), *words]) == 2
     assert told in capsys.readouterr().err
     assert not out.exists()
 
@@ -230,6 +226,9 @@ def test_a_log_that_lacks_a_column_or_goes_straight_is_told(
     pq.write_table(table.drop_columns(["north_m"]), log)
     assert main(["replay", str(log), *arguments]) == 2
     assert "has no column north_m" in capsys.readouterr().err
+    (tmp_path / "a.csv").write_text("time_s,time_s,east_m,north_m\n0,0,0,0\n")
+    assert main(["replay", str(tmp_path / "a.csv"), *arguments]) == 2
+    assert "a.csv: time_s: stands 2 times; must stand once" in capsys.readouterr().err
     straight = {name: table[name] for name in table.column_names} | {
         "ve_mps": pa.array(np.full(len(table), 9.0))
     }
