@@ -89,6 +89,11 @@ class Campaign(Section):
         for section, keys in (("set", self.set_), ("grid", self.grid), ("random", self.random)):
             for name in keys:
                 self._check_key((section, name), taken)
+        for name, values in self.grid.items():
+            if index := _repeated(values):
+                raise KeyFault(
+                    ("grid", name, index), "is there already; keep one (draws flies each more often)"
+                )
         _check_entries("planners", self.planners, taken)
         _check_entries("aircraft", self.aircraft, taken)
         return self

@@ -335,6 +335,7 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
         ("  environment.wind.speed_mps", "  environment.wnd.speed_mps", "unknown key; did you mean wind"),
         ("[0, 4.5]", "[0, 45]", "campaign.yaml:12: grid.environment.wind.speed_mps[1]: is 45; must be below"),
         ("[0, 4.5]", '[0, "x"]', "grid.environment.wind.speed_mps[1]: is the text 'x'; must be a number"),
+        ("[0, 4.5]", "[4.5, 0, 4.5]", "grid.environment.wind.speed_mps[2]: is there already; keep one"),
         ("{uniform: [0, 360]}", "{uniform: [361, 400]}", "random.environment.wind.from_deg: is 3"),
         ("{uniform: [0, 360]}", "{unifrm: [0, 360]}", "from_deg.unifrm: unknown key; did you mean uniform"),
         ("{uniform: [0, 360]}", "{}", "from_deg: has none of uniform, normal, choice"),
