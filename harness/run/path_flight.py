@@ -135,19 +135,10 @@ def planned(
     )
     route = mission_route(given.mission, flying, given.source)
     profile, notes = route.profile, list(route.notes)
-    lowest, highest = ALTITUDES_M
     if altitude_m is not None:
         profile = replace(profile, altitude_m=np.full_like(profile.altitude_m, altitude_m))
-    elif profile.altitude_m.min() < lowest or profile.altitude_m.max() > highest:
-        held_m = np.clip(profile.altitude_m, lowest, highest)
-        worst = int(np.abs(held_m - profile.altitude_m).argmax())
-        if abs(held_m[worst] - profile.altitude_m[worst]) > scenario.trackability.altitude_m:
-            told = (
-                f"goes to {profile.altitude_m[worst]:g} m above the sea; must be {lowest:g} to {highest:g} m"
-            )
-            raise InputError(f"{given.source}: {told}, or give --altitude-m")
-        profile = replace(profile, altitude_m=held_m)
-        notes.append(f"altitudes below {lowest:g} m or above {highest:g} m above the sea: flown at these")
+    else:
+        profile = _in_the_air(profile, given.source, scenario.trackability.altitude_m, notes)
     if altitude_m is None and ground is None:
         notes += _above_home(given.mission.above_ground)
     if by_waypoints and any(step.loiter is not None for step in given.mission.steps):
@@ -157,6 +148,22 @@ def planned(
     return PathPlan(
         route.way, profile, route.asked_mps, frame, route.marks, notes=tuple(notes), legs=route.legs
     )
+
+
+def _in_the_air(
+    profile: VerticalProfile, source: str, tolerance_m: float, notes: list[str]
+) -> VerticalProfile:
+    """Returns altitudes that can be flown, with a note; an InputError where they differ by more than a tolerance."""
+    lowest, highest = ALTITUDES_M
+    held_m = np.clip(profile.altitude_m, lowest, highest)
+    worst = int(np.abs(held_m - profile.altitude_m).argmax())
+    if abs(held_m[worst] - profile.altitude_m[worst]) > tolerance_m:
+        told = f"goes to {profile.altitude_m[worst]:g} m above the sea; must be {lowest:g} to {highest:g} m"
+        raise InputError(f"{source}: {told}, or give --altitude-m")
+    if (held_m != profile.altitude_m).any():
+        notes.append(f"altitudes below {lowest:g} m or above {highest:g} m above the sea: flown at these")
+        return replace(profile, altitude_m=held_m)
+    return profile
 
 
 def _above_home(items: Sequence[int]) -> list[str]:

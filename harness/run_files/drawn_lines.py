@@ -83,12 +83,22 @@ def read_csv(text: str, source: str) -> PathAsRead:
             finite(cells[name], f"{source}:{number}: {name}", text=True) for name in names
         )
         points.append((first, second, height[0] if height else None))
+    return PathAsRead(
+        source,
+        points,
+        _notes_on_columns(header, names),
+        names[2:] == [ABOVE_GROUND],
+        tuple(names[:2]) in LOCAL,
+    )
+
+
+def _notes_on_columns(header: list[str], names: list[str]) -> list[str]:
     others = ", ".join(name or "one without a name" for name in header if name not in names)
     notes = [f"columns passed over: {shown(others)}"] if others else []
     if speeds := [name for name in header if SPEED_WORD.search(name)]:
         told = "not flown: the airspeed is --airspeed-mps, else the aircraft's cruise"
         notes.append(f"{shown(', '.join(speeds))} {told}")
-    return PathAsRead(source, points, notes, names[2:] == [ABOVE_GROUND], tuple(names[:2]) in LOCAL)
+    return notes
 
 
 def _filled_rows(text: str, source: str) -> list[tuple[int, list[str]]]:

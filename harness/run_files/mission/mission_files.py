@@ -154,10 +154,7 @@ def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
         raise InputError(f"{where}: must be a mission item")
     if item.get("type", "SimpleItem") in ("SimpleItem", None) and not item.get("complexItemType"):
         return [_simple(item, where, number)]
-    if item.get("type", "ComplexItem") != "ComplexItem" and not item.get("complexItemType"):
-        told = f"is {shown(str(item['type']))!r}; must be 'SimpleItem' or 'ComplexItem'"
-        raise InputError(f"{where}.type: {told}")
-    kind = shown(str(item.get("complexItemType") or item.get("type")))
+    kind = _complex_kind(item, where)
     if kind in LANDING_PATTERNS:
         return _landing(item, where, number, LANDING_PATTERNS[kind])
     inner, where = (item[TRANSECTS], f"{where}.{TRANSECTS}") if TRANSECTS in item else (item, where)
@@ -166,6 +163,14 @@ def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
         notes.append(f"item {number}, complex ({kind}): not flown, it has no items of its own")
         return []
     return [_simple(each, f"{where}.Items[{place}]", number + place) for place, each in enumerate(held)]
+
+
+def _complex_kind(item: dict[str, Any], where: str) -> str:
+    """Returns what a complex item is; an InputError says that it is none."""
+    kind, named = item.get("complexItemType"), item.get("type")
+    if not kind and named not in ("ComplexItem", *LANDING_PATTERNS):
+        raise InputError(f"{where}.type: is {shown(str(named))!r}; must be 'SimpleItem' or 'ComplexItem'")
+    return shown(str(kind or named))
 
 
 def _simple(item: Any, where: str, number: int) -> Item:

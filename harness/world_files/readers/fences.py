@@ -36,10 +36,7 @@ def read_ardupilot(spec: FileSpec) -> Contents:
         home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
         rally = [item.command for item in items].count(commands.RALLY_POINT)
         return _contents(item_fences(items, home), False, rally)
-    rows = [(f"line {n}", line.partition("#")[0].split()) for n, line in enumerate(text.splitlines(), 1)]
-    if wrong := next((at for at, row in rows if len(row) not in (0, 2)), None):
-        raise InputError(f"{wrong}: is not latitude and longitude; must be a fence")
-    places = [(finite(row[0], at, text=True), finite(row[1], at, text=True)) for at, row in rows if row]
+    places = _places(text)
     if len(places) < 4:
         raise InputError(f"has {len(places)} lines; must be a return point and at least three corners")
     # Mission Planner saves polygons as fences, without a return point.
@@ -47,6 +44,14 @@ def read_ardupilot(spec: FileSpec) -> Contents:
     told = ("has no return point: its first place is a corner",) if bare else ()
     fence = Fence("fence", True, (tuple(places if bare else places[1:]),))
     return _contents((fence,), False, 0, told)
+
+
+def _places(text: str) -> list[tuple[float, float]]:
+    """Returns latitude and longitude of each line that is no comment."""
+    rows = [(f"line {n}", line.partition("#")[0].split()) for n, line in enumerate(text.splitlines(), 1)]
+    if wrong := next((at for at, row in rows if len(row) not in (0, 2)), None):
+        raise InputError(f"{wrong}: is not latitude and longitude; must be a fence")
+    return [(finite(row[0], at, text=True), finite(row[1], at, text=True)) for at, row in rows if row]
 
 
 def _fence_shape(fence: Fence) -> Any:

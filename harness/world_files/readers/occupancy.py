@@ -33,11 +33,9 @@ def read_moving_ai(spec: FileSpec) -> Contents:
     sizes = {head[1]: int(head[2]), head[3]: int(head[4])}
     rows, columns = sizes["height"], sizes["width"]
     body = [line.encode("latin-1", "replace") for line in text[head.end() :].rstrip().splitlines()]
-    wrong = next(
-        (number for number, line in enumerate(body) if len(line) != columns or number == rows), len(body)
-    )
-    if wrong != rows or len(body) > rows or not rows * columns:
-        line = text.count("\n", 0, head.end()) + wrong + 1
+    wrong = next((number for number, line in enumerate(body) if len(line) != columns), len(body))
+    if wrong != rows or not rows * columns:
+        line = text.count("\n", 0, head.end()) + min(wrong, rows) + 1
         raise InputError(f"has no row of {columns} cells in line {line}, of {rows} rows: it may be torn")
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
     if strange := set(np.unique(cells).tolist()) - set(FREE_CELLS + BLOCKED_CELLS):
@@ -64,13 +62,15 @@ def read_ros(spec: FileSpec) -> Contents:
     mode, size = str(keys.get("mode", "trinary")).lower(), keys.get("resolution", 0.0)
     origin = keys.get("origin", (0.0, 0.0, 0.0))
     over, under = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
-    if mode not in MODES:
-        raise InputError(f"has the mode {mode[:20]!r}; must be one of {', '.join(MODES)}")
+    negate = keys.get("negate", 0)
+    for name, value, known in (("mode", mode, MODES), ("negate", negate, (0, 1))):
+        if value not in known:
+            raise InputError(
+                f"has the {name} {str(value)[:20]!r}; must be one of {', '.join(map(str, known))}"
+            )
     if not _are_numbers((size, over, under), least=0.0) or size == 0 or max(over, under) > 1:
         told = f"the resolution {size} and the thresholds {over}, {under}"
         raise InputError(f"has {told}; must be metres above 0, and shares between 0 and 1")
-    if (negate := keys.get("negate", 0)) not in (0, 1):
-        raise InputError(f"has negate {str(negate)[:20]!r}; must be 0 or 1")
     if not isinstance(origin, tuple) or len(origin) not in (2, 3) or not _are_numbers(origin):
         raise InputError("has an origin that is not [x, y, yaw]")
     greys = _greys(spec.path.parent / keys["image"])
