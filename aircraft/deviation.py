@@ -79,11 +79,17 @@ def _functions_for(
     others = [each for each in aerodynamics.findall("axis") if each not in axes]
     others = [each for each in others if each.get("name") not in DRAG_AXES]
     functions = aerodynamics.findall("function")
-    read, elsewhere = ({text for axis in some for text in _texts(axis)} for some in (axes, others))
-    for each in reversed(functions):  # one that is read may read others, which stand before it
-        for names in (read, elsewhere):
-            names |= _texts(each) if each.get("name") in names else set()
-    return [each for each in functions if each.get("name") in read - elsewhere]
+    alone = _read_by(axes, functions) - _read_by(others, functions)
+    return [each for each in functions if each.get("name") in alone]
+
+
+def _read_by(axes: list[ElementTree.Element], functions: list[ElementTree.Element]) -> set[str]:
+    """All names that axes read, themselves or through functions; a function reads only those before it."""
+    names = {text for axis in axes for text in _texts(axis)}
+    for each in reversed(functions):
+        if each.get("name") in names:
+            names |= _texts(each)
+    return names
 
 
 def _texts(element: ElementTree.Element) -> set[str]:

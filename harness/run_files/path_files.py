@@ -27,7 +27,7 @@ from harness.scenario.sections import ALTITUDES_M
 
 MAX_BYTES: Final = 64_000_000  # a larger path file is refused
 MAX_SPAN_M: Final = 500e3  # a path that reaches further is refused
-ON_EARTH_DEG: Final = (85.0, 360.0)  # a latitude or a longitude further than this from 0 is refused
+ON_EARTH_DEG: Final = (85.0, 360.0)  # a latitude or longitude further from 0, either way, is refused
 LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
     ".csv": read_csv,
     ".geojson": read_geojson,

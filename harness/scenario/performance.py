@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from aircraft.model_files import ModelFiles
     from planner.interface import Mission
 
-LEAST_CLEARANCE_RADII: Final = 0.02  # planners keep at least this share of the turn radius from obstacles
+LEAST_CLEARANCE_RADII: Final = 0.02
+"""Planners keep at least this share of the turn radius from obstacles, also where less is wanted."""
 MAX_WIND_FRACTION: Final = 0.9
 """Wind from this fraction of the airspeed on is refused: against it an aircraft makes hardly any way."""
 

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 MAX_FAULTS: Final = 2
 """An error on a file has at most this many lines, the last of which counts what is left out."""
-MOST_WHOLE: Final = 2**53  # a whole number from this on is refused: below it a float has each of them
+MOST_WHOLE: Final = 2**53
+"""A whole number of this size or more, either way, is refused: below it a float has each of them."""
 NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"  # of a name that a folder may have
 
 _PATTERNS: Final = {NAME_PATTERN: "have only a-z, 0-9, '.', '_' and '-', and not only dots"}

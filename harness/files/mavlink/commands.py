@@ -22,7 +22,7 @@ TAKEOFFS: Final = {
     VTOL_TAKEOFF: "the vertical takeoff is not flown: the flight begins at its altitude",
 }
 LANDINGS: Final = (LAND, VTOL_LAND)
-AT_AN_ALTITUDE: Final = (WAYPOINT, SPLINE_WAYPOINT, *TAKEOFFS)  # these always have an altitude
+AT_AN_ALTITUDE: Final = (WAYPOINT, SPLINE_WAYPOINT, *TAKEOFFS)  # they have an altitude of their own
 FLOWN: Final = (*AT_AN_ALTITUDE, *LOITERS, RETURN_TO_LAUNCH, *LANDINGS)  # flown to, or about
 NAMES: Final = {
     WAYPOINT: "waypoint", LOITER_UNLIMITED: "loiter without limit", LOITER_TURNS: "loiter turns",

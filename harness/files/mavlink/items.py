@@ -102,13 +102,7 @@ def _item(cells: list[str], place: str) -> Item:
     return Item(place, number, command, frame, params, given[7] == 0.0)
 
 
-GEOFENCE_KEYS: Final = (
-    "polygons",
-    "circles",
-    "breachReturn",
-    "version",
-    "polygon",
-)  # of a plan, the last of old ones
+GEOFENCE_KEYS: Final = ("polygons", "circles", "breachReturn", "version", "polygon")  # of a plan
 Place = tuple[float, float]
 Keys = dict[str, Any]
 
