@@ -84,7 +84,7 @@ def _functions_for(
 
 
 def _read_by(axes: list[ElementTree.Element], functions: list[ElementTree.Element]) -> set[str]:
-    """All names that axes read, themselves or through functions; a function reads only those before it."""
+    """All names that axes read, themselves or through functions, each of which reads only those before it."""
     names = {text for axis in axes for text in _texts(axis)}
     for each in reversed(functions):
         if each.get("name") in names:

@@ -154,11 +154,12 @@ def _settings(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
         for other, before in found:
             there = other.replace("[", ".").replace("]", "")
             section, _, key = there.partition(".")
-            own = place in shared and place == f"{section}.kind" and key not in shared[place]
+            own = place in shared and place == f"{section}.kind" and key not in ("", *shared[place])
             same = there == place and value.strip() == before.strip()
             if own or (f"{there}.".startswith(f"{place}.") and not same):
-                told = f"{name}={value[:60]} replaces {other}={before[:60]}, which stands before it"
-                raise typer.BadParameter(f"{told}; leave one of them out", param_hint="--set")
+                told = f"{name}={value[:60]} {'drops' if own else 'replaces'} {other}={before[:60]}"
+                wanted = f"put {name} first" if own else "leave one of them out"
+                raise typer.BadParameter(f"{told}, which stands before it; {wanted}", param_hint="--set")
         found.append((name, value))
     return tuple(found)
 

@@ -115,17 +115,17 @@ def _key_twice(text: str) -> tuple[str, int, int]:
         elif token[0] == "}":
             opened.pop()
         elif token[1]:
-            key, line = json.loads(token[1]), text.count("\n", 0, token.start()) + 1
+            key, at = json.loads(token[1]), token.start()
             if key in opened[-1]:
-                return key, line, opened[-1][key]
-            opened[-1][key] = line
+                return key, *(text.count("\n", 0, each) + 1 for each in (at, opened[-1][key]))
+            opened[-1][key] = at
     raise AssertionError("no key comes twice")
 
 
 def finite(value: Any, where: str, text: bool = False) -> float:
     """Returns a finite number of JSON, or as `text` from other files; an InputError on anything else, true too."""
     is_text = isinstance(value, str)
-    fits = is_text and value.isascii() and "_" not in value if text else type(value) in (int, float)
+    fits = is_text and value.strip().isascii() and "_" not in value if text else type(value) in (int, float)
     try:
         number = float(value) if fits else math.nan
     except (ValueError, OverflowError):

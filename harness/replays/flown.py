@@ -96,9 +96,9 @@ def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
         table = parquet.read_table(path) if path.suffix.lower() == ".parquet" else csv.read_csv(path)
     table = table.rename_columns([name.strip() for name in table.column_names])
     names = table.column_names
-    if (twice := next((name for name in names if names.count(name) > 1), None)) is not None:
-        raise InputError(f"{path}: {twice}: stands {names.count(twice)} times; must stand once")
     place, wanted = _wanted_columns(names, path)
+    if (twice := next((name for name in wanted.values() if names.count(name) > 1), None)) is not None:
+        raise InputError(f"{path}: {twice}: stands {names.count(twice)} times; must stand once")
     columns = {new: _numbers(table, name, path) for new, name in wanted.items()}
     known = np.isfinite([columns[name] for name in ("time_s", "east_m", "north_m")]).all(axis=0)
     columns = {name: each[known] for name, each in columns.items()}

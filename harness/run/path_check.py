@@ -88,13 +88,18 @@ class CheckedFile:
         return prepare_check(self.given, [*self.settings, *day], world=self.world, name=name, **beside)
 
     def words(self, day: Sequence[tuple[str, str]] = ()) -> list[str]:
-        """Returns the command that checks it again, with further keys of a day."""
+        """Returns the command that checks it again, with further keys of a day, without what these replace."""
         model = strict_yaml.parse(dict(self.settings)["aircraft.model"], "aircraft.model").plain()
         beside = {"--scenario": self.world, "--altitude-m": self.altitude_m, "--corner-m": self.corner_m}
         told = [("--aircraft", model), *(("--guidance", law) for law in self.laws)]
         told += [(option, str(value)) for option, value in beside.items() if value is not None]
         own = ("aircraft.model", *("guidance.kind" for _ in self.laws))
-        told += [("--set", f"{key}={value}") for key, value in (*self.settings, *day) if key not in own]
+        every = [*self.settings, *day]
+        told += [
+            ("--set", f"{key}={value}")
+            for number, (key, value) in enumerate(every, start=1)
+            if key not in own and not any(f"{key}.".startswith(f"{later}.") for later, _ in every[number:])
+        ]
         return ["wayproof", "check", str(self.file), *(word for pair in told for word in pair)]
 
     def content(self) -> str:

@@ -153,7 +153,7 @@ def planned(
 def _in_the_air(
     profile: VerticalProfile, source: str, tolerance_m: float, notes: list[str]
 ) -> VerticalProfile:
-    """Returns altitudes that can be flown, with a note; an InputError where they differ by more than a tolerance."""
+    """Returns altitudes that can be flown, with a note; an InputError where they differ by more than the tolerance."""
     lowest, highest = ALTITUDES_M
     held_m = np.clip(profile.altitude_m, lowest, highest)
     worst = int(np.abs(held_m - profile.altitude_m).argmax())

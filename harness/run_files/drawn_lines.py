@@ -27,10 +27,11 @@ DEGREES: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), 
 ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")  # above mean sea level
 ABOVE_GROUND: Final = "altitude_agl_m"  # column that holds an altitude above ground
 ALTITUDE_WORD: Final = re.compile(
-    r"(?<![a-z])(alt|altitudes?|elev?|elevation|height|hgt|agl|a?msl)(?![a-z])|^(up|z|fl)(?![a-z])"
+    r"(^(up|z|fl)|(?<![a-z])((rel_?)?alt|altitudes?|elev?|elevation|height|hgt|hae|agl|a?msl))"
+    r"([ _(\[]+(m|ft|feet|met(er|re)s?|rel|agl|a?msl)[)\]]?)*$"
 )
-"""Occurs in the name of a column that holds an altitude, as `alt_ft`, whether or not it is read."""
-SPEED_WORD: Final = re.compile(r"speed|velocity|(?<![a-z])[tic]as(?![a-z])")  # in the name of a column
+"""Ends the name of a column that holds an altitude, as `alt_ft`, whether or not it is read."""
+SPEED_WORD: Final = re.compile(r"^(?!.*wind).*(speed|velocity|(?<![a-z])[tice]as(?![a-z]))")  # of a column
 SINGLE_TYPE: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
 """The type of the single parts of a geometry with several."""
 MEMBERS_KEY: Final = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
@@ -69,11 +70,14 @@ def _notes_on_others(others: Mapping[str, int]) -> list[str]:
     ]
 
 
-def read_csv(text: str, source: str) -> PathAsRead:
-    """Reads the path of a CSV file: a header, and a point a row, without blank lines and comments after #."""
+def read_csv(text: str, source: str, any_altitude: bool = False) -> PathAsRead:
+    """Reads the path of a CSV file: a header, and a point a row, without blank lines and comments after #.
+
+    With `any_altitude` a column of altitudes that are not read, as of feet, is passed over.
+    """
     (line, header), *filled = _filled_rows(text, source) or [(1, [])]
     header = [name.strip().lower() for name in header]
-    names = _columns(header, f"{source}:{line}")
+    names = _columns(header, f"{source}:{line}", any_altitude)
     points: list[Point] = []
     for number, row in filled:
         if len(row) != len(header):
@@ -110,7 +114,7 @@ def _filled_rows(text: str, source: str) -> list[tuple[int, list[str]]]:
         raise InputError(f"{source}: is not CSV ({error})") from error
 
 
-def _columns(header: list[str], where: str) -> list[str]:
+def _columns(header: list[str], where: str, any_altitude: bool) -> list[str]:
     """Returns the columns of the place, and that of the altitude where there is one."""
     pair = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
     if pair is None:
@@ -119,9 +123,9 @@ def _columns(header: list[str], where: str) -> list[str]:
             "latitude_deg,longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas"
         )
     names = [*pair, *[name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]]
-    unread = next(filter(ALTITUDE_WORD.search, header), None) if len(names) == 2 else None
-    if unread is not None:
-        wanted = f"metres as altitude_m (above the sea) or {ABOVE_GROUND}, or no such column"
+    unread = next(filter(ALTITUDE_WORD.search, header), None)
+    if unread is not None and len(names) == 2 and not any_altitude:
+        wanted = f"metres as altitude_m (above the sea) or {ABOVE_GROUND}; or give --altitude-m"
         raise InputError(f"{where}: {shown(unread)}: is no altitude that is read; must be {wanted}")
     for name in names:
         if header.count(name) > 1:

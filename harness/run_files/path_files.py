@@ -92,7 +92,8 @@ def read_path(path: Path, any_altitude: bool = False, origin_deg: Place | None =
         mission = read_plan
     if mission is not None:
         return _of_mission(mission(text, source), source, origin_deg)
-    return _of_line(LINES[suffix](text, source), source, any_altitude, origin_deg)
+    found = read_csv(text, source, any_altitude) if suffix == ".csv" else LINES[suffix](text, source)
+    return _of_line(found, source, any_altitude, origin_deg)
 
 
 def _of_line(found: PathAsRead, source: str, any_altitude: bool, origin_deg: Place | None) -> PathAsGiven:

@@ -96,10 +96,11 @@ def _item(cells: list[str], place: str) -> Item:
     # What is left to the autopilot is 0, or no number; the first parameter is field 5, counted from 1.
     given = [
         None if cell.lower() == "nan" else finite(cell, f"{place}: field {field}", text=True)
-        for field, cell in enumerate(cells[4:], start=5)
+        for field, cell in enumerate(cells[4:11], start=5)
     ]
-    params = filled(given[:7], command, frame, lambda index: f"{place}: field {5 + index} is nan")
-    return Item(place, number, command, frame, params, given[7] == 0.0)
+    params = filled(given, command, frame, lambda index: f"{place}: field {5 + index} is nan")
+    waits = finite(cells[11], f"{place}: field 12", text=True) == 0.0
+    return Item(place, number, command, frame, params, waits)
 
 
 GEOFENCE_KEYS: Final = ("polygons", "circles", "breachReturn", "version", "polygon")  # of a plan

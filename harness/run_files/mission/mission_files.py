@@ -118,7 +118,8 @@ def read_plan(text: str, source: str) -> Program:
     home = _home(mission.get("plannedHomePosition"), f"{source}: mission.plannedHomePosition", notes)
     items = _every_item(mission["items"], f"{source}: mission.items", notes)
     geofence, rally = (plan[key] if plan.get(key) is not None else {} for key in ("geoFence", "rallyPoints"))
-    firmware = whole(mission.get("firmwareType", 0), f"{source}: mission.firmwareType")
+    firmware = mission.get("firmwareType")
+    firmware = None if firmware is None else whole(firmware, f"{source}: mission.firmwareType")
     fences = Fences(plan_fences(geofence, f"{source}: "), firmware != commands.PX4)
     if geofence.get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
@@ -189,7 +190,7 @@ def _simple(item: Any, where: str, number: int) -> Item:
     values = filled(given, command, frame, lambda index: f"{where}.params[{index}]: is null")
     if item.get("doJumpId") is not None:
         number = whole(item["doJumpId"], f"{where}.doJumpId")
-    if not isinstance(goes_on := item.get("autoContinue", True), bool):
+    if (goes_on := item.get("autoContinue", True)) not in (True, False):
         raise InputError(f"{where}.autoContinue: is {shown(str(goes_on))!r}; must be true or false")
     return Item(where, number, command, frame, values, not goes_on)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import shapely
 
-from harness.files.input_file import InputError, finite, listed
+from harness.files.input_file import InputError, finite, listed, whole
 from harness.files.mavlink import commands
 from harness.files.mavlink.items import WPL, Fence, item_fences, plan_fences, wpl_items
 from harness.files.wording import counted
@@ -23,6 +23,7 @@ def read_plan(spec: FileSpec) -> Contents:
         raise InputError("has no geoFence; must be a QGroundControl plan with one")
     mission, rally = content.get("mission"), content.get("rallyPoints")
     firmware = mission.get("firmwareType") if isinstance(mission, dict) else None
+    firmware = None if firmware is None else whole(firmware, "mission.firmwareType")
     points = listed(rally.get("points") or [], "rallyPoints.points") if isinstance(rally, dict) else None
     fences = plan_fences(content["geoFence"], "")
     return _contents(fences, firmware == commands.PX4, len(points or ()))

@@ -73,7 +73,8 @@ def polygon_of(geometry: dict[str, Any], key: str) -> Any:
         return None
     if kind not in ("Polygon", "MultiPolygon"):
         raise InputError(
-            f"{f'{key}.type'.lstrip('.')}: is {shown(str(kind))!r}; must be that of a GeoJSON geometry"
+            f"{f'{key}.type'.lstrip('.')}: is {'missing' if kind is None else repr(shown(str(kind)))}; "
+            "must be that of a GeoJSON geometry"
         )
     key, given = f"{key}.coordinates".lstrip("."), geometry.get("coordinates")
     if kind == "Polygon":
@@ -82,16 +83,16 @@ def polygon_of(geometry: dict[str, Any], key: str) -> Any:
 
 
 def _polygon(given: Any, key: str) -> Any:
-    rings = [_ring(ring, f"{key}[{number}]") for number, ring in enumerate(listed(given, key, " of rings"))]
+    each = enumerate(listed(given, key, " of rings"))
+    rings = [_ring(ring, f"{key}[{number}]") for number, ring in each if ring != []]
     return shapely.Polygon(*rings[:1], rings[1:])
 
 
 def _ring(given: Any, key: str) -> list[list[float]]:
     """Returns the places of a ring; an InputError names the key of what is none."""
     places = enumerate(listed(given, key, " of [longitude, latitude]"))
-    ring = [
-        numbers(place, f"{key}[{number}]", "[longitude, latitude]", (2, 3, 4))[:2] for number, place in places
-    ]
+    pairs = ((number, place[:2] if isinstance(place, list) else place) for number, place in places)
+    ring = [numbers(place, f"{key}[{number}]", "[longitude, latitude]", (2,)) for number, place in pairs]
     if len(ring) < 3:
         raise InputError(f"{key}: has {counted(len(ring), 'place')}; a ring has at least 3")
     return ring

@@ -34,7 +34,7 @@ def read_moving_ai(spec: FileSpec) -> Contents:
     rows, columns = sizes["height"], sizes["width"]
     body = [line.encode("latin-1", "replace") for line in text[head.end() :].rstrip().splitlines()]
     wrong = next((number for number, line in enumerate(body) if len(line) != columns), len(body))
-    if wrong != rows or not rows * columns:
+    if not len(body) == wrong == rows or not rows * columns:
         line = text.count("\n", 0, head.end()) + min(wrong, rows) + 1
         raise InputError(f"has no row of {columns} cells in line {line}, of {rows} rows: it may be torn")
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
