@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import sys
 import time
@@ -34,7 +35,7 @@ class AskedPlanner:
     """A planner as the loop calls it.
 
     The planner reads the map but cannot change it, and prints to standard error. What it answers has been checked
-    (`planner.plan_checks`) when the loop gets it.
+    (`planner.plan_checks`) when the loop gets it. Garbage of the whole process is collected between its calls.
     """
 
     def __init__(self, planner: Planner, mission: Mission) -> None:
@@ -66,7 +67,9 @@ class AskedPlanner:
             PlannerFailedError: the planner raised, or its answer cannot be flown.
             KeyboardInterrupt: as ever.
         """
-        output, begun, began = sys.stdout, time.thread_time(), time.perf_counter()
+        output, collects = sys.stdout, gc.isenabled()
+        gc.disable()
+        begun, began = time.thread_time(), time.perf_counter()
         try:
             sys.stdout = sys.stderr
             own = self._planner.plan(request)
@@ -83,6 +86,8 @@ class AskedPlanner:
             raise PlannerFailedError(told, trace(error)) from None
         finally:
             sys.stdout = output
+            if collects:
+                gc.enable()
 
 
 def _where(error: BaseException) -> str:
