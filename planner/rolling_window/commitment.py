@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,6 +22,8 @@ PROGRESS_SHARE = 0.25
 
 CONCENTRIC_SHARE = 0.05
 """An arc whose centre lies within this share of the hold radius from that of a hold is part of the hold."""
+
+_certifier = lru_cache(maxsize=8)(Certifier)
 
 
 class Commitment:
@@ -124,7 +127,7 @@ class Commitment:
     def _certifier(self, spacing_m: float) -> Certifier:
         """The certifier of holds that asks for free space every `spacing_m`."""
         mission = self._mission
-        return Certifier(self._local.room.holds, mission.clearance_m, mission.sensor_range_m, spacing_m)
+        return _certifier(self._local.room.holds, mission.clearance_m, mission.sensor_range_m, spacing_m)
 
 
 def explanation(position: Point, goal: Point, nodes: Sequence[Point]) -> str:

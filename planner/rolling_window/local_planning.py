@@ -93,14 +93,15 @@ class Trail:
 
     def retraced_m(self, nodes: Sequence[Point]) -> float:
         """Length (m) of a polyline that lies where the aircraft has been, to about a square."""
-        back_m = 0.0
+        back_m, side_m = 0.0, self._side
         for (ax, ay), (bx, by) in pairwise(nodes):
             length = math.hypot(bx - ax, by - ay)
-            count = max(math.ceil(length / self._side), 1)
-            shares = ((i + 0.5) / count for i in range(count))
-            places = ((ax + share * (bx - ax), ay + share * (by - ay)) for share in shares)
-            squares = ((math.floor(x / self._side), math.floor(y / self._side)) for x, y in places)
-            back_m += length / count * sum(square in self._flown for square in squares)
+            count, back = max(math.ceil(length / side_m), 1), 0
+            for i in range(count):
+                share = (i + 0.5) / count
+                x, y = ax + share * (bx - ax), ay + share * (by - ay)
+                back += (math.floor(x / side_m), math.floor(y / side_m)) in self._flown
+            back_m += length / count * back
         return back_m
 
 

@@ -18,8 +18,8 @@ from planner.paper.sectors import distance_left_m
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.window import SectorEdge, Window, guide_vector
 
-SHORT_OF_SHARE = 0.005
-"""A step ends short of what it meets by this share of the kept distance: from there its edges can be seen."""
+SHORT_OF_SHARE, LEAST_STEP_SHARE = 0.005, 0.01
+"""Shares of the kept distance: a step ends so far short of what it meets, to see its edges from there; least length."""
 
 MOST_TURN_RAD, MOST_AWAY_RAD = 2.1, 0.8
 """Largest turn from one step to the next, and largest turn away from the obstacle that the last step hugged; rad."""
@@ -132,38 +132,18 @@ def _steps(
     back_too: bool,
 ) -> Iterator[Candidate]:
     """Yields the candidate lengthened by a step along each edge, inside the area; those away or back only if wanted."""
-    xmin, ymin, xmax, ymax = bounds_m
-    guide = guide_vector(candidate.nodes[-1], goal)
+    (x, y), last, (xmin, ymin, xmax, ymax) = candidate.nodes[-1], candidate.last, bounds_m
+    gx, gy, left_m = guide_vector((x, y), goal)
     for edge in edges:
-        if not back_too and _leads_away(candidate, edge):
+        if last is not None and not back_too:
+            turn = math.atan2(last.ux * edge.uy - last.uy * edge.ux, last.ux * edge.ux + last.uy * edge.uy)
+            if abs(turn) > MOST_TURN_RAD or turn * last.side > MOST_AWAY_RAD:
+                continue  # shortest ways bend round what they hug
+        length_m = min(edge.hugged_m, edge.clear_m - SHORT_OF_SHARE * outer_m)
+        east, north = x + edge.ux * length_m, y + edge.uy * length_m
+        if length_m < LEAST_STEP_SHARE * outer_m or not (xmin <= east <= xmax and ymin <= north <= ymax):
             continue
-        child = _step(candidate, edge, guide, outer_m)
-        if child is not None and xmin <= child.nodes[-1][0] <= xmax and ymin <= child.nodes[-1][1] <= ymax:
-            yield child
-
-
-def _leads_away(candidate: Candidate, edge: SectorEdge) -> bool:
-    """Tells whether a step leads back, or away from what the last one hugged: shortest ways bend round that."""
-    if candidate.last is None:
-        return False
-    turn = math.atan2(
-        candidate.last.ux * edge.uy - candidate.last.uy * edge.ux,
-        candidate.last.ux * edge.ux + candidate.last.uy * edge.uy,
-    )
-    return abs(turn) > MOST_TURN_RAD or turn * candidate.last.side > MOST_AWAY_RAD
-
-
-def _step(
-    candidate: Candidate, edge: SectorEdge, guide: tuple[float, float, float], outer_m: float
-) -> Candidate | None:
-    """The candidate lengthened by one step along the edge of a free sector; None where that is too short."""
-    here = candidate.nodes[-1]
-    length = min(edge.hugged_m, edge.clear_m - SHORT_OF_SHARE * outer_m)
-    if length < 1e-2 * outer_m:
-        return None
-    x, y = here[0] + edge.ux * length, here[1] + edge.uy * length
-    gx, gy, left = guide
-    off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
-    left = distance_left_m(left, length, off_guide)
-    hugged = edge if length == edge.hugged_m else None
-    return Candidate((*candidate.nodes, (x, y)), candidate.flown_m + length, left, hugged)
+        off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
+        after_m = distance_left_m(left_m, length_m, off_guide)
+        hugged = edge if length_m == edge.hugged_m else None
+        yield Candidate((*candidate.nodes, (east, north)), candidate.flown_m + length_m, after_m, hugged)
