@@ -50,10 +50,6 @@ class Tightest:
         """Returns the limits at the kept points, without the ends."""
         return Tightest(*(np.broadcast_to(each, count)[kept][1:-1] for each in vars(self).values()))
 
-    def at(self, corner: int) -> Tightest:
-        """Returns the limits of one corner of several."""
-        return Tightest(*(each[corner] for each in vars(self).values()))
-
 
 @dataclass(frozen=True)
 class CutCorner:
@@ -120,10 +116,9 @@ def fly_by(
     kept = needed(points_m)
     points = points_m[kept]
     spots = points[:, 0] + 1j * points[:, 1]
-    place, own = spots.copy(), np.arange(len(points))
-    for each in [] if tightest is None or every else _joined(spots, tightest.of(kept, len(points_m))):
-        place[each.sharpest] = each.apex
-        own[each.first : each.last + 1] = each.sharpest
+    place, own = spots, np.arange(len(points))
+    if tightest is not None and not every:
+        place, own = _joined(spots, tightest.of(kept, len(points_m)))
     own, first, count = np.unique(own, return_index=True, return_counts=True)
     place, last, of = place[own], first + count - 1, kept[own]
     least, free = (np.broadcast_to(each, len(points_m))[of][1:-1] for each in (radius_m, free_cut_m))
@@ -174,15 +169,6 @@ def fly_by(
     return FlyBy(points, np.array(rows), corners, kept, np.interp(along, knots, stations), given)
 
 
-class _Joined(NamedTuple):
-    """Neighbouring corners, `first` to `last`, that are flown as one at the apex of the legs before and after them."""
-
-    first: int
-    last: int
-    sharpest: int
-    apex: complex
-
-
 def _legs(place: NDArray[np.complex128]) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:
     """Returns lengths and directions of the legs between places, and the turns between legs."""
     length = np.abs(np.diff(place))
@@ -190,20 +176,25 @@ def _legs(place: NDArray[np.complex128]) -> tuple[FloatArray, NDArray[np.complex
     return length, ahead, np.angle(ahead[1:] / ahead[:-1])
 
 
-def _joined(place: NDArray[np.complex128], tightest: Tightest) -> list[_Joined]:
-    """Returns the kinks whose legs have no room for the least turn, each with the neighbours that make room for it.
+def _joined(
+    place: NDArray[np.complex128], tightest: Tightest
+) -> tuple[NDArray[np.complex128], NDArray[np.int64]]:
+    """Joins kinks whose legs have no room for the least turn with the neighbours that make room for it.
 
     An aircraft that turns at such a kink overshoots by about R (1 - cos(turn)). Legs are left out one by one, until
-    an arc about the apex of those before and after fits, within the limit of the points or that overshoot.
+    an arc about the apex of those before and after fits, within the limit of the points or that overshoot. Corners
+    that are joined are flown as one: the sharpest of them, whose place becomes the apex. Returns all places, and the
+    index of the corner as which each is flown.
     """
     length, ahead, turn = _legs(place)
     tangent = np.concatenate(([0.0], np.tan(0.5 * np.minimum(np.abs(turn), PAST_RAD)), [0.0]))
     least = _least_m(ahead, turn, tightest)
     overshoot_m = (least - _fitting(length, least, _shapes(turn))) * (1.0 - np.cos(turn))
-    found: list[_Joined] = []
+    joined, own, done = place.copy(), np.arange(len(place)), 0
     for kink in (1 + np.flatnonzero(overshoot_m > (1.0 - LIMIT_SHARE) * tightest.limit_m)).tolist():
-        first, last, limits = kink, kink, tightest.at(kink - 1)
-        while (found[-1].last if found else 0) < first and last < len(place) - 1:
+        first, last = kink, kink
+        limits = Tightest(*(each[kink - 1] for each in vars(tightest).values()))
+        while done < first and last < len(place) - 1:
             legs = ahead[[first - 1, last]]
             onto, gap = legs[1] / legs[0], (place[last] - place[first]) / legs[0]
             turned = np.angle(onto)
@@ -221,10 +212,10 @@ def _joined(place: NDArray[np.complex128], tightest: Tightest) -> list[_Joined]:
                 within_m = max(LIMIT_SHARE * float(limits.limit_m), radius * (1.0 - np.cos(turned)))
                 if first < last and off_m <= within_m:
                     sharpest = first + int(np.abs(turn[first - 1 : last]).argmax())
-                    found.append(_Joined(first, last, sharpest, complex(apex)))
+                    joined[sharpest], own[first : last + 1], done = apex, sharpest, last
                 break
             first, last = (first - 1, last) if fits[0] < fits[1] else (first, last + 1)
-    return found
+    return joined, own
 
 
 def _off_arc_m(places: NDArray[Any], apex: complex, legs: NDArray[Any], radius_m: float) -> float:
