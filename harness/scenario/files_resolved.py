@@ -12,7 +12,7 @@ from harness.files.strict_yaml import Loc
 from harness.scenario.environment import GroundSpec, SourceSpec
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.obstacles import Obstacle, Polygon, WorldFile
-from harness.scenario.sections import Interval, Point
+from harness.scenario.sections import Interval
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
@@ -75,18 +75,12 @@ def file_beside(text: str, folder: Path | None) -> Path | None:
 
 def _parts(source: Source, active_s: Interval | None) -> list[Obstacle]:
     """Makes an obstacle of each polygon of a file: its outline and its holes, no corner twice."""
-    import numpy as np
     import shapely
 
-    rings, of = shapely.get_rings(np.array(source.polygons, dtype=object), return_index=True)
-    corners = list(map(tuple, shapely.get_coordinates(rings).tolist()))
-    found: list[list[tuple[Point, ...]]] = [[] for _ in source.polygons]
-    end = 0
-    for index, count in zip(of.tolist(), shapely.get_num_coordinates(rings).tolist(), strict=True):
-        begin, end = end, end + count
-        found[index].append(tuple(corners[begin : end - 1]))
     parts = []
-    for (outline, *holes), heights_m in zip(found, source.heights_m, strict=True):
+    for shape, heights_m in zip(source.polygons, source.heights_m, strict=True):
+        rings = (shapely.get_coordinates(ring)[:-1].tolist() for ring in shapely.get_rings(shape))
+        outline, *holes = (tuple(map(tuple, ring)) for ring in rings)
         polygon = Polygon.model_construct(vertices_m=outline, holes_m=tuple(holes) or None)
         parts.append(Obstacle.model_construct(polygon=polygon, active_s=active_s, heights_m=heights_m))
     return parts

@@ -20,8 +20,6 @@ MAX_OBSTACLES: Final = 10_000  # a forest that is asked for more trunks is refus
 TRIES, TRIES_AT_ONCE = 100, 10
 """A copse is tried at this many places before it is left out, and at this many of them at once."""
 Place = tuple[float, float]
-
-
 Count = Annotated[int, Field(ge=1, le=1000)]
 
 

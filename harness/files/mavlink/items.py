@@ -131,9 +131,8 @@ class Fence:
     @property
     def places(self) -> tuple[Place, ...]:
         """All its corners, or its centre."""
-        return (
-            tuple(place for ring in self.rings for place in ring) if self.center is None else (self.center,)
-        )
+        corners = tuple(place for ring in self.rings for place in ring)
+        return corners if self.center is None else (self.center,)
 
     @cached_property
     def area(self) -> Geometry:
@@ -157,10 +156,15 @@ class Fence:
         return {"name": self.name, "kind": self.kind, **shape}
 
 
-def plan_fences(geofence: Any, source: str) -> tuple[Fence, ...]:
-    """Returns the fences in a plan's geoFence, in degrees; `source`, as `path: ` or nothing, begins an InputError."""
-    if not isinstance(geofence, dict):
-        raise InputError(f"{source}geoFence: must be a mapping")
+def plan_fences(plan: Keys, source: str) -> tuple[tuple[Fence, ...], bool, int]:
+    """Returns the fences of a plan, in degrees, whether to stay inside all inclusion fences, and its rally points.
+
+    `source`, as `path: ` or nothing, begins an InputError.
+    """
+    geofence, rally = ({} if plan.get(key) is None else plan[key] for key in ("geoFence", "rallyPoints"))
+    for key, given in (("geoFence", geofence), ("rallyPoints", rally)):
+        if not isinstance(given, dict):
+            raise InputError(f"{source}{key}: must be a mapping")
     for key in (key for key, value in geofence.items() if value and key not in GEOFENCE_KEYS):
         raise InputError(
             f"{source}geoFence.{shown(key)}: is not known; must be one of {', '.join(GEOFENCE_KEYS)}"
@@ -174,7 +178,11 @@ def plan_fences(geofence: Any, source: str) -> tuple[Fence, ...]:
             if not isinstance(each, dict) or not isinstance(each.get("inclusion"), bool):
                 raise InputError(f"{source}{key}.inclusion: must be true or false")
             found.append(read(each, source, key))
-    return tuple(found)
+    mission = plan.get("mission")
+    firmware = mission.get("firmwareType") if isinstance(mission, dict) else None
+    is_px4 = firmware is not None and whole(firmware, f"{source}mission.firmwareType") == commands.PX4
+    points = listed(rally.get("points") or [], f"{source}rallyPoints.points")
+    return tuple(found), not is_px4, len(points)
 
 
 def _polygon(each: Keys, source: str, key: str) -> Fence:

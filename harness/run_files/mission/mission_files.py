@@ -117,15 +117,10 @@ def read_plan(text: str, source: str) -> Program:
     notes: list[str] = []
     home = _home(mission.get("plannedHomePosition"), f"{source}: mission.plannedHomePosition", notes)
     items = _every_item(mission["items"], f"{source}: mission.items", notes)
-    geofence, rally = (plan[key] if plan.get(key) is not None else {} for key in ("geoFence", "rallyPoints"))
-    firmware = mission.get("firmwareType")
-    firmware = None if firmware is None else whole(firmware, f"{source}: mission.firmwareType")
-    fences = Fences(plan_fences(geofence, f"{source}: "), firmware != commands.PX4)
-    if geofence.get("breachReturn") is not None:
+    fences, inside_all, rally = plan_fences(plan, f"{source}: ")
+    if (plan.get("geoFence") or {}).get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
-    points = (rally.get("points") or []) if isinstance(rally, dict) else None
-    every_rally = listed(points, f"{source}: rallyPoints.points")
-    return _mission(source, items, home, fences, len(every_rally), notes)
+    return _mission(source, items, home, Fences(fences, inside_all), rally, notes)
 
 
 def _home(home: Any, where: str, notes: list[str]) -> Home:

@@ -7,7 +7,7 @@ from typing import Any
 
 import shapely
 
-from harness.files.input_file import InputError, finite, listed, whole
+from harness.files.input_file import InputError, finite
 from harness.files.mavlink import commands
 from harness.files.mavlink.items import WPL, Fence, item_fences, plan_fences, wpl_items
 from harness.files.wording import counted
@@ -21,12 +21,7 @@ def read_plan(spec: FileSpec) -> Contents:
     content = json_of(spec.path)
     if not isinstance(content, dict) or not isinstance(content.get("geoFence"), dict):
         raise InputError("has no geoFence; must be a QGroundControl plan with one")
-    mission, rally = content.get("mission"), content.get("rallyPoints")
-    firmware = mission.get("firmwareType") if isinstance(mission, dict) else None
-    firmware = None if firmware is None else whole(firmware, "mission.firmwareType")
-    points = listed(rally.get("points") or [], "rallyPoints.points") if isinstance(rally, dict) else None
-    fences = plan_fences(content["geoFence"], "")
-    return _contents(fences, firmware == commands.PX4, len(points or ()))
+    return _contents(*plan_fences(content, ""))
 
 
 def read_ardupilot(spec: FileSpec) -> Contents:
@@ -36,7 +31,7 @@ def read_ardupilot(spec: FileSpec) -> Contents:
         items = wpl_items(text, "")
         home = next((item.position for item in items[:1] if item.command == commands.WAYPOINT), None)
         rally = [item.command for item in items].count(commands.RALLY_POINT)
-        return _contents(item_fences(items, home), False, rally)
+        return _contents(item_fences(items, home), True, rally)
     places = _places(text)
     if len(places) < 4:
         raise InputError(f"has {len(places)} lines; must be a return point and at least three corners")
@@ -44,7 +39,7 @@ def read_ardupilot(spec: FileSpec) -> Contents:
     bare = spec.path.suffix.lower() == ".poly" or (places[0] == places[-1] != places[1])
     told = ("has no return point: its first place is a corner",) if bare else ()
     fence = Fence("fence", True, (tuple(places if bare else places[1:]),))
-    return _contents((fence,), False, 0, told)
+    return _contents((fence,), True, 0, told)
 
 
 def _places(text: str) -> list[tuple[float, float]]:
@@ -64,8 +59,8 @@ def _fence_shape(fence: Fence) -> Any:
     return shapely.Polygon(places)
 
 
-def _contents(fences: Sequence[Fence], any_of: bool, rally: int, told: tuple[str, ...] = ()) -> Contents:
-    """Returns fences as parts; where `any_of`, as with PX4, the union of all inclusion fences is one part."""
+def _contents(fences: Sequence[Fence], inside_all: bool, rally: int, told: tuple[str, ...] = ()) -> Contents:
+    """Returns fences as parts; unless `inside_all`, as with PX4, the union of all inclusion fences is one part."""
     points = counted(rally, "rally point")
     if not fences:
         held = f", but {points}, which are no obstacles" if rally else ""
@@ -74,7 +69,7 @@ def _contents(fences: Sequence[Fence], any_of: bool, rally: int, told: tuple[str
             "check`)"
         )
     inside = [_fence_shape(each) for each in fences if each.inclusion]
-    inside = [shapely.union_all(inside)] if any_of and inside else inside
+    inside = inside if inside_all or not inside else [shapely.union_all(inside)]
     parts = [Part(shape, name="inclusion fence", keep_in=True) for shape in inside]
     parts += [Part(_fence_shape(each), name="exclusion fence") for each in fences if not each.inclusion]
     notes = ["a fence has no heights: taken as solid at every altitude", *told]
