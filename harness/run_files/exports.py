@@ -15,7 +15,6 @@ from harness.files.mavlink.commands import WAYPOINT
 from harness.flight.record import FloatArray, IntArray
 from harness.run_files.given_path import needed
 from harness.run_files.run_folder import Run
-from harness.run_files.run_tables import PlanRow
 from harness.scenario.scenario import Scenario, parse_scenario
 from harness.scenario.sections import Origin
 
@@ -79,7 +78,11 @@ def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
     points = np.full((len(track), 2), np.nan)
     for plan in run.plans:
         rows = np.flatnonzero(track.plan_index == plan.plan_index)
-        points[rows] = _on_plan(plan, track.arc_length_m[rows])
+        chord = np.append(0.0, np.cumsum(np.hypot(*np.diff(plan.path_m, axis=0).T)))
+        # The chords are a little shorter than the arcs that arc length is counted along.
+        along = chord * (plan.length_m / chord[-1])
+        for axis in (0, 1):
+            points[rows, axis] = np.interp(track.arc_length_m[rows], along, plan.path_m[:, axis])
     course = np.radians(track.course_deg)
     ahead = np.column_stack((np.sin(course), np.cos(course)))
     kept: list[int] = []
@@ -87,14 +90,6 @@ def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
         if not kept or (points[row] - points[kept[-1]]) @ ahead[row] > FORWARD_M:
             kept.append(row)
     return points[kept], np.array(kept, dtype=np.int64)
-
-
-def _on_plan(plan: PlanRow, arc_length_m: FloatArray) -> FloatArray:
-    """(k, 2) points of a plan at (k,) arc lengths, clamped to its ends."""
-    chord = np.append(0.0, np.cumsum(np.hypot(*np.diff(plan.path_m, axis=0).T)))
-    # The chords are a little shorter than the arcs that arc length is counted along.
-    along = chord * (plan.length_m / chord[-1])
-    return np.column_stack([np.interp(arc_length_m, along, plan.path_m[:, axis]) for axis in (0, 1)])
 
 
 def plan_text(path: ExportedPath) -> str:

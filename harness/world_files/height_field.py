@@ -114,10 +114,9 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
     for raster, mapping in sources:
         missing = np.flatnonzero(np.isnan(heights))
         x, y = mapping.from_plane(east.ravel()[missing], north.ravel()[missing], raster.middle_x)
-        places = raster.cells(x, y)
-        sizes = raster.values.shape[::-1]
-        inside = np.logical_and(*((p >= 0) & (p <= size) for p, size in zip(places, sizes, strict=True)))
-        column, row = (np.clip(p - 0.5, 0.0, size - 1.0) for p, size in zip(places, sizes, strict=True))
+        places, sizes = np.array(raster.cells(x, y)), np.array(raster.values.shape[::-1])[:, None]
+        inside = ((places >= 0) & (places <= sizes)).all(axis=0)
+        column, row = np.clip(places - 0.5, 0.0, sizes - 1.0)
         heights[missing[inside]] = bilinear(raster.values, column[inside], row[inside])
     if not np.isfinite(heights).any():
         return None, []
@@ -126,17 +125,15 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
 
 def window_of(raster: Raster, mapping: Mapping, box: Box) -> tuple[slice, slice]:
     """Returns the rows and the columns of a raster that cover a box of the plane."""
-    share = np.linspace(0.0, 1.0, 33)
-    x, y = (low + share * (high - low) for low, high in ((box[0], box[2]), (box[1], box[3])))
+    x, y = np.linspace(box[:2], box[2:], 33).T
     across, along = np.meshgrid(x, box[1::2]), np.meshgrid(box[::2], y)
     east, north = (np.concatenate((across[k].ravel(), along[k].ravel())) for k in (0, 1))
     column, row = raster.cells(*mapping.from_plane(east, north, raster.middle_x))
     spans = []
     for places, size in ((row, raster.values.shape[0]), (column, raster.values.shape[1])):
-        known = np.clip(places[np.isfinite(places)], -1e9, 1e9)
-        low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
-        begin = min(max(math.floor(low) - 2, 0), size)
-        spans.append(slice(begin, max(min(math.ceil(high) + 2, size), begin)))
+        known = places[np.isfinite(places)] if np.isfinite(places).any() else np.zeros(1)
+        ends = np.floor(known.min()) - 2.0, np.ceil(known.max()) + 2.0
+        spans.append(slice(*np.clip(ends, 0, size).astype(int).tolist()))
     return spans[0], spans[1]
 
 

@@ -16,6 +16,7 @@ from harness.files.mavlink.items import (
     SEA,
     WPL,
     Item,
+    Place,
     filled,
     item_fences,
     plan_fences,
@@ -33,8 +34,8 @@ RELATIVE, ABSOLUTE = 3, 0
 PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')
 """Matches every plan of QGroundControl, whatever the name of its file."""
 PLACE_FORM: Final = "[latitude, longitude, altitude]"
-Home = Sequence[float | None]
-"""Latitude, longitude and altitude of home; None each where the file does not say."""
+Home = tuple[Place | None, float]
+"""Latitude and longitude of home, None where the file does not say, and its altitude."""
 
 
 def _mission(
@@ -48,12 +49,7 @@ def _mission(
     if rally:
         told = "a return to launch is flown to home, not to the nearest of them"
         notes.append(f"{counted(rally, 'rally point')} passed over: {told}")
-    return replace(program(source, items, _place(home), home[2] or 0.0), fences=fences, notes=tuple(notes))
-
-
-def _place(home: Home) -> tuple[float, float] | None:
-    latitude, longitude, _ = home
-    return None if latitude is None or longitude is None else (latitude, longitude)
+    return replace(program(source, items, *home), fences=fences, notes=tuple(notes))
 
 
 def read_waypoints(text: str, source: str) -> Program:
@@ -75,20 +71,20 @@ def read_waypoints(text: str, source: str) -> Program:
         held = f"{counted(len(items) - rally, 'fence item')} and {counted(rally, 'rally point')}"
         remedy = "`wayproof world` takes fences, and `check` takes them beside a mission"
         raise InputError(f"{source}: has no items to fly to, but {held}; {remedy}")
-    fences = Fences(item_fences(items, _place(home)), inside_all=True)
+    fences = Fences(item_fences(items, home[0]), inside_all=True)
     return _mission(source, flown, home, fences, rally, notes)
 
 
 def _home_item(items: list[Item], notes: list[str]) -> Home:
-    """Takes the first item out of the items if it is home, and returns home; else three times None."""
+    """Takes the first item out of the items if it is home, and returns home; else no place, and altitude 0."""
     above = FRAMES.get(items[0].frame, SEA) if items else HOME
     if not items or items[0].command != commands.WAYPOINT or (items[0].number != 0 and above != SEA):
-        return None, None, None
+        return None, 0.0
     first = items.pop(0)
     if above != SEA and first.params[6]:
         told = f"its altitude, {first.params[6]:g} m, is taken as above the sea"
         notes.append(f"its first item is home, though of frame {first.frame}: {told}")
-    return *(first.position or (None, None)), first.params[6]
+    return first.position, first.params[6]
 
 
 def _numbered(items: list[Item], notes: list[str]) -> list[Item]:
@@ -126,11 +122,12 @@ def read_plan(text: str, source: str) -> Program:
 def _home(home: Any, where: str, notes: list[str]) -> Home:
     """Returns place and altitude of home; QGroundControl writes null for what it does not know."""
     if home is None or home == [None, None, None]:
-        return None, None, None
+        return None, 0.0
     if isinstance(home, list) and len(home) == 3 and home[2] is None:
         notes.append("its home has no altitude: altitudes above home are counted from the sea")
         home = [*home[:2], 0.0]
-    return numbers(home, where, PLACE_FORM, (3,))
+    latitude, longitude, altitude = numbers(home, where, PLACE_FORM, (3,))
+    return (latitude, longitude), altitude
 
 
 def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item]:

@@ -188,8 +188,8 @@ class _RouteBuilder:
         here, heading = self._here(), self._heading()
         touch = circle.joined_from(here) if here is not None and self._run else None
         if here is not None and touch is not None and self._flying.heads_for_centres:
-            return self._join_from_far(item, circle, circle.edge(here), altitude)
-        if touch is not None and not self._turns_to(touch) and not self._is_near(touch, turn_m):
+            self._join_from_far(item, circle, circle.edge(here), altitude)
+        elif touch is not None and not self._turns_to(touch) and not self._is_near(touch, turn_m):
             self._add(Vertex(touch, altitude, None))
             self.flush()
         elif heading is not None:  # over the waypoint, and from there by a turn
@@ -210,15 +210,13 @@ class _RouteBuilder:
         way = place - self._pose[0]
         return abs(way - abs(way) * self._pose[1]) > SAME_DIRECTION * abs(way)
 
-    def _join_from_far(self, item: int, circle: Circle, edge: complex, altitude: float) -> Pose:
+    def _join_from_far(self, item: int, circle: Circle, edge: complex, altitude: float) -> None:
         """Adds the way onto a circle for autopilots that head for its centre, with a corner where they join it."""
         self._add(Vertex(edge, altitude, None, centre=circle.center))
         self.flush()
         self._pose = edge, circle.direction(edge)
         turn_deg = -90.0 * circle.side
         self._corners.append(CutCorner(item, edge.real, edge.imag, turn_deg, 0.0, 0.0, self._length_m, 0.0))
-        self._passed.append((None, edge, self._length_m))
-        return self._pose
 
     def _is_near(self, touch: complex, turn_m: float) -> bool:
         """Tells whether a corner at the last waypoint has no room before the next place."""

@@ -204,10 +204,10 @@ class Buildings:
 
     def notes(self) -> list[str]:
         """Returns notes on buildings without a height and on heights that are no plain length."""
-        told = f"taken as {self._default_m:g} m high (default_height_m)"
-        notes = [f"{counted(self._guessed, 'building')} without height and levels {told}"] * bool(
-            self._guessed
-        )
+        notes = []
+        if self._guessed:
+            told = f"taken as {self._default_m:g} m high (default_height_m)"
+            notes.append(f"{counted(self._guessed, 'building')} without height and levels {told}")
         if self._odd:
             notes.append(
                 f"{counted(self._odd.total(), 'height')} of buildings no plain length, {next(iter(self._odd))} the "
