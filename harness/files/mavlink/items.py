@@ -5,6 +5,7 @@ https://mavlink.io/en/file_formats/#mission_plain_text_file, https://mavlink.io/
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -161,10 +162,17 @@ def plan_fences(plan: Keys, source: str) -> tuple[tuple[Fence, ...], bool, int]:
 
     `source`, as `path: ` or nothing, begins an InputError.
     """
-    geofence, rally = ({} if plan.get(key) is None else plan[key] for key in ("geoFence", "rallyPoints"))
-    for key, given in (("geoFence", geofence), ("rallyPoints", rally)):
-        if not isinstance(given, dict):
-            raise InputError(f"{source}{key}: must be a mapping")
+    inner = {key: plan.get(key) for key in ("geoFence", "mission", "rallyPoints")}
+    for key in (key for key, value in inner.items() if not isinstance(value, dict | None)):
+        raise InputError(f"{source}{key}: must be a mapping")
+    geofence, mission, rally = (value or {} for value in inner.values())
+    firmware = mission.get("firmwareType")
+    is_px4 = firmware is not None and whole(firmware, f"{source}mission.firmwareType") == commands.PX4
+    points = listed(rally.get("points") or [], f"{source}rallyPoints.points")
+    return _geofence(geofence, source), not is_px4, len(points)
+
+
+def _geofence(geofence: Keys, source: str) -> tuple[Fence, ...]:
     for key in (key for key, value in geofence.items() if value and key not in GEOFENCE_KEYS):
         raise InputError(
             f"{source}geoFence.{shown(key)}: is not known; must be one of {', '.join(GEOFENCE_KEYS)}"
@@ -178,11 +186,7 @@ def plan_fences(plan: Keys, source: str) -> tuple[tuple[Fence, ...], bool, int]:
             if not isinstance(each, dict) or not isinstance(each.get("inclusion"), bool):
                 raise InputError(f"{source}{key}.inclusion: must be true or false")
             found.append(read(each, source, key))
-    mission = plan.get("mission")
-    firmware = mission.get("firmwareType") if isinstance(mission, dict) else None
-    is_px4 = firmware is not None and whole(firmware, f"{source}mission.firmwareType") == commands.PX4
-    points = listed(rally.get("points") or [], f"{source}rallyPoints.points")
-    return tuple(found), not is_px4, len(points)
+    return tuple(found)
 
 
 def _polygon(each: Keys, source: str, key: str) -> Fence:
@@ -210,27 +214,22 @@ def _place(value: Any, where: str) -> Place:
 def item_fences(items: Sequence[Item], home: Place | None) -> tuple[Fence, ...]:
     """Returns the fences among items, in degrees; an InputError says that one is torn, or has no radius or place."""
     found: list[Fence] = []
-    corners: list[Item] = []
-    for item in (each for each in items if each.command in (*CORNERS, *CIRCLES)):
-        if corners and item.command != corners[0].command:
-            raise _torn_fence(corners)
-        if item.command in CIRCLES:
-            found.append(_item_circle(item, home))
-            continue
-        corners.append(item)
-        if len(corners) >= corners[0].params[0]:
+    left = [each for each in items if each.command in (*CORNERS, *CIRCLES)]
+    while left:
+        first, wanted = left[0], left[0].params[0]
+        corners = left[: max(math.ceil(wanted), 1)]
+        if first.command in CIRCLES:
+            corners = [first]
+            found.append(_item_circle(first, home))
+        elif (count := [each.command for each in corners].count(first.command)) < max(wanted, len(corners)):
+            begun = f"{first.place}: item {first.number} begins a fence of {wanted:g} corners"
+            raise InputError(f"{begun}, of which {count} follow; it may be torn")
+        else:
             ring = tuple((each.params[4], each.params[5]) for each in corners)
-            name = f"items {corners[0].number} to {item.number}"
-            found.append(Fence(name, CORNERS[item.command], (ring,)))
-            corners = []
-    if corners:
-        raise _torn_fence(corners)
+            name = f"items {first.number} to {corners[-1].number}"
+            found.append(Fence(name, CORNERS[first.command], (ring,)))
+        left = left[len(corners) :]
     return tuple(found)
-
-
-def _torn_fence(corners: Sequence[Item]) -> InputError:
-    begun = f"{corners[0].place}: item {corners[0].number} begins a fence of {corners[0].params[0]:g} corners"
-    return InputError(f"{begun}, of which {len(corners)} follow; it may be torn")
 
 
 def _item_circle(item: Item, home: Place | None) -> Fence:
