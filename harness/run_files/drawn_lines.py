@@ -34,7 +34,6 @@ ALTITUDE_WORD: Final = re.compile(
 SPEED_WORD: Final = re.compile(r"^(?!.*wind).*(speed|velocity|(?<![a-z])[tice]as(?![a-z]))")  # of a column
 SINGLE_TYPE: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
 """The type of the single parts of a geometry with several."""
-MEMBERS_KEY: Final = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
 """Values of KML's altitudeMode, the last the default; at any other value, and at that, the altitude means nothing."""
 
@@ -135,7 +134,11 @@ def _columns(header: list[str], where: str, any_altitude: bool) -> list[str]:
 
 def read_geojson(text: str, source: str) -> PathAsRead:
     """Reads the path of a GeoJSON file, its one LineString."""
-    shapes = list(_shapes(parsed_json(text, source), source, ""))
+    content = parsed_json(text, source)
+    try:
+        shapes = list(_shapes(content))
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
     lines = [(key, line) for key, kind, line in shapes if kind == "LineString"]
     if len(lines) != 1:
         raise InputError(f"{source}: has {len(lines)} LineStrings; must have exactly one, the path")
@@ -150,26 +153,22 @@ def read_geojson(text: str, source: str) -> PathAsRead:
     return PathAsRead(where, points, _notes_on_others(others))
 
 
-def _shapes(node: Any, source: str, key: str) -> Iterator[tuple[str, str, Any]]:
-    """Yields key, type and coordinates of all geometries in one part of a GeoJSON object."""
-    node = node if isinstance(node, dict) else {}
-    kind, before = str(node.get("type") or ""), f"{key}." if key else ""
-    if kind == "Feature":
-        if node.get("geometry") is not None:  # else it lies nowhere
-            yield from _shapes(node["geometry"], source, f"{before}geometry")
-    elif kind in MEMBERS_KEY:
-        key = f"{before}{MEMBERS_KEY[kind]}"
-        for number, part in enumerate(listed(node.get(MEMBERS_KEY[kind]), f"{source}: {key}")):
-            yield from _shapes(part, source, f"{key}[{number}]")
-    elif kind in SINGLE_TYPE:
-        key = f"{before}coordinates"
-        for number, part in enumerate(listed(node.get("coordinates"), f"{source}: {key}")):
-            yield f"{key}[{number}]", SINGLE_TYPE[kind], part
-    elif kind in SINGLE_TYPE.values():
-        yield f"{before}coordinates", kind, node.get("coordinates")
-    else:
-        told, where = f"the type {shown(kind)}" if kind else "no type", f"{source}: {key}".removesuffix(": ")
-        raise InputError(f"{where}: has {told}; must be a GeoJSON LineString")
+def _shapes(content: Any) -> Iterator[tuple[str, str, Any]]:
+    """Yields key, type and coordinates of all geometries in a GeoJSON, of one with several parts each part."""
+    from harness.world_files.readers.maps import features_of, simple
+
+    every = (each for _, geometry, key in features_of(content) for each in simple(geometry, key))
+    for geometry, at in every:
+        kind, given = str(geometry.get("type") or ""), geometry.get("coordinates")
+        key = f"{at}.coordinates".lstrip(".")
+        if kind in SINGLE_TYPE:
+            for number, part in enumerate(listed(given, key)):
+                yield f"{key}[{number}]", SINGLE_TYPE[kind], part
+        elif kind in SINGLE_TYPE.values():
+            yield key, kind, given
+        elif geometry:  # else it lies nowhere
+            told = f"the type {shown(kind)}" if kind else "no type"
+            raise InputError(f"{at}: has {told}; must be a GeoJSON LineString".removeprefix(": "))
 
 
 def read_kml(data: bytes, source: str, most: int) -> PathAsRead:

@@ -196,11 +196,13 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
         layer = layer._replace(flat_m=0.0)
         notes.append("no terrain: the ground is taken as flat at 0 m (ground_m)")
     solids = sliced_parts(contents.parts, mapping, layer, box)
-    tolerance_m = _tolerance_m(spec, contents, mapping)
+    tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
     if (raster := contents.raster) is not None:
-        heights_m = HEIGHTS_M if raster.occupancy else (layer.low_m, layer.low_m)
-        solid = _solid_cells(raster, spec, layer.low_m, notes)
+        solid, heights_m = _solid_cells(raster, spec, layer.low_m, notes)
         solids += [Solid(shape, *heights_m) for shape in placed_cells(raster, solid, mapping, box)]
+        if spec.tolerance_m is None:
+            rows, columns = raster.values.shape
+            tolerance_m = max(cell_sides(raster, mapping, columns / 2, rows / 2) or (tolerance_m,))
     solids = clipped(solids, box)
     polygons = _outlines([each.shape for each in solids], tolerance_m)
     if polygons:
@@ -211,28 +213,22 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
     return Source(spec, contents.kind, contents.sha256, tuple(polygons), heights, tuple(notes))
 
 
-def _tolerance_m(spec: FileSpec, contents: Contents, mapping: Mapping) -> float:
-    """Tells by how many metres outlines may be simplified; by default a cell's side of a raster, else 0.1 m."""
-    if spec.tolerance_m is not None or contents.raster is None:
-        return 0.1 if spec.tolerance_m is None else spec.tolerance_m
-    rows, columns = contents.raster.values.shape
-    return max(cell_sides(contents.raster, mapping, columns / 2, rows / 2) or (0.1,))
-
-
-def _solid_cells(raster: Raster, spec: FileSpec, low_m: float, notes: list[str]) -> BoolArray:
-    """Tells which cells of a raster are solid: occupied, or no lower than the lowest altitude of the aircraft."""
+def _solid_cells(
+    raster: Raster, spec: FileSpec, low_m: float, notes: list[str]
+) -> tuple[BoolArray, tuple[float, float]]:
+    """Returns which cells of a raster are solid, occupied or no lower than the aircraft may fly, and their heights."""
     missing = np.isnan(raster.values)
-    taken, key = (spec.unknown, "unknown") if raster.occupancy else (spec.nodata, "nodata")
+    least, taken, key, heights_m = low_m, spec.nodata, "nodata", (low_m, low_m)
+    if raster.occupancy:
+        least, taken, key, heights_m = 0.5, spec.unknown, "unknown", HEIGHTS_M
     if missing.any():
         notes.append(f"{counted(int(missing.sum()), 'cell')} without a value taken as {taken} ({key})")
-    solid: BoolArray = raster.values >= (0.5 if raster.occupancy else low_m)
-    return solid | (missing & (taken != "free"))
+    return (raster.values >= least) | (missing & (taken != "free")), heights_m
 
 
 def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     """Returns the union of polygons, simplified and valid, with corners rounded to `DECIMALS`."""
-    merged = shapely.get_parts(shapely.disjoint_subset_union_all(polygons))
-    grown = simplified([each for each in merged if each.geom_type == "Polygon"], tolerance_m)
+    grown = simplified(shapely.get_parts(shapely.disjoint_subset_union_all(polygons)), tolerance_m)
     shapes = np.array(shapely.get_parts(shapely.disjoint_subset_union_all(grown)), dtype=object)
     placed = shapely.transform(shapes, lambda points: np.round(points, DECIMALS))
     bad = ~shapely.is_valid(placed)  # a sliver that the grid makes a line, too: of it nothing is left

@@ -165,14 +165,11 @@ def outlines(mask: BoolArray) -> list[Any]:
 def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -> list[Any]:
     """Returns the outlines in the plane of the solid cells, (rows, columns), of a raster near a box."""
     rows, columns = window_of(raster, mapping, box)
-
-    def place(points: FloatArray) -> FloatArray:
-        x, y = raster.places(points[:, 0] + columns.start, points[:, 1] + rows.start)
-        return np.column_stack(mapping.to_plane(x, y))
-
+    first = columns.start, rows.start
     shapes = np.array(outlines(solid[rows, columns]), dtype=object)
     dense = shapely.segmentize(shapes, LONGEST_EDGE_CELLS) if mapping.crs else shapes
-    return list(shapely.transform(dense, place))
+    placed = shapely.transform(dense, lambda p: np.column_stack(raster.places(*(p + first).T)))
+    return list(mapping.geometries(placed))
 
 
 def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
