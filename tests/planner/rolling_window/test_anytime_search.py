@@ -172,8 +172,8 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
 @pytest.mark.parametrize(
     ("gap_m", "off_m", "border_m", "open_to_m", "aside"),
     [
-        (500.0, 1200.0, 8000.0, 0.0, True),
-        (500.0, 1200.0, 8000.0, 6000.0, False),  # the gap, 3.1 km ahead, is seen to lead on
+        (500.0, 1200.0, 8000.0, 3050.0, True),
+        (500.0, 1200.0, 8000.0, 3200.0, False),  # the gap, 3.1 km ahead, is seen to lead on
         (500.0, 1200.0, 8000.0, None, False),  # room is not asked for
         (500.0, 2000.0, 8000.0, 0.0, False),  # longer by more than half a hold, which is 471 m
         (900.0, 1200.0, 8000.0, 0.0, False),  # a hold has room in the gap
@@ -183,13 +183,14 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
 def test_a_way_with_room_for_holds_may_be_longer_by_half_a_hold(
     gap_m: float, off_m: float, border_m: float, open_to_m: float | None, aside: bool, wall: MakePoints, known: Known
 ) -> None:  # fmt: skip
-    """A wall across with a gap 900 m north of the way straight on, and an end south of it; 200 m clear."""
+    """A wall across with a gap 900 m north of the way straight on, an end south of it, a post behind; 200 m clear."""
     south, north = 900.0 - 0.5 * gap_m, 900.0 + 0.5 * gap_m
-    parts = [wall((3000.0, a), (3000.0, b), 50.0) for a, b in ((north, 8000.0), (370.0 - off_m, south))]
+    ends = (3000.0, north, 8000.0), (3000.0, 370.0 - off_m, south), (6000.0, -300.0, -200.0)
+    parts = [wall((x, a), (x, b), 50.0) for x, a, b in ends]
     mission = replace(MISSION, bounds_m=(-4000.0, -border_m, 16_000.0, 8000.0))
     _, thinking = planning(known(np.concatenate(parts)), mission=mission, open_to_m=open_to_m)
-    course = next(iter(thinking.courses(START, None, 10**9)))
-    assert (course.nodes[0][1] < -500.0) is aside
+    course, *others = thinking.courses(START, None, 10**9)
+    assert (len(others), course.nodes[0][1] < -500.0) == (2 + aside, aside)  # offered once
     around_m, through_m = (math.hypot(3000.0, y) + math.hypot(9000.0, y) for y in (off_m, south + 220.0))
     assert course.path.length_m == pytest.approx(around_m if aside else through_m, abs=60.0)
     assert not aside or through_m < around_m < through_m + math.pi * MISSION.hold_radius_m

@@ -225,6 +225,15 @@ def test_a_course_leads_on_to_a_hold_elsewhere_or_four_radii_short_of_what_is_in
     assert pilot._search._open_to_m(course) == pytest.approx(in_sight_m, abs=SPACING)
 
 
+def test_of_plans_too_near_to_what_moves_the_one_that_keeps_off_most_is_kept() -> None:
+    search, threats = planner()._search, SimpleNamespace(room_m=lambda path, *_: path)
+    search._commitment.leads_on = lambda *_: True  # type: ignore[method-assign]
+    ways = [SimpleNamespace(path=room_m) for room_m in (20.0, 60.0, 40.0)]
+    start = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
+    assert not any(search._may_be_flown(way, start, threats) for way in ways)  # type: ignore[arg-type]
+    assert search.nearer is ways[1]
+
+
 def test_a_course_that_serves_is_not_left_for_the_beginning_of_another() -> None:
     seen, pilot = Seen(nothing()), planner()
     now = request_on(flown(pilot, seen), 0.0, seen)
@@ -259,15 +268,9 @@ def test_want_of_room_to_turn_is_proved_after_all_was_tried_again() -> None:
     searched_in_vain(pilot)
     for _ in range(MOST_RETRIES + 1):
         assert pilot._no_way_found(now).status is PlanStatus.NO_PATH
-    error = None
-    for _ in range((MOST_RETRIES + 1) * (MOST_EFFORT + 2)):
-        try:
-            assert pilot._no_way_found(now).status is PlanStatus.NO_PATH
-        except NoRoomToTurn as raised:
-            error = raised
-            break
-    assert "none is 700 m wide" in str(error)
-    assert "does not prove the goal unreachable" in str(error)
+    tries = range((MOST_RETRIES + 1) * (MOST_EFFORT + 2))
+    with pytest.raises(NoRoomToTurn, match=r"(?s)none is 700 m wide.*does not prove the goal unreachable"):
+        assert all(pilot._no_way_found(now).status is PlanStatus.NO_PATH for _ in tries)
     assert pilot.state is PlanningState.PROVING
     assert pilot._giving_up.tried_again
 
