@@ -35,7 +35,9 @@ GIVEN_ELSEWHERE: Final[dict[Loc, str]] = {
 
 Settings: TypeAlias = Sequence[tuple[str, str]]
 """Key paths and their values as YAML."""
-Values = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
+Values = Annotated[
+    tuple[Any, ...], Strict(False), Field(min_length=1, json_schema_extra={"uniqueItems": True})
+]
 
 
 def _bare(section: type[Section], name: str) -> BeforeValidator:

@@ -35,6 +35,15 @@ class Command(TyperCommand):
         """Returns the parameters as help shows them."""
         return _without_types_of_flags(super().get_params(ctx))
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parses arguments; a UsageError says which option is given twice, of which the last alone would count."""
+        _, _, given = self.make_parser(ctx).parse_args(args=list(args))
+        for each in given:
+            takes_one = not (each.multiple or getattr(each, "is_flag", False))
+            if takes_one and given.count(each) > 1 and not ctx.resilient_parsing:
+                ctx.fail(f"{each.opts[0]} is given {given.count(each)} times; give it once")
+        return list(super().parse_args(ctx, args))
+
 
 class Group(TyperGroup):
     """The program itself."""

@@ -203,9 +203,8 @@ def told(scenario: ScenarioKeys) -> str:
     air, navigation, deviation = scenario.environment, scenario.navigation, scenario.aircraft.deviation
     wind = air.wind or Wind()
     blows = f"wind {wind.speed_mps:.3g} m/s from {wind.from_deg:.0f} deg"
-    blows += (f" at {wind.measured_at_m:g} m" if wind.measured_at_m else "") + ", changing" * bool(
-        wind.changes
-    )
+    blows += f" at {wind.measured_at_m:g} m" if wind.measured_at_m else ""
+    blows += ", changing" if wind.changes else ""
     exact = navigation.kind == "perfect" and not navigation.latency_s
     sayings = {
         blows: wind.fastest_mps,

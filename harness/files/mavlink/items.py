@@ -84,8 +84,11 @@ def filled(
 def wpl_items(text: str, source: str) -> list[Item]:
     """Reads the items of a plain-text file, home among them, without comments (#). `source` begins an InputError."""
     where = f"{source}:" if source else "line "
-    rows = [(f"{where}{number}", line.split()) for number, line in enumerate(text.splitlines(), start=1)]
-    return [_item(cells, place) for place, cells in rows[1:] if cells and not cells[0].startswith(COMMENT)]
+    header, *lines = text.splitlines()
+    if header.split() != f"{WPL} 110".split():
+        raise InputError(f'{where}1: is {shown(header)!r}; must be "{WPL} 110", the version that is read')
+    rows = [(f"{where}{number}", line.split()) for number, line in enumerate(lines, start=2)]
+    return [_item(cells, place) for place, cells in rows if cells and not cells[0].startswith(COMMENT)]
 
 
 def _item(cells: list[str], place: str) -> Item:

@@ -135,7 +135,7 @@ print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
         (f"sweep {SCENARIO}", f"{SCENARIO}: this is a scenario: use `wayproof fly {SCENARIO}`"),
         ("fly paper_circles --set sensor.range_m=100", "command line: sensor.range_m: is 100, too short"),
         ("validate", "FILE"),
-        ("view", "RUN_DIR"),
+        ("fly paper_circles --seed 3 --seed 4", "--seed is given 2 times; give it once (see"),
         ("view no-such-run", "no-such-run"),
         ("report no-such-run", "no-such-run: no such folder; give a run folder"),
         ("bench nowhere.yaml", "nowhere.yaml: no such file"),

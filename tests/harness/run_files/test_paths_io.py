@@ -163,7 +163,7 @@ BROKEN = {
     "no place": ("a.plan", plan(item(47.0, 8.0, params=[0, 0, 0, None, 47.0, 8.0, None]), item(47.1, 8.0)),
         ": mission.items[0].params[6]: is null; a waypoint must have an altitude"),
     "text as command": ("a.plan", plan(item(47.0, 8.0, command="fly")), "items[0].command: is 'fly'; must be"),
-    "no header line": ("a.waypoints", "0 1 0 16\n", ':1: must begin with "QGC WPL 110"'),
+    "version": ("a.waypoints", wpl(*wpl_items()).replace("110", "120", 1), ":1: is 'QGC WPL 120'; must be \"QGC WPL"),
     "fields": ("a.waypoints", wpl("1\t0\t3"), ":3: has 3 fields; a mission item has 12"),
     "unknown frame": ("a.waypoints", wpl(*wpl_items(frame=9)),
         ":3: item 1 has the frame 9; must be one of 0, 2, 3, 5"),

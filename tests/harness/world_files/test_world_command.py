@@ -166,7 +166,7 @@ def test_bad_usage_is_told_and_nothing_is_written(
     arguments: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, out = geojson(tmp_path / "a.geojson", feature({})), tmp_path / "out.yaml"
-    given = ["world", str(path), "--out", str(out), *arguments]
+    given = ["world", str(path), *arguments, *([] if "--out" in arguments else ["--out", str(out)])]
     assert main([*given, *([] if "--altitude-m" in arguments else ["--altitude-m", "300"])]) == 2
     assert sentence in capsys.readouterr().err
     assert not out.exists()
