@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.frames import LocalPlane
-from harness.files.input_file import InputError, read_data
+from harness.files.input_file import InputError, finite, read_data
 from harness.flight.record import FloatArray
 from harness.replays.logs import MAX_BYTES, READERS, read_log, reading
 from harness.run_files.drawn_lines import ALTITUDES, DEGREES, LOCAL
@@ -89,11 +89,10 @@ def check_kind(path: Path) -> None:
 
 def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
     """Reads the columns of a table, without the rows that have no place."""
-    import pyarrow.csv as csv
     import pyarrow.parquet as parquet
 
     with reading(path):
-        table = parquet.read_table(path) if path.suffix.lower() == ".parquet" else csv.read_csv(path)
+        table = parquet.read_table(path) if path.suffix.lower() == ".parquet" else _csv_table(path)
     table = table.rename_columns([name.strip() for name in table.column_names])
     names = table.column_names
     place, wanted = _wanted_columns(names, path)
@@ -108,6 +107,23 @@ def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
         placed = np.array([plane.plane(*pair) for pair in pairs]).reshape(-1, 2)
         columns["east_m"], columns["north_m"] = placed.T
     return columns
+
+
+def _csv_table(path: Path) -> pa.Table:
+    """Reads a CSV table; an InputError names the first line that has other than one cell for each column."""
+    import pyarrow.csv as csv
+
+    def refuse(row: csv.InvalidRow) -> str:
+        wrong.append(f":{row.number}: has {row.actual_columns} cells, the header {row.expected_columns}")
+        return "skip"
+
+    wrong: list[str] = []
+    table = csv.read_csv(
+        path, csv.ReadOptions(use_threads=False), csv.ParseOptions(invalid_row_handler=refuse)
+    )
+    if wrong:
+        raise InputError(f"{path}{wrong[0]}")
+    return table
 
 
 def _wanted_columns(names: Sequence[str], path: Path) -> tuple[tuple[str, str], dict[str, str]]:
@@ -125,10 +141,20 @@ def _wanted_columns(names: Sequence[str], path: Path) -> tuple[tuple[str, str], 
 
 
 def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:
-    import pyarrow as pa
+    """Returns a column, NaN where it has nothing; an InputError names the first row that is no number, from 1."""
+    from pyarrow import types
 
-    try:
-        values: FloatArray = table[name].cast("float64", safe=False).to_numpy()
-    except pa.ArrowException as error:
-        raise InputError(f"{path}: {name}: must be numbers ({' '.join(str(error).split())[:120]})") from error
-    return values
+    column = table[name]
+    plain = [types.is_integer, types.is_floating, types.is_decimal]
+    plain += [types.is_boolean] if name == "autonomous" else []
+    if any(is_so(column.type) for is_so in plain):
+        values: FloatArray = column.cast("float64", safe=False).to_numpy()
+        return values
+    rows = enumerate(column.to_pylist(), start=1)
+    where = f"{path}: {name}: row"
+    return np.array(
+        [
+            np.nan if each in (None, "", "nan") else finite(each, f"{where} {row}", isinstance(each, str))
+            for row, each in rows
+        ]
+    )
