@@ -32,6 +32,7 @@ ALTITUDE_WORD: Final = re.compile(
 )
 """Ends the name of a column that holds an altitude, as `alt_ft`, whether or not it is read."""
 SPEED_WORD: Final = re.compile(r"^(?!.*wind).*(speed|velocity|(?<![a-z])[tice]as(?![a-z]))")  # of a column
+SPEED_NOT_FLOWN: Final = "not flown: the airspeed is --airspeed-mps, else the aircraft's cruise"
 SINGLE_TYPE: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
 """The type of the single parts of a geometry with several."""
 ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
@@ -99,8 +100,7 @@ def _notes_on_columns(header: list[str], names: list[str]) -> list[str]:
     others = ", ".join(name or "one without a name" for name in header if name not in names)
     notes = [f"columns passed over: {shown(others)}"] if others else []
     if speeds := [name for name in header if SPEED_WORD.search(name)]:
-        told = "not flown: the airspeed is --airspeed-mps, else the aircraft's cruise"
-        notes.append(f"{shown(', '.join(speeds))} {told}")
+        notes.append(f"{shown(', '.join(speeds))} {SPEED_NOT_FLOWN}")
     return notes
 
 

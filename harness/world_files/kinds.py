@@ -151,23 +151,18 @@ def _zip_kind(path: Path) -> str:
 
 
 def _text_kind(path: Path, first: bytes) -> str | None:
-    """Tells the kind of a text file; None where no pattern matches."""
+    """Tells the kind of a text file; None where no pattern matches. An InputError says that it is no JSON."""
     if b"\0" in first:
         return None
     text = bounded.text_of(first).lstrip("\ufeff\x1e \t\r\n")
     if text[:1] in ("{", "["):
-        return _json_kind(path)
+        text = bounded.text_of(bounded.read_bytes(path, bounded.MAX_TREE_BYTES))
+        found = next((kind for kind, pattern in _JSON_PATTERNS if re.search(pattern, text)), None)
+        if found is None:
+            bounded.json_of(path)  # says so where it is no JSON at all
+        return found
     lines = [line.strip() for line in text.splitlines()]
     text = "\n".join(line for line in lines if line and line[0] not in "*#") + "\n"
     return next(
         (kind for kind, pattern in _TEXTS if re.search(pattern, text, re.MULTILINE | re.IGNORECASE)), None
     )
-
-
-def _json_kind(path: Path) -> str | None:
-    """Tells the kind of a JSON file; raises InputError if it is no JSON."""
-    text = bounded.text_of(bounded.read_bytes(path, bounded.MAX_TREE_BYTES))
-    found = next((kind for kind, pattern in _JSON_PATTERNS if re.search(pattern, text)), None)
-    if found is None:
-        bounded.json_of(path)  # says so where it is no JSON at all
-    return found

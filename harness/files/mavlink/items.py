@@ -84,9 +84,9 @@ def filled(
 def wpl_items(text: str, source: str) -> list[Item]:
     """Reads the items of a plain-text file, home among them, without comments (#). `source` begins an InputError."""
     where = f"{source}:" if source else "line "
-    header, *lines = text.splitlines()
-    if header.split() != f"{WPL} 110".split():
-        raise InputError(f'{where}1: is {shown(header)!r}; must be "{WPL} 110", the version that is read')
+    header, *lines = text.splitlines() or [""]
+    if (begin := " ".join(header.split())) != f"{WPL} 110":
+        raise InputError(f'{where}1: is {shown(begin)!r}; must be "{WPL} 110", as a mission begins')
     rows = [(f"{where}{number}", line.split()) for number, line in enumerate(lines, start=2)]
     return [_item(cells, place) for place, cells in rows if cells and not cells[0].startswith(COMMENT)]
 

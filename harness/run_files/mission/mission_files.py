@@ -14,7 +14,6 @@ from harness.files.mavlink.items import (
     HOME,
     MISSION,
     SEA,
-    WPL,
     Item,
     Place,
     filled,
@@ -23,6 +22,7 @@ from harness.files.mavlink.items import (
     wpl_items,
 )
 from harness.files.wording import counted
+from harness.run_files.drawn_lines import SPEED_NOT_FLOWN
 from harness.run_files.fences import Fences
 from harness.run_files.mission.program import Program, program
 
@@ -34,6 +34,7 @@ RELATIVE, ABSOLUTE = 3, 0
 PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')
 """Matches every plan of QGroundControl, whatever the name of its file."""
 PLACE_FORM: Final = "[latitude, longitude, altitude]"
+PLAN_SPEEDS: Final = ("cruiseSpeed", "hoverSpeed")  # m/s, where no item says another
 Home = tuple[Place | None, float]
 """Latitude and longitude of home, None where the file does not say, and its altitude."""
 
@@ -58,10 +59,6 @@ def read_waypoints(text: str, source: str) -> Program:
     A waypoint above home that has another number than 0 is no home. Items of fences that stand among those of the
     mission are fences; rally points are counted.
     """
-    if not text.startswith(WPL):
-        raise InputError(
-            f'{source}:1: must begin with "{WPL} 110" (of fences and rally points alone there is no mission to check)'
-        )
     notes: list[str] = []
     items = _numbered(wpl_items(text, source), notes)
     home = _home_item(items, notes)
@@ -116,6 +113,8 @@ def read_plan(text: str, source: str) -> Program:
     fences, inside_all, rally = plan_fences(plan, f"{source}: ")
     if (plan.get("geoFence") or {}).get("breachReturn") is not None:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
+    speeds = [f"{key} {shown(str(mission[key]))}" for key in PLAN_SPEEDS if mission.get(key) is not None]
+    notes += [f"{', '.join(speeds)} {SPEED_NOT_FLOWN}"] * bool(speeds)
     return _mission(source, items, home, Fences(fences, inside_all), rally, notes)
 
 

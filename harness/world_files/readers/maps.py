@@ -16,8 +16,11 @@ from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Datum,
 from harness.world_files.readers import limits
 
 WITHOUT_AREA: Final = ("Point", "MultiPoint", "LineString", "MultiLineString")
-DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
-"""Datum of a KML altitude by its altitudeMode; an altitude that is clamped to the ground has none."""
+DATUMS: Final = {
+    **{"absolute": Datum.SEA, "relativeToGround": Datum.GROUND},
+    **dict.fromkeys(("clampToGround", "clampToSeaFloor", "relativeToSeaFloor", "")),
+}
+"""Datum of a KML altitude by its altitudeMode, of which "" is the first without one."""
 
 
 def read_geojson(spec: FileSpec) -> Contents:
@@ -105,7 +108,7 @@ def read_kml_polygons(spec: FileSpec) -> Contents:
     parts = tuple(_kml_part(each, notes) for each in found.polygons)
     if flat := sum((part.bottom, part.top) == (NO_BOTTOM, NO_TOP) for part in parts):
         notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
-    if any(each.mode in DATUMS and not limits.has_limits(each.data) for each in found.polygons):
+    if any(DATUMS[each.mode] and not limits.has_limits(each.data) for each in found.polygons):
         notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
     others = {"LineString": len(found.lines), **found.others}
     notes += [f"{counted(count, kind)} passed over" for kind, count in others.items() if count > 0]
@@ -116,6 +119,9 @@ def _kml_part(shape: Shape, notes: list[str]) -> Part:
     """Returns a polygon of KML as a part: between its limits, or up to its highest corner if it is in the air."""
     rings = [[(longitude, latitude) for latitude, longitude, _ in ring] for ring in shape.rings]
     name, datum = shape.name[:40], DATUMS.get(shape.mode)
+    if shape.mode not in DATUMS:
+        wanted = ", ".join(filter(None, DATUMS))
+        raise InputError(f"{name}: has the altitudeMode {shown(shape.mode)!r}; must be one of {wanted}")
     try:
         footprint = shapely.Polygon(rings[0], [ring for ring in rings[1:] if ring])
     except ValueError as error:

@@ -17,12 +17,15 @@ from harness.files.wording import counted
 from harness.world_files.bounded import MAX_BYTES, read_bytes
 from harness.world_files.parts import WGS84, Contents, FileSpec, Part
 from harness.world_files.readers import limits
+from harness.world_files.readers.footprints import on_earth
 
 TALL_MAN_MADE: Final = frozenset(
     ("chimney", "communications_tower", "cooling_tower", "gasometer", "mast", "silo", "storage_tank", "tower",
      "water_tower")
 )  # fmt: skip
 """Values of `man_made` for what stands up like a building, which piers, pipelines and the like do not."""
+
+NOT_THERE: Final = 2**31 - 1  # coordinate that osmium gives a node which a way names and the file has not
 
 
 def read_xml(spec: FileSpec) -> Contents:
@@ -101,8 +104,11 @@ class _Found:
             return
         kind = {"n": "point", "w": "way"}.get(each.type_str(), "relation")
         if is_building(tags) and kind != "point":
-            nodes = getattr(each, "nodes", ())
-            places = [(node.lon, node.lat) for node in nodes if node.location.valid()]
+            places = [
+                on_earth(node.location.lon_without_check(), node.location.lat_without_check())
+                for node in getattr(each, "nodes", ())
+                if node.location.x != NOT_THERE
+            ]
             self.ways[f"{kind} {each.id}"] = tags, places
         else:
             self.tall += (

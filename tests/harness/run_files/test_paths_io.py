@@ -229,6 +229,7 @@ def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_pa
 
     content = json.loads(plan(*(old(k, *place) for k, place in enumerate(POINTS, 1))))
     content["geoFence"] = {"polygon": [[46.9, 7.9], [47.2, 7.9], [47.2, 8.5], [46.9, 8.5]], "version": 1}
+    content["mission"]["cruiseSpeed"] = 15
     path = tmp_path / "old.plan"
     path.write_text(json.dumps(content))
     found = read_path(path)
@@ -236,6 +237,7 @@ def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_pa
     assert [step.position for step in found.mission.steps] == list(map(tuple, found.points_m.tolist()))
     assert found.origin_deg == POINTS[0]
     assert [step.height_m for step in found.mission.steps] == [120.0] * 3
+    assert "cruiseSpeed 15 not flown: the airspeed is --airspeed-mps, else the" in str(found.notes)
     (fence,) = found.fences.every
     assert fence.inclusion
 

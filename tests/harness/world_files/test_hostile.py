@@ -101,6 +101,9 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "no properties": (text("a.json", '{"type": "Feature", "properties": "x"}'), "properties: is 'x'; must be"),
     "a tag twice": (lambda folder: osm(folder / "a.osm", [({"building": "yes", "a": '1"/><tag k="a" v="2'}, RING)]),
         "has the tag 'a' twice; keep one"),
+    "a pole": (lambda folder: osm(folder / "a.osm", [({"building": "yes"}, [*RING, (8.0, 95.0)])]), "at 95, 8; must"),
+    "a mode": (text("a.kml", "<kml><Placemark><name>z</name><Polygon><altitudeMode>up</altitudeMode><outerBoundaryIs>"
+        "<coordinates/></outerBoundaryIs></Polygon></Placemark></kml>"), "z: has the altitudeMode 'up'; must be"),
     "a fence of words": (text("a.txt", "47.0 8.0\n47.0 8.1\n47.1 8.1\n47.1 east\n"), "line 4: is 'east'; must be"),
     "a NumPy archive": (lambda folder: zipped(folder / "a.npz", elevation__npy=npy(np.array([1.0]))),
         "must have numbers `elevation`"),

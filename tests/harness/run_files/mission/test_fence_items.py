@@ -123,7 +123,7 @@ def test_items_are_counted_by_lines_where_their_numbers_leave_it_open() -> None:
         (wpl(*INSIDE, *RALLY[:1]), "no items to fly to, but 4 fence items and 1 rally point; `wayproof"),
         (wpl(*WAYPOINTS, *INSIDE[:3]), ":5: item 3 begins a fence of 4 corners, of which 3 follow"),
         (wpl(*WAYPOINTS, (5003, 0.0, 47.0, 8.0)), ":5: item 3 is a fence of radius 0 m"),
-        ("47.0 8.0\n47.1 8.0\n", ':1: must begin with "QGC WPL 110" (of fences and rally points alone'),
+        ("47.0 8.0\n47.1 8.0\n", ":1: is '47.0 8.0'; must be \"QGC WPL 110\", as a mission begins"),
     ],
 )
 def test_what_is_no_mission_is_told(text: str, said: str, tmp_path: Path) -> None:
