@@ -15,7 +15,7 @@ import typer
 
 from harness.cli.terminal import FlightReport, progress_bar, say
 from harness.files.input_file import InputError, read_index
-from harness.files.wording import printable
+from harness.files.wording import counted, printable
 
 if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
@@ -26,6 +26,25 @@ BAD_INPUT: Final = 2
 """Exit status of bad input or usage."""
 FOLDER_KEYS: Final = ("name", "seed", "planner.kind", "planner.shield", "aircraft.model")
 """Keys that name the default folder of a run; a model that is a folder stands there by its last name."""
+
+
+def outside_area(scenario: Scenario) -> list[str]:
+    """Says how many of a scenario's own obstacles stand wholly outside its area, where nothing flies; if any do."""
+    xmin, ymin, xmax, ymax = scenario.area.bounds_m
+    outside = []
+    for each in scenario.obstacles:
+        circle, polygon = each.circle, each.polygon
+        places = (circle.center_m,) if circle else polygon.vertices_m if polygon else ()
+        if (
+            not places or each.velocity_mps or (scenario.sources and each.heights_m)
+        ):  # files are cut at the border
+            continue
+        east, north = zip(*places, strict=True)
+        apart_m = max(xmin - max(east), min(east) - xmax, ymin - max(north), min(north) - ymax)
+        if apart_m > (circle.radius_m if circle else 0.0):
+            outside.append(list(places[0]))
+    told = f"{counted(len(outside), 'obstacle')} wholly outside area.bounds_m"
+    return [f"{told}, the first at {outside[0]}"] if outside else []
 
 
 def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:

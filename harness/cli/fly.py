@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from harness.cli.command_line import FAILED, flying_into, load, print_json, told_apart
+from harness.cli.command_line import FAILED, flying_into, load, outside_area, print_json, told_apart
 from harness.cli.flight_rows import flight_rows
 from harness.cli.options import Count, Json, NoRecording, Number, OptionalScenario, Out, Quiet, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
@@ -135,6 +135,8 @@ def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_
     if outside:
         more = f" (and {len(outside) - 1} more: `wayproof validate` names them)" if len(outside) > 1 else ""
         rows["not covered"] = plain(outside[0] + more)
+    for sentence in outside_area(scenario):
+        rows["outside"] = plain(sentence)
     print_table(f"{scenario.name}: {scenario.planner.label}, {scenario.aircraft.model}{under}", rows)
     if as_the_campaign:
         say("digest: as the campaign flew it")

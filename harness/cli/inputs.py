@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 import typer
 
-from harness.cli.command_line import BAD_INPUT, load, print_json
+from harness.cli.command_line import BAD_INPUT, load, outside_area, print_json
 from harness.cli.options import argument
 from harness.cli.terminal import say, step_bar
 from harness.files.input_file import InputError
@@ -159,12 +159,12 @@ def validate(
         else:
             say(f"{file}: {found[0]}: valid")
             for sentence in found[1]:
-                say(f"  not covered by what the planner promises: {sentence}")
+                say(f"  {sentence}")
     return status
 
 
-def _found(file: str) -> tuple[str, tuple[str, ...]]:
-    """Returns what a valid file holds, in a few words, and which of the planner's assumptions a scenario breaks."""
+def _found(file: str) -> tuple[str, list[str]]:
+    """Returns what a valid file holds, in a few words, and what of a scenario's obstacles is not as one expects."""
     from harness.campaign.campaign_file import is_a
     from harness.files.wording import counted
     from harness.scenario.shipped import campaign_path, shipped_campaigns
@@ -173,12 +173,13 @@ def _found(file: str) -> tuple[str, tuple[str, ...]]:
         from harness.cli.sweep import checked
 
         runs = checked(campaign_path(file))
-        return f"{runs.campaign.name}, {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}", ()
+        return f"{runs.campaign.name}, {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}", []
     loaded = load(file)
     from harness.world.motion_assumptions import outside_assumptions
 
     held = f"{loaded.name}, {counted(len(loaded.obstacles), 'obstacle')}"
-    return held, outside_assumptions(loaded)
+    uncovered = "not covered by what the planner promises"
+    return held, [*(f"{uncovered}: {each}" for each in outside_assumptions(loaded)), *outside_area(loaded)]
 
 
 def schema(

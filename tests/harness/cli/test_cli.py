@@ -224,9 +224,10 @@ def test_a_reader_that_has_gone_changes_no_status(
 def test_validate_goes_on_after_a_bad_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bad = tmp_path / "bad.yaml"
     bad.write_text("name: bad\n")
-    assert main(["validate", str(bad), "paper_circles"]) == 2
+    assert main(["validate", str(bad), "paper_circles", "enclosed_start/enclosed-start-005"]) == 2
     said = capsys.readouterr()
-    assert said.out == "paper_circles: paper_circles, 10 obstacles: valid\n"
+    assert said.out.startswith("paper_circles: paper_circles, 10 obstacles: valid\nenclosed_start/")
+    assert said.out.endswith(" 10 obstacles wholly outside area.bounds_m, the first at [-3995.9, 16740.1]\n")
     assert said.err.startswith(f"{bad}:1: schema: is missing")
 
 
