@@ -142,9 +142,8 @@ def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item
 
 def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
     """Returns the simple items that an item of a plan stands for, or none, with a note."""
-    if not isinstance(item, dict):
-        raise InputError(f"{where}: must be a mission item")
-    if item.get("type", "SimpleItem") in ("SimpleItem", None) and not item.get("complexItemType"):
+    keys = item if isinstance(item, dict) else {}
+    if keys.get("type", "SimpleItem") in ("SimpleItem", None) and not keys.get("complexItemType"):
         return [_simple(item, where, number)]
     kind = _complex_kind(item, where)
     if kind in LANDING_PATTERNS:

@@ -53,10 +53,7 @@ def read_ros(spec: FileSpec) -> Contents:
     Occupied and free are told as map_server does: p = (255 - grey) / 255, or grey / 255 if `negate`; above
     `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown.
     """
-    try:
-        keys = strict_yaml.parse(text_of(read_bytes(spec.path, 100_000)), "map").plain()
-    except InputError as error:
-        raise InputError(str(error).removeprefix("map:")) from error
+    keys = strict_yaml.parse(text_of(read_bytes(spec.path, 100_000)), "line").plain()
     if not isinstance(keys, dict) or not isinstance(keys.get("image"), str):
         raise InputError("names no image; must be a map of ROS map_server")
     mode, size = str(keys.get("mode", "trinary")).lower(), keys.get("resolution", 0.0)

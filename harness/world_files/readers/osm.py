@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
+import numpy as np
 import shapely
 
 from harness.files.input_file import InputError
@@ -25,16 +26,24 @@ TALL_MAN_MADE: Final = frozenset(
 )  # fmt: skip
 """Values of `man_made` for what stands up like a building, which piers, pipelines and the like do not."""
 
+NODE: Final = re.compile(
+    rb"<node\s" + b"".join(rb"(?=[^>]*\b%s=['\"](-?\d+\.?\d*)['\"])" % key for key in (b"id", b"lat", b"lon"))
+)
+"""Matches a node of an XML file by its id, latitude and longitude, in any order."""
 NOT_THERE: Final = 2**31 - 1  # coordinate that osmium gives a node which a way names and the file has not
 
 
 def read_xml(spec: FileSpec) -> Contents:
-    """Reads an OpenStreetMap XML file, its elements in any order; InputError: Overpass' `out geom`, JOSM's changes."""
+    """Reads OpenStreetMap XML in any order; InputError: `out geom`, changes of JOSM, a node at two places."""
     data = read_bytes(spec.path, MAX_BYTES)
     if re.search(rb"<nd [^>]*\blat=", data):
         raise InputError("has places inside its ways (`out geom`); ask for `out body; >; out skel`")
     if re.search(rb"<way id=['\"]-|action=['\"]delete", data):
         raise InputError("has ways of JOSM that are new or deleted; give a file without them")
+    rows = (tuple(map(float, node.groups())) for node in NODE.finditer(data))
+    placed = np.unique(np.fromiter(rows, np.dtype((float, 3))), axis=0)
+    if len(again := np.flatnonzero(np.diff(placed[:, 0]) == 0.0)):
+        raise InputError(f"has the node {placed[again[0], 0]:.0f} twice, at two places; keep one")
     osmium = _imported_osmium()
     if data.rfind(b"<node ") < data.find(b"<way "):
         return read_pbf(spec)
@@ -57,9 +66,7 @@ def _osmium_errors() -> Iterator[None]:
         raise
     except Exception as error:  # of kinds of its own, too
         said = " ".join(str(error).split())[:120].rstrip(".")
-        raise InputError(
-            f"cannot be read by osmium: {said}; get it again, or save it anew in JOSM"
-        ) from error
+        raise InputError(f"cannot be read by osmium: {said}; get it again, or save it in JOSM") from error
 
 
 def _imported_osmium() -> Any:

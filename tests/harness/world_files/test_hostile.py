@@ -101,6 +101,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "no properties": (text("a.json", '{"type": "Feature", "properties": "x"}'), "properties: is 'x'; must be"),
     "a tag twice": (lambda folder: osm(folder / "a.osm", [({"building": "yes", "a": '1"/><tag k="a" v="2'}, RING)]),
         "has the tag 'a' twice; keep one"),
+    "a node twice": (text("a.osm", "<osm><node id='1' lat='1' lon='2'/><node lon='3' lat='1' id='1'/>"), "1 twice"),
     "a pole": (lambda folder: osm(folder / "a.osm", [({"building": "yes"}, [*RING, (8.0, 95.0)])]), "at 95, 8; must"),
     "a mode": (text("a.kml", "<kml><Placemark><name>z</name><Polygon><altitudeMode>up</altitudeMode><outerBoundaryIs>"
         "<coordinates/></outerBoundaryIs></Polygon></Placemark></kml>"), "z: has the altitudeMode 'up'; must be"),
