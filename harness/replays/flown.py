@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError, finite, read_data
+from harness.files.wording import counted
 from harness.flight.record import FloatArray
 from harness.replays.logs import MAX_BYTES, READERS, read_log, reading
 from harness.run_files.drawn_lines import ALTITUDES, DEGREES, LOCAL
@@ -60,7 +61,7 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     """
     suffix = path.suffix.lower()
     if suffix in TABLES:
-        columns, notes = _of_table(path, plane), list[str]()
+        columns, notes = _of_table(path, plane)
     else:
         check_kind(path)
         columns, notes = read_log(path, plane or LocalPlane(0.0, 0.0))
@@ -87,8 +88,8 @@ def check_kind(path: Path) -> None:
         raise InputError(f"{path}: is no flight log that is read; must end in {told}")
 
 
-def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
-    """Reads the columns of a table, without the rows that have no place."""
+def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArray], list[str]]:
+    """Reads the columns of a table, without the rows that have no time or place; how many those are is a note."""
     import pyarrow.parquet as parquet
 
     with reading(path):
@@ -101,12 +102,14 @@ def _of_table(path: Path, plane: LocalPlane | None) -> dict[str, FloatArray]:
     columns = {new: _numbers(table, name, path) for new, name in wanted.items()}
     known = np.isfinite([columns[name] for name in ("time_s", "east_m", "north_m")]).all(axis=0)
     columns = {name: each[known] for name, each in columns.items()}
+    dropped = int((~known).sum())
+    notes = [f"{counted(dropped, 'row')} without time or place passed over"] if dropped else []
     if place in DEGREES:
         pairs = np.column_stack((columns["east_m"], columns["north_m"])).tolist()
         plane = plane or LocalPlane(*pairs[0])
         placed = np.array([plane.plane(*pair) for pair in pairs]).reshape(-1, 2)
         columns["east_m"], columns["north_m"] = placed.T
-    return columns
+    return columns, notes
 
 
 def _csv_table(path: Path) -> pa.Table:
