@@ -35,10 +35,8 @@ def outside_area(scenario: Scenario) -> list[str]:
     for each in scenario.obstacles:
         circle, polygon = each.circle, each.polygon
         places = (circle.center_m,) if circle else polygon.vertices_m if polygon else ()
-        if (
-            not places or each.velocity_mps or (scenario.sources and each.heights_m)
-        ):  # files are cut at the border
-            continue
+        if not places or each.velocity_mps or (scenario.sources and each.heights_m):
+            continue  # what moves may come in, and what is read from a file was cut at the border
         east, north = zip(*places, strict=True)
         apart_m = max(xmin - max(east), min(east) - xmax, ymin - max(north), min(north) - ymax)
         if apart_m > (circle.radius_m if circle else 0.0):
