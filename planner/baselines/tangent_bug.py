@@ -225,7 +225,6 @@ class TangentBug(Walker[TangentBugState]):
             shorter = math.dist(place, onto) < share * whole - self._progress_m
             if share * whole <= least_m or (state.on_boundary and not shorter):
                 continue
-            outline = np.concatenate(([place], ahead))
-            if self.known.sees(place, onto) and self.known.encloses_nothing(outline):
+            if self.known.sees(place, onto) and self.known.encloses_nothing(np.concatenate(([place], ahead))):
                 return float(share * whole)
         return 0.0

@@ -79,7 +79,9 @@ def search_candidates(
     start, (steps, keep_best, most_tracks, wide) = window.center_m, width
     _, _, straight = guide_vector(start, goal)
     queue = [(straight if to_go is None else to_go(start), 0, 0, Candidate((start,), 0.0, straight))]
-    apart_m = APART_SHARE * outer_m if not wide else _wide_apart_m(window, outer_m)
+    kept_m = float(window.keep_m.max(initial=0.0))
+    apart_m = WIDE_APART_SHARE * 2.0 * math.sqrt(outer_m * outer_m - kept_m * kept_m) if wide else 0.0
+    apart_m = max(APART_SHARE * outer_m, apart_m)
     kept_at = [0] * (steps + 1)
     visited: set[tuple[int, int]] = set()
     count = 0
@@ -115,12 +117,6 @@ def search_candidates(
             count += 1
             cost = child.cost_m if to_go is None else child.flown_m + to_go(child.nodes[-1])
             heapq.heappush(queue, (cost, count, depth + 1, child))
-
-
-def _wide_apart_m(window: Window, outer_m: float) -> float:
-    """Distance (m) within which two track points of a wide search count as one."""
-    kept_m = float(window.keep_m.max(initial=0.0))
-    return max(APART_SHARE * outer_m, WIDE_APART_SHARE * 2.0 * math.sqrt(outer_m * outer_m - kept_m * kept_m))
 
 
 def _steps(
