@@ -116,9 +116,7 @@ class LocalPlanning:
         self._steps, self._candidates = steps, candidates
         self.work_count = WorkCount()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
-        self._grown_m = (
-            0.0  # how much longer the way has become on the sides of obstacles on which it is flown
-        )
+        self._grown_m = 0.0  # how much longer the way has become on these sides of obstacles
         self._most_growth_m = math.tau * mission.hold_radius_m if mission.wind_mps else 0.0
         self._hug_m = LEAST_HUG_SHARE * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN_SHARE * margin_m)
