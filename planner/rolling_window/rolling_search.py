@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 from functools import partial
 from typing import TypeGuard
@@ -162,7 +163,8 @@ class RollingSearch:
         """Ends a search that has found a plan, and returns that."""
         self.running, self.known, self.anew = None, search.known, False
         self._giving_up.effort = 0
-        self._monitor.lengthened_m = self._local.growth_m(found.course, ahead)
+        before_m = -math.inf if ahead is None else ahead.path.length_m
+        self._monitor.lengthened_m = found.course.path.length_m - before_m
         return found
 
     def _as_good(self, ahead: Course | None, course: Course) -> bool:

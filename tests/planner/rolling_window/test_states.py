@@ -129,7 +129,8 @@ def test_from_the_loiter_a_way_that_opens_is_followed() -> None:
         answer = pilot.plan(request_on(plan, entry_m + 25.0 * step, Seen(nothing())))
         if answer.status is PlanStatus.FOUND:
             break
-    assert (answer.status, pilot.state) == (PlanStatus.FOUND, PlanningState.FOLLOWING)
+    assert answer.status is PlanStatus.FOUND
+    assert pilot.state is PlanningState.FOLLOWING
 
 
 def test_walled_in_at_the_start_a_turn_is_the_escape_where_there_is_room(ring: MakePoints) -> None:
@@ -199,8 +200,10 @@ def test_where_no_other_hold_is_found_another_way_to_the_one_ahead_is_flown() ->
     now = request_on(flown(pilot, seen), 100.0, seen)
     pilot.plan(now)
     assert pilot._monitor.plan is not None
-    assert (found_of(pilot, pilot._monitor.plan.course, now), pilot._search.refused) == (True, 0)
-    assert (found_of(pilot, east_to(10.0), now), pilot._search.refused) == (False, 1)
+    assert found_of(pilot, pilot._monitor.plan.course, now)
+    assert pilot._search.refused == 0
+    assert not found_of(pilot, east_to(10.0), now)
+    assert pilot._search.refused == 1
 
 
 def test_a_course_leads_on_to_a_hold_elsewhere_or_four_radii_short_of_what_is_in_sight() -> None:
