@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 import tomllib
 import zipfile
 from importlib.metadata import version
@@ -16,8 +13,8 @@ from typing import Any
 import pytest
 
 from harness.run_files.run_folder import load_run
+from tests.processes import FRONT_DOOR, ROOT, python
 
-ROOT = Path(__file__).parents[1]
 ROOMS = ("planner", "aircraft", "harness")
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
@@ -38,7 +35,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel, built from this checkout."""
     folder = tmp_path_factory.mktemp("wheel")
     build = f"import hatchling.build; hatchling.build.build_wheel({str(folder)!r})"
-    subprocess.run([sys.executable, "-c", build], cwd=ROOT, capture_output=True, timeout=60, check=True)
+    python("-c", build, check=True)
     (built,) = folder.glob("*.whl")
     return built
 
@@ -53,9 +50,8 @@ def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None
         for path in (ROOT / room).rglob("*")
         if path.is_file() and not {"__pycache__", "front_door"} & {*path.parts}
     }
-    front_door = ROOT / "harness" / "front_door"
     own = {
-        str(path.relative_to(front_door)) for path in (front_door / "wayproof").iterdir() if path.is_file()
+        str(path.relative_to(FRONT_DOOR)) for path in (FRONT_DOOR / "wayproof").iterdir() if path.is_file()
     }
     shipped = [path for path in (ROOT / "scenarios").rglob("*") if path.is_file()]
     scenarios = {f"harness/{path.relative_to(ROOT)}" for path in shipped}
@@ -67,12 +63,12 @@ def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None
 
 def test_an_editable_installation_copies_no_source(tmp_path: Path) -> None:
     build = f"import hatchling.build; hatchling.build.build_editable({str(tmp_path)!r})"
-    subprocess.run([sys.executable, "-c", build], cwd=ROOT, capture_output=True, timeout=600, check=True)
+    python("-c", build, check=True)
     (built,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(built) as archive:
         assert [name for name in archive.namelist() if name.endswith(".py")] == []
         (path,) = (name for name in archive.namelist() if name.endswith(".pth"))
-        assert archive.read(path).decode().split() == [str(ROOT), str(ROOT / "harness" / "front_door")]
+        assert archive.read(path).decode().split() == [str(ROOT), str(FRONT_DOOR)]
 
 
 def give_machine_code(site: Path) -> None:
@@ -103,15 +99,7 @@ def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) 
         (command, ["validate", "forest_planners"], "forest_planners"),
         (command, ["sweep", "one.yaml"], "results: runs/one/results.parquet"),
     ):
-        run = subprocess.run(
-            [sys.executable, "-c", code, *arguments],
-            cwd=tmp_path / "empty",
-            env={**os.environ, "PYTHONPATH": str(tmp_path / "site")},
-            capture_output=True,
-            text=True,
-            timeout=600,
-            check=False,
-        )
+        run = python("-c", code, *arguments, folder=tmp_path / "empty", path=(tmp_path / "site",))
         assert run.returncode == 0, run.stderr
         assert shown in run.stdout
     read = load_run(tmp_path / "empty" / "runs" / "aerosonde_forest" / "rolling_window-aerosonde-1")

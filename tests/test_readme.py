@@ -8,7 +8,6 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,8 @@ import pytest
 
 from harness.run_files.run_folder import load_run
 from tests.longer import longer
+from tests.processes import FRONT_DOOR, ROOT, python
 
-ROOT = Path(__file__).parents[1]
 ROOMS = ("planner", "aircraft", "harness", "scenarios")
 READMES = {
     str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
@@ -28,7 +27,6 @@ READMES = {
         *(each for room in ROOMS for each in sorted((ROOT / room).rglob("*.md"))),
     )
 }
-FRONT_DOOR = ROOT / "harness" / "front_door"
 README = READMES["README.md"]
 CAMPAIGNS, FALSIFY = READMES["harness/campaign/README.md"], READMES["harness/falsify/README.md"]
 SET_UP = "python3 -m venv .venv && .venv/bin/pip install -q --no-compile -c constraints.txt "
@@ -66,28 +64,9 @@ def quick(command: str) -> bool:
     )
 
 
-def ran(words: list[str], folder: Path, path: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """Runs Python with some words in a folder as a person would, the packages taken from `path`."""
-    places = os.pathsep.join(map(str, dict.fromkeys((path, ROOT, FRONT_DOOR))))
-    return subprocess.run(
-        [sys.executable, *words],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": places},
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
-
-
 def wayproof(arguments: str, folder: Path, *, path: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """Runs the command."""
-    return ran(["-m", "harness", *shlex.split(arguments)], folder, path)
-
-
-def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Runs code."""
-    return ran(["-c", code], folder)
+    """Runs the command in a folder as a person would, the packages taken from `path`."""
+    return python("-m", "harness", *shlex.split(arguments), folder=folder, path=(path, ROOT, FRONT_DOOR))
 
 
 @pytest.mark.flights
@@ -228,7 +207,7 @@ def test_ones_own_planner_in_a_file_is_flown_on_the_command_line_and_in_python(t
     assert (flown.returncode, said(flown)) == (0, [])
     first = json.loads(flown.stdout)
     assert first["outcome"] == "reached"
-    done = python(script, tmp_path)
+    done = python("-c", script, folder=tmp_path)
     assert (done.returncode, said(done)) == (0, [])
     assert done.stdout.splitlines()[0] == f"reached {first['reason']}"
     (again,) = load_run(tmp_path / "runs" / "windy").manifest["command"]
@@ -250,7 +229,7 @@ def test_ones_own_law_in_a_file_is_compared_on_the_command_line_and_in_python(tm
     assert [row["outcome"] for row in rows] == ["reached", "reached"]
     assert rows[0]["total_system_error_max_m"] < rows[1]["total_system_error_max_m"]
     call = f"compare('my_world.yaml', ['rolling_window'], 'in_python', guidance={laws.split(',')})"
-    done = python(f"import wayproof\nprint(wayproof.{call}.table.to_pylist())", tmp_path)
+    done = python("-c", f"import wayproof\nprint(wayproof.{call}.table.to_pylist())", folder=tmp_path)
     assert (done.returncode, said(done)) == (0, [])
     assert repr(rows[1]["total_system_error_max_m"]) in done.stdout
 
@@ -264,7 +243,7 @@ def test_python_shown_runs(name: str, tmp_path: Path) -> None:
     # Each with names of its own, in one process: to import and load all of it takes longer than to run them.
     code = "\n".join(f"exec({block!r}, {{'__name__': '__main__'}})" for block in shown)
     if shown:
-        done = python(code, tmp_path)
+        done = python("-c", code, folder=tmp_path)
         assert (done.returncode, said(done)) == (0, [])
 
 
@@ -276,7 +255,7 @@ def test_ones_own_planner_as_a_distribution_is_found_and_flown(tmp_path: Path) -
     (tmp_path / "pyproject.toml").write_text(project)
     (tmp_path / "my_world.yaml").write_text(scenario)
     build = f"import hatchling.build; hatchling.build.build_wheel({str(tmp_path)!r})"
-    subprocess.run([sys.executable, "-c", build], cwd=tmp_path, capture_output=True, timeout=60, check=True)
+    python("-c", build, folder=tmp_path, check=True)
     (wheel,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "installed")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import gc
 import math
-import subprocess
-import sys
 import weakref
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
+from tests.processes import python
 
 PLANE = LocalPlane(47.0, 8.0)
 SECOND = 60
@@ -65,13 +64,7 @@ def test_threads_that_end_fly_too() -> None:
         "        loops = list(threads.map(make_loop, [scenario] * 8))\n"
         "    assert len({loop.model.state() for loop in loops}) == 1\n"
     )
-    run = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        cwd=Path(__file__).parents[2],
-    )
+    run = python("-c", code)
     assert (run.returncode, run.stdout + run.stderr) == (0, ""), run.stderr
 
 
@@ -87,7 +80,7 @@ def test_a_forked_process_loads_models_too() -> None:
         "    os._exit(7)\n"
         "assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7\n"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60, cwd=Path(__file__).parents[2])
+    python("-c", code, check=True)
 
 
 @pytest.mark.parametrize("wind", WINDS)
@@ -238,19 +231,12 @@ open({out!r}, "w").write(" ".join(value.hex() for value in state))
 @pytest.mark.flights
 @pytest.mark.parametrize("name", VERIFIED)
 def test_two_processes_fly_the_same_bits_in_silence(name: str, tmp_path: Path) -> None:
-    root = Path(__file__).resolve().parents[2]
     results = []
     for run in ("first", "second"):
         work, out = tmp_path / f"{run}-work", tmp_path / run
         work.mkdir()
         code = FLIGHT.format(name=name, airspeed=airframe(name).cruise_mps, out=str(out))
-        done = subprocess.run(
-            [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(root)!r})\n{code}"],
-            cwd=work,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        done = python("-c", code, folder=work, check=True)
         assert (done.stdout, done.stderr) == ("", "")
         assert list(work.iterdir()) == []
         results.append(out.read_text(encoding="utf-8"))

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.processes import ROOT, python
+
 LEAN = sorted(
     {
         ".".join(path.relative_to(ROOT).with_suffix("").parts)
@@ -21,11 +18,9 @@ LEAN = sorted(
 
 
 def loaded_after(*modules: str) -> set[str]:
-    code = f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
-    code += "".join(f"import {module}\n" for module in modules)
+    code = "".join(f"import {module}\n" for module in ("sys", *modules))
     code += "print(*(name.split('.')[0] for name in sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
+    return set(python("-c", code, check=True).stdout.split())
 
 
 def test_importing_the_package_imports_neither_jsbsim_nor_numba_nor_yaml() -> None:

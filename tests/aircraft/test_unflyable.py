@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from aircraft.airframes import airframe
 from aircraft.model_files import OWN_FOLDER
+from tests.processes import python
 from wayproof import InputError, load_scenario
 
 RUDDER = r'      <aerosurface_scale name="rudder">.*?</aerosurface_scale>\n'
@@ -57,12 +56,7 @@ def test_an_engine_that_does_not_run_is_told() -> None:
 def test_a_missing_property_ends_with_status_2(tmp_path: Path) -> None:
     """JSBSim ends the process when it takes such a model down (SIGABRT, 134)."""
     folder = aerosonde_with(tmp_path, ("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"))
-    told = subprocess.run(
-        [sys.executable, "-m", "wayproof", "envelope", str(folder)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    told = python("-m", "wayproof", "envelope", str(folder))
     assert told.returncode == 2
     assert "read the property fcs/nothing" in " ".join(told.stderr.split())
 

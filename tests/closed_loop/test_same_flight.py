@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +15,7 @@ from planner.rolling_window.planner import RollingWindow
 from tests.closed_loop.small import small_world
 from tests.longer import longer
 from tests.point_mass import PointMass
+from tests.processes import python
 from wayproof import PlanRequest, load_scenario
 
 ROOT = Path(__file__).parents[2]
@@ -25,14 +23,9 @@ ROOT = Path(__file__).parents[2]
 
 def digest_of(folder: Path, scenario: str, *options: str, hash_seed: int = 0, status: int = 0) -> str:
     """Flies in a process of its own."""
-    run = subprocess.run(
-        [sys.executable, "-m", "harness", "fly", scenario, "--out", str(folder), "--quiet", *options],
-        cwd=folder.parent,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": str(hash_seed)},
-        timeout=120,
-        check=False,
-    )
-    assert run.returncode == status
+    words = ("-m", "harness", "fly", scenario, "--out", str(folder), "--quiet", *options)
+    run = python(*words, folder=folder.parent, environment={"PYTHONHASHSEED": str(hash_seed)})
+    assert run.returncode == status, run.stderr
     digest: str = json.loads((folder / "metrics.json").read_text())["digest"]
     return digest
 

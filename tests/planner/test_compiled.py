@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
-import subprocess
 import sys
 from functools import partial
 from pathlib import Path
@@ -15,6 +13,7 @@ import pytest
 from planner import compiled
 from planner.compiled import FLOAT, ROWS, Compiled
 from planner.kernels.fans import encircled
+from tests.processes import ROOT, python
 
 
 def twice(x: float) -> float:
@@ -37,16 +36,10 @@ def names_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def ran(source: str, folder: Path, **environment: str) -> list[str]:
-    """What a program writes that is run in another folder."""
-    run = subprocess.run(
-        [sys.executable, "-c", source],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": os.getcwd(), **environment},
-        check=True,
-        cwd=folder,
-    )
-    return run.stdout.split()
+    """What a program writes that is run in another folder, whose modules it finds."""
+    places = (ROOT, folder)
+    done = python("-c", source, folder=folder, path=places, environment=environment, check=True)
+    return done.stdout.split()
 
 
 def test_to_import_planners_compiles_nothing(tmp_path: Path) -> None:
@@ -124,8 +117,8 @@ made.compile()
 print(made.anew)
 """
     (tmp_path / "keepable.py").write_text("def twice(x):\n    return 2.0 * x\n")
-    paths = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{os.getcwd()}{os.pathsep}{tmp_path}"}
-    assert [ran(source, tmp_path, **paths) for _ in range(2)] == [["True"], ["False"]]
+    cache = str(tmp_path / "cache")
+    assert [ran(source, tmp_path, NUMBA_CACHE_DIR=cache) for _ in range(2)] == [["True"], ["False"]]
 
 
 @pytest.mark.flights
@@ -162,6 +155,5 @@ for folder, processors, python, starts_bytes in (
         for number, name in enumerate("abc"):
             text = f"@compiled('float64')\ndef it(x):\n    return x + {number}\n"
             (tmp_path / folder / f"{name}.py").write_text(f"from planner.compiled import compiled\n{text}")
-    paths = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{os.getcwd()}{os.pathsep}{tmp_path}"}
-    said = ran(source, tmp_path, **paths)
+    said = ran(source, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     assert said == [word for folder in here for word in (folder, "1.0", "2.0", "3.0", here[folder])]

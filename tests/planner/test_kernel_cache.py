@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.processes import ROOT, python
+
 KERNEL = "import numba\n@numba.njit('float64(float64)', cache=True)\ndef twice(x):\n    return 2.0 * x\n"
 CALL = """
 from planner.kernel_cache import seal
@@ -22,12 +20,8 @@ print(kernel.twice(21.0), sum(kernel.twice.stats.cache_hits.values()))
 
 def called(folder: Path) -> tuple[str, list[str]]:
     """What the kernel gives and how often it was loaded; the lines on standard error."""
-    path = f"{ROOT}{os.pathsep}{folder}"
-    done = subprocess.run(
-        [sys.executable, "-c", CALL],
-        env={**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(folder / "cache")},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+    cache = {"NUMBA_CACHE_DIR": str(folder / "cache")}
+    done = python("-c", CALL, path=(ROOT, folder), environment=cache, check=True)
     return done.stdout.strip(), done.stderr.splitlines()
 
 
@@ -66,15 +60,19 @@ def test_linear_algebra_of_a_users_kernel_is_there_when_it_is_asked_for(tmp_path
     head = "import numba\nimport numpy as np\n@numba.njit('float64[:, ::1](float64[:, ::1])', cache=True)\n"
     (tmp_path / "kernel.py").write_text(f"{head}def algebra(x):\n{body}")
     (tmp_path / "plain.py").write_text(KERNEL)
-    path = f"{ROOT}{os.pathsep}{tmp_path}"
-    keys = {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     for hits in ("0", "1"):
-        done = subprocess.run(
-            [sys.executable, "-c", ALGEBRA], env=keys, capture_output=True, text=True, check=True
-        )
+        done = python("-c", ALGEBRA, path=(ROOT, tmp_path), environment=cache, check=True)
         *numbers, loaded = done.stdout.split()
         assert [float(each) for each in numbers] == pytest.approx([1.5, -1.0, -1.0, 3.0])
         assert loaded == hits
+
+
+def assert_sealed(folder: Path) -> None:
+    """There is machine code, and each file ends in the SHA-256 of what stands before that."""
+    files = [file.read_bytes() for file in folder.rglob("*.nbc")]
+    assert files
+    assert all(sha256(data[:-32]).digest() == data[-32:] for data in files)
 
 
 LIST = """
@@ -87,20 +85,12 @@ main(["list", "aircraft"])
 
 @pytest.mark.flights
 def test_what_a_survey_compiles_is_sealed(tmp_path: Path) -> None:
-    """As first command on a machine; each file ends in the SHA-256 of what stands before that."""
-    keys = {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path)}
+    """As first command on a machine."""
+    keys = {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path)}
     for flown in (True, False):
-        done = subprocess.run(
-            [sys.executable, "-c", LIST],
-            env={**os.environ, **keys},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        done = python("-c", LIST, environment=keys, check=True)
         assert ("flown for the figures" in done.stderr) == flown
-    files = [file.read_bytes() for file in tmp_path.rglob("*.nbc")]
-    assert files
-    assert all(sha256(data[:-32]).digest() == data[-32:] for data in files)
+    assert_sealed(tmp_path)
 
 
 CARD = """
@@ -114,9 +104,6 @@ def test_what_the_card_of_a_law_compiles_is_sealed(tmp_path: Path) -> None:
     """The second time the aircraft has been surveyed, but no card of the law is there, nor any machine code."""
     for period_s in (18.0, 19.0):
         code = tmp_path / f"code{period_s:g}"
-        keys = {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(code)}
-        text = CARD.replace("PERIOD", str(period_s))
-        subprocess.run([sys.executable, "-c", text], env={**os.environ, **keys}, check=True)
-        files = [file.read_bytes() for file in code.rglob("*.nbc")]
-        assert files
-        assert all(sha256(data[:-32]).digest() == data[-32:] for data in files)
+        keys = {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(code)}
+        python("-c", CARD.replace("PERIOD", str(period_s)), environment=keys, check=True)
+        assert_sealed(code)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +11,7 @@ import pytest
 
 import wayproof
 from tests.harness.api.worlds import SCENARIO, small, source_file
+from tests.processes import python
 
 CAMPAIGN = """
 schema: wayproof/campaign/1
@@ -65,21 +64,12 @@ def test_planners_are_compared_and_one_of_them_comes_from_a_file(
 def test_a_script_needs_no_guard(tmp_path: Path) -> None:
     (tmp_path / "short.yaml").write_text(SCENARIO)
     (tmp_path / "two.yaml").write_text(CAMPAIGN)
-    script = tmp_path / "script.py"
-    script.write_text(
+    (tmp_path / "script.py").write_text(
         "import wayproof\nprint('begun')\n"
         "print(wayproof.sweep('two.yaml', out='swept', workers=1).outcomes)\n"
         "print(wayproof.compare('short.yaml', ['bug2'], out='compared').all_reached)\n"
     )
-    done = subprocess.run(
-        [sys.executable, script],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
+    done = python("script.py", folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.splitlines() == ["begun", "{'reached': 2}", "True"]
 

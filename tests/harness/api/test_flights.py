@@ -5,11 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import pickle
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -23,6 +21,7 @@ from harness.cli.app import main
 from harness.scenario.kinds import GUIDANCE, PLANNER, guidance_kinds
 from harness.scenario.performance import mission_of
 from tests.harness.api.worlds import SCENARIO, Beeline, small, source_file
+from tests.processes import python
 
 CONTRACT = (
     "time_s east_m north_m up_m course_deg heading_deg roll_deg pitch_deg airspeed_mps groundspeed_mps "
@@ -292,6 +291,5 @@ def test_importing_it_loads_nothing_heavy() -> None:
         "import sys, wayproof; heavy = {'numpy', 'pydantic', 'numba', 'pyarrow', 'rerun', 'harness'} & {*sys.modules};"
         "sys.exit(', '.join(heavy) or 0)"
     )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    done = python("-c", code)
     assert (done.returncode, done.stderr) == (0, "")

@@ -24,6 +24,7 @@ from tests.harness.campaign.test_sweep import (
     start,
     wait_for,
 )
+from tests.processes import python
 
 LOCAL = "127.0.0.1"
 
@@ -194,22 +195,8 @@ def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.Captur
     assert main(["sweep", str(place / "campaign.yaml"), "--scheduler", address, "--out", str(out)]) == 2
     assert f"no Dask scheduler answers at {address}" in capsys.readouterr().err
     assert not out.exists()
-    words = [
-        "sweep",
-        "campaign.yaml",
-        "--scheduler",
-        "tcp://no-such-host:8786",
-        "--unencrypted",
-        "--out",
-        "nowhere",
-    ]
-    nobody = subprocess.run(
-        [sys.executable, "-m", "harness", *words],
-        cwd=place,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-    )
+    words = "sweep campaign.yaml --scheduler tcp://no-such-host:8786 --unencrypted --out nowhere"
+    nobody = python("-m", "harness", *words.split(), folder=place)
     line = "wayproof: no Dask scheduler answers at tcp://no-such-host:8786; start one there\n"
     assert (nobody.returncode, nobody.stderr) == (2, line), "no traceback at its end"
     for options, said in (

@@ -18,8 +18,8 @@ import pytest
 from harness.cli.app import main
 from harness.scenario import scenario
 from tests.harness.cli.test_terminal import METRICS
+from tests.processes import ROOT, python
 
-ROOT = Path(__file__).parents[3]
 CAMPAIGN = ROOT / "scenarios" / "campaigns" / "forest_planners.yaml"
 SCENARIO = ROOT / "scenarios" / "paper_circles.yaml"
 SLOW = {"jsbsim", "numba", "rerun", "shapely", "pyarrow", "pydantic", "matplotlib", "numpy", "scipy", "yaml"}
@@ -29,15 +29,7 @@ COMMANDS += ["bench", "envelope", "world", "sweep", "certify", "replay"]
 
 def wayproof(*arguments: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Runs the command in a process of its own, in a folder."""
-    return subprocess.run(
-        [sys.executable, "-m", "harness", *arguments],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)} | environment,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    return python("-m", "harness", *arguments, folder=folder, environment=environment)
 
 
 def test_help_lists_the_commands_and_fits_80_columns(tmp_path: Path) -> None:
@@ -89,15 +81,7 @@ assert main({words!r}) == 0
 print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
 """
     main(["validate", "paper_circles"])  # flies the aircraft, once
-    run = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert run.stderr == "[]\n"
+    assert python("-c", code, folder=tmp_path, check=True).stderr == "[]\n"
 
 
 @pytest.mark.parametrize(

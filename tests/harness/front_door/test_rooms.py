@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
-FRONT_DOOR = ROOT / "harness" / "front_door"
+from tests.processes import python
 
 
 def run(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Python in a folder, which it searches first."""
-    path = os.pathsep.join(("", str(ROOT), str(FRONT_DOOR)))
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    return python("-c", code, folder=folder)
 
 
 @pytest.mark.parametrize("room", ["planner", "harness"])

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 import re
-import subprocess
-import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -23,9 +20,9 @@ from harness.mapping.scan import RangeScan
 from harness.scenario.performance import mission_of
 from tests.closed_loop.small import small_world as world
 from tests.harness.learning.steering import flown
+from tests.processes import ROOT, python
 from wayproof import Scenario
 
-ROOT = Path(__file__).parents[3]
 ID = "wayproof/Waypoints-v0"
 TREE = {"circle": {"center_m": [1500.0, 1640.0], "radius_m": 150.0}}
 
@@ -182,15 +179,7 @@ def test_a_step_before_the_first_reset_is_told() -> None:
     ],
 )
 def test_the_environments_are_known_in_whatever_order_things_are_imported(code: str, tmp_path: Path) -> None:
-    paths = os.pathsep.join([str(ROOT), str(ROOT / "harness" / "front_door")])
-    run = subprocess.run(
-        [sys.executable, "-W", "error::UserWarning", "-c", code],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    run = python("-W", "error::UserWarning", "-c", code, folder=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")
 
 
