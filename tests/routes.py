@@ -1,4 +1,4 @@
-"""Points of a route at an arc length, from the closed form of each segment."""
+"""Routes of pieces, and their points at an arc length, from the closed form of each segment."""
 
 from __future__ import annotations
 
@@ -6,6 +6,15 @@ import numpy as np
 
 from aircraft.interface import Route
 from aircraft.route import arc_point
+
+
+def route_of(*pieces: tuple[float, float], loiter: bool = False) -> Route:
+    """A route from (0, 0) northwards, of curvatures (1/m, positive left) and lengths (m)."""
+    rows, point = [], (0.0, 0.0, 0.0, 1.0)
+    for curvature, length in pieces:
+        rows.append((*point, curvature, length))
+        point = arc_point(rows[-1], length)
+    return Route(np.array(rows), loiter)
 
 
 def route_point(route: Route, arc_length_m: float) -> tuple[float, float, float, float]:

@@ -10,7 +10,8 @@ from aircraft.guidance.npfg import NpfgConfig, NpfgInput, npfg
 from aircraft.guidance.pure_pursuit import PurePursuitConfig, look_ahead_distance, pure_pursuit
 from aircraft.guidance.vector_field import VectorFieldConfig, VectorFieldLaw, line_course, orbit_course
 from aircraft.interface import GRAVITY_MPS2, AircraftState
-from tests.contracts.test_guidance_contract import LINE, Point, route_of
+from tests.contracts.test_guidance_contract import LINE, Point
+from tests.routes import route_of
 
 LIMITS = GuidanceLimits(25.0, 30.0, math.radians(45.0), 1.0, 0.25, 0.03, 1.44)
 FIELD = VectorFieldConfig().resolved(LIMITS)

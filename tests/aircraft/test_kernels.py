@@ -15,8 +15,8 @@ from aircraft.guidance.interface import GuidanceOutput
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import AircraftState, Route
-from aircraft.route import arc_point, route_length
-from tests.routes import route_point
+from aircraft.route import route_length
+from tests.routes import route_of, route_point
 
 LIMITS = airframe("aerosonde").guidance_limits()
 CIRCLE = (1.0 / 120.0, math.tau * 120.0)
@@ -38,11 +38,7 @@ def drawn(rng: np.random.Generator) -> Route:
         (float(rng.choice((0.0, *rng.uniform(-1e-2, 1e-2, 2)))), float(rng.uniform(1.0, 2000.0)))
         for _ in range(rng.integers(1, 6))
     ]
-    rows, place = [], (0.0, 0.0, 0.0, 1.0)
-    for curvature, length in [*pieces, CIRCLE] if loiter else pieces:
-        rows.append((*place, curvature, length))
-        place = arc_point(rows[-1], length)
-    return Route(np.array(rows), loiter)
+    return route_of(*pieces, *([CIRCLE] if loiter else []), loiter=loiter)
 
 
 def near(route: Route, arc_length_m: float, rng: np.random.Generator) -> AircraftState:

@@ -11,22 +11,12 @@ from aircraft.airframes import airframe
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.guidance.waypoints import WaypointLaw, acceptance, mission_waypoints
 from aircraft.interface import AircraftState, Route
-from aircraft.route import arc_point
 from aircraft.start import StartConditions
 from harness.scenario.kinds import guidance_kinds
 from tests.point_mass import PointMass
+from tests.routes import route_of
 
-
-def joined(*pieces: tuple[float, float], loiter: bool = False) -> Route:
-    """Segments of a curvature and a length one after the other, from (0, 0) northwards."""
-    point, rows = (0.0, 0.0, 0.0, 1.0), []
-    for curvature, length in pieces:
-        rows.append((*point, curvature, length))
-        point = arc_point(rows[-1], length)
-    return Route(np.array(rows), loiter)
-
-
-RIGHT_ANGLE = joined((0.0, 400.0), (-0.01, 50.0 * math.pi), (0.0, 400.0))
+RIGHT_ANGLE = route_of((0.0, 400.0), (-0.01, 50.0 * math.pi), (0.0, 400.0))
 """North, round a corner at (0, 500), east."""
 
 
@@ -52,22 +42,22 @@ def test_waypoints_are_the_corners_that_arcs_round() -> None:
 
 
 def test_half_a_turn_has_two_corners() -> None:
-    points = mission_waypoints(joined((0.0, 400.0), (-0.01, 100.0 * math.pi), (0.0, 400.0)))
+    points = mission_waypoints(route_of((0.0, 400.0), (-0.01, 100.0 * math.pi), (0.0, 400.0)))
     assert points == pytest.approx(np.array([[0, 0], [0, 500], [200, 500], [200, 0]]), abs=1e-9)
 
 
 def test_before_a_loiter_the_last_waypoint_is_where_it_begins() -> None:
     circle = (0.01, 200.0 * math.pi)
-    assert mission_waypoints(joined((0.0, 400.0), circle, loiter=True)) == pytest.approx(
+    assert mission_waypoints(route_of((0.0, 400.0), circle, loiter=True)) == pytest.approx(
         np.array([[0, 0], [0, 400]])
     )
-    alone = mission_waypoints(joined(circle, loiter=True))
+    alone = mission_waypoints(route_of(circle, loiter=True))
     assert alone == pytest.approx(np.array([[0, -1], [0, 0]]))
 
 
 @pytest.mark.parametrize("length", [0.3, 1e-6])
 def test_a_route_of_next_to_no_length_is_a_leg_all_the_same(length: float) -> None:
-    start, end = mission_waypoints(joined((0.0, length)))
+    start, end = mission_waypoints(route_of((0.0, length)))
     assert math.dist(start, end) == pytest.approx(1.0)
     assert end == pytest.approx([0.0, length])
 
@@ -95,7 +85,7 @@ def test_goes_on_to_the_next_leg_within_the_acceptance_radius_and_where_it_has_p
 def test_a_loiter_is_flown_as_a_circle() -> None:
     law = Watched()
     legs = WaypointLaw(law, "preview", lambda speed, turn: 60.0)
-    legs.follow(joined((0.0, 400.0), (0.01, 200.0 * math.pi), loiter=True))
+    legs.follow(route_of((0.0, 400.0), (0.01, 200.0 * math.pi), loiter=True))
     legs.update(at(0.0, 399.0))
     assert [route.loiter for route in law.routes] == [False]
     legs.update(at(0.0, 401.0))

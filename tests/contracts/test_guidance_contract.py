@@ -23,12 +23,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
-
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
 from aircraft.guidance.registry import BUILT_IN, GuidanceKind
 from aircraft.interface import GRAVITY_MPS2
-from aircraft.route import arc_point
+from tests.routes import route_of
 from wayproof import AircraftState, GuidanceLimits, GuidanceOutput, Route
 
 README = Path(__file__).parents[2] / "aircraft" / "README.md"
@@ -67,15 +65,6 @@ class Point(NamedTuple):
         north = self.north_m + step_s * speed * math.cos(middle)
         time_s = round(self.time_s + step_s, 6)
         return Point(east, north, self.heading_rad + turn, roll, time_s, self.wind_east_mps)
-
-
-def route_of(*pieces: tuple[float, float], loiter: bool = False) -> Route:
-    """A route from (0, 0) northwards, of curvatures (1/m, positive left) and lengths (m)."""
-    rows, point = [], (0.0, 0.0, 0.0, 1.0)
-    for curvature, length in pieces:
-        rows.append((*point, curvature, length))
-        point = arc_point(rows[-1], length)
-    return Route(np.array(rows), loiter)
 
 
 LINE = route_of((0.0, 20_000.0))

@@ -24,11 +24,12 @@ PIECES = st.lists(
     min_size=1,
     max_size=6,
 )
+ASLANT = Pose(0.0, 0.0, 0.6, 0.8)
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 1000.0)]))
 
 
-def path_of(pieces: list[tuple[float, float]]) -> Path:
-    pose = Pose(0.0, 0.0, 0.6, 0.8)
+def path_of(pose: Pose, pieces: list[tuple[float, float]]) -> Path:
+    """A path from a pose, of curvatures and lengths."""
     rows = []
     for curvature, length in pieces:
         rows.append((*pose, curvature, length))
@@ -46,7 +47,7 @@ def dense_line(path: Path, integrated: Integrated) -> shapely.LineString:
 def test_distances_and_their_stations(
     pieces: list[tuple[float, float]], seed: int, integrated: Integrated
 ) -> None:
-    path = path_of(pieces)
+    path = path_of(ASLANT, pieces)
     points = np.random.default_rng(seed).uniform(-1500.0, 1500.0, (40, 2))
     distance, arc_length_m = distances(path, points)
     line = dense_line(path, integrated)
@@ -62,7 +63,7 @@ def test_distances_and_their_stations(
 def test_a_breach_is_told_where_and_only_where_there_is_one(
     pieces: list[tuple[float, float]], seed: int, radius: float, integrated: Integrated
 ) -> None:
-    path = path_of(pieces)
+    path = path_of(ASLANT, pieces)
     points = np.random.default_rng(seed).uniform(-1500.0, 1500.0, (6, 2))
     nearest = shapely.distance(dense_line(path, integrated), shapely.points(points))
     assume(np.abs(nearest - radius).min() > 0.01)
@@ -104,7 +105,7 @@ def test_a_second_pass_is_a_breach_where_the_first_does_not_count() -> None:
 def test_inside_bounds(
     pieces: list[tuple[float, float]], seed: int, full: bool, integrated: Integrated
 ) -> None:
-    path = path_of(pieces)
+    path = path_of(ASLANT, pieces)
     if full:
         end = along(path.segments[-1], float(path.segments[-1, 5]))
         path = Path(np.array([*path.segments.tolist(), full_turn(end, 300.0, 1.0)]))

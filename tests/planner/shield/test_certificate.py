@@ -12,11 +12,12 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.geometry.curves import Limits, along, between, pose_at, poses_at, sample
+from planner.geometry.curves import Limits, Pose, between, pose_at, poses_at, sample
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, Path
 from planner.shield.certificate import Certified, Certifier, disc_radius_m
 from tests.examples import examples
+from tests.planner.geometry.test_clearance import path_of
 from tests.planner.rolling_window.test_rolling_window import Seen
 
 AssertFlyable = Callable[[Path, float], None]
@@ -26,6 +27,7 @@ LIMITS = Limits(RADIUS, ROLL)
 CERTIFIER = Certifier(LIMITS, KEEP, HORIZON, SPACING)
 DISC_M = disc_radius_m(RADIUS, KEEP)
 WIDE = (-1e4, -1e4, 1e4, 1e4)
+EAST = Pose(0.0, 0.0, 1.0, 0.0)
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 1500.0)]))
 PIECES = st.lists(
     st.tuples(st.sampled_from([0.0, 1 / 300.0, -1 / 180.0, 1 / 120.0, -1 / 100.0]), st.floats(50.0, 500.0)),
@@ -58,15 +60,6 @@ class FreeDiscs(Seen):
 def terrain(points: FloatArray | None = None) -> Terrain:
     points = np.zeros((0, 2)) if points is None else points
     return Terrain(points, np.full(len(points), KEEP), WIDE)
-
-
-def bent(pieces: list[tuple[float, float]]) -> Path:
-    rows = []
-    pose: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
-    for curvature, length in pieces:
-        rows.append((*pose, curvature, length))
-        pose = along(rows[-1], length)
-    return Path(np.array(rows))
 
 
 def filled_disc(path: Path, radius: float, spacing: float) -> FloatArray:
@@ -110,7 +103,7 @@ def test_what_is_certified_is_free_everywhere(
     pieces: list[tuple[float, float]], seed: int, count: int, assert_flyable: AssertFlyable
 ) -> None:
     rng = np.random.default_rng(seed)
-    path = bent(pieces)
+    path = path_of(EAST, pieces)
     on_it = poses_at(path, rng.uniform(0.0, path.length_m, count))[:, :2]
     discs = np.column_stack((on_it + rng.normal(0.0, 80.0, (count, 2)), rng.uniform(150.0, 500.0, count)))
     seen = FreeDiscs(np.concatenate((discs, [(0.0, 0.0, 60.0)])))
@@ -165,7 +158,7 @@ def test_a_path_that_bends_behind_something_in_a_gap_is_left_straight_on(
     assert_flyable: AssertFlyable,
 ) -> None:
     # Beyond the gap the path turns left, to where nothing was seen; the view goes straight on, to room on the right.
-    path = bent([(0.0, 650.0), (1.0 / RADIUS, 0.5 * math.pi * RADIUS), (0.0, 900.0)])
+    path = path_of(EAST, [(0.0, 650.0), (1.0 / RADIUS, 0.5 * math.pi * RADIUS), (0.0, 900.0)])
     lane = [(x, 0.0, 70.0) for x in np.arange(0.0, 900.0, 20.0)]
     seen = FreeDiscs(np.array([*lane, (950.0, -100.0, 180.0)]))
     points = np.array([(600.0, -60.0), (600.0, 60.0)])
@@ -199,7 +192,7 @@ def test_a_tip_inside_the_circle_but_not_on_it_forbids_the_turn() -> None:
 
 
 def test_a_turn_against_the_bend_of_the_path_begins_after_room_to_roll(assert_flyable: AssertFlyable) -> None:
-    path = bent([(1 / 200.0, 300.0), (0.0, 1.0)])
+    path = path_of(EAST, [(1 / 200.0, 300.0), (0.0, 1.0)])
     seen = FreeDiscs(np.array([(100.0, 0.0, 3000.0)]))
     x, y, tx, ty = pose_at(path, path.length_m)
     # Points to the left of the end leave only turns to the right.
@@ -215,7 +208,7 @@ def test_a_turn_against_the_bend_of_the_path_begins_after_room_to_roll(assert_fl
 def test_a_turn_that_begins_after_room_to_roll_is_free_where_it_is_flown() -> None:
     fine, roll = 4.0, 60.0
     certifier = Certifier(Limits(RADIUS, roll), KEEP, HORIZON, fine)
-    path = bent([(1 / 200.0, 300.0)])
+    path = path_of(EAST, [(1 / 200.0, 300.0)])
     x, y, tx, ty = pose_at(path, path.length_m)
     # Free is the path, and the disc of a right turn that begins at its end without rolling.
     on_it = sample(path, 5.0)
