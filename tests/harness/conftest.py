@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -9,11 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.cli.app import main
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from tests.harness.breaking import SCENARIO
 from tests.page import NoBrowserError, browser
 from wayproof import Path, Plan, PlanPicture, PlanStatus
 
+Checked = Callable[..., tuple[int, Any]]
 MakeTrack = Callable[..., Track]
 MakePlan = Callable[..., AcceptedPlan]
 
@@ -106,6 +109,18 @@ def straight_plan() -> AcceptedPlan:
 @pytest.fixture
 def circle_plan() -> AcceptedPlan:
     return plan([(500.0, 0.0, 0.0, 1.0, 1 / 500.0, math.tau * 500.0)])
+
+
+@pytest.fixture
+def checked(tmp_path: FilePath, capsys: pytest.CaptureFixture[str]) -> Checked:
+    """Flies a path with the command `check` into the folder `run`: exit status and metrics."""
+
+    def fly(path: FilePath, *options: str) -> tuple[int, Any]:
+        aircraft = [] if "--aircraft" in options else ["--aircraft", "aerosonde"]
+        given = [*aircraft, "--no-recording", "--json", "--out", str(tmp_path / "run"), *options]
+        return main(["check", str(path), *given]), json.loads(capsys.readouterr().out)
+
+    return fly
 
 
 @pytest.fixture

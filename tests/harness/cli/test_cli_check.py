@@ -14,20 +14,13 @@ from rerun.chunk import RrdReader
 
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
+from tests.harness.conftest import Checked
 from tests.scenarios import scenario_of
 from wayproof import InputError, check
 
 STRIP = "x_m,y_m\n0,0\n0,2000\n60,2000\n60,0\n"
 """Two corners 60 m apart: too tight for an Aerosonde."""
 CIRCUIT = "x_m,y_m\n0,0\n0,2000\n1500,2000\n1500,0\n0,0\n"
-
-
-def flown(path: Path, out: Path, *options: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, Any]:
-    """Exit status and metrics of a check."""
-    aircraft = [] if "--aircraft" in options else ["--aircraft", "aerosonde"]
-    given = [*aircraft, "--no-recording", "--json", "--out", str(out), *options]
-    status = main(["check", str(path), *given])
-    return status, json.loads(capsys.readouterr().out)
 
 
 @pytest.fixture
@@ -72,13 +65,11 @@ def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
     assert (scenario.mission.start_m, scenario.mission.goal_m) == ((0.0, 0.0), (60.0, 2000.0))
 
 
-def test_a_circuit_is_flown_to_its_end_and_is_trackable(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_circuit_is_flown_to_its_end_and_is_trackable(tmp_path: Path, checked: Checked) -> None:
     path = tmp_path / "circuit.csv"
     path.write_text(CIRCUIT)
     options = ["--corner-m", "120", "--wind", "6,200", "--turbulence", "light"]
-    status, said = flown(path, tmp_path / "run", *options, capsys=capsys)
+    status, said = checked(path, *options)
     assert status == 0
     assert said == json.loads((tmp_path / "run" / "metrics.json").read_text())
     assert said["outcome"] == "reached"
@@ -88,12 +79,10 @@ def test_a_circuit_is_flown_to_its_end_and_is_trackable(
     assert not (tmp_path / "run" / "flight.rrd").exists()
 
 
-def test_an_end_that_is_passed_far_off_is_not_reached(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_end_that_is_passed_far_off_is_not_reached(tmp_path: Path, checked: Checked) -> None:
     path = tmp_path / "path.csv"
     path.write_text("x_m,y_m\n0,0\n2400,0\n1900,500\n3000,700\n7000,0\n")
-    status, said = flown(path, tmp_path / "run", "--aircraft", "T38", capsys=capsys)
+    status, said = checked(path, "--aircraft", "T38")
     track = load_run(tmp_path / "run").track
     off_m = math.dist((track.east_m[-1], track.north_m[-1]), (7000.0, 0.0))
     assert off_m > 1000.0
@@ -163,24 +152,20 @@ def test_an_aircraft_that_flies_through_a_circle_is_told_so_everywhere(
     assert "obstacles[0] (obstacle)" in page
 
 
-def test_what_keeps_off_obstacles_and_bounds_is_flown_as_given(
-    straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_keeps_off_obstacles_and_bounds_is_flown_as_given(straight: Path, checked: Checked) -> None:
     beside = CIRCLE.replace("[100, 800]", "[200, 800]")
     bounds = "area.bounds_m=[-400, -100, 400, 1600]"
-    status, metrics = flown(straight, tmp_path / "run", "--set", beside, "--set", bounds, capsys=capsys)
+    status, metrics = checked(straight, "--set", beside, "--set", bounds)
     assert (status, metrics["contact"], metrics["breaches"]) == (0, False, [])
     assert metrics["min_clearance_m"] == pytest.approx(50.0, abs=0.5)
     assert metrics["deviation_from_given_m"]["max"] < 1.0
-    status, metrics = flown(
-        straight, tmp_path / "run", "--set", bounds.replace("1600", "1200"), capsys=capsys
-    )
+    status, metrics = checked(straight, "--set", bounds.replace("1600", "1200"))
     (left,) = metrics["breaches"]
     assert (status, left["name"]) == (1, "area.bounds_m")
 
 
 def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(
-    straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    straight: Path, tmp_path: Path, checked: Checked
 ) -> None:
     world = tmp_path / "world.yaml"
     world.write_text(
@@ -188,24 +173,20 @@ def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(
         f"{CIRCLE.replace('=', ': ')}\nmission: {{start_m: [-900, 0], goal_m: [-900, 1500], altitude_m: 700}}\n"
         "environment: {wind: {speed_mps: 4, from_deg: 90}}\n"
     )
-    status, metrics = flown(straight, tmp_path / "run", "--scenario", str(world), capsys=capsys)
+    status, metrics = checked(straight, "--scenario", str(world))
     assert (status, [each["name"] for each in metrics["contacts"]]) == (1, ["obstacles[0]"])
     scenario = scenario_of(load_run(tmp_path / "run").scenario_yaml)
     assert (scenario.mission.altitude_m, scenario.mission.start_m) == (700.0, (0.0, 0.0))
     assert scenario.environment.wind is not None
     inside = "obstacles[0].circle.center_m=[0, 100]"
-    status, metrics = flown(
-        straight, tmp_path / "run", "--scenario", str(world), "--set", inside, capsys=capsys
-    )
+    status, metrics = checked(straight, "--scenario", str(world), "--set", inside)
     assert (status, metrics["contacts"][0]["start_s"]) == (1, 0.0)
 
 
 @pytest.mark.parametrize("off_m", [20.0, 3000.0])
-def test_a_path_may_begin_outside_the_area(
-    off_m: float, straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_path_may_begin_outside_the_area(off_m: float, straight: Path, checked: Checked) -> None:
     bounds = f"area.bounds_m=[-400, {off_m}, 400, 5000]"
-    status, metrics = flown(straight, tmp_path / "run", "--set", bounds, capsys=capsys)
+    status, metrics = checked(straight, "--set", bounds)
     (left,) = metrics["breaches"]
     assert (status, metrics["outcome"]) == (1, "reached")
     assert (left["start_s"], left["time_s"] < 1.0) == (0.0, True)
@@ -242,11 +223,11 @@ AROUND: dict[str, Any] = {"inclusion": True, "circle": {"center": [47.006, 8.008
     ],
 )
 def test_the_fences_of_a_mission_are_kept(
-    fences: list[dict[str, Any]], told: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    fences: list[dict[str, Any]], told: list[str], tmp_path: Path, checked: Checked
 ) -> None:
     path = tmp_path / "mission.plan"
     path.write_text(mission(*fences))
-    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    status, metrics = checked(path)
     assert (status, [each["name"] for each in metrics["breaches"]]) == (1 if told else 0, told)
     assert metrics["check"]["ok"] is not bool(told)
     assert metrics["min_clearance_m"] is not None
@@ -262,18 +243,16 @@ def test_a_mission_may_cut_corners_by_its_acceptance_radius(
     status: int,
     allowed_m: float,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    checked: Checked,
 ) -> None:
     path = tmp_path / "mission.plan"
     path.write_text(mission(acceptance_m=acceptance_m))
-    ended, metrics = flown(path, tmp_path / "run", *options, capsys=capsys)
+    ended, metrics = checked(path, *options)
     (corner,) = metrics["check"]["corners"]
     assert (ended, corner["allowed_cut_m"], corner["kept"]) == (status, allowed_m, status == 0)
 
 
-def test_a_polygon_across_a_line_is_no_fence_and_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_polygon_across_a_line_is_no_fence_and_told(tmp_path: Path, checked: Checked) -> None:
     path = tmp_path / "line.geojson"
     ring = [[longitude, latitude] for latitude, longitude in ACROSS["polygon"]]
     shapes = [
@@ -285,7 +264,7 @@ def test_a_polygon_across_a_line_is_no_fence_and_told(
         {"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes
     ]
     path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    status, metrics = checked(path)
     assert (status, metrics["breaches"]) == (0, [])
     assert metrics["check"]["notes"] == [
         f"1 {each} beside the path passed over" for each in ("Polygon", "Point")

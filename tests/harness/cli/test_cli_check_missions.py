@@ -9,7 +9,7 @@ import pytest
 
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
-from tests.harness.cli.test_cli_check import flown
+from tests.harness.conftest import Checked
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real"
 MISSIONS = sorted((REAL / "missions").glob("*")) if REAL.is_dir() else []
@@ -35,7 +35,9 @@ def write(path: Path, *rows: str) -> Path:
 
 
 @pytest.mark.flights
-def test_a_mission_is_flown_item_by_item(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_mission_is_flown_item_by_item(
+    tmp_path: Path, checked: Checked, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = write(
         tmp_path / "m.waypoints",
         row(1, 22, 15, north_m=0, up_m=60),
@@ -48,7 +50,7 @@ def test_a_mission_is_flown_item_by_item(tmp_path: Path, capsys: pytest.CaptureF
         row(8, 16, north_m=6500, up_m=180),
         row(9, 21, north_m=9000, up_m=0),
     )
-    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    status, metrics = checked(path)
     assert (status, metrics["check"]["verdict"].partition(":")[0]) == (0, "yes")
     assert [item["what"] for item in metrics["check"]["items"]] == [
         *("flown", "flown", "passed over", "flown", "flown", "flown", "not flown", "flown", "flown")
@@ -84,26 +86,22 @@ def test_an_item_that_is_not_reached_and_keeps_autopilots_from_loading_the_missi
 
 
 @pytest.mark.parametrize(("up_m", "cause"), [(700.0, "climb too steep"), (-320.0, "descent too steep")])
-def test_what_is_too_steep_is_told(
-    up_m: float, cause: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_too_steep_is_told(up_m: float, cause: str, tmp_path: Path, checked: Checked) -> None:
     path = write(
         tmp_path / "m.waypoints",
         *(row(1, 16, up_m=100), row(2, 16, north_m=1000, up_m=100), row(3, 16, north_m=2000, up_m=up_m)),
     )
-    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    status, metrics = checked(path)
     assert status == 1
     assert {leg["cause"] for leg in metrics["trackability"] if not leg["trackable"]} == {cause}
 
 
-def test_a_drawn_line_with_altitudes_is_flown_up_and_down(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_drawn_line_with_altitudes_is_flown_up_and_down(tmp_path: Path, checked: Checked) -> None:
     path = tmp_path / "stairs.csv"
     path.write_text("x_m,y_m,altitude_m\n0,0,300\n0,1500,400\n0,3000,400\n0,4500,320\n")
-    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    status, metrics = checked(path)
     assert (status, metrics["altitude_error_m"]["max"] < 5.0, len(metrics["trackability"])) == (0, True, 3)
-    status, metrics = flown(path, tmp_path / "run", "--altitude-m", "350", capsys=capsys)
+    status, metrics = checked(path, "--altitude-m", "350")
     track = load_run(tmp_path / "run").track
     assert status == 0
     assert (track.up_m.min(), track.up_m.max()) == pytest.approx((350.0, 350.0), abs=0.1)
@@ -119,26 +117,24 @@ def asc(path: Path) -> Path:
     return path
 
 
-def test_a_path_that_meets_terrain_is_told_where(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_path_that_meets_terrain_is_told_where(tmp_path: Path, checked: Checked) -> None:
     terrain = f"obstacles=[{{file: {{path: {asc(tmp_path / 'ridge.asc')}}}}}]"
     path = tmp_path / "low.csv"
     path.write_text("x_m,y_m,altitude_m\n0,0,400\n0,1000,440\n0,3500,440\n")
-    status, metrics = flown(path, tmp_path / "run", "--set", terrain, capsys=capsys)
+    status, metrics = checked(path, "--set", terrain)
     (contact,) = metrics["contacts"]
     assert (status, contact["kind"], metrics["outcome"]) == (1, "terrain", "collision")
     assert contact["depth_m"] == pytest.approx(60.0, abs=3.0)
     assert 1600.0 < contact["north_m"] < 2400.0
     assert metrics["check"]["verdict"].startswith("no: touches the ground at 74 s")
     path.write_text("x_m,y_m,altitude_m\n0,0,500\n0,1500,550\n0,3500,550\n")
-    status, metrics = flown(path, tmp_path / "run", "--set", terrain, capsys=capsys)
+    status, metrics = checked(path, "--set", terrain)
     assert (status, metrics["contact"]) == (0, False)
     assert 40.0 < metrics["height_above_ground_m"]["min"] < 60.0
 
 
 @pytest.mark.flights
-def test_a_building_is_touched_only_below_its_roof(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Checked) -> None:
     town = tmp_path / "town.geojson"
     corners = [[7.999, 47.009], [8.001, 47.009], [8.001, 47.011], [7.999, 47.011], [7.999, 47.009]]
     shape = {"type": "Polygon", "coordinates": [corners]}
@@ -150,7 +146,7 @@ def test_a_building_is_touched_only_below_its_roof(
         line = {"type": "LineString", "coordinates": places}
         path = tmp_path / "line.geojson"
         path.write_text(json.dumps(line))
-        _, metrics = flown(path, tmp_path / "run", "--set", solid, capsys=capsys)
+        _, metrics = checked(path, "--set", solid)
         assert [each["name"] for each in metrics["contacts"]] == ["town.geojson"] * contacts
 
 
@@ -190,9 +186,9 @@ def test_a_mutilated_mission_is_refused_in_a_line(
 
 @pytest.mark.flights
 @needs_missions
-def test_real_missions_over_their_terrain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_real_missions_over_their_terrain(checked: Checked) -> None:
     path = REAL / "missions" / "ardupilot_ap-terrain.txt"
-    _, metrics = flown(path, tmp_path / "run", "--set", CANBERRA, capsys=capsys)
+    _, metrics = checked(path, "--set", CANBERRA)
     assert [item["what"] for item in metrics["check"]["items"]] == ["flown"] * 7
     assert (metrics["outcome"], metrics["contacts"]) == ("reached", [])
     assert 10.0 < metrics["height_above_ground_m"]["min"] < 20.0
