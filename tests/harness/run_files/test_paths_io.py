@@ -30,6 +30,14 @@ def plan(*items: dict[str, Any], home_m: float = 400.0) -> str:
     return json.dumps({"fileType": "Plan", "mission": mission, "version": 1})
 
 
+def refused(path: Path) -> str:
+    """What is said, in one line, of a file that is none to fly."""
+    with pytest.raises(InputError) as fault:
+        check(path)
+    assert len(str(fault.value).splitlines()) == 1
+    return str(fault.value)
+
+
 def steps_of(path: Path) -> tuple[MissionStep, ...]:
     mission = read_path(path).mission
     assert mission is not None
@@ -205,11 +213,9 @@ BROKEN = {
 def test_says_where_and_what_is_wrong(name: str, text: str, sentence: str, tmp_path: Path) -> None:
     path = tmp_path / name
     path.write_text(text)
-    with pytest.raises(InputError) as fault:
-        check(path)
-    assert str(fault.value).startswith(f"{path}:")
-    assert sentence in str(fault.value)
-    assert len(str(fault.value).splitlines()) == 1
+    said = refused(path)
+    assert said.startswith(f"{path}:")
+    assert sentence in said
 
 
 UNREADABLE = [("missing.csv", "no such file; give"), ("folder.csv", "is a folder, not a file; give")]
