@@ -17,8 +17,6 @@ from tests.page import NoBrowserError, browser
 from wayproof import Path, Plan, PlanPicture, PlanStatus
 
 Checked = Callable[..., tuple[int, Any]]
-MakeTrack = Callable[..., Track]
-MakePlan = Callable[..., AcceptedPlan]
 
 
 def track(rows: int, **columns: Any) -> Track:
@@ -60,6 +58,10 @@ def plan(
     )
 
 
+STRAIGHT_PLAN = plan([(0.0, 0.0, 0.0, 1.0, 0.0, 5000.0)])
+CIRCLE_PLAN = plan([(500.0, 0.0, 0.0, 1.0, 1 / 500.0, math.tau * 500.0)])
+
+
 def circle_track(radius_m: float, seconds: float, speed_mps: float = 25.0) -> Track:
     """A left turn at constant speed round (0, 0), from due east of it."""
     time_s = np.arange(round(10 * seconds) + 1) / 10.0
@@ -84,31 +86,6 @@ def chromium() -> Iterator[Any]:
         except NoBrowserError as error:
             pytest.skip(str(error))
         yield opened
-
-
-@pytest.fixture
-def make_track() -> MakeTrack:
-    return track
-
-
-@pytest.fixture
-def make_plan() -> MakePlan:
-    return plan
-
-
-@pytest.fixture
-def make_circle() -> Callable[..., Track]:
-    return circle_track
-
-
-@pytest.fixture
-def straight_plan() -> AcceptedPlan:
-    return plan([(0.0, 0.0, 0.0, 1.0, 0.0, 5000.0)])
-
-
-@pytest.fixture
-def circle_plan() -> AcceptedPlan:
-    return plan([(500.0, 0.0, 0.0, 1.0, 1 / 500.0, math.tau * 500.0)])
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +10,12 @@ import pytest
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import error_figures, metrics, percentiles
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
+from tests.harness.conftest import CIRCLE_PLAN, circle_track
+from tests.harness.conftest import STRAIGHT_PLAN as STRAIGHT
 from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
 from wayproof import Path
 
-STRAIGHT = make_plan([(0.0, 0.0, 0.0, 1.0, 0.0, 5000.0)])
 LIMITS = FlightLimits(300.0, 200.0, math.radians(45), turn_radius_m=110.0, max_cross_track_m=20.0)
 KEYS = {
     "shield", "outcome", "reason", "flown_length_m", "planned_length_m", "flight_time_s", "min_clearance_m",
@@ -66,10 +66,8 @@ def test_the_least_height_above_ground_is_over_what_is_known() -> None:
     assert metrics(flight(track, STRAIGHT), LIMITS)["min_altitude_above_ground_m"] == 80.0
 
 
-def test_smoothness_of_planned_and_flown_agree_on_a_circle(
-    make_circle: Callable[..., Track], circle_plan: AcceptedPlan
-) -> None:
-    figures = metrics(flight(make_circle(500.0, 60.0), circle_plan), LIMITS)["smoothness"]
+def test_smoothness_of_planned_and_flown_agree_on_a_circle() -> None:
+    figures = metrics(flight(circle_track(500.0, 60.0), CIRCLE_PLAN), LIMITS)["smoothness"]
     assert set(figures) == {"planned", "flown"}
     for name in ("heading_change_deg", "bending_energy_1pm", "max_curvature_1pm"):
         assert figures["flown"][name] == pytest.approx(figures["planned"][name], rel=1e-3)
@@ -104,20 +102,18 @@ def test_planned_length_survives_frequent_replanning() -> None:
     assert (figures["planned_length_m"], figures["replans"]) == (pytest.approx(2500.0), 100)
 
 
-def test_planned_length_counts_every_round_of_a_loiter_and_nothing_beyond_an_end(
-    circle_plan: AcceptedPlan,
-) -> None:
-    once = circle_plan.plan.path
+def test_planned_length_counts_every_round_of_a_loiter_and_nothing_beyond_an_end() -> None:
+    once = CIRCLE_PLAN.plan.path
     assert once is not None
-    for_ever = replace(circle_plan, plan=replace(circle_plan.plan, path=Path(once.segments, loiter=True)))
+    for_ever = replace(CIRCLE_PLAN, plan=replace(CIRCLE_PLAN.plan, path=Path(once.segments, loiter=True)))
     track, beyond = (
         make_track(2001),
         make_track(101, arc_length_m=once.length_m + 10.0 + 2.5 * np.arange(101)),
     )
     for flown, plan, length_m in (
         (track, for_ever, 5000.0),
-        (track, circle_plan, once.length_m),
-        (beyond, circle_plan, 0.0),
+        (track, CIRCLE_PLAN, once.length_m),
+        (beyond, CIRCLE_PLAN, 0.0),
     ):
         assert metrics(flight(flown, plan), LIMITS)["planned_length_m"] == pytest.approx(length_m)
 

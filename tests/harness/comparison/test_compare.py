@@ -10,7 +10,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,13 +22,13 @@ from harness.analysis.metric import number
 from harness.analysis.rows import Row
 from harness.cli.app import main
 from harness.cli.compare import print_comparison
-from harness.flight.record import AcceptedPlan, Track
 from harness.report import figures
 from harness.report.page import Chapter, rendered
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.world.obstacle import Circle, Obstacle
 from tests.harness.campaign.test_sweep import wait_for
+from tests.harness.conftest import CIRCLE_PLAN, circle_track
 from tests.page import shown
 
 ROOT = Path(__file__).parents[3]
@@ -355,16 +355,14 @@ def test_numbers_read_well() -> None:
 
 
 @pytest.fixture
-def drawn(
-    make_circle: Callable[..., Track], circle_plan: AcceptedPlan
-) -> tuple[figures.FigureScene, figures.DrawnRun]:
-    track = make_circle(500.0, 60.0)
+def drawn() -> tuple[figures.FigureScene, figures.DrawnRun]:
+    track = circle_track(500.0, 60.0)
     obstacle = Obstacle(Circle((3000.0, 3000.0), 400.0))
     scene = figures.FigureScene(
         name="a_world", bounds_m=(-1000.0, -1000.0, 5000.0, 5000.0), obstacles=(obstacle,), start_m=(500.0, 0.0),
         goal_m=(4000.0, 4500.0), goal_radius_m=60.0, clearance_m=50.0, turn_radius_m=100.0, optimum_m=np.zeros((0, 2)),
     )  # fmt: skip
-    return scene, figures.DrawnRun("round", "timeout", track, [circle_plan])
+    return scene, figures.DrawnRun("round", "timeout", track, [CIRCLE_PLAN])
 
 
 @pytest.mark.parametrize("changes", [False, True])
@@ -393,9 +391,7 @@ def test_a_planner_that_came_too_near_is_marked_on_the_page() -> None:
         assert f'<td data-planner="fair">{text}</td>' in html
 
 
-def test_a_near_miss_is_enlarged(
-    drawn: tuple[figures.FigureScene, figures.DrawnRun], circle_plan: AcceptedPlan
-) -> None:
+def test_a_near_miss_is_enlarged(drawn: tuple[figures.FigureScene, figures.DrawnRun]) -> None:
     """With the obstacle where it was then, and the clearance that was wanted."""
     scene, run = drawn
     # Half the circle of 500 m is flown in 60 s; at 30 s the obstacle, which came from the west, is north of it.
@@ -417,7 +413,7 @@ def test_a_near_miss_is_enlarged(
     moved_km = np.array((-265.0 + 10.0 * at_s, 610.0)) / 1e3
     assert corners_km.mean(axis=0) == pytest.approx(moved_km, abs=1e-3)
     assert any(np.allclose(line.get_ydata(), scene.clearance_m) for line in clearance.get_lines())
-    crash = figures.DrawnRun("round", "collision", track.part(0, row + 1), [circle_plan])
+    crash = figures.DrawnRun("round", "collision", track.part(0, row + 1), [CIRCLE_PLAN])
     assert planner_figure(scene, crash, 0).axes[1].get_title() == f"its collision, at {at_s:.1f} s"
     assert len(planner_figure(replace(scene, clearance_m=least_m), run, 0).axes) == 1
 

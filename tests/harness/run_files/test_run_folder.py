@@ -13,8 +13,10 @@ import pytest
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.files.errors import RunFolderError
-from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
+from harness.flight.record import AcceptedPlan, Flight, Outcome, digest
 from harness.run_files.run_folder import METRICS, PLANS, TRACK, RunFolder, load_run, recording_of
+from tests.harness.conftest import CIRCLE_PLAN, STRAIGHT_PLAN
+from tests.harness.conftest import track as make_track
 
 REPOSITORY = Path(__file__).parents[3]
 REFEREE = REPOSITORY.parent / "shared" / "tools" / "referee.py"
@@ -31,7 +33,7 @@ planner: {kind: rolling_window, clearance_m: 200}
 """
 
 
-def fly_straight(make_track: Callable[..., Track], plan: AcceptedPlan) -> Flight:
+def fly_straight(plan: AcceptedPlan) -> Flight:
     """100 s north from (0, 0), past a circle at 500 m, to the goal."""
     north = np.arange(1001) * 2.5
     track = make_track(1001, clearance_m=np.hypot(600.0, north - 1250.0) - 100.0)
@@ -45,10 +47,8 @@ def write_run(folder: Path, flight: Flight) -> dict[str, object]:
     return figures
 
 
-def test_run_reads_back_as_written(
-    tmp_path: Path, make_track: Callable[..., Track], circle_plan: AcceptedPlan
-) -> None:
-    flight = fly_straight(make_track, circle_plan)
+def test_run_reads_back_as_written(tmp_path: Path) -> None:
+    flight = fly_straight(CIRCLE_PLAN)
     figures = write_run(tmp_path / "a" / "run", flight)
     run = load_run(tmp_path / "a" / "run")
     assert run.scenario_yaml == SCENARIO
@@ -67,7 +67,7 @@ def test_run_reads_back_as_written(
     assert not list((tmp_path / "a" / "run").glob("*.partial"))
 
 
-def test_run_without_a_plan(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+def test_run_without_a_plan(tmp_path: Path) -> None:
     track = make_track(20, plan_index=-1, cross_track_m=np.nan, arc_length_m=np.nan)
     write_run(tmp_path, Flight(track, (), Outcome.PLANNER_FAILED, "no plan", (), 2.0, 0.1))
     run = load_run(tmp_path)
@@ -78,10 +78,8 @@ def test_run_without_a_plan(tmp_path: Path, make_track: Callable[..., Track]) ->
 @pytest.mark.skipif(
     not REFEREE.exists(), reason=f"needs {REFEREE.name}, which is not part of this repository"
 )
-def test_referee_finds_no_fault(
-    tmp_path: Path, make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
-    write_run(tmp_path, fly_straight(make_track, straight_plan))
+def test_referee_finds_no_fault(tmp_path: Path) -> None:
+    write_run(tmp_path, fly_straight(STRAIGHT_PLAN))
     done = subprocess.run(
         [sys.executable, str(REFEREE), "--json", str(tmp_path)], capture_output=True, text=True, check=False
     )
@@ -104,10 +102,8 @@ def test_a_path_that_is_no_place_for_a_run_is_refused(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["thesis.tex"]
 
 
-def test_former_run_is_removed_and_nothing_else(
-    tmp_path: Path, make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
-    write_run(tmp_path, fly_straight(make_track, straight_plan))
+def test_former_run_is_removed_and_nothing_else(tmp_path: Path) -> None:
+    write_run(tmp_path, fly_straight(STRAIGHT_PLAN))
     (tmp_path / "flight.rrd").write_text("old")
     (tmp_path / "notes.txt").write_text("mine")
     RunFolder.create(tmp_path, SCENARIO, [])
@@ -119,8 +115,6 @@ def test_former_run_is_removed_and_nothing_else(
 @pytest.mark.parametrize("last", [TRACK, PLANS, METRICS, "manifest.json"])
 def test_process_killed_while_finishing_leaves_no_complete_run(
     tmp_path: Path,
-    make_track: Callable[..., Track],
-    straight_plan: AcceptedPlan,
     monkeypatch: pytest.MonkeyPatch,
     last: str,
 ) -> None:
@@ -134,14 +128,12 @@ def test_process_killed_while_finishing_leaves_no_complete_run(
 
     monkeypatch.setattr("harness.run_files.run_folder.os.replace", die_at)
     with pytest.raises(SystemExit):
-        write_run(tmp_path, fly_straight(make_track, straight_plan))
+        write_run(tmp_path, fly_straight(STRAIGHT_PLAN))
     with pytest.raises(RunFolderError, match="incomplete"):
         load_run(tmp_path)
 
 
-def test_metric_that_json_cannot_hold_leaves_the_run_incomplete(
-    tmp_path: Path, make_track: Callable[..., Track]
-) -> None:
+def test_metric_that_json_cannot_hold_leaves_the_run_incomplete(tmp_path: Path) -> None:
     with (
         RunFolder.create(tmp_path, SCENARIO, []) as run,
         pytest.raises(ValueError, match="not JSON compliant"),
@@ -151,12 +143,10 @@ def test_metric_that_json_cannot_hold_leaves_the_run_incomplete(
         load_run(tmp_path)
 
 
-def test_missing_and_damaged_runs_are_told_apart(
-    tmp_path: Path, make_track: Callable[..., Track], straight_plan: AcceptedPlan
-) -> None:
+def test_missing_and_damaged_runs_are_told_apart(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="is not a run folder"):
         load_run(tmp_path)
-    write_run(tmp_path, fly_straight(make_track, straight_plan))
+    write_run(tmp_path, fly_straight(STRAIGHT_PLAN))
     (tmp_path / TRACK).write_bytes(b"PAR1")
     with pytest.raises(RunFolderError, match="is damaged"):
         load_run(tmp_path)
