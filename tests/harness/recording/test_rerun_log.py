@@ -35,7 +35,7 @@ from harness.recording.scene import quaternions
 from harness.recording.summary import summary
 from harness.recording.viewer import NO_DRIVER, ViewerError, _executable, open_viewer, run_names
 from harness.world.obstacle import Circle, Obstacle, Polygon
-from planner.interface import MovingEdges
+from planner.interface import FloatArray, MovingEdges
 from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
 from tests.page import NoBrowserError, browser
@@ -132,13 +132,16 @@ def column(entities: dict[str, Columns], entity: str, ending: str) -> list[Any]:
     return values
 
 
+def numbers(entities: dict[str, Columns], entity: str, ending: str = "scalars") -> FloatArray:
+    return np.array(column(entities, entity, ending), dtype=np.float64)
+
+
+def texts(entities: dict[str, Columns], entity: str, ending: str = "text") -> list[str]:
+    return [str(text) for (text,) in column(entities, entity, ending)]
+
+
 def seconds(entities: dict[str, Columns], entity: str) -> list[float]:
-    times = entities[entity]["sim_time"]
-    return [time.total_seconds() for time in times]
-
-
-def rerun(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([_executable(), *arguments], capture_output=True, text=True, check=False)
+    return [time.total_seconds() for time in entities[entity]["sim_time"]]
 
 
 def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
@@ -154,21 +157,16 @@ def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
         "altitude_error/flown": flight.track.up_m - 300.0,
         "throttle/flown": np.full(1001, 50.0),
     }.items():
-        logged = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64).ravel()
-        np.testing.assert_array_equal(logged[-1001:], values)
+        np.testing.assert_array_equal(numbers(entities, f"/series/{entity}").ravel()[-1001:], values)
     limit_deg = math.degrees(0.78)
     for entity, value in {"clearance/wanted": [100.0], "bank/limit": [-limit_deg, limit_deg]}.items():
-        level = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64)
+        level = numbers(entities, f"/series/{entity}")
         np.testing.assert_allclose(level, np.tile(value, (len(level), 1)))
-        assert (seconds(entities, f"/series/{entity}")[0], seconds(entities, f"/series/{entity}")[-1]) == (
-            0,
-            100,
-        )
-    np.testing.assert_array_equal(np.ravel(column(entities, "/series/search/flown", "scalars")), [2.5, 2.5])
-    np.testing.assert_array_equal(
-        np.ravel(column(entities, "/series/plan_delay/flown", "scalars")), [0.0, 1.5]
-    )
-    clearance = np.array(column(entities, "/series/clearance/flown", "scalars"), dtype=np.float64).ravel()
+        first_s, *_, last_s = seconds(entities, f"/series/{entity}")
+        assert (first_s, last_s) == (0, 100)
+    assert numbers(entities, "/series/search/flown").ravel().tolist() == [2.5, 2.5]
+    assert numbers(entities, "/series/plan_delay/flown").ravel().tolist() == [0.0, 1.5]
+    clearance = numbers(entities, "/series/clearance/flown").ravel()
     assert np.isnan(clearance[:200]).all()
     assert (clearance[200:] == 150.0).all()
     assert seconds(entities, "/series/bank/flown")[:2] == [0.0, 0.1]
@@ -183,7 +181,7 @@ def test_a_path_that_climbs_is_drawn_and_held_against_at_its_altitudes(tmp_path:
     log.on_block(track)
     log.close()
     entities = read(tmp_path / "flight.rrd")
-    error = np.array(column(entities, "/series/altitude_error/flown", "scalars"), dtype=np.float64).ravel()
+    error = numbers(entities, "/series/altitude_error/flown").ravel()
     np.testing.assert_allclose(error, track.up_m - 300.0 - 0.1 * track.arc_length_m)
     ((strip,),) = column(entities, "/world/chosen", "strips")
     np.testing.assert_allclose(np.array(strip)[[0, -1]], [[0.0, 0.0, 300.0], [0.0, 2500.0, 550.0]])
@@ -191,7 +189,7 @@ def test_a_path_that_climbs_is_drawn_and_held_against_at_its_altitudes(tmp_path:
 
 def test_pose_and_trail_follow_the_track(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
-    position = np.array(column(entities, "/world/aircraft", "translation"), dtype=np.float64).reshape(-1, 3)
+    position = numbers(entities, "/world/aircraft", "translation").reshape(-1, 3)
     np.testing.assert_allclose(
         position, np.column_stack((np.zeros(1001), np.arange(1001) * 2.5, np.full(1001, 300.0)))
     )
@@ -210,9 +208,7 @@ def test_scans_are_drawn_as_the_aircraft_goes_on(recording: tuple[Path, Flight])
     times = seconds(entities, "/plan/scan")
     assert times[:3] == [0.0, 2.0, 4.0]
     assert 50.0 in times
-    np.testing.assert_array_equal(
-        column(entities, "/plan/scan", "positions")[0], [[105.0, 7.0], [-195.0, 7.0]]
-    )
+    assert column(entities, "/plan/scan", "positions")[0] == [[105.0, 7.0], [-195.0, 7.0]]
 
 
 def test_what_two_scans_have_shown_is_marked_once(tmp_path: Path) -> None:
@@ -246,9 +242,8 @@ def test_what_should_not_happen_is_a_warning(tmp_path: Path) -> None:
     log.on_event(20.0, "reached: inside the goal circle")
     log.close()
     entities = read(tmp_path / "a.rrd")
-    texts = [str(text) for (text,) in column(entities, "/events", "text")]
-    levels = [str(level) for (level,) in column(entities, "/events", "level")]
-    assert list(zip(texts, levels, strict=True)) == [
+    levels = texts(entities, "/events", "level")
+    assert list(zip(texts(entities, "/events"), levels, strict=True)) == [
         ("t = 5 s: nearer to an obstacle than the wanted 100 m", "WARN"),
         ("t = 15 s: clear of the obstacle again, after 62.5 m at the least", "INFO"),
         ("t = 18 s: no way on", "WARN"),
@@ -311,14 +306,10 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path) -> None:
 def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     assert seconds(entities, "/plan/chosen") == [0.0, 50.0]
-    np.testing.assert_array_equal(
-        column(entities, "/plan/chosen", "strips")[1], [[[0.0, 1250.0], [0.0, 2500.0]]]
-    )
-    np.testing.assert_array_equal(column(entities, "/plan/waypoints", "positions")[0], [[0.0, 0.0]])
-    np.testing.assert_array_equal(column(entities, "/plan/guide", "vectors")[0], [[0.0, 800.0]])
-    np.testing.assert_array_equal(
-        column(entities, "/plan/candidates", "strips")[0], [[[0.0, 0.0], [200.0, 600.0]]]
-    )
+    assert column(entities, "/plan/chosen", "strips")[1] == [[[0.0, 1250.0], [0.0, 2500.0]]]
+    assert column(entities, "/plan/waypoints", "positions")[0] == [[0.0, 0.0]]
+    assert column(entities, "/plan/guide", "vectors")[0] == [[0.0, 800.0]]
+    assert column(entities, "/plan/candidates", "strips")[0] == [[[0.0, 0.0], [200.0, 600.0]]]
     (window,), (sector,) = (column(entities, f"/plan/{name}", "strips")[0] for name in ("window", "sectors"))
     np.testing.assert_allclose(np.hypot(*np.array(window).T), 700.0, rtol=1e-6)
     np.testing.assert_allclose([sector[0], sector[1], sector[-2]], [[0, 0], [700, 0], [0, 700]], atol=1e-3)
@@ -342,34 +333,32 @@ def test_what_the_map_takes_to_move_is_shown_until_it_is_lost(tmp_path: Path) ->
     log.on_block(make_track(301, plan_index=-1))
     log.close()
     entities = read(tmp_path / "a.rrd")
-    times = seconds(entities, "/plan/tracked")
-    np.testing.assert_array_equal(times, [*np.arange(5.0, 20.5), 20.5])
-    np.testing.assert_array_equal(
-        column(entities, "/plan/tracked", "strips")[3], [[(80.0, 0.0), (100.0, 0.0), (120.0, 30.0)]]
-    )
-    np.testing.assert_array_equal(column(entities, "/plan/tracked/velocity", "origins")[3], [(100.0, 10.0)])
-    np.testing.assert_array_equal(column(entities, "/plan/tracked/velocity", "vectors")[3], [(300.0, -30.0)])
+    assert seconds(entities, "/plan/tracked") == [*np.arange(5.0, 20.5), 20.5]
+    assert column(entities, "/plan/tracked", "strips")[3] == [[[80.0, 0.0], [100.0, 0.0], [120.0, 30.0]]]
+    assert column(entities, "/plan/tracked/velocity", "origins")[3] == [[100.0, 10.0]]
+    assert column(entities, "/plan/tracked/velocity", "vectors")[3] == [[300.0, -30.0]]
     for entity, part in (("tracked", "strips"), ("tracked/velocity", "vectors")):
         assert column(entities, f"/plan/{entity}", part)[-1] == [], "cleared when it is lost"
 
 
 def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
-    texts = [str(text) for (text,) in column(entities, "/events", "text")]
-    assert texts == [
+    assert texts(entities, "/events") == [
         "t = 0 s: a way was found (plan 0, 2.5 ms)",
         "t = 50 s: a way was found (plan 1, 2.5 ms, 1.5 s after its scan)",
         "t = 100 s: goal reached",
     ]
-    documents = [str(text) for (text,) in column(entities, "/summary", "text")]
-    assert "stopped before the end" in documents[0]
-    assert "**reached**: in the goal's circle" in documents[-1]
-    assert not documents[-1].startswith("#"), "a heading leaves a low view no room for figures"
-    assert "| flown length | 2.5 km |" in documents[-1]
-    assert "| flight time | 100.0 s |" in documents[-1]
-    assert "name: straight" in documents[-1]
-    figures = json.loads(column(entities, "/__properties/metrics", "json")[0][0])
-    assert figures["outcome"] == "reached"
+    first, *_, last = texts(entities, "/summary")
+    assert "stopped before the end" in first
+    assert not last.startswith("#"), "a heading leaves a low view no room for figures"
+    for told in (
+        "**reached**: in the goal's circle",
+        "| flown length | 2.5 km |",
+        "| flight time | 100.0 s |",
+        "name: straight",
+    ):
+        assert told in last
+    assert json.loads(column(entities, "/__properties/metrics", "json")[0][0])["outcome"] == "reached"
 
 
 def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Path, Flight]) -> None:
@@ -391,7 +380,7 @@ def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) ->
     assert cross[:, 2].sum() == pytest.approx(400000.0, rel=1e-5), "roof: the polygon's area, seen from above"
     assert corners[:, 2].min() == 0.0
     assert corners[:, 2].max() > 300.0
-    moved = np.array(column(entities, "/world/moving/2", "translation"), dtype=np.float64).reshape(-1, 3)
+    moved = numbers(entities, "/world/moving/2", "translation").reshape(-1, 3)
     assert seconds(entities, "/world/moving/2")[-1] == 100.0
     np.testing.assert_allclose(moved[-1], [-200.0, 0.0, 0.0])
     assert seconds(entities, "/plan/moving/3") == [20.0, 60.0]
@@ -400,7 +389,8 @@ def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) ->
 
 def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -> None:
     path, _ = recording
-    done = rerun("rrd", "verify", str(path))
+    verify = [_executable(), "rrd", "verify", str(path)]
+    done = subprocess.run(verify, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     reader = rr.chunk.RrdReader(str(path))
     assert len(reader.blueprints()) == 1
@@ -420,20 +410,18 @@ def test_overlay_keeps_every_track_and_one_world(tmp_path: Path) -> None:
     write_overlay([tmp_path / "a.rrd", tmp_path / "b.rrd"], ["first", "second"], tmp_path / "c.rrd")
     entities = read(tmp_path / "c.rrd")
     for number, east_m in enumerate((0.0, 40.0)):
-        position = column(entities, f"/world/runs/{number}/aircraft", "translation")[0]
-        assert position[0][0] == east_m
+        assert column(entities, f"/world/runs/{number}/aircraft", "translation")[0][0][0] == east_m
         assert len(column(entities, f"/series/bank/flown/{number}", "scalars")) >= 1001
     assert "/world/true_obstacles/circles" in entities
     assert "/plan/chosen" not in entities
     for place, (name, rgba) in enumerate((("first", 0xFFB340FF), ("second", 0x40C4FFFF))):
         # One entity a run: rerun's log takes colours from the wrong run where they share one.
-        told = [str(text) for (text,) in column(entities, f"/events/{place}", "text")]
+        told = texts(entities, f"/events/{place}")
         assert told[-1] == f"{name}, t = 100 s: goal reached"
         assert {text.partition(",")[0] for text in told} == {name}
         assert {colour for (colour,) in column(entities, f"/events/{place}", "color")} == {rgba}
     assert "/events" not in entities
-    (((page,),)) = (column(entities, "/summary", "text")[-1],)
-    assert "| outcome | reached | reached |" in str(page)
+    assert "| outcome | reached | reached |" in texts(entities, "/summary")[-1]
     colours = [column(entities, f"/plan/runs/{number}/flown", "colors")[-1] for number in (0, 1)]
     assert colours[0] != colours[1]
 
@@ -445,15 +433,13 @@ def test_an_overlay_says_which_runs_are_of_other_worlds(tmp_path: Path) -> None:
     for thin in (False, True):
         for name, scene in (("a", SCENE), ("b", SCENE), ("c", elsewhere)):
             log = RerunLog(tmp_path / f"{name}.rrd", scene, name, thin=thin)
-            log.on_block(make_track(11, plan_index=-1))
-            log.close(
-                metrics(Flight(make_track(11, plan_index=-1), (), Outcome.TIMEOUT, "x", (), 1.0, 1.0), LIMITS)
-            )
+            track = make_track(11, plan_index=-1)
+            log.on_block(track)
+            log.close(metrics(Flight(track, (), Outcome.TIMEOUT, "x", (), 1.0, 1.0), LIMITS))
         paths = [tmp_path / f"{name}.rrd" for name in "abc"]
         told = write_overlay(paths, ["first", "second", "third"], tmp_path / "over.rrd")
         assert told == "The obstacles are those of first; third was flown in another world."
-        (((page,),)) = (column(read(tmp_path / "over.rrd"), "/summary", "text")[-1],)
-        assert str(page).startswith(f"**{told}**")
+        assert texts(read(tmp_path / "over.rrd"), "/summary")[-1].startswith(f"**{told}**")
         assert write_overlay(paths[:2], ["first", "second"], tmp_path / "same.rrd") == ""
 
 
