@@ -77,12 +77,10 @@ def test_pure_pursuit_looks_ahead_by_time() -> None:
 
 def test_npfg_on_its_path_in_calm_air_asks_for_the_curvature() -> None:
     at = NpfgInput(0j, 25j, 0j, 0j, 1j, 1.0 / 150.0)
-    output = npfg(at, NpfgConfig(roll_time_constant_s=0.5), 25.0, 30.0)
-    assert output == pytest.approx((625.0 / 150.0, 25.0))
+    assert npfg(at, NpfgConfig(roll_time_constant_s=0.5), 25.0, 30.0) == pytest.approx((625.0 / 150.0, 25.0))
 
 
 def test_npfg_flies_nowhere_slower_than_the_wind_allows() -> None:
     # A wind of twice the airspeed, against the path: the nose stays in the wind.
     at = NpfgInput(0j, -25j, -50j, 0j, 1j, 0.0)
-    output = npfg(at, NpfgConfig(roll_time_constant_s=0.5), 25.0, 25.0)
-    assert output == pytest.approx((0.0, 25.0), abs=1e-9)
+    assert npfg(at, NpfgConfig(roll_time_constant_s=0.5), 25.0, 25.0) == pytest.approx((0.0, 25.0), abs=1e-9)

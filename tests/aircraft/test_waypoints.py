@@ -51,8 +51,7 @@ def test_before_a_loiter_the_last_waypoint_is_where_it_begins() -> None:
     assert mission_waypoints(route_of((0.0, 400.0), circle, loiter=True)) == pytest.approx(
         np.array([[0, 0], [0, 400]])
     )
-    alone = mission_waypoints(route_of(circle, loiter=True))
-    assert alone == pytest.approx(np.array([[0, -1], [0, 0]]))
+    assert mission_waypoints(route_of(circle, loiter=True)) == pytest.approx(np.array([[0, -1], [0, 0]]))
 
 
 @pytest.mark.parametrize("length", [0.3, 1e-6])

@@ -66,8 +66,7 @@ def test_in_memory_and_into_a_folder_the_same_is_flown(
     for name in run.track.column_names:
         np.testing.assert_array_equal(kept.track[name].to_numpy(), run.track[name].to_numpy())
     assert kept.folder is not None
-    written = json.loads((kept.folder / "metrics.json").read_text())
-    assert kept.metrics.to_dict() == written
+    assert kept.metrics.to_dict() == json.loads((kept.folder / "metrics.json").read_text())
     assert kept.recording == kept.folder / "flight.rrd"
     again = wayproof.load_run(str(kept.folder))
     assert (again.digest, again.scenario, again.metrics) == (kept.digest, kept.scenario, kept.metrics)
@@ -159,8 +158,7 @@ def test_a_guidance_law_is_given_as_a_class(
     assert (back.digest, back.scenario.guidance) == (gentle.digest, gentle.scenario.guidance)
     assert main(["report", str(tmp_path / "run")]) == 0
     assert back.manifest["turn_radius_m"] == radius_m > mission_of(small()).turn_radius_m
-    page = (tmp_path / "run" / "report.html").read_text()
-    assert f"turn radius R {radius_m:.1f} m" in page
+    assert f"turn radius R {radius_m:.1f} m" in (tmp_path / "run" / "report.html").read_text()
     assert main(["export", str(tmp_path / "run"), "--format", "plan", "--out", str(tmp_path / "a.plan")]) == 0
     with pytest.raises(wayproof.InputError, match=r"guidance\.kind: .*Gentle is not here; give it anew"):
         wayproof.fly(back.scenario)
@@ -232,8 +230,7 @@ def test_a_run_of_a_planner_that_is_not_here_is_read_and_shown_all_the_same(
 def test_a_scenario_file_never_runs_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = source_file(tmp_path)
     source.write_text("raise SystemExit(3)\n")
-    text = SCENARIO + f"planner: {{kind: '{source}:Beeline'}}\n"
-    (tmp_path / "short.yaml").write_text(text)
+    (tmp_path / "short.yaml").write_text(SCENARIO + f"planner: {{kind: '{source}:Beeline'}}\n")
     assert main(["fly", str(tmp_path / "short.yaml")]) == 2
     said = capsys.readouterr().err
     assert "planner.kind" in said

@@ -23,8 +23,7 @@ def test_points_are_checked_and_nothing_is_left_behind() -> None:
 
 
 def test_a_path_through_an_obstacle_of_a_scenario_is_told(tmp_path: Path) -> None:
-    line = [(300.0, 1700.0), (1800.0, 1700.0)]
-    run = wayproof.check(line, scenario=small(), out=tmp_path / "run")
+    run = wayproof.check([(300.0, 1700.0), (1800.0, 1700.0)], scenario=small(), out=tmp_path / "run")
     assert run.metrics.check is not None
     assert (run.metrics.check.ok, run.metrics.contact) == (False, True)
     assert run.manifest["command"][0].startswith("wayproof.check('points', 'aerosonde')")

@@ -164,8 +164,7 @@ def test_the_scenario_of_a_run_without_changes_is_the_file_but_for_its_seed(plac
     runs = runs_of(
         place, "schema: wayproof/campaign/1\nname: small\nseed: 5\nscenarios: [ring.yaml]\ndraws: 2\n"
     )
-    loaded = load_scenario(place / "ring.yaml", [("seed", str(runs.cells(1)["seed"]))])
-    assert runs.scenario(1) == loaded
+    assert runs.scenario(1) == load_scenario(place / "ring.yaml", [("seed", str(runs.cells(1)["seed"]))])
     assert runs.cells(0)["seed"] != runs.cells(1)["seed"]
 
 
@@ -451,8 +450,7 @@ def test_shipped_campaigns_are_valid_and_named_after_their_files(name: str) -> N
 def test_editors_find_the_campaign_schema_and_one_shipped_campaign_has_every_key() -> None:
     assert len(shipped_campaigns()) >= 2
     assert shipped_campaigns().keys().isdisjoint(shipped_scenarios())
-    shipped = json.loads((ROOT / "scenarios" / "campaign.schema.json").read_text())
-    assert shipped == campaign_schema()
+    assert json.loads((ROOT / "scenarios" / "campaign.schema.json").read_text()) == campaign_schema()
     whole = load_campaign(shipped_campaigns()["everything"]).campaign
     assert whole.model_fields_set == set(type(whole).model_fields)
     forms = {name for each in whole.random.values() for name in each.model_fields_set}

@@ -151,8 +151,7 @@ def test_nearly_all_is_not_all_and_none_of_a_few_is_not_never() -> None:
 
 
 def test_tables_by_two_keys_split_the_runs(tmp_path: Path) -> None:
-    summary = summarise(by_two(tmp_path / "c"), by=[("planner", WIND), ("sensor.rays",)])
-    two, one = summary.tables
+    two, one = summarise(by_two(tmp_path / "c"), by=[("planner", WIND), ("sensor.rays",)]).tables
     assert (two.rows.labels, one.rows.labels, one.columns) == (("rolling_window", "bug2"), ("720",), None)
     assert two.columns is not None
     assert two.columns.edges == tuple(np.quantile(np.arange(12.0), np.linspace(0, 1, BINS + 1)).tolist())
@@ -195,8 +194,7 @@ def test_each_figure_has_wilcoxons_test_corrected_by_holm() -> None:
     (duel,) = duels(planners, cases, [True] * 40, figures)
     raw = sorted((float(stats.wilcoxon(ours[name] - theirs[name]).pvalue), name) for name in figures)
     expected = list(itertools.accumulate((min(1.0, (3 - rank) * p) for rank, (p, _) in enumerate(raw)), max))
-    found = sorted(each.p for each in duel.figures if each.p is not None)
-    assert found == pytest.approx(expected)
+    assert sorted(each.p for each in duel.figures if each.p is not None) == pytest.approx(expected)
     assert 0.0 < expected[0] < 0.06 < expected[2]
     assert duel.figures[0].p is None, "all reached: there is nothing to test"
 

@@ -84,8 +84,7 @@ def test_an_end_that_is_passed_far_off_is_not_reached(tmp_path: Path, checked: C
     path.write_text("x_m,y_m\n0,0\n2400,0\n1900,500\n3000,700\n7000,0\n")
     status, said = checked(path, "--aircraft", "T38")
     track = load_run(tmp_path / "run").track
-    off_m = math.dist((track.east_m[-1], track.north_m[-1]), (7000.0, 0.0))
-    assert off_m > 1000.0
+    assert math.dist((track.east_m[-1], track.north_m[-1]), (7000.0, 0.0)) > 1000.0
     assert (status, said["outcome"], said["trackable"]) == (1, "timeout", False)
     assert "the end of the path" in said["reason"]
 
@@ -112,8 +111,7 @@ def test_bad_input_is_refused_before_anything_is_flown(
     options: str, sentence: str, strip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     aircraft = [] if "--aircraft" in options else ["--aircraft", "aerosonde"]
-    words = ["check", str(strip), *aircraft, *options.split()]
-    assert main([*words, "--out", str(tmp_path / "run")]) == 2
+    assert main(["check", str(strip), *aircraft, *options.split(), "--out", str(tmp_path / "run")]) == 2
     said = capsys.readouterr()
     assert said.out == ""
     assert len(said.err.splitlines()) <= 2

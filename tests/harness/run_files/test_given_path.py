@@ -80,8 +80,7 @@ def test_points_on_a_circle_give_the_circle_back(
     # The first and the last arc have a whole leg for themselves.
     assert (bend[bend > 0] >= 0.45 / radius).all()
     assert (bend <= 1.02 / radius + 1e-12).all()
-    off = np.abs(np.hypot(*polylines([way.segments], 1e-4)[0].T) - radius)
-    assert off.max() <= sagitta
+    assert np.abs(np.hypot(*polylines([way.segments], 1e-4)[0].T) - radius).max() <= sagitta
     assert way.corners == ()
 
 

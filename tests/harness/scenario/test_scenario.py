@@ -137,8 +137,7 @@ def test_nobody_starts_or_ends_inside_an_obstacle_however_little_clearance_is_wa
 
 @pytest.mark.parametrize("name", ["on", "1e3", "0.1", "null", "0x1f", "yes", "-", "_", "2001-01-01", "1.-"])
 def test_dumped_text_stays_text(name: str) -> None:
-    data = {**yaml.safe_load(LEAST), "name": name}
-    scenario = scenario_of(json.dumps(data))
+    scenario = scenario_of(json.dumps({**yaml.safe_load(LEAST), "name": name}))
     text = dump_scenario(scenario)
     assert scenario_of(text) == scenario
     assert yaml.safe_load(text)["name"] == name
@@ -244,8 +243,7 @@ def test_the_keys_of_a_guidance_law_are_checked_as_those_of_a_planner(tmp_path: 
     text = LEAST + "guidance: {kind: l1, period_s: 20}\n"
     given = overridden(("guidance.kind", "l1"), text=text, folder=tmp_path)
     assert given.guidance.own == {"period_s": 20, "damping": 0.75, "integrator_gain": 0.02}
-    other = overridden(("guidance.kind", "npfg"), text=text, folder=tmp_path)
-    assert other.guidance.own["period_s"] == 10.0
+    assert overridden(("guidance.kind", "npfg"), text=text, folder=tmp_path).guidance.own["period_s"] == 10.0
     again = scenario_of(dump_scenario(given))
     assert again == given
     assert performance_of(again) == performance_of(given)
@@ -323,8 +321,7 @@ def test_a_scenario_with_other_keys_is_derived_anew_and_the_first_one_stays() ->
 def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
     bare = scenario_of(LEAST)
     faster = bare.with_({"aircraft.model": "c172p", "environment.wind.speed_mps": 5})
-    written = scenario_of(LEAST + "aircraft: {model: c172p}\nenvironment: {wind: {speed_mps: 5}}\n")
-    assert faster == written
+    assert faster == scenario_of(LEAST + "aircraft: {model: c172p}\nenvironment: {wind: {speed_mps: 5}}\n")
     assert faster.planner != bare.planner
     assert faster.with_({"aircraft": None, "environment": None}) == bare
 

@@ -201,8 +201,7 @@ def test_a_turn_against_the_bend_of_the_path_begins_after_room_to_roll(assert_fl
     found = CERTIFIER.certify(path, seen, terrain(beside + along_it))
     assert found is not None
     assert_certified(found, path, seen, beside + along_it, assert_flyable)
-    bends = [row[4] for row in found.path.segments.tolist()]
-    assert all(a * b >= 0.0 for a, b in pairwise(bends))
+    assert all(a * b >= 0.0 for a, b in pairwise([row[4] for row in found.path.segments.tolist()]))
 
 
 def test_a_turn_that_begins_after_room_to_roll_is_free_where_it_is_flown() -> None:
