@@ -79,11 +79,6 @@ class GivingUp:
         """Whether the search has been repeated with all the effort that there is."""
         return self.effort == MOST_EFFORT
 
-    def effort_spent(self, edges_went: bool, only_given_up: bool) -> bool:
-        """Whether all searches have been made that a proof for want of room to turn has to wait for."""
-        needed = MOST_EFFORT if edges_went else 1
-        return self.effort >= needed or (only_given_up and self.tried_again)
-
     def narrow(self, no_room: bool, time_s: float) -> bool:
         """Tells whether it is certain that only ways without room to turn are left; `no_room` is proved."""
         # What moved may have closed the way. Where edge points were taken back the sensor errs, and a place that was

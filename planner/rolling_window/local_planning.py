@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -47,6 +47,10 @@ SWITCH_SHARE, RETRACE_SHARE = 0.03, 0.25
 """Hysteresis: the other way round an obstacle is taken only where it saves `SWITCH_SHARE` of the distance left, and
 `RETRACE_SHARE` of what leads back along where the aircraft has been."""
 
+RECEDING_FACTOR = 6.0
+"""The way round an edge that recedes as more of it is seen grows. Among ways with room for holds it is expected to grow
+on by this factor of that, but at most by a full turn of a hold; in calm air, where nothing is gained by it, not."""
+
 TRAIL_CLEARANCES = 4.0
 """Side (in clearances) of squares of the plane: places in or beside one flown through count as retraced."""
 
@@ -55,9 +59,6 @@ TURN_EXITS = 8
 
 ROOM_WORTH_HOLDS = 0.5
 """A way with room for holds may be longer by this many of them than a narrow one that is not seen to lead on."""
-
-NINE_SQUARES = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1))
-"""Offsets in columns and rows of a square and the eight around it."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class Trail:
         x, y = math.floor(place[0] / self._side), math.floor(place[1] / self._side)
         if (x, y) != self._last:
             self._last = x, y
-            self._flown.update((x + i, y + j) for i, j in NINE_SQUARES)
+            self._flown.update((x + i, y + j) for i, j in product((-1, 0, 1), repeat=2))
 
     def retraced_m(self, nodes: Sequence[Point]) -> float:
         """Length (m) of a polyline that lies where the aircraft has been, to about a square."""
@@ -115,6 +116,8 @@ class LocalPlanning:
         self._steps, self._candidates = steps, candidates
         self.work_count = WorkCount()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
+        self._grown_m = 0.0  # how much longer the way has become on these sides of obstacles
+        self._most_growth_m = math.tau * mission.hold_radius_m if mission.wind_mps else 0.0
         self._hug_m = LEAST_HUG_SHARE * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN_SHARE * margin_m)
         self.limits = Limits.of(mission)
@@ -178,7 +181,7 @@ class LocalPlanning:
                 if candidate.cost_m >= least_m:
                     break
                 candidates.append(candidate)
-                reluctance_m = self._reluctance_m(candidate, course)
+                reluctance_m = self._reluctance_m(candidate, course, attempt.inside_m > 0.0)
                 if candidate.cost_m + reluctance_m >= least_m:
                     continue
                 route = self.fitted(start, attempt, candidate.nodes, points, turning=course is None)
@@ -193,15 +196,26 @@ class LocalPlanning:
         routes = (self.fitted(start, attempt, way, points, turning=course is None) for way in ways)
         return next((route for route in routes if route is not None), None)
 
-    def _reluctance_m(self, candidate: Candidate, course: Course | None) -> float:
-        """Length (m) added to a candidate for leading back and for sides of obstacles other than the course's."""
+    def _reluctance_m(self, candidate: Candidate, course: Course | None, roomy: bool) -> float:
+        """Length (m) added to a candidate: on the course's sides for growing, else for other sides and leading back."""
         switching = 0.0
         if course is not None:
             self.work_count.add(4, POINT_WORK, 4 * len(candidate.nodes) * course.known)
             if course.same_side(candidate.nodes, self.memory.points_m):
-                return 0.0
+                return min(RECEDING_FACTOR * self._grown_m, self._most_growth_m) if roomy else 0.0
             switching = SWITCH_SHARE * candidate.cost_m
         return switching + RETRACE_SHARE * self.trail.retraced_m(candidate.nodes)
+
+    def growth_m(self, course: Course, before: Course | None) -> float:
+        """By how much (m) a course that is flown from now on is longer than what was left of the one before, if any."""
+        if before is None:
+            return math.inf
+        self.work_count.add(4, POINT_WORK, 4 * len(course.nodes) * before.known)
+        start: Point = tuple(course.path.segments[0, :2].tolist())
+        same_side = before.same_side((start, *course.nodes), self.memory.points_m)
+        growth_m = course.path.length_m - before.path.length_m
+        self._grown_m = max(self._grown_m + growth_m, 0.0) if same_side else 0.0
+        return growth_m
 
     def is_worth_room(self, wide: Route, narrow: Course, open_to_m: float) -> bool:
         """Whether a way with room for holds is to be flown before a shorter one, which leads on up to `open_to_m`.

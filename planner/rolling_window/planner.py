@@ -4,10 +4,11 @@ A course is searched N steps deep among the free sectors (`multi_step_search`, `
 ends in a turn seen to be free, or in the goal circle, is put into effect (`commitment`) and flown until the window
 rolls on. What is done about the plan in effect is one of five states (`PlanningState`), each entered by one method.
 
-Why it converges. The search takes unseen space as free, so the course is a shortest one through what is known, or,
-until the aircraft has turned in a hold, one with room for holds that is longer by about half a turn. It is flown
-until something seen contradicts it. Edge points lie on a finite grid, so that happens finitely often, and a course
-that nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
+Why it converges. The search takes unseen space as free, so the course is a shortest one through what is known. Where
+the aircraft is nearer to the goal by a sensing range than each place where it turned in a hold, it may be one with room
+for holds, longer by about half a turn; in wind also one past another side of an obstacle whose edge receded. It is
+flown until something seen contradicts it. Edge points lie on a finite grid, so that happens finitely often, and a
+course that nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
 searches (`dead_ends`), with a disc of the clearance or more about it: these are finitely many as well. They are tried
 again only where no other way is left, the widest first. A search in vain is repeated with twice the effort. Where no
 way is left, a closed chain of edges proves it (`barrier`); where none is left but those given up, one with room to
@@ -30,7 +31,7 @@ from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proofs
 from planner.rolling_window.commitment import Commitment
 from planner.rolling_window.config import RollingWindowConfig
-from planner.rolling_window.dead_ends import MOST_RETRIES, GivingUp
+from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.rolling_search import RollingSearch, Work
 from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
@@ -123,7 +124,8 @@ class RollingWindow(CertifiedPlanner):
             now = Situation(request, plan, on_loiter(plan.path, request.arc_length_m))
             self._loiter(now, plan)
         # In the turn a search goes to its end: begun anew with every edge that goes, it might never come to it.
-        if self._free_again(now) and not (in_turn and self._search.running):
+        far_on = request.arc_length_m - self._monitor.searched_at_m >= self._rolling_step_m
+        if self._search.freed and far_on and not (in_turn and self._search.running):
             self._search.stop()  # it was begun with edges that have gone
             self._search.anew = True
         newly_cut = self._monitor.look(plan, now.here_m, request.position_m, fresh_m)
@@ -160,11 +162,6 @@ class RollingWindow(CertifiedPlanner):
         if self._giving_up.out_of_effort and self._search.up_to_date:
             return since_m >= self._giving_up.whole_turn_m
         return self._monitor.due(plan, here_m, since_m, newly_cut) or met or self._search.anew
-
-    def _free_again(self, now: Situation) -> bool:
-        """Whether edge points have gone, and a rolling step has been flown, since the last search."""
-        since_m = now.request.arc_length_m - self._monitor.searched_at_m
-        return self._search.freed and since_m >= self._rolling_step_m
 
     def _left_behind(self, request: PlanRequest, plan: CommittedPlan | None, here_m: float) -> bool:
         """Whether the plan in effect is so far off that none can go on from it, as after a jump of the position."""
@@ -228,7 +225,8 @@ class RollingWindow(CertifiedPlanner):
     def _loiter(self, now: Situation, plan: CommittedPlan) -> None:
         """FOLLOWING -> LOITERING: the aircraft is in its turn. A place that was turned before twice is given up."""
         self.state = PlanningState.LOITERING
-        self._search.prefers_room = False  # among pockets, the shortest ways first leave none out
+        turned_m = math.dist(now.request.position_m, self._mission.goal_m)
+        self._search.turned_m = min(self._search.turned_m, turned_m)
         first, self._loitered = plan is not self._loitered, plan
         if not plan.course.to_goal or not first:
             return
@@ -272,14 +270,13 @@ class RollingWindow(CertifiedPlanner):
         """Whether no way has room to turn, asked once enough was tried; whether no way is left but given-up ones."""
         position, proofs = now.request.position_m, self._proofs
         only_given_up = len(self._memory.refused_m) > 0 and proofs.only_given_up.closed(position)
-        edges_went = self._memory.cleared != self._search.gone
-        tried = self._giving_up.effort_spent(edges_went, only_given_up)
+        needed = MOST_EFFORT if self._search.freed else 1  # all of it where edges have gone
+        tried = self._giving_up.effort >= needed or (only_given_up and self._giving_up.tried_again)
         return tried and proofs.no_room_to_turn.closed(position), only_given_up
 
-    def _proved_closed(self, request: PlanRequest) -> bool:
+    def _proved_closed(self, now: PlanRequest) -> bool:
         """Whether the world stands still and the edge points seen leave no way at all."""
-        settled = self._stability.settled(request.time_s)
-        return settled and self._proofs.no_way.closed(request.position_m)
+        return self._stability.settled(now.time_s) and self._proofs.no_way.closed(now.position_m)
 
     def _give_up(
         self, now: Situation, plan: CommittedPlan, search: AnytimeSearch, no_room: bool, only_given_up: bool

@@ -59,7 +59,7 @@ class RollingSearch:
         self.last: AnytimeSearch | None = None  # the one that was at work last
         self.known = 0  # how many edge points the last search that ended began with
         self.gone = 0  # how many edge points had been let go of when the last search began
-        self.prefers_room = True  # a way with room for holds may go first
+        self.turned_m = math.inf  # least distance from the goal at which the aircraft has turned in a hold
         self.anew = False  # a search is to be made though the course serves: a way may have become free
         self.refused = 0  # how many courses were found of which no part that leads on could be certified
         self.nearer: CommittedPlan | None = None  # certified, but too near to what moves
@@ -144,7 +144,9 @@ class RollingSearch:
         self.gone = self._memory.cleared
         effort, widest_first = self._giving_up.effort, self._giving_up.tried_again
         closed = partial(self._no_way.closed, position)
-        open_to_m = self._open_to_m if self.prefers_room and not widest_first else None
+        # Among pockets, the shortest ways first leave none out; past them a way with room for holds may go first.
+        past = math.dist(position, self._mission.goal_m) < self.turned_m - self._mission.sensor_range_m
+        open_to_m = self._open_to_m if past and not widest_first else None
         return AnytimeSearch(self._local, effort, closed, widest_first, open_to_m)
 
     def _open_to_m(self, course: Course) -> float:
@@ -163,8 +165,7 @@ class RollingSearch:
         """Ends a search that has found a plan, and returns that."""
         self.running, self.known, self.anew = None, search.known, False
         self._giving_up.effort = 0
-        before_m = -math.inf if ahead is None else ahead.path.length_m
-        self._monitor.lengthened_m = found.course.path.length_m - before_m
+        self._monitor.lengthened_m = self._local.growth_m(found.course, ahead)
         return found
 
     def _as_good(self, ahead: Course | None, course: Course) -> bool:

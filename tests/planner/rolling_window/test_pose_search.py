@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from itertools import pairwise
 
 import numpy as np
@@ -52,7 +52,11 @@ def searched(
 ) -> Route | None:
     """What the search finds, led by the distances to go."""
     to_go = distances_to_go(start, goal, points, bounds)
-    search = search_poses(start, curvature, goal, LIMITS, terrain(points, bounds), to_go)
+    return returned(search_poses(start, curvature, goal, LIMITS, terrain(points, bounds), to_go))
+
+
+def returned(search: Generator[None, None, Route | None]) -> Route | None:
+    """What a search in portions returns at its end."""
     while True:
         try:
             next(search)

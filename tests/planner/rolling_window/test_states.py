@@ -108,9 +108,16 @@ def test_a_plan_that_serves_is_prolonged_and_followed_on() -> None:
 
 def test_in_its_turn_the_aircraft_loiters_and_gives_up_a_place_that_was_turned_before_twice() -> None:
     pilot, seen, plan, entry_m = loitering()
-    before = pilot._search.prefers_room
-    pilot.plan(request_on(plan, entry_m + 10.0, seen))
-    assert (before, pilot._search.prefers_room) == (True, False)
+    assert math.isinf(pilot._search.turned_m)
+    request = request_on(plan, entry_m + 10.0, seen)
+    pilot.plan(request)
+    turned_m, (goal_east_m, _) = math.dist(request.position_m, MISSION.goal_m), MISSION.goal_m
+    for nearer_m, with_room_first in (
+        (0.99 * MISSION.sensor_range_m, False),
+        (1.01 * MISSION.sensor_range_m, True),
+    ):
+        search = pilot._search._begun((goal_east_m - turned_m + nearer_m, 0.0))
+        assert (search._open_to_m is not None) is with_room_first
     assert pilot.state in (PlanningState.LOITERING, PlanningState.GIVING_UP)
     pilot.plan(request_on(plan, entry_m + 11.0, seen))
     assert pilot.state is PlanningState.LOITERING
@@ -129,8 +136,7 @@ def test_from_the_loiter_a_way_that_opens_is_followed() -> None:
         answer = pilot.plan(request_on(plan, entry_m + 25.0 * step, Seen(nothing())))
         if answer.status is PlanStatus.FOUND:
             break
-    assert answer.status is PlanStatus.FOUND
-    assert pilot.state is PlanningState.FOLLOWING
+    assert (answer.status, pilot.state) == (PlanStatus.FOUND, PlanningState.FOLLOWING)
 
 
 def test_walled_in_at_the_start_a_turn_is_the_escape_where_there_is_room(ring: MakePoints) -> None:
@@ -200,10 +206,8 @@ def test_where_no_other_hold_is_found_another_way_to_the_one_ahead_is_flown() ->
     now = request_on(flown(pilot, seen), 100.0, seen)
     pilot.plan(now)
     assert pilot._monitor.plan is not None
-    assert found_of(pilot, pilot._monitor.plan.course, now)
-    assert pilot._search.refused == 0
-    assert not found_of(pilot, east_to(10.0), now)
-    assert pilot._search.refused == 1
+    assert (found_of(pilot, pilot._monitor.plan.course, now), pilot._search.refused) == (True, 0)
+    assert (found_of(pilot, east_to(10.0), now), pilot._search.refused) == (False, 1)
 
 
 def test_a_course_leads_on_to_a_hold_elsewhere_or_four_radii_short_of_what_is_in_sight() -> None:
