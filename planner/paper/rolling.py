@@ -21,7 +21,8 @@ from planner.geometry.clearance import first_breach
 from planner.geometry.course import Route
 from planner.geometry.curves import Pose, Segment, along, between, end_of, place_on
 from planner.geometry.joining import branch_off, lead_of, stuck
-from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.memory import ObstacleMemory
 from planner.paper.config import ImprovedBugConfig
 from planner.paper.model import within
 from planner.paper.multi_step_search import Window, multi_step_search
@@ -34,8 +35,7 @@ class ImprovedBug:
 
     def __init__(self, config: ImprovedBugConfig, mission: Mission) -> None:
         self._config, self._mission = config.resolved(mission), mission
-        self._sensed_m: FloatArray = np.zeros((0, 2))
-        self._revision = -1
+        self._memory = ObstacleMemory(mission.clearance_m)
 
     def plan(self, request: PlanRequest) -> Plan:
         """Section 3.3: one step of the rolling window, where one is due; a holding turn without a candidate."""
@@ -72,19 +72,11 @@ class ImprovedBug:
         config, mission = self._config, self._mission
         assert config.planning_window_m is not None
         keep_m = mission.clearance_m + config.margin(mission)
-        sensed = np.concatenate(
-            (self._sensed(request.seen), *(each.points_m for each in request.seen.moving))
-        )
+        self._memory.take_in(request.seen, met=[])
+        moving = (each.points_m for each in request.seen.moving)
+        sensed = np.concatenate((self._memory.standing_m, *moving))
         near = within(sensed, request.position_m, config.planning_window_m + keep_m)
         return Window(request.position_m, config.planning_window_m, near, keep_m, mission, config)
-
-    def _sensed(self, seen: MapView) -> FloatArray:
-        """(m, 2) the edge points of all scans so far, without those that later scans took back."""
-        taken_back = seen.last_removal_revision > self._revision
-        fresh = seen.edges_since(-1 if taken_back else self._revision)
-        self._sensed_m = np.concatenate((self._sensed_m[: 0 if taken_back else None], fresh))
-        self._revision = seen.revision
-        return self._sensed_m
 
     def local_planning(self, window: Window, start: Pose) -> list[Route]:
         """Section 3.2: multi-step search, route optimisation of each candidate; the shortest first, none if blocked."""
