@@ -111,7 +111,7 @@ def sample(path: Path, spacing_m: float, deviation_m: float = math.inf) -> Float
 
 def poses_at(path: Path, arc_lengths_m: FloatArray) -> FloatArray:
     """(k, 4) poses at (k,) arc lengths along a path, clamped to its ends."""
-    return kernel.poses_at(path.segments, np.ascontiguousarray(arc_lengths_m))
+    return kernel.poses_at(path.segments, np.ascontiguousarray(arc_lengths_m))[:, :4]
 
 
 def places_along(path: Path, end_m: float, pieces: int) -> FloatArray:
@@ -124,7 +124,13 @@ def turn_centres(path: Path, arc_lengths_m: FloatArray, radius_m: float, roll_m:
 
     Where the path turns the other way, the turn begins after a straight of `roll_m`.
     """
-    return kernel.turn_centres(path.segments, np.ascontiguousarray(arc_lengths_m), radius_m, roll_m)
+    poses = kernel.poses_at(path.segments, np.ascontiguousarray(arc_lengths_m))
+    place, ahead, curvature = poses[:, None, :2], poses[:, None, 2:4], poses[:, 4:]
+    aside_m = np.array((radius_m, -radius_m))
+    rolled_m = np.where(aside_m * curvature < 0.0, roll_m, 0.0)
+    left = np.stack((-ahead[..., 1], ahead[..., 0]), axis=2)
+    centres: FloatArray = place + rolled_m[..., None] * ahead + aside_m[:, None] * left
+    return centres
 
 
 def turns_onto(pose: Pose, target: Point, radius_m: float) -> Iterator[list[Segment]]:
@@ -274,6 +280,14 @@ def onward(path: Path, arc_length_m: float, length_m: float) -> list[Segment]:
 def full_turn(pose: Pose, radius_m: float, side: float) -> Segment:
     """A full circle from a pose, to the left (`side` = 1) or to the right (-1)."""
     return (*pose, side / radius_m, math.tau * radius_m)
+
+
+def turn_off(pose: Pose, curvature: float, side: float, limits: Limits) -> list[Segment]:
+    """A full turn from a pose to one side, after a straight to roll where the other way is turned before (1/m)."""
+    if side * curvature >= 0.0:
+        return [full_turn(pose, limits.radius_m, side)]
+    roll: Segment = (*pose, 0.0, limits.roll_m)
+    return [roll, full_turn(along(roll, limits.roll_m), limits.radius_m, side)]
 
 
 def moved(segments: Sequence[Segment], to: Pose) -> list[Segment]:

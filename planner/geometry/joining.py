@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from planner.geometry.clearance import first_breach
-from planner.geometry.curves import Limits, Pose, Segment, along, between, full_turn, place_on, sample
+from planner.geometry.curves import Limits, Pose, Segment, between, place_on, sample, turn_off
 from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 
@@ -61,9 +61,7 @@ def divert_to_loiter(
     for i in range(max(int((to_m - from_m) / step_m), 0), -1, -1):
         pose, curvature = place_on(path, from_m + i * step_m)
         for side in (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0):
-            roll: list[Segment] = [(*pose, 0.0, limits.roll_m)] if side * curvature < 0.0 else []
-            start = along(roll[0], limits.roll_m) if roll else pose
-            turn = Path(np.array([*roll, full_turn(start, limits.radius_m, side)]))
+            turn = Path(np.array(turn_off(pose, curvature, side, limits)))
             if seen is not None and not seen.seen_free(sample(turn, step_m)).all():
                 continue
             if terrain.admits(turn):

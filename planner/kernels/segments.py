@@ -16,13 +16,14 @@ from planner.interface import FloatArray, IntArray
 
 
 @compiled(ROWS, COUNT, FLOAT, inner=True)
-def place(rows: FloatArray, which: int, along: float) -> tuple[float, float]:
-    """East and north (m) at a distance `along` a segment."""
-    x, y, tx, ty = rows[which, 0], rows[which, 1], rows[which, 2], rows[which, 3]
-    half = 0.5 * rows[which, 4] * along
+def pose(rows: FloatArray, which: int, along: float) -> tuple[float, float, float, float]:
+    """Place (m) and tangent at a distance `along` a segment."""
+    tx, ty, half = rows[which, 2], rows[which, 3], 0.5 * rows[which, 4] * along
     chord = along * (math.sin(half) / half if half else 1.0)
     cos, sin = math.cos(half), math.sin(half)
-    return x + chord * (tx * cos - ty * sin), y + chord * (ty * cos + tx * sin)
+    cx, cy = tx * cos - ty * sin, ty * cos + tx * sin  # direction of the chord
+    east, north = rows[which, 0] + chord * cx, rows[which, 1] + chord * cy
+    return east, north, cx * cos - cy * sin, cy * cos + cx * sin
 
 
 @compiled(ROWS, COUNT, FLOAT, FLOAT, inner=True)
@@ -70,7 +71,7 @@ def first_breach(rows: FloatArray, points: FloatArray, radius: FloatArray, from_
     first, begins, last = math.inf, 0.0, len(radius) - 1
     for which in range(len(rows)):
         half = 0.5 * rows[which, 5]
-        east, north = place(rows, which, half)
+        east, north, _, _ = pose(rows, which, half)
         for i in range(len(points)):
             keep = radius[min(i, last)]
             dx, dy, reach = points[i, 0] - east, points[i, 1] - north, half + keep
@@ -89,7 +90,7 @@ def comes_too_near(rows: FloatArray, places: FloatArray, first: IntArray, circle
     """Whether a path passes a point within the distance to be kept from it; points by squares (`Buckets`)."""
     for which in range(len(rows)):
         half = 0.5 * rows[which, 5]
-        east, north = place(rows, which, half)
+        east, north, _, _ = pose(rows, which, half)
         for block in range(len(first) - 1):
             dx, dy, reach = circles[0, block] - east, circles[1, block] - north, half + circles[2, block]
             if dx * dx + dy * dy >= reach * reach:
@@ -106,7 +107,7 @@ def inside_bounds(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax:
     """Whether a path stays inside a rectangle."""
     for which in range(len(rows) + 1):
         end = which == len(rows)
-        x, y = place(rows, which - 1, rows[which - 1, 5]) if end else (rows[which, 0], rows[which, 1])
+        x, y, _, _ = pose(rows, which - 1, rows[which - 1, 5]) if end else pose(rows, which, 0.0)
         if not (xmin <= x <= xmax and ymin <= y <= ymax):
             return False
     for which in range(len(rows)):
@@ -139,43 +140,16 @@ def to_nearest(places: FloatArray, points: FloatArray) -> FloatArray:
     return away
 
 
-@compiled(ROWS, FLOAT, inner=True)
-def pose(rows: FloatArray, arc_length: float) -> tuple[float, float, float, float, float]:
-    """Place and tangent at an arc length, clamped to the ends, and the curvature there."""
-    which, along = 0, max(arc_length, 0.0)
-    while along > rows[which, 5] and which < len(rows) - 1:
-        along -= rows[which, 5]
-        which += 1
-    along = min(along, rows[which, 5])
-    tx, ty, half = rows[which, 2], rows[which, 3], 0.5 * rows[which, 4] * along
-    chord = along * (math.sin(half) / half if half else 1.0)
-    cos, sin = math.cos(half), math.sin(half)
-    cx, cy = tx * cos - ty * sin, ty * cos + tx * sin  # direction of the chord
-    east, north = rows[which, 0] + chord * cx, rows[which, 1] + chord * cy
-    return east, north, cx * cos - cy * sin, cy * cos + cx * sin, rows[which, 4]
-
-
 @compiled(ROWS, FLOATS)
 def poses_at(rows: FloatArray, arc_lengths: FloatArray) -> FloatArray:
-    """(k, 4) places and tangents at (k,) arc lengths of a path, clamped to its ends."""
-    poses = np.empty((len(arc_lengths), 4))
+    """(k, 5) places, tangents and curvatures at (k,) arc lengths of a path, clamped to its ends."""
+    poses = np.empty((len(arc_lengths), 5))
     for i in range(len(arc_lengths)):
-        poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3], _ = pose(rows, arc_lengths[i])
+        which, along = 0, max(arc_lengths[i], 0.0)
+        while along > rows[which, 5] and which < len(rows) - 1:
+            along -= rows[which, 5]
+            which += 1
+        at = pose(rows, which, min(along, rows[which, 5]))
+        poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3] = at
+        poses[i, 4] = rows[which, 4]
     return poses
-
-
-@compiled(ROWS, FLOATS, FLOAT, FLOAT)
-def turn_centres(rows: FloatArray, arc_lengths: FloatArray, radius: float, roll: float) -> FloatArray:
-    """(k, 2, 2) centres of the turns off a path at (k,) arc lengths: to the left, and to the right.
-
-    Where the path turns the other way, the turn begins after a straight of length `roll`.
-    """
-    centres = np.empty((len(arc_lengths), 2, 2))
-    for i in range(len(arc_lengths)):
-        x, y, tx, ty, curvature = pose(rows, arc_lengths[i])
-        for k in range(2):
-            aside = radius if k == 0 else -radius
-            ahead = roll if aside * curvature < 0.0 else 0.0
-            centres[i, k, 0] = x + ahead * tx - aside * ty
-            centres[i, k, 1] = y + ahead * ty + aside * tx
-    return centres

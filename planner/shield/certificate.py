@@ -32,6 +32,7 @@ from planner.geometry.curves import (
     places_along,
     poses_at,
     turn_centres,
+    turn_off,
 )
 from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, MapView, Path
@@ -141,7 +142,7 @@ class Certifier:
             some = arc_lengths_m[i : i + ARC_LENGTHS_AT_ONCE]
             for k, which in np.argwhere(self._discs_free(path, some, seen)).tolist():
                 arc_length_m = float(some[k])
-                turn = self._turn(path, arc_length_m, SIDES[which])
+                turn = turn_off(*place_on(path, arc_length_m), SIDES[which], self._limits)
                 if terrain.admits(Path(np.array(turn))):
                     way = between(path, 0.0, arc_length_m)
                     return Certified(Path(np.array([*way, *turn]), loiter=True), arc_length_m)
@@ -198,14 +199,6 @@ class Certifier:
         places = (centres.reshape(-1, 1, 2) + self._disc).reshape(-1, 2)
         free: BoolArray = np.all(seen.seen_free(places).reshape(len(arc_lengths_m), len(SIDES), -1), axis=2)
         return free
-
-    def _turn(self, path: Path, arc_length_m: float, side: float) -> list[Segment]:
-        """A full turn off a path, after a straight to roll where the path turns the other way."""
-        pose, curvature = place_on(path, arc_length_m)
-        if side * curvature >= 0.0:
-            return [full_turn(pose, self._limits.radius_m, side)]
-        roll: Segment = (*pose, 0.0, self._limits.roll_m)
-        return [roll, full_turn(along(roll, self._limits.roll_m), self._limits.radius_m, side)]
 
 
 def hold_centre(turn: Sequence[float]) -> Point:

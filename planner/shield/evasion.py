@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.geometry.clearance import inside_bounds
-from planner.geometry.curves import Limits, Point, Pose, Segment, along, full_turn, poses_at
+from planner.geometry.curves import Limits, Point, Pose, Segment, along, poses_at, turn_off
 from planner.interface import FloatArray, Mission, Path, PlanRequest
 from planner.kernels.buckets import Buckets, bucketed
 from planner.kernels.room import room_along
@@ -144,14 +144,10 @@ def _chain(
     out: list[Segment] = []
     for side, degrees, straight_m in turns:
         if degrees > 0.0:
-            if side * curvature < 0.0:
-                out.append((*pose, 0.0, limits.roll_m))
-                pose = along(out[-1], limits.roll_m)
-            curvature = side / limits.radius_m
-            turn = full_turn(pose, limits.radius_m, side)
+            *roll, turn = turn_off(pose, curvature, side, limits)
             arc = (*turn[:5], turn[5] * degrees / 360.0)
-            out.append(arc)
-            pose = along(arc, arc[5])
+            out += [*roll, arc]
+            pose, curvature = along(arc, arc[5]), arc[4]
         if straight_m > 0.0:
             out.append((*pose, 0.0, straight_m))
             pose, curvature = along(out[-1], straight_m), 0.0
