@@ -22,11 +22,7 @@ import numpy as np
 from planner.baselines.polyline import Mark, beside, length_of, mark_at, piece, stations
 from planner.baselines.walk import ON_RIGHT, Enclosed, Straight, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
-from planner.interface import FloatArray, Mission
-from planner.keys import MarginConfig
-
-PROGRESS_SHARE = 0.05
-"""A leave point is nearer to the goal than the hit point by more than this share of the kept distance."""
+from planner.interface import FloatArray
 
 LOST_SHARE = 1.5
 """If Q is not met again within this many rounds of the obstacle, that has changed, and is gone round anew."""
@@ -153,9 +149,7 @@ class Bug1(Walker[BugState]):
 class Bug2(Bug1):
     """Bug2 for one flight."""
 
-    def __init__(self, config: MarginConfig, mission: Mission) -> None:
-        super().__init__(config, mission)
-        self._start = mission.goal_m
+    _start: Point  # of the M-line
 
     def begin(self, place: Point) -> BugState:
         """Straight to the goal: the M-line begins at the start of the flight, or where the walk is begun anew."""
@@ -176,7 +170,7 @@ class Bug2(Bug1):
         assert isinstance(state, Circling)
         m_line = np.array(self.goal) - self._start
         off = (way - self._start) @ (-m_line[1], m_line[0])
-        least_m = math.dist(state.hit.place, self.goal) - PROGRESS_SHARE * self.keep_m
+        least_m = math.dist(state.hit.place, self.goal) - self.progress_m
         at = stations(way)
         for i in np.flatnonzero((off[:-1] * off[1:] <= 0.0) & (off[:-1] != off[1:])).tolist():
             share = off[i] / (off[i] - off[i + 1])

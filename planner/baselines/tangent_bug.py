@@ -26,11 +26,8 @@ import numpy as np
 from planner.baselines.polyline import NOWHERE, Mark, Tangent, length_of, mark_at, piece
 from planner.baselines.walk import ON_RIGHT, Enclosed, Walker, WalkLeg, place_at_end
 from planner.geometry.curves import Point
-from planner.interface import FloatArray, Mission
-from planner.keys import MarginConfig
+from planner.interface import FloatArray
 
-PROGRESS_SHARE = 0.05
-"""A place counts as nearer to the goal only by at least this share of the kept distance."""
 LOOKS_PER_RANGE = 40.0
 """The local tangent graph is made anew this many times per sensing range flown, and when the way is blocked."""
 SHORTER_SHARE = 0.005
@@ -66,10 +63,6 @@ TangentBugState = Toward | BoundaryFollowing | Enclosed
 
 class TangentBug(Walker[TangentBugState]):
     """The planner for one flight."""
-
-    def __init__(self, config: MarginConfig, mission: Mission) -> None:
-        super().__init__(config, mission)
-        self._progress_m = PROGRESS_SHARE * self.keep_m
 
     def begin(self, place: Point) -> TangentBugState:
         """Motion to the goal, wherever that leads."""
@@ -123,7 +116,7 @@ class TangentBug(Walker[TangentBugState]):
             node = self._best(place, self._nodes(place), state.limit_m)
             slide = self._slide(place, node) if node is not None else NOWHERE
             onto = place_at_end(slide, place)
-            if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self._progress_m:
+            if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self.progress_m:
                 state = self._caught(place, place_at_end(line, place))
             else:
                 yield WalkLeg(state, slide)
@@ -164,7 +157,7 @@ class TangentBug(Walker[TangentBugState]):
     def _slide(self, place: Point, node: Tangent) -> FloatArray:
         """The way to a node, then along the obstacle while that leads nearer to the goal and hides it."""
         way, met = self.straight(place, node.place)
-        if met and length_of(way) < math.dist(place, node.place) - self._progress_m:
+        if met and length_of(way) < math.dist(place, node.place) - self.progress_m:
             return way
         along = self.known.boundary(node.place, node.side, self.horizon_m)
         to_goal = np.hypot(*(along - self.goal).T).tolist()
@@ -184,7 +177,7 @@ class TangentBug(Walker[TangentBugState]):
         nodes = [node for node in self._nodes(place) if node.side]
         side = min(nodes, key=lambda node: self._way_m(place, node)).side if nodes else ON_RIGHT
         first = mark_at(self.known.boundary(hit, side, self.keep_m), 0.0)
-        on_boundary = math.dist(place, hit) < self._progress_m
+        on_boundary = math.dist(place, hit) < self.progress_m
         return BoundaryFollowing(first, side, hit, 0.0, on_boundary, self._nearest_m(hit))
 
     def _nearest_m(self, anchor: Point) -> float:
@@ -193,7 +186,7 @@ class TangentBug(Walker[TangentBugState]):
 
     def _leave_node(self, place: Point, state: BoundaryFollowing) -> Tangent | None:
         """The node to leave the boundary for: d_reach < d_followed, of these the one soonest reached; None if none."""
-        limit = state.followed_m - self._progress_m
+        limit = state.followed_m - self.progress_m
         nodes = self._nodes(place, state.anchor)
         nearer = [node for node in nodes if math.dist(node.place, self.goal) < limit]
         return min(nearer, key=lambda node: self._way_m(place, node), default=None)
@@ -222,7 +215,7 @@ class TangentBug(Walker[TangentBugState]):
         for share in (np.arange(SHORTCUT_TRIES, 0, -1) / SHORTCUT_TRIES).tolist():
             ahead = piece(way, 0.0, share * whole)
             onto = place_at_end(ahead, place)
-            shorter = math.dist(place, onto) < share * whole - self._progress_m
+            shorter = math.dist(place, onto) < share * whole - self.progress_m
             if share * whole <= least_m or (state.on_boundary and not shorter):
                 continue
             if self.known.sees(place, onto) and self.known.encloses_nothing(np.concatenate(([place], ahead))):

@@ -35,6 +35,9 @@ SAME_PLACE_SHARE = 0.5
 """Places on a boundary passed in one sense and nearer than this share of the kept distance are the same: no two
 stretches that run the same way can be that near to each other."""
 
+PROGRESS_SHARE = 0.05
+"""A place counts as nearer to the goal only by at least this share of the kept distance, `progress_m`."""
+
 WalkState = TypeVar("WalkState")
 
 
@@ -68,6 +71,7 @@ class Walker(ABC, Generic[WalkState]):
         self.mission, self.goal, self.horizon_m = mission, mission.goal_m, mission.sensor_range_m
         self.known = GrownObstacles(mission, margin_m)
         self.keep_m = self.known.keep_m
+        self.progress_m = PROGRESS_SHARE * self.keep_m
         self._near_m = 2.0 * self.keep_m + mission.ground_speed_mps * (2.0 + mission.compute_latency_s)
         self._breach_keep_m = self.keep_m - BREACH_SHARE * margin_m
         self._unrest = WorldStability()
