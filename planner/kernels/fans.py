@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, FLOATS_OUT, INTS, POINT, ROWS, compiled
+from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, INTS, POINT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 from planner.kernels.buckets import Buckets, Cells
 
@@ -68,20 +68,6 @@ def first_met(
     return max(nearest, 0.0), met
 
 
-@compiled(FLOATS_OUT, FLOATS_OUT, COUNT, COUNT, inner=True)
-def _sift_down(key: FloatArray, value: FloatArray, place: int, count: int) -> None:
-    """Restores a binary heap of `count` pairs, least key first, in which the key at `place` may be too great."""
-    while 2 * place + 1 < count:
-        child = 2 * place + 1
-        if child + 1 < count and key[child + 1] < key[child]:
-            child += 1
-        if key[place] <= key[child]:
-            return
-        key[place], key[child] = key[child], key[place]
-        value[place], value[child] = value[child], value[place]
-        place = child
-
-
 @compiled(ROWS, CELLS, FLOAT, RAY, FLOAT, FLOAT, inner=True)
 def hugged(
     own: FloatArray,
@@ -94,7 +80,9 @@ def hugged(
     """Distance along a ray that touches an obstacle at which it is `outer` away from the obstacle again; 0: never."""
     first, counts, _, _ = cells
     east, north, ux, uy = ray
+    # Stretches of the ray near to a point that end beyond the touch, and the end of the one that begins first.
     begin, end, count = np.empty(own.shape[1]), np.empty(own.shape[1]), 0
+    least, furthest = math.inf, 0.0
     within = outer + 1.5 * side  # points of one cell lie no further apart than its diagonal
     for cell in range(len(first)):
         dx, dy = own[0, first[cell]] - east, own[1, first[cell]] - north
@@ -103,21 +91,18 @@ def hugged(
         for j in range(first[cell], first[cell] + counts[cell]):
             dx, dy = own[0, j] - east, own[1, j] - north
             ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
-            reach = outer * outer - beside * beside
-            if reach > 0.0 and ahead > -outer:
-                half = math.sqrt(reach)
+            half = math.sqrt(max(outer * outer - beside * beside, 0.0))
+            if half > 0.0 and ahead + half > touch:
                 begin[count], end[count] = ahead - half, ahead + half
+                if begin[count] < least:
+                    least, furthest = begin[count], end[count]
                 count += 1
-    if not count:
-        return 0.0
-    # Stretches of the ray near to a point, from the first on, which a heap gives: those that overlap are one.
-    for k in range(count // 2 - 1, -1, -1):
-        _sift_down(begin, end, k, count)
-    furthest = -math.inf
-    while count and not begin[0] > furthest > touch:
-        furthest, count = max(furthest, end[0]), count - 1
-        begin[0], end[0] = begin[count], end[count]
-        _sift_down(begin, end, 0, count)
+    grown = True
+    while grown:  # Those that overlap are one.
+        grown = False
+        for k in range(count):
+            if begin[k] <= furthest < end[k]:
+                furthest, grown = end[k], True
     return furthest
 
 
