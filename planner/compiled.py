@@ -19,7 +19,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from typing import Any, Generic, ParamSpec, TypeVar
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 from planner.kernel_cache import seal
 
@@ -137,7 +137,7 @@ def compile_all(rare: bool = False) -> None:
             elsewhere = _second.names if _second else frozenset()
             _compile([each for each in _functions() if each.__module__ not in elsewhere])
             if _second:
-                _second.wait()
+                _second.process.wait()
                 _second = None
             _compile(_functions())
         _compile(list(_waiting) if rare else ())
@@ -174,28 +174,21 @@ def compile_modules(names: Sequence[str], parent: int) -> None:
         _compile(each for each in _functions() if each.__module__ in names and os.getppid() == parent)
 
 
-class _SecondProcess:
-    """Compiles the functions of some modules; at its end they are on disk, unless it failed."""
+class _SecondProcess(NamedTuple):
+    """A process that compiles the functions of some modules; at its end they are on disk, unless it failed."""
 
-    def __init__(self, names: frozenset[str]) -> None:
-        self.names = names
+    names: frozenset[str]
+    process: subprocess.Popen[bytes]
+
+    @classmethod
+    def started(cls, names: frozenset[str]) -> _SecondProcess:
+        """Starts it; it is ended with this process."""
         code = f"import sys; sys.path[:] = {sys.path!r}; from planner.compiled import compile_modules; "
         command = [sys.executable, "-c", code + f"compile_modules({sorted(names)!r}, {os.getpid()})"]
         nobody = subprocess.DEVNULL
-        self._process = subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody)
-        atexit.register(self._end)
-
-    def wait(self) -> None:
-        """Waits until the process ends."""
-        try:
-            self._process.wait()
-        finally:
-            self._end()
-
-    def _end(self) -> None:
-        self._process.kill()
-        self._process.wait()
-        atexit.unregister(self._end)
+        process = subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody)
+        atexit.register(process.kill)
+        return cls(names, process)
 
 
 _second: _SecondProcess | None = None
@@ -217,7 +210,7 @@ def _start_second(busy_bytes: int) -> None:
         sys.stderr.write("wayproof: compiling for this machine, once; this takes some seconds\n")
     names = _share(_functions(), busy_bytes) if first.kept and os.cpu_count() != 1 else frozenset()
     with suppress(OSError):  # All are then compiled here.
-        _second = _SecondProcess(names) if names else None
+        _second = _SecondProcess.started(names) if names else None
 
 
 def _compile(functions: Iterable[Compiled[..., Any]]) -> None:
