@@ -33,10 +33,6 @@ class ObstacleMemory:
         """Whether an edge point that had been seen was cleared again: the sensor errs, or something has gone."""
         self._outlines: Sequence[FloatArray] = ()
         self._revision = -1
-        self._drop_all()
-
-    def _drop_all(self) -> None:
-        """Drops all points that stand still."""
         self._points, self._genuine = NO_POINTS, np.zeros(0, dtype=np.bool_)
         self._labels: IntArray | None = None
         self._with_moving: FloatArray | None = None
@@ -122,7 +118,7 @@ class ObstacleMemory:
     def _keep_only(self, genuine_m: FloatArray, refused_m: FloatArray) -> None:
         """Begins anew with the points left; refused places come first, so that no other moves up in the order."""
         self.cleared += self.known - len(genuine_m) - len(refused_m)
-        self._drop_all()
+        self._points, self._genuine = NO_POINTS, self._genuine[:0]
         self._add(refused_m, genuine=False)
         self._add(genuine_m, genuine=True)
 

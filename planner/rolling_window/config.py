@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from planner.geometry.joining import LEAD_S
 from planner.interface import Mission
 from planner.keys import MarginConfig, key
-from planner.shield.certificate import least_sensor_range_m
+from planner.shield.certificate import DISC_RADII
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,8 @@ class RollingWindowConfig(MarginConfig):
         """
         reaction_s = LEAD_S + mission.sensor_latency_s + mission.compute_latency_s + mission.roll_in_s
         radius_m, keep_m = mission.hold_radius_m, mission.clearance_m
-        least = least_sensor_range_m(radius_m, keep_m, mission.ground_speed_mps, reaction_s)
+        # A turn beside the course reaches two radii to the side; beyond lie the clearance and what is flown by then.
+        least = 2.0 * DISC_RADII * radius_m + keep_m + mission.ground_speed_mps * reaction_s
         if mission.sensor_range_m < least:
             raise ValueError(
                 f"sensor.range_m is {mission.sensor_range_m:g}, too short for a turn radius of "

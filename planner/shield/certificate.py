@@ -221,12 +221,3 @@ def _disc(radius_m: float, spacing_m: float) -> FloatArray:
 def disc_radius_m(radius_m: float, clearance_m: float) -> float:
     """Radius of the disc that has to be seen to be free for a turn of one radius to be certified, m."""
     return max(DISC_RADII * radius_m, radius_m + DISC_BEYOND_SHARE * clearance_m)
-
-
-def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, reaction_s: float) -> float:
-    """Sensing range without which not even a turn can be certified, m.
-
-    A turn beside the course reaches two radii to the side; beyond it lie the clearance and what is flown within
-    `reaction_s`: latency of sensor and planner, and the time to roll.
-    """
-    return 2.0 * DISC_RADII * radius_m + clearance_m + speed_mps * reaction_s

@@ -8,7 +8,7 @@ from planner.geometry.joining import lead_of
 from planner.interface import FloatArray, Mission, PlanRequest
 from planner.memory import ObstacleMemory
 from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start, start_of
-from planner.shield.encounters import encounters
+from planner.shield.encounters import met_at
 from planner.shield.escape import Escape, Escapes, PlanInEffect, Room
 from planner.shield.evasion import Threats
 from planner.shield.intervention_log import InterventionLog, ShieldReport
@@ -38,7 +38,8 @@ class CertifiedPlanner:
 
     def _sense(self, request: PlanRequest) -> FloatArray:
         """Takes in what was seen since the last request; returns the (k, 2) new edge points."""
-        met = encounters(request, self._mission) if request.seen.moving else []
+        how = request.position_m, request.time_s, self._mission.speed_mps, 0.5 * self._mission.clearance_m
+        met = [met_at(each, *how) for each in request.seen.moving]
         fresh_m = self._memory.take_in(request.seen, met)
         self._threats = self._escapes.threats(request)
         return fresh_m

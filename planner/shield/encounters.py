@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from planner.geometry.curves import Point
-from planner.interface import FloatArray, Mission, MovingEdges, PlanRequest
+from planner.interface import FloatArray, MovingEdges
 
 FASTEST_SHARE = 0.8
 """Share of the aircraft's airspeed. An obstacle that is faster may be met anywhere; it is taken to be this fast."""
@@ -22,12 +22,6 @@ EARLIEST, LATEST = 0.85, 1.3
 """The aircraft may be at a place between these shares of the time that a straight line there takes at its airspeed."""
 PASSING_S = 3.0
 """Time that the aircraft may be later than the latest, to turn and pass by."""
-
-
-def encounters(request: PlanRequest, mission: Mission) -> list[FloatArray]:
-    """The outline of each obstacle that moves, (k, 2), drawn out over the places where it can be met."""
-    here, spacing_m = request.position_m, 0.5 * mission.clearance_m
-    return [met_at(each, here, request.time_s, mission.speed_mps, spacing_m) for each in request.seen.moving]
 
 
 def met_at(
