@@ -17,66 +17,34 @@ from planner.kernels.buckets import Buckets, Cells
 
 BUCKETS, CELLS = f"Tuple(({ROWS}, {INTS}, {ROWS}))", f"UniTuple({INTS}, 4)"
 RAY = "UniTuple(float64, 4)"  # east, north, unit vector
+Point = tuple[float, float]
+Ray = tuple[float, float, float, float]
 
 EDGE_OFF_RAD = 1e-7
 """Edges are turned this much into the free sector, clear of rounding errors."""
 
 
-@compiled(ROWS, COUNT, COUNT, FLOAT, FLOAT, FLOAT, FLOAT, inner=True)
-def _first_of(
-    places: FloatArray, begin: int, end: int, east: float, north: float, ux: float, uy: float
-) -> tuple[float, int]:
-    """Does the same as `first_met` for the points of indices `begin` to `end` alone."""
-    nearest, met = math.inf, 0
-    for k in range(begin, end):
-        dx, dy = places[0, k] - east, places[1, k] - north
-        ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
-        room = places[2, k] * places[2, k] - beside * beside
-        if room > 0.0 and ahead > 0.0:
-            entry = ahead - math.sqrt(room)
-            if entry < nearest:
-                nearest, met = entry, k
-    return nearest, met
-
-
-@compiled(ROWS, INTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
-def first_met(
-    places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float, ux: float, uy: float
-) -> tuple[float, int]:
+@compiled(BUCKETS, RAY)
+def first_met(buckets: Buckets, ray: Ray) -> tuple[float, int]:
     """Distance along a ray at which it comes too near to a point, and the point's index; infinite and 0: never."""
-    squares, begins, count = np.empty(len(first), dtype=np.intp), np.empty(len(first)), 0
+    (places, first, circles), (east, north, ux, uy) = buckets, ray
+    nearest, met = math.inf, 0
     for block in range(len(first) - 1):
         dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
         ahead = dx * ux + dy * uy
-        if abs(dx * uy - dy * ux) < reach and ahead > -reach:
-            squares[count], begins[count] = block, ahead - reach
-            count += 1
-    nearest, met = math.inf, 0
-    for _ in range(count):
-        # The square that the ray may enter first.
-        least = 0
-        for i in range(1, count):
-            if begins[i] < begins[least]:
-                least = i
-        if begins[least] >= nearest:
-            break
-        begins[least] = math.inf
-        block = squares[least]
-        entry, k = _first_of(places, first[block], first[block + 1], east, north, ux, uy)
-        if entry < nearest or (entry == nearest and k < met):
-            nearest, met = entry, k
+        if abs(dx * uy - dy * ux) >= reach or not -reach < ahead < nearest + reach:
+            continue
+        for k in range(first[block], first[block + 1]):
+            dx, dy = places[0, k] - east, places[1, k] - north
+            ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
+            room = places[2, k] * places[2, k] - beside * beside
+            if room > 0.0 and ahead > 0.0 and ahead - math.sqrt(room) < nearest:
+                nearest, met = ahead - math.sqrt(room), k
     return max(nearest, 0.0), met
 
 
 @compiled(ROWS, CELLS, FLOAT, RAY, FLOAT, FLOAT, inner=True)
-def hugged(
-    own: FloatArray,
-    cells: Cells,
-    side: float,
-    ray: tuple[float, float, float, float],
-    outer: float,
-    touch: float,
-) -> float:
+def hugged(own: FloatArray, cells: Cells, side: float, ray: Ray, outer: float, touch: float) -> float:
     """Distance along a ray that touches an obstacle at which it is `outer` away from the obstacle again; 0: never."""
     first, counts, _, _ = cells
     east, north, ux, uy = ray
@@ -142,7 +110,7 @@ def fan_edges(
     own: FloatArray,
     cells: Cells,
     side: float,
-    origin: tuple[float, float],
+    origin: Point,
     outer: float,
 ) -> tuple[FloatArray, IntArray, int]:
     """Finds the tangents to the ends of an obstacle's fan that are free up to the touch, and what hides the others.
@@ -153,7 +121,7 @@ def fan_edges(
         (h,) the obstacles that hide a tangent, or close it right behind the place where it touches;
         how many tangents were looked along.
     """
-    (places, block, circles), (east, north) = buckets, origin
+    (places, _, _), (east, north) = buckets, origin
     many, count = len(cells[0]), 0
     tangents = np.empty((4, own.shape[1]))
     for j in range(own.shape[1]):
@@ -180,12 +148,13 @@ def fan_edges(
             off, x, y = hand * EDGE_OFF_RAD, tangents[row, j], tangents[row + 1, j]
             towards, aside = x - off * y, y + off * x
             touch = math.sqrt(touch2)
-            clear, met = first_met(places, block, circles, east, north, towards, aside)
+            ray = (east, north, towards, aside)
+            clear, met = first_met(buckets, ray)
             looked += 1
             if clear >= touch:
                 edges[count, 0], edges[count, 1], edges[count, 2] = towards, aside, touch
                 edges[count, 3], edges[count, 4] = clear, hand
-                edges[count, 5] = hugged(own, cells, side, (east, north, towards, aside), outer, touch)
+                edges[count, 5] = hugged(own, cells, side, ray, outer, touch)
                 count += 1
             if clear < touch + places[2, met] and not (hides and hiding[hides - 1] == labels[met]):
                 hiding[hides] = labels[met]
@@ -193,20 +162,13 @@ def fan_edges(
     return edges[:count], hiding[:hides], looked
 
 
-@compiled(ROWS, INTS, ROWS, POINT, POINT, COUNT)
-def entered(
-    places: FloatArray,
-    first: IntArray,
-    circles: FloatArray,
-    a: tuple[float, float],
-    b: tuple[float, float],
-    most: int,
-) -> tuple[FloatArray, IntArray]:
+@compiled(BUCKETS, POINT, POINT, COUNT)
+def entered(buckets: Buckets, a: Point, b: Point, most: int) -> tuple[FloatArray, IntArray]:
     """The discs about points by squares that the line from a to b enters: distances from a, and their indices.
 
     A disc that holds `a` counts only when the line leads deeper into it. At most `most` discs are returned.
     """
-    (ax, ay), (bx, by) = a, b
+    (places, first, circles), (ax, ay), (bx, by) = buckets, a, b
     most = min(most, len(places[0]))
     entry, which, count = np.empty(most), np.empty(most, dtype=np.intp), 0
     length = math.hypot(bx - ax, by - ay)
@@ -231,10 +193,8 @@ def entered(
     return entry[:count], which[:count]
 
 
-@compiled(ROWS, INTS, ROWS, ROWS)
-def shortcuts(
-    places: FloatArray, first: IntArray, circles: FloatArray, nodes: FloatArray
-) -> tuple[IntArray, int]:
+@compiled(BUCKETS, ROWS)
+def shortcuts(buckets: Buckets, nodes: FloatArray) -> tuple[IntArray, int]:
     """Drops those of (n, 2) track points that lie between one and the furthest that it sees.
 
     Returns:
@@ -246,7 +206,7 @@ def shortcuts(
         while there > here + 1:
             a, b = nodes[here], nodes[there]
             lines += 1
-            if not len(entered(places, first, circles, (a[0], a[1]), (b[0], b[1]), 1)[1]):
+            if not len(entered(buckets, (a[0], a[1]), (b[0], b[1]), 1)[1]):
                 break
             there -= 1
         here = there

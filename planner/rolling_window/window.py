@@ -86,7 +86,7 @@ class Window:
         """Where the line to the goal comes too near to edge points, m from the origin, and the obstacle of each."""
         blocked, labels = self._buckets
         self.work_count.add(1, POINT_WORK, len(labels))
-        entry, which = entered(*blocked, origin, goal, len(labels))
+        entry, which = entered(blocked, origin, goal, len(labels))
         return entry, labels[which]
 
     def nearest_obstacles(self, most: int) -> list[int]:

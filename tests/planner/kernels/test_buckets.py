@@ -59,7 +59,7 @@ def test_a_ray_meets_what_it_meets_among_all_points(seed: int, count: int, beari
     points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
     ux, uy = math.cos(bearing), math.sin(bearing)
     order, squares = bucketed(points, keep, 500.0)
-    distance, met = first_met(*squares, 100.0, -50.0, ux, uy)
+    distance, met = first_met(squares, (100.0, -50.0, ux, uy))
     away = points - (100.0, -50.0)
     ahead, beside = away @ (ux, uy), away @ (uy, -ux)
     hit = (ahead > 0.0) & (np.abs(beside) < keep)
@@ -77,9 +77,9 @@ def test_a_line_enters_what_it_enters_among_all_points(seed: int, count: int, le
     found = [
         dict(zip(order[which].tolist(), entry.tolist(), strict=True))
         for order, squares in (whole, parts)
-        for entry, which in [entered(*squares, *line, count)]
+        for entry, which in [entered(squares, *line, count)]
     ]
     assert found[0] == found[1]
-    one = entered(*parts[1], *line, 1)[0]
+    one = entered(parts[1], *line, 1)[0]
     assert len(one) == min(len(found[0]), 1)
     assert set(one) <= set(found[0].values())
