@@ -1,7 +1,4 @@
-"""Sorts edge points into squares of the plane, so that a search near a place does not go through all points.
-
-Compiled: see `planner.kernels`.
-"""
+"""Edge points sorted into squares of the plane, for searches near a place; compiled, see `planner.kernels`."""
 
 from __future__ import annotations
 
@@ -22,6 +19,7 @@ diagonally too, each pair once."""
 Buckets = tuple[FloatArray, IntArray, FloatArray]
 """(3, m) east and north of points by squares and the distance to be kept from each; (b + 1,) where each square begins
 among them, and the end; (3, b) centre and radius of a circle about each that holds what is to be kept from them. m."""
+BUCKETS = f"Tuple(({ROWS}, {INTS}, {ROWS}))"  # the type of those as an argument
 
 
 @compiled(INTS, INTS, inner=True)
@@ -44,10 +42,8 @@ def _sorted_by(keys: IntArray, order: IntArray) -> IntArray:
 @compiled(INTS, INTS, inner=True)
 def _by_squares(columns: IntArray, rows: IntArray) -> tuple[IntArray, IntArray]:
     """(m,) indices of points, column by column and row by row; (c + 1,) where each square begins, and the end."""
-    order, first, count = np.empty(len(rows), dtype=np.intp), np.empty(len(rows) + 1, dtype=np.intp), 0
-    for k in range(len(order)):
-        order[k] = k
-    order = _sorted_by(columns, _sorted_by(rows, order))
+    order = _sorted_by(columns, _sorted_by(rows, np.arange(len(rows))))
+    first, count = np.empty(len(rows) + 1, dtype=np.intp), 0
     for k in range(len(order)):
         if not k or columns[order[k]] != columns[order[k - 1]] or rows[order[k]] != rows[order[k - 1]]:
             first[count] = k
@@ -87,9 +83,7 @@ def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray,
 @compiled(COUNT, INTS, INTS)
 def joined(count: int, one: IntArray, other: IntArray) -> IntArray:
     """(count,) the first square of the group that each square is joined to by touching pairs: union-find."""
-    first = np.empty(count, dtype=np.intp)
-    for square in range(count):
-        first[square] = square
+    first = np.arange(count)
     for pair in range(len(one)):
         a, b = one[pair], other[pair]
         while first[a] != a:

@@ -1,7 +1,4 @@
-"""Chains of edge points as a forest, with the parity of their crossings: union-find with parity.
-
-Compiled: see `planner.kernels`.
-"""
+"""Chains of edge points by union-find with the parity of their crossings; compiled, see `planner.kernels`."""
 
 from __future__ import annotations
 

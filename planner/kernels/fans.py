@@ -1,8 +1,8 @@
 """Obstacles as seen from a track point: where their fans end, and how far lines lead past their edge points.
 
-Metres, ENU. `places`, `first` and `circles` are all edge points by squares, `planner.kernels.buckets.Buckets`. `own`
-are those of one obstacle, (3, m): east, north and the distance to be kept from each. Its `cells`, of a `side`, are
-`planner.kernels.buckets.Cells`. A ray begins at (east, north), along (ux, uy). Compiled: see `planner.kernels`.
+Metres, ENU. `buckets` are all edge points by squares. `own` are those of one obstacle, (3, m): east, north and the
+distance to be kept from each. Its `cells`, of a `side`, are `planner.kernels.buckets.Cells`. A ray begins at (east,
+north), along (ux, uy). Compiled: see `planner.kernels`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 
 from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, INTS, POINT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
-from planner.kernels.buckets import Buckets, Cells
+from planner.kernels.buckets import BUCKETS, Buckets, Cells
 
-BUCKETS, CELLS = f"Tuple(({ROWS}, {INTS}, {ROWS}))", f"UniTuple({INTS}, 4)"
+CELLS = f"UniTuple({INTS}, 4)"
 RAY = "UniTuple(float64, 4)"  # east, north, unit vector
 Point = tuple[float, float]
 Ray = tuple[float, float, float, float]

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 
-from planner.compiled import FLOAT, INTS, ROWS, compiled
-from planner.interface import FloatArray, IntArray
+from planner.compiled import FLOAT, ROWS, compiled
+from planner.interface import FloatArray
+from planner.kernels.buckets import BUCKETS, Buckets
 
 
-@compiled(ROWS, ROWS, INTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, rare=True)
+@compiled(ROWS, BUCKETS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, rare=True)
 def room_along(
     places: FloatArray,
-    still: FloatArray,
-    first: IntArray,
-    circles: FloatArray,
+    still: Buckets,
     moving: FloatArray,
     step: float,
     speed: float,
@@ -25,12 +24,12 @@ def room_along(
 ) -> float:
     """Least distance (m) from all edge points of an aircraft that flies along (n, 2) places, `step` (m) apart.
 
-    Those that stand are `Buckets`; `moving` are (k, 5): edge points now, their velocity, and how fast they may come
+    `still` are those that stand; `moving` are (k, 5): edge points now, their velocity, and how fast they may come
     nearer beyond that, for `unknown_s`. For each metre along the way, what is met counts as `farther` m further away.
     At each place the aircraft may be from `earliest` to `latest` times the time at its speed. With less room than
     `least` the rest is not looked at.
     """
-    room, i, fastest, beside = math.inf, 0, 0.0, 0
+    room, i, fastest, beside, (standing, first, circles) = math.inf, 0, 0.0, 0, still
     for j in range(len(moving)):
         fastest = max(fastest, math.hypot(moving[j, 2], moving[j, 3]) + moving[j, 4])
     # So much nearer at most something comes from one place to the next.
@@ -44,7 +43,7 @@ def room_along(
             if dx * dx + dy * dy >= reach * reach:
                 continue
             for j in range(first[block], first[block + 1]):
-                dx, dy = still[0, j] - x, still[1, j] - y
+                dx, dy = standing[0, j] - x, standing[1, j] - y
                 if dx * dx + dy * dy < squared:
                     squared, beside = dx * dx + dy * dy, block
             nearest = math.sqrt(squared)

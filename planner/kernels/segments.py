@@ -1,7 +1,6 @@
 """Segments of constant curvature: places along them, and distances to points.
 
 A path is (n, 6) rows, as in `planner.interface.Path`; arc lengths are counted from its start. All in metres.
-
 Compiled: see `planner.kernels`.
 """
 
@@ -50,9 +49,7 @@ def to_segment(rows: FloatArray, which: int, east: float, north: float) -> tuple
 @compiled(ROWS, ROWS)
 def distances(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(m,) distance of each of (m, 2) points to a path, and (m,) arc length of the nearest place."""
-    nearest, arc_lengths, begins = np.empty(len(points)), np.empty(len(points)), 0.0
-    for i in range(len(points)):
-        nearest[i], arc_lengths[i] = math.inf, 0.0
+    nearest, arc_lengths, begins = np.full(len(points), math.inf), np.zeros(len(points)), 0.0
     for which in range(len(rows)):
         for i in range(len(points)):
             distance, along = to_segment(rows, which, points[i, 0], points[i, 1])

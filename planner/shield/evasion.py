@@ -91,7 +91,7 @@ class Threats:
             at_m = np.where(at_m > begin, begin + (at_m - begin) % turn, at_m)
         places = np.ascontiguousarray(poses_at(path, at_m)[:, :2])
         how = (self.step_m, self.speed_mps, least_m, later, EARLIEST, LATEST, UNKNOWN_S)
-        return room_along(places, *self._still, self.moving, *how)
+        return room_along(places, self._still, self.moving, *how)
 
     @cached_property
     def _still(self) -> Buckets:
