@@ -19,7 +19,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 from planner.kernel_cache import seal
 
@@ -132,14 +132,13 @@ def compile_all(rare: bool = False) -> None:
         waiting = _functions() + (list(_waiting) if rare else [])
         if not waiting:
             return
-        while _functions():
-            _start_second(0)
-            elsewhere = _second.names if _second else frozenset()
-            _compile([each for each in _functions() if each.__module__ not in elsewhere])
-            if _second:
-                _second.process.wait()
-                _second = None
-            _compile(_functions())
+        begin_compiling()
+        elsewhere = _second[0] if _second else frozenset()
+        _compile([each for each in _functions() if each.__module__ not in elsewhere])
+        if _second:
+            _second[1].wait()
+            _second = None
+        _compile(_functions())
         _compile(list(_waiting) if rare else ())
         _let_stay(any(each.anew for each in waiting))
 
@@ -157,15 +156,6 @@ def _let_stay(anew: bool) -> None:
         gc.set_threshold(*_usual_threshold)
 
 
-def begin_compiling(busy_bytes: int) -> None:
-    """Has a second process compile some of the functions imported so far, until `compile_all` needs them.
-
-    It does nothing where they are on disk, or where there is one processor.
-    """
-    with _compiling:
-        _start_second(busy_bytes)
-
-
 def compile_modules(names: Sequence[str], parent: int) -> None:
     """Compiles the functions of some modules, so that they are on disk, as long as the parent process lives."""
     for name in names:
@@ -174,43 +164,41 @@ def compile_modules(names: Sequence[str], parent: int) -> None:
         _compile(each for each in _functions() if each.__module__ in names and os.getppid() == parent)
 
 
-class _SecondProcess(NamedTuple):
-    """A process that compiles the functions of some modules; at its end they are on disk, unless it failed."""
-
-    names: frozenset[str]
-    process: subprocess.Popen[bytes]
-
-    @classmethod
-    def started(cls, names: frozenset[str]) -> _SecondProcess:
-        """Starts it; it is ended with this process."""
-        code = f"import sys; sys.path[:] = {sys.path!r}; from planner.compiled import compile_modules; "
-        command = [sys.executable, "-c", code + f"compile_modules({sorted(names)!r}, {os.getpid()})"]
-        nobody = subprocess.DEVNULL
-        process = subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody)
-        atexit.register(process.kill)
-        return cls(names, process)
+def _started(names: frozenset[str]) -> subprocess.Popen[bytes]:
+    """Starts a process that puts the functions of some modules on disk, unless it fails; it does not outlive this."""
+    code = f"import sys; sys.path[:] = {sys.path!r}; from planner.compiled import compile_modules; "
+    command = [sys.executable, "-c", code + f"compile_modules({sorted(names)!r}, {os.getpid()})"]
+    nobody = subprocess.DEVNULL
+    process = subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody)
+    atexit.register(process.kill)
+    return process
 
 
-_second: _SecondProcess | None = None
+# Modules, and the process that compiles them.
+_second: tuple[frozenset[str], subprocess.Popen[bytes]] | None = None
 
 
-def _start_second(busy_bytes: int) -> None:
-    """Compiles one function, and starts the second process where that was not on disk."""
+def begin_compiling(busy_bytes: int = 0) -> None:
+    """Has a second process compile some of the functions imported so far, until `compile_all` needs them.
+
+    One is compiled here. Where that was on disk, or where there is one processor, there is no second process. This one
+    is busy with something else for as long as compiling `busy_bytes` of byte code takes.
+    """
     global _second
-    if _second or not _functions():
-        return
-    # The first function of a module calls no other one. The shortest tells soonest whether they are on disk.
-    first = min(
-        {each.__module__: each for each in reversed(_functions())}.values(), key=lambda each: each.size
-    )
-    _compile([first])
-    if not first.anew:
-        return
-    if sys.stderr is not None and sys.stderr.isatty():
-        sys.stderr.write("wayproof: compiling for this machine, once; this takes some seconds\n")
-    names = _share(_functions(), busy_bytes) if first.kept and os.cpu_count() != 1 else frozenset()
-    with suppress(OSError):  # All are then compiled here.
-        _second = _SecondProcess.started(names) if names else None
+    with _compiling:
+        if _second or not _functions():
+            return
+        # The first function of a module calls no other one. The shortest tells soonest whether they are on disk.
+        firsts = {each.__module__: each for each in reversed(_functions())}
+        first = min(firsts.values(), key=lambda each: each.size)
+        _compile([first])
+        if not first.anew:
+            return
+        if sys.stderr is not None and sys.stderr.isatty():
+            sys.stderr.write("wayproof: compiling for this machine, once; this takes some seconds\n")
+        names = _share(_functions(), busy_bytes) if first.kept and os.cpu_count() != 1 else frozenset()
+        with suppress(OSError):  # All are then compiled here.
+            _second = (names, _started(names)) if names else None
 
 
 def _compile(functions: Iterable[Compiled[..., Any]]) -> None:
