@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from planner.geometry.course import Route
-from planner.geometry.curves import SHORTEST_M, Limits, Point, Pose, fillet
+from planner.geometry.curves import Limits, Point, Pose, fillet
 from planner.geometry.terrain import POINT_WORK, Terrain
 from planner.kernels.fans import shortcuts
 
@@ -22,17 +20,6 @@ def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
     kept, lines = shortcuts(terrain.squares, np.array(nodes))
     terrain.work_count.add(lines, POINT_WORK, lines * len(terrain.points_m))
     return [nodes[i] for i in kept.tolist()]
-
-
-@lru_cache(maxsize=256)
-def _is_tight(before: Point, corner: Point, after: Point, radius_m: float) -> bool:
-    """Whether the legs of a corner have no room for an arc of a radius, wherever `fillet` begins the leg to it."""
-    leg, out = math.dist(before, corner), math.dist(corner, after)
-    if min(leg, out) <= SHORTEST_M:
-        return True
-    ux, uy = (corner[0] - before[0]) / leg, (corner[1] - before[1]) / leg
-    vx, vy = (after[0] - corner[0]) / out, (after[1] - corner[1]) / out
-    return radius_m * math.tan(0.5 * abs(math.atan2(ux * vy - uy * vx, ux * vx + uy * vy))) > min(leg, out)
 
 
 def optimise(
@@ -64,9 +51,6 @@ def optimise(
     uncut = ((short, False), (short, True), (list(nodes[1:]), False))
     choices += [(way, 0.0, longer, tightest) for way, longer in uncut]
     for choice, cut, longer_turn, first_radius in choices:
-        corners = zip(choice, choice[1:], choice[2:], strict=False)
-        if any(_is_tight(*corner, tightest) for corner in corners):
-            continue
         path = fillet(start, choice, limits, cut, start_curvature, longer_turn, first_radius)
         if path is not None and terrain.admits(path):
             return Route(tuple(choice), path)
