@@ -14,11 +14,8 @@ from planner.interface import MapView, Mission, Path, Plan, PlanPicture, PlanReq
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.window import guide_vector
-from planner.shield.certificate import Certified, Certifier, hold_centre
+from planner.shield.certificate import PROGRESS_SHARE, Certified, Certifier, hold_centre
 from planner.shield.committed_plan import CommittedPlan, Start
-
-PROGRESS_SHARE = 0.25
-"""A plan leads on if it gains this share of the hold radius along its course, its hold as far from the old one's."""
 
 CONCENTRIC_SHARE = 0.05
 """An arc whose centre lies within this share of the hold radius from that of a hold is part of the hold."""

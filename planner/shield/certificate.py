@@ -44,6 +44,10 @@ DISC_BEYOND_SHARE = 0.5
 """The certified disc reaches beyond its turn by at least this share of the clearance. With all of the clearance the
 aircraft flies round forests: trees hide each other until it is among them."""
 
+PROGRESS_SHARE = 0.25
+"""What is certified gets on if it gains this share of the turn's radius along the way, and its turn lies as far from
+the one before."""
+
 MOST_ARC_LENGTHS = 32
 """A safe turn is sought at no more arc lengths of a path than this."""
 

@@ -53,7 +53,8 @@ class CommittedPlan:
     def left(self, arc_length_m: float) -> Path:
         """The rest of the path: the way to its turn, with the straight to roll on before that, and the turn."""
         turn_at_m = self.path.length_m - self.turn.length_m
-        return Path(np.array([*between(self.path, arc_length_m, turn_at_m), *self.turn.segments.tolist()]))
+        rows = (*between(self.path, arc_length_m, turn_at_m), *self.turn.segments.tolist())
+        return Path(np.array(rows), self.path.loiter)
 
 
 @dataclass(frozen=True, eq=False)

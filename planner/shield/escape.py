@@ -96,7 +96,9 @@ class Escapes:
     def threats(self, request: PlanRequest) -> Threats | None:
         """What stands near the aircraft and all that moves, while something moves or has just appeared; else None."""
         appeared = request.time_s - request.seen.last_contradiction_s < EVADING_S
-        return self._threats(request) if appeared or len(request.seen.moving) > 0 else None
+        if not (appeared or len(request.seen.moving)):
+            return None
+        return Threats.within_reach(request, self._memory.genuine_m, self._mission)
 
     def at_start(self, request: PlanRequest, threats: Threats | None, lead_m: float) -> Escape:
         """A turn before the first plan, where what is ahead was seen to be free at all.
@@ -192,7 +194,8 @@ class Escapes:
         if certain and not self._began_hidden:
             raise CertificateBroken(request.time_s)
         ways = ways or list(rolled_out(prefix, self._room.limits))
-        return self._clearest(request, threats or self._threats(request), left, ways)
+        threats = threats or Threats.within_reach(request, self._memory.genuine_m, self._mission)
+        return self._clearest(request, threats, left, ways)
 
     def _left_from(self, request: PlanRequest, effective: PlanInEffect) -> tuple[Path, float, float]:
         """The path to leave for a turn, between two arc lengths; `prefix` if the aircraft is off the plan in effect."""
@@ -239,10 +242,6 @@ class Escapes:
     def _standing(self, share: float) -> Terrain:
         """Terrain of a share of the distance kept from what stands; refused places do not count."""
         return self._room.terrain(share * self._room.path_keeps_m, standing=True)
-
-    def _threats(self, request: PlanRequest) -> Threats:
-        """What was seen to stand near the aircraft, and all that moves; refused places are left out."""
-        return Threats.within_reach(request, self._memory.genuine_m, self._mission)
 
     @staticmethod
     def _turn_away(request: PlanRequest, path: Path, reason: str) -> Escape:

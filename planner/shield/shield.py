@@ -26,15 +26,12 @@ from planner.geometry.terrain import WorkCount
 from planner.interface import Mission, NoWayToBegin, Path, Plan, Planner, PlanRequest, PlanStatus, Refused
 from planner.memory import ObstacleMemory
 from planner.plan_checks import WrongAnswerError, checked_plan
-from planner.shield.certificate import Certified, Certifier, hold_centre
+from planner.shield.certificate import PROGRESS_SHARE, Certified, Certifier, hold_centre
 from planner.shield.certified_planner import CertifiedPlanner
 from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import Room, meets, room_m
 from planner.shield.refused_places import with_places
 from planner.shield.tracking import MOST_TRACK_RADII, Tracked, can_be_flown, tracked
-
-PROGRESS_SHARE = 0.25
-"""A certified part makes progress if it gains this share of the hold radius along the planner's path."""
 
 HOLD_WITHIN_RADII = 1.0
 """A path of a planner that begins its full turn within this many turn radii only asks to circle."""
@@ -101,9 +98,7 @@ class Shield(CertifiedPlanner):
             arc_length_m = _nearest_m(adopted.plan.path, request.position_m, adopted.certified_m)
         seen = with_places(request.seen, self._places)
         told = request._replace(seen=seen, flown=flown, arc_length_m=arc_length_m, refused=self._refused)
-        if effective is not None:
-            left = Path(effective.left(here_m).segments, effective.path.loiter)
-            told = told._replace(committed=left)
+        told = told._replace(committed=effective.left(here_m) if effective is not None else None)
         try:
             self._own = self._inner.plan(told)
             return checked_plan(self._own, request.position_m, self._mission)

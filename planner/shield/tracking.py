@@ -87,11 +87,10 @@ def can_be_flown(path: Path, pose: Pose, limits: Limits) -> bool:
     rows = path.segments
     if np.abs(rows[:, 4]).max(initial=0.0) > (1.0 + 1e-6) / limits.radius_m:
         return False
-    here: Pose = pose
     for row in rows.tolist():
-        turn = abs(here.tangent_east * row[3] - here.tangent_north * row[2])
-        ahead = here.tangent_east * row[2] + here.tangent_north * row[3]
-        if math.dist(here[:2], row[:2]) > SMOOTH_M or turn > math.sin(SMOOTH_RAD) or ahead < 0.0:
+        turn = abs(pose.tangent_east * row[3] - pose.tangent_north * row[2])
+        ahead = pose.tangent_east * row[2] + pose.tangent_north * row[3]
+        if math.dist(pose[:2], row[:2]) > SMOOTH_M or turn > math.sin(SMOOTH_RAD) or ahead < 0.0:
             return False
-        here = along(row, row[5])
+        pose = along(row, row[5])
     return True
