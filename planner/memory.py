@@ -33,35 +33,31 @@ class ObstacleMemory:
         """Whether an edge point that had been seen was cleared again: the sensor errs, or something has gone."""
         self._outlines: Sequence[FloatArray] = ()
         self._revision = -1
-        self._points, self._genuine = NO_POINTS, np.zeros(0, dtype=np.bool_)
+        self.standing_m = NO_POINTS  # (`known`, 2) points that stand still, refused places among them
+        self._genuine = np.zeros(0, dtype=np.bool_)
         self._labels: IntArray | None = None
         self._with_moving: FloatArray | None = None
 
     @property
     def known(self) -> int:
         """Number of points that stand still: they come first, in the order in which they came in."""
-        return len(self._points)
+        return len(self.standing_m)
 
     @property
     def points_m(self) -> FloatArray:
         """(m, 2) edge points, those of moving obstacles last; later calls do not change this array."""
         if self._with_moving is None:
             moving = self._outlines
-            self._with_moving = np.concatenate((self._points, *moving)) if moving else self._points
+            self._with_moving = np.concatenate((self.standing_m, *moving)) if moving else self.standing_m
         return self._with_moving
 
     @property
     def labels(self) -> IntArray:
         """(m,) label of the obstacle that each point belongs to; each moving obstacle has its own."""
         if self._labels is None:
-            self._labels = obstacles_of(self._points, self.cell_m)
+            self._labels = obstacles_of(self.standing_m, self.cell_m)
         numbers = [np.full(len(outline), FIRST_MOVING_LABEL - i) for i, outline in enumerate(self._outlines)]
         return np.concatenate((self._labels, *numbers)) if numbers else self._labels
-
-    @property
-    def standing_m(self) -> FloatArray:
-        """(`known`, 2) points that stand still, refused places among them."""
-        return self._points
 
     @property
     def met_m(self) -> FloatArray:
@@ -71,12 +67,12 @@ class ObstacleMemory:
     @property
     def genuine_m(self) -> FloatArray:
         """(k, 2) points seen to stand still, without refused places."""
-        return self._points if self._genuine.all() else self._points.compress(self._genuine, axis=0)
+        return self.standing_m if self._genuine.all() else self.standing_m.compress(self._genuine, axis=0)
 
     @property
     def refused_m(self) -> FloatArray:
         """(k, 2) refused places."""
-        return self._points.compress(~self._genuine, axis=0)
+        return self.standing_m.compress(~self._genuine, axis=0)
 
     def refuse(self, place: tuple[float, float]) -> None:
         """Remembers a place as an edge point, so that no path leads there again."""
@@ -118,13 +114,13 @@ class ObstacleMemory:
     def _keep_only(self, genuine_m: FloatArray, refused_m: FloatArray) -> None:
         """Begins anew with the points left; refused places come first, so that no other moves up in the order."""
         self.cleared += self.known - len(genuine_m) - len(refused_m)
-        self._points, self._genuine = NO_POINTS, self._genuine[:0]
+        self.standing_m, self._genuine = NO_POINTS, self._genuine[:0]
         self._add(refused_m, genuine=False)
         self._add(genuine_m, genuine=True)
 
     def _add(self, fresh: FloatArray, genuine: bool) -> None:
         """Adds (k, 2) points that stand still: seen ones (`genuine`), or refused places."""
-        self._points = np.ascontiguousarray(np.concatenate((self._points, fresh)))
+        self.standing_m = np.ascontiguousarray(np.concatenate((self.standing_m, fresh)))
         self._genuine = np.concatenate((self._genuine, np.full(len(fresh), genuine)))
         self._labels = self._with_moving = None
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from planner.interface import FloatArray, MapView, MovingEdges
-
-if TYPE_CHECKING:
-    import shapely
 
 
 class NearestEdge:
@@ -17,7 +14,7 @@ class NearestEdge:
 
     def __init__(self, seen: MapView) -> None:
         self._seen = seen
-        self._tree: shapely.STRtree | None = None
+        self._tree: Any = None
         self._built_for: tuple[int, tuple[MovingEdges, ...]] = -1, ()
 
     def distance_m(self, points_m: FloatArray) -> FloatArray:

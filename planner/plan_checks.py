@@ -63,14 +63,12 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
     if letters > MOST_REASON_LETTERS:
         told = f"the planner's plan has a reason of {letters:,} characters"
         raise WrongAnswerError(f"{told}; it must have at most {MOST_REASON_LETTERS:,}")
+    reason, more = str.__str__(reason), bool(wants_more_time)
     if status is not PlanStatus.FOUND:
-        if type(answer) is Plan:
-            return answer
-        return Plan(status, str.__str__(reason), wants_more_time=bool(wants_more_time))
+        return answer if type(answer) is Plan else Plan(status, reason, wants_more_time=more)
     waypoints_m = _waypoints(answer.waypoints_m)
     path = _path(answer.path, position_m, start_tolerance_m(mission))
-    picture, more = _picture(answer.picture), bool(wants_more_time)
-    return Plan(status, str.__str__(reason), waypoints_m, path, picture, wants_more_time=more)
+    return Plan(status, reason, waypoints_m, path, _picture(answer.picture), wants_more_time=more)
 
 
 def _type_text(value: object) -> str:
@@ -174,8 +172,7 @@ def _ends(rows: FloatArray) -> FloatArray:
     half = 0.5 * rows[:, 4] * rows[:, 5]
     chord = rows[:, 5] * np.sinc(half / np.pi)
     ahead, left = (chord * np.cos(half))[:, None], (chord * np.sin(half))[:, None]
-    ends: FloatArray = rows[:, :2] + ahead * rows[:, 2:4] + left * np.column_stack((-rows[:, 3], rows[:, 2]))
-    return ends
+    return rows[:, :2] + ahead * rows[:, 2:4] + left * np.column_stack((-rows[:, 3], rows[:, 2]))
 
 
 def _picture(make: Callable[[], PlanPicture] | None) -> Callable[[], PlanPicture] | None:

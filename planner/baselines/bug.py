@@ -124,8 +124,9 @@ class Bug1(Walker[BugState]):
         """The state at the end of a boundary: on the way back to Q, or there on to the goal, or enclosed."""
         if isinstance(state, Circling):
             state = self._circled(state, flown)
-            onward = state.q_at_m <= 0.5 * state.walked_m  # the shorter way back
-            q, side = (state.q, ON_RIGHT) if onward else (state.q.reversed(), -ON_RIGHT)
+            q, side = state.q, ON_RIGHT
+            if state.q_at_m > 0.5 * state.walked_m:  # the other way back is the shorter one
+                q, side = Mark(q.place, -q.ux, -q.uy), -ON_RIGHT
             return Returning(q, side, state.walked_m)
         if state.walked_m > LOST_SHARE * state.round_m:
             return self._begin_circling(place)

@@ -22,10 +22,6 @@ class Mark:
     ux: float
     uy: float
 
-    def reversed(self) -> Mark:
-        """Returns the same tangent point, passed the other way round."""
-        return Mark(self.place, -self.ux, -self.uy)
-
 
 class Tangent(NamedTuple):
     """Where a line from a place touches an obstacle: a corner of it."""

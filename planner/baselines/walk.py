@@ -200,9 +200,8 @@ class Walker(ABC, Generic[WalkState]):
         clear, _ = self.known.first_hit(place, target)
         whole = math.dist(place, target)
         length = min(whole, clear)
-        if length <= SHORTEST_M:
-            return NOWHERE, clear < whole
-        return piece(np.array([place, target]), 0.0, length), clear < whole
+        way = piece(np.array([place, target]), 0.0, length) if length > SHORTEST_M else NOWHERE
+        return way, clear < whole
 
     def passes(self, way: FloatArray, mark: Mark, from_m: float) -> float:
         """Arc length at which a way passes a mark in its sense, not before an arc length; infinite for never."""

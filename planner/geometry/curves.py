@@ -129,8 +129,7 @@ def turn_centres(path: Path, arc_lengths_m: FloatArray, radius_m: float, roll_m:
     aside_m = np.array((radius_m, -radius_m))
     rolled_m = np.where(aside_m * curvature < 0.0, roll_m, 0.0)
     left = np.stack((-ahead[..., 1], ahead[..., 0]), axis=2)
-    centres: FloatArray = place + rolled_m[..., None] * ahead + aside_m[:, None] * left
-    return centres
+    return place + rolled_m[..., None] * ahead + aside_m[:, None] * left
 
 
 def turns_onto(pose: Pose, target: Point, radius_m: float) -> Iterator[list[Segment]]:
