@@ -68,7 +68,8 @@ def hugged(own: FloatArray, cells: Cells, side: float, ray: Ray, outer: float, t
     grown = True
     while grown:  # Those that overlap are one.
         grown = False
-        for k in range(count):
+        for i in range(2 * count):
+            k = i if i < count else 2 * count - 1 - i  # there and back: along a wall they are in order
             if begin[k] <= furthest < end[k]:
                 furthest, grown = end[k], True
     return furthest
