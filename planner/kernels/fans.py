@@ -48,9 +48,8 @@ def hugged(own: FloatArray, cells: Cells, side: float, ray: Ray, outer: float, t
     """Distance along a ray that touches an obstacle at which it is `outer` away from the obstacle again; 0: never."""
     first, counts, _, _ = cells
     east, north, ux, uy = ray
-    # Stretches of the ray near to a point that end beyond the touch, and the end of the one that begins first.
+    # Stretches of the ray near to a point that end beyond the touch.
     begin, end, count = np.empty(own.shape[1]), np.empty(own.shape[1]), 0
-    least, furthest = math.inf, 0.0
     within = outer + 1.5 * side  # points of one cell lie no further apart than its diagonal
     for cell in range(len(first)):
         dx, dy = own[0, first[cell]] - east, own[1, first[cell]] - north
@@ -62,16 +61,12 @@ def hugged(own: FloatArray, cells: Cells, side: float, ray: Ray, outer: float, t
             half = math.sqrt(max(outer * outer - beside * beside, 0.0))
             if half > 0.0 and ahead + half > touch:
                 begin[count], end[count] = ahead - half, ahead + half
-                if begin[count] < least:
-                    least, furthest = begin[count], end[count]
                 count += 1
-    grown = True
-    while grown:  # Those that overlap are one.
-        grown = False
-        for i in range(2 * count):
-            k = i if i < count else 2 * count - 1 - i  # there and back: along a wall they are in order
-            if begin[k] <= furthest < end[k]:
-                furthest, grown = end[k], True
+    furthest = 0.0
+    for k in np.argsort(begin[:count], kind="mergesort"):  # Those that overlap are one.
+        if begin[k] > furthest > touch:
+            break
+        furthest = max(furthest, end[k])
     return furthest
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -97,3 +98,37 @@ def test_hidden_edges_are_not_returned_but_those_of_what_hides_them(ring: MakePo
     assert from_far
     assert sorted(from_far) == sorted(window.sector_edges((0.0, 0.0), [0]))
     assert max(edge.touch_m for edge in from_far) < 3000.0
+
+
+@settings(max_examples=examples(30))
+@given(seed=SEEDS, count=st.integers(1, 6), outer=st.floats(1.005, 1.5))
+def test_an_obstacle_is_hugged_up_to_the_outer_distance(
+    seed: int, count: int, outer: float, ring: MakePoints, wall: MakePoints
+) -> None:
+    window = random_window(seed, count, ring, wall)
+    for edge in window.sector_edges((0.0, 0.0), range(count), outer * KEEP):
+        along = np.append(np.linspace(edge.touch_m, edge.hugged_m, 500), edge.hugged_m + 1e-3)
+        places = along[:, None] * (edge.ux, edge.uy)
+        own = window.points_m[window.labels == edge.obstacle]
+        nearest = np.hypot(*(places[:, None] - own).T).min(axis=0)
+        assert nearest[:-1].max() < outer * KEEP * (1.0 + 1e-9)
+        assert nearest[-1] > outer * KEEP
+
+
+def test_hugging_a_long_wall_takes_little_time() -> None:
+    """A straight wall of 20,000 points to the north-west, hugged to its end, in whatever order they were seen."""
+    ahead_m = 100.0 + 8.0 * np.arange(20_000)
+    (x, y), outer = (-math.sqrt(0.5), math.sqrt(0.5)), 1.005 * KEEP
+    off = 1e-6 + 1e-7  # the tangent to the nearest point leads away from the wall; rad
+    beside_m = KEEP - 1e-4 + off * ahead_m[-1]
+    origin, took_s = (y * (KEEP - 1e-4), -x * (KEEP - 1e-4)), []
+    for order in (np.arange(20_000), np.random.default_rng(1).permutation(20_000)):
+        window = window_of(np.outer(ahead_m[order], (x, y)))
+        tangents = window.sector_edges(origin, [0])  # sorts the points into squares
+        begun = time.process_time()
+        edges = window.sector_edges(origin, [0], outer)
+        took_s.append(time.process_time() - begun)
+        assert len(edges) == len(tangents)
+        hugged_m = max(edge.hugged_m for edge in edges if edge.touch_m < 200.0)
+        assert hugged_m == pytest.approx(ahead_m[-1] + math.sqrt(outer**2 - beside_m**2), abs=0.1)
+    assert max(took_s) < 0.05, took_s
