@@ -208,13 +208,14 @@ class LocalPlanning:
 
     def growth_m(self, course: Course, before: Course | None) -> float:
         """By how much (m) a course that is flown from now on is longer than what was left of the one before, if any."""
+        grown_m, self._grown_m = self._grown_m, 0.0
         if before is None:
             return math.inf
         self.work_count.add(4, POINT_WORK, 4 * len(course.nodes) * before.known)
         start: Point = tuple(course.path.segments[0, :2].tolist())
-        same_side = before.same_side((start, *course.nodes), self.memory.points_m)
         growth_m = course.path.length_m - before.path.length_m
-        self._grown_m = max(self._grown_m + growth_m, 0.0) if same_side else 0.0
+        if before.same_side((start, *course.nodes), self.memory.points_m):
+            self._grown_m = max(grown_m + growth_m, 0.0)
         return growth_m
 
     def is_worth_room(self, wide: Route, narrow: Course, open_to_m: float) -> bool:

@@ -169,6 +169,8 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back_or_ha
     nodes = ((6000.0, -2250.0), MISSION.goal_m)
     ways = ([*((-float(grown_m), 0.0),) * (grown_m > 0), (0.0, 0.0), *nodes], [(0.0, 0.0), *nodes])
     grown, south = (Course(Path.through(np.array(way)), nodes, local.memory.known, False) for way in ways)
+    assert [local.growth_m(grown, south) for _ in range(4)] == pytest.approx([grown_m] * 4)
+    assert math.isinf(local.growth_m(south, None))  # from here on it is another course, which has not grown
     assert local.growth_m(grown, south) == pytest.approx(grown_m)
     if flown_before:
         for share in np.linspace(0.3, 1.0, 60).tolist():
