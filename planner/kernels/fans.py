@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, INTS, POINT, ROWS, compiled
+from planner.compiled import BOOLS_OUT, COUNT, COUNTS_OUT, FLOAT, FLOATS_OUT, INTS, POINT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 from planner.kernels.buckets import BUCKETS, Buckets, Cells
 
@@ -43,6 +43,20 @@ def first_met(buckets: Buckets, ray: Ray) -> tuple[float, int]:
     return max(nearest, 0.0), met
 
 
+@compiled(FLOATS_OUT, FLOATS_OUT, COUNT, COUNT, inner=True)
+def _sift_down(key: FloatArray, value: FloatArray, place: int, count: int) -> None:
+    """Restores a binary heap of `count` pairs, least key first, in which the key at `place` may be too great."""
+    while 2 * place + 1 < count:
+        child = 2 * place + 1
+        if child + 1 < count and key[child + 1] < key[child]:
+            child += 1
+        if key[place] <= key[child]:
+            return
+        key[place], key[child] = key[child], key[place]
+        value[place], value[child] = value[child], value[place]
+        place = child
+
+
 @compiled(ROWS, CELLS, FLOAT, RAY, FLOAT, FLOAT, inner=True)
 def hugged(own: FloatArray, cells: Cells, side: float, ray: Ray, outer: float, touch: float) -> float:
     """Distance along a ray that touches an obstacle at which it is `outer` away from the obstacle again; 0: never."""
@@ -62,11 +76,14 @@ def hugged(own: FloatArray, cells: Cells, side: float, ray: Ray, outer: float, t
             if half > 0.0 and ahead + half > touch:
                 begin[count], end[count] = ahead - half, ahead + half
                 count += 1
+    # From the first on, which a heap gives: those that overlap are one.
+    for k in range(count // 2 - 1, -1, -1):
+        _sift_down(begin, end, k, count)
     furthest = 0.0
-    for k in np.argsort(begin[:count], kind="mergesort"):  # Those that overlap are one.
-        if begin[k] > furthest > touch:
-            break
-        furthest = max(furthest, end[k])
+    while count and not begin[0] > furthest > touch:
+        furthest, count = max(furthest, end[0]), count - 1
+        begin[0], end[0] = begin[count], end[count]
+        _sift_down(begin, end, 0, count)
     return furthest
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from planner.compiled import COUNT, FLOAT, FLOATS, ROWS, compiled
 from planner.interface import FloatArray
+from planner.kernels.buckets import BUCKETS, Buckets
 
 
 @compiled(ROWS, COUNT, FLOAT, inner=True)
@@ -80,6 +81,24 @@ def first_breach(rows: FloatArray, points: FloatArray, radius: FloatArray, from_
                 first = begins + along
         begins += rows[which, 5]
     return first
+
+
+@compiled(ROWS, BUCKETS)
+def comes_too_near(rows: FloatArray, buckets: Buckets) -> bool:
+    """Whether a path passes a point within the distance to be kept from it."""
+    places, first, circles = buckets
+    for which in range(len(rows)):
+        half = 0.5 * rows[which, 5]
+        east, north, _, _ = pose(rows, which, half)
+        for block in range(len(first) - 1):
+            dx, dy, reach = circles[0, block] - east, circles[1, block] - north, half + circles[2, block]
+            if dx * dx + dy * dy >= reach * reach:
+                continue
+            for i in range(first[block], first[block + 1]):
+                distance, along = to_segment(rows, which, places[0, i], places[1, i])
+                if distance < places[2, i] and (along > 0.0 or not which):  # as in `first_breach`
+                    return True
+    return False
 
 
 @compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
