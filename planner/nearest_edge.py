@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.interface import FloatArray, MapView, MovingEdges
+
+if TYPE_CHECKING:
+    import shapely
 
 
 class NearestEdge:
@@ -14,7 +17,7 @@ class NearestEdge:
 
     def __init__(self, seen: MapView) -> None:
         self._seen = seen
-        self._tree: Any = None
+        self._tree: shapely.STRtree | None = None
         self._built_for: tuple[int, tuple[MovingEdges, ...]] = -1, ()
 
     def distance_m(self, points_m: FloatArray) -> FloatArray:

@@ -125,11 +125,7 @@ def turn_centres(path: Path, arc_lengths_m: FloatArray, radius_m: float, roll_m:
     Where the path turns the other way, the turn begins after a straight of `roll_m`.
     """
     poses = kernel.poses_at(path.segments, np.ascontiguousarray(arc_lengths_m))
-    place, ahead, curvature = poses[:, None, :2], poses[:, None, 2:4], poses[:, 4:]
-    aside_m = np.array((radius_m, -radius_m))
-    rolled_m = np.where(aside_m * curvature < 0.0, roll_m, 0.0)
-    left = np.stack((-ahead[..., 1], ahead[..., 0]), axis=2)
-    return place + rolled_m[..., None] * ahead + aside_m[:, None] * left
+    return kernel.turn_centres(poses, radius_m, roll_m)
 
 
 def turns_onto(pose: Pose, target: Point, radius_m: float) -> Iterator[list[Segment]]:

@@ -152,3 +152,19 @@ def poses_at(rows: FloatArray, arc_lengths: FloatArray) -> FloatArray:
         poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3] = at
         poses[i, 4] = rows[which, 4]
     return poses
+
+
+@compiled(ROWS, FLOAT, FLOAT)
+def turn_centres(poses: FloatArray, radius: float, roll: float) -> FloatArray:
+    """(k, 2, 2) centres of the turns off (k, 5) poses of a path, as `poses_at` gives: to the left, and to the right.
+
+    Where the path turns the other way, the turn begins after a straight of length `roll`.
+    """
+    centres = np.empty((len(poses), 2, 2))
+    for i in range(len(poses)):
+        for k in range(2):
+            aside = radius if k == 0 else -radius
+            ahead = roll if aside * poses[i, 4] < 0.0 else 0.0
+            centres[i, k, 0] = poses[i, 0] + ahead * poses[i, 2] - aside * poses[i, 3]
+            centres[i, k, 1] = poses[i, 1] + ahead * poses[i, 3] + aside * poses[i, 2]
+    return centres
