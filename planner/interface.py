@@ -23,6 +23,8 @@ ComplexArray = NDArray[np.complex128]
 
 OFF_PATH_ERRORS = 4.0
 """An aircraft further from a path than this many tracking errors, and than 1 m, has left it."""
+LEAST_CURVATURE_1PM = 1e-12
+"""A smaller curvature is none: 100 km of it lie 5 mm off a straight line, and its centre is too far away to count."""
 UNIT_TOLERANCE = 1e-6
 """A tangent counts as a unit vector if its length differs from 1 by less than this."""
 MOST_ROWS = 1_000_000
@@ -153,7 +155,7 @@ class Path:
     """Joined segments of constant curvature.
 
     A row of `segments`, (n, 6), read-only, is start east, start north, unit tangent east, unit tangent north, curvature
-    (1/m, positive = left) and length (m).
+    (1/m, positive = left; 0 below `LEAST_CURVATURE_1PM`) and length (m).
     """
 
     segments: FloatArray
@@ -161,6 +163,7 @@ class Path:
 
     def __post_init__(self) -> None:
         rows = np.array(self.segments, dtype=np.float64, order="C").reshape(-1, 6)
+        rows[np.abs(rows[:, 4]) < LEAST_CURVATURE_1PM, 4] = 0.0
         rows.setflags(write=False)
         object.__setattr__(self, "segments", rows)
 

@@ -16,6 +16,7 @@ from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
+from planner.interface import Path
 from tests.routes import route_of, route_point
 
 LIMITS = airframe("aerosonde").guidance_limits()
@@ -91,3 +92,15 @@ def test_a_point_beside_a_route_is_told_with_its_distance_and_curvature(seed: in
         )
         assert point.curvature_1pm in route.segments[[int(np.searchsorted(ends, arc_length))], 4]
         assert not point.past_end
+
+
+@pytest.mark.parametrize("curvature", [1e-13, 1e-15, -1e-17, -1e-25])
+def test_beside_a_line_that_rounding_has_curved_the_cross_track_error_is_the_distance_from_the_line(
+    curvature: float,
+) -> None:
+    """By hand: 3 m to the right of the x axis, whatever the curvature that rounding has left in the segment."""
+    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, curvature, 6000.0)]))
+    progress = RouteProgress(Route(path.segments))
+    for along_m in np.linspace(0.0, 5900.0, 60):
+        point = progress.nearest(float(along_m), -3.0)
+        assert (point.arc_length_m, point.cross_track_m) == pytest.approx((along_m, 3.0), abs=1e-6)
