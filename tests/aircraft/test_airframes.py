@@ -99,6 +99,16 @@ def test_planning_banks_no_steeper_than_speed_and_altitude_allow() -> None:
         performance(replace(frame, level_banks=((18.0, 3.0),)), slow)
 
 
+@pytest.mark.parametrize(("limit_deg", "bank_deg"), [(5.0, 2.5), (12.0, 5.0), (15.0, 5.0), (22.0, 7.0)])
+def test_a_small_bank_limit_is_planned_for(limit_deg: float, bank_deg: float) -> None:
+    frame = replace(airframe("aerosonde"), bank_limit_deg=limit_deg)
+    by_hand = 25.0**2 / (9.80665 * math.tan(math.radians(bank_deg)))
+    assert performance(frame, 25.0).turn_radius_m == pytest.approx(by_hand)
+    for turbulence in ("light", "moderate", "severe"):
+        gusty = performance(frame, 25.0, 5.0, turbulence)
+        assert 0.0 < gusty.hold_radius_m <= gusty.spaced_radius_m <= gusty.turn_radius_m < math.inf
+
+
 def test_level_banks_are_joined_by_lines() -> None:
     frame = replace(airframe("aerosonde"), level_banks=((20.0, 10.0), (30.0, 40.0), (40.0, 20.0)))
     flown = [frame.level_bank_deg(speed) for speed in (15.0, 20.0, 25.0, 30.0, 35.0, 45.0)]
