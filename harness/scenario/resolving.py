@@ -55,6 +55,7 @@ def resolve(
     if latency_s or aircraft.autopilot is not None:
         autopilot = (aircraft.autopilot or AutopilotSpec()).filled(state_latency_s=latency_s)
         aircraft = aircraft.model_copy(update={"autopilot": autopilot})
+        _airframe(aircraft, latency_s)
     guidance = resolved_guidance(keys.guidance, aircraft, as_flown)
     scenario = keys.updated(aircraft=aircraft, guidance=guidance)
     if as_flown and guidance.kind not in guidance_kinds():
@@ -123,13 +124,16 @@ def model_or_folder(model: str, folder: Path | None) -> str:
     return str(found.resolve()) if found and found.is_dir() else model
 
 
-def _airframe(spec: AircraftSpec) -> Airframe:
-    """Returns the airframe; if there is none, a KeyFault names the key without which there would be one."""
+def _airframe(spec: AircraftSpec, latency_s: float | None = None) -> Airframe:
+    """Returns the airframe; if there is none, a KeyFault names a latency that is given, else the aircraft's key."""
     from aircraft.airframes import AircraftError
 
     try:
         return airframe_of(spec)
     except AircraftError as error:
+        if latency_s is not None:
+            told = f"is {latency_s:g}; must be less, or aircraft.autopilot.state_latency_s be given: {error}"
+            raise KeyFault(("navigation", "latency_s"), told) from error
         for key in ("actuators", "autopilot"):
             if getattr(spec, key) is not None:
                 _airframe(spec.model_copy(update={key: None}))

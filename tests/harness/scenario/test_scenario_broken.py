@@ -98,6 +98,8 @@ BROKEN = {
     "seventh rate": ("rate_hz: 2", "rate_hz: 7", "18: sensor.rate_hz", "does not divide 120 Hz"),
     "too few rays": ("rays: 360", "rays: 2", "18: sensor.rays", "at least 3"),
     "sensor is a list": ("{range_m: 3000, rays: 360, rate_hz: 2}", "[3000]", "18: sensor", "must be a mapping"),
+    "late state": ("planner:", "navigation: {kind: gnss, latency_s: 1}\nplanner:", "19: navigation.latency_s",
+        "is 1; must be less, or aircraft.autopilot.state_latency_s be given: aerosonde cannot be held"),
     "unknown planner": ("rolling_window", "astar", "20: planner.kind", "must be one of rolling_window"),
     "planner's misspelt key": ("steps: 8", "stepz: 8", "22: planner.stepz", "did you mean steps?"),
     "planner's key out of range": ("steps: 8", "steps: 0", "22: planner.steps", "at least 1"),
