@@ -262,13 +262,17 @@ def replaced(node: Node, loc: Loc, new: Node, depth: int = 0) -> Node:
 
 
 def without(node: Node, loc: Loc) -> Node:
-    """Returns a copy of `node` in which a mapping lacks the key at `loc`; the same where it is not there."""
-    step, *rest = loc
-    inner = node.inner(step)
-    if inner is None or not isinstance(node.value, dict):
+    """Returns a copy of `node` without what is at `loc`; the same if nothing is; InputError if `loc` leads nowhere."""
+    replaced(node, loc, Node(None, IN_PYTHON))
+    *way, last = loc
+    parent = node.at(tuple(way))
+    if parent is None or isinstance(parent.value, Scalar):
         return node
-    kept = {key: value for key, value in node.value.items() if key != step}
-    return Node({**kept, str(step): without(inner, tuple(rest))} if rest else kept, node.line)
+    if isinstance(parent.value, dict):
+        kept: dict[str, Node] | tuple[Node, ...] = {k: v for k, v in parent.value.items() if k != last}
+    else:
+        kept = tuple(each for index, each in enumerate(parent.value) if index != last)
+    return replaced(node, tuple(way), Node(kept, parent.line))
 
 
 # Writes text in quotes wherever a YAML 1.2 reader would take it for something else, and no aliases: those are refused.

@@ -16,14 +16,15 @@ import numpy as np
 from pydantic import ValidationError
 
 from harness.files import strict_yaml
-from harness.files.strict_yaml import COMMAND_LINE, IN_PYTHON, InputError, Loc, Node, loc_of, node_of
+from harness.files.input_file import InputError
+from harness.files.strict_yaml import COMMAND_LINE, IN_PYTHON, Loc, Node, fault_line, loc_of, node_of
 from harness.files.wording import counted
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.parts import with_own_keys
 from harness.scenario.resolving import resolve
-from harness.scenario.sections import GuidanceSpec, PlannerSpec, Section
+from harness.scenario.sections import GuidanceSpec, PartSpec, PlannerSpec, Section
 from harness.scenario.shipped import scenario_path
-from harness.scenario.validation import KeyFaults
+from harness.scenario.validation import KeyFaults, known_keys, unknown_key
 
 OWN_KEYS: Final[Mapping[Loc, Any]] = {("planner", "kind"): PlannerSpec, ("guidance", "kind"): GuidanceSpec}
 """Keys that name a kind with own keys in its section, and the section's type, which has the keys of all kinds."""
@@ -56,15 +57,33 @@ class Given(NamedTuple):
 
 
 def changed(given: Given, keys: Mapping[str, Any]) -> Node:
-    """Returns the keys that a scenario was given, without defaults, with some changed; None takes a key away."""
+    """Returns the keys that a scenario was given, without defaults, with some changed.
+
+    None takes a key away; items of lists that it takes away are counted as they were before.
+    """
     if not isinstance(keys, Mapping) or not all(isinstance(name, str) for name in keys):
         raise InputError('with_: must be given a mapping of key paths, such as {"planner.clearance_m": 60}')
     plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}
     root = node_of(plain, IN_PYTHON)
-    for name, value in keys.items():
-        loc, new = loc_of(name, "with_"), node_of(_plain(value), IN_PYTHON)
-        root = strict_yaml.without(root, loc) if value is None else with_key(root, loc, new)
+    places = {loc_of(name, "with_"): value for name, value in keys.items()}
+    items = [loc for loc, value in places.items() if value is None and isinstance(loc[-1], int)]
+    for loc, value in places.items():
+        if value is not None:
+            root = with_key(root, loc, node_of(_plain(value), IN_PYTHON))
+        elif loc not in items:
+            root = strict_yaml.without(root, loc)
+    for loc in sorted(items, key=lambda loc: (len(loc), loc[-1]), reverse=True):
+        root = strict_yaml.without(root, loc)
     return root
+
+
+def _refuse_unknown(made: Scenario, loc: Loc) -> None:
+    """Raises an InputError if a scenario with these kinds of planner and law has no key at `loc`."""
+    for depth, step in enumerate(loc):
+        part = getattr(made, str(loc[0]), None) if depth == 1 else None
+        known = (*known_keys(ScenarioKeys, loc[:depth]), *(part.own if isinstance(part, PartSpec) else ()))
+        if isinstance(step, str) and step not in known:
+            raise InputError(fault_line("", IN_PYTHON, loc[: depth + 1], unknown_key(step, known)))
 
 
 def _plain(value: Any) -> Any:
@@ -90,10 +109,14 @@ class Scenario(ScenarioKeys):
 
         Args:
             keys: values by key path, as `{"seed": 3, "obstacles[0].circle.radius_m": 50}`; plain values, numpy's, or
-                sections. None stands for the default.
+                sections. None stands for the default, and takes an item out of a list.
         """
         given: Given = self.__dict__["_given"]
-        return validated(changed(given, keys), "with_", given.folder)
+        made = validated(changed(given, keys), "with_", given.folder)
+        for name, value in keys.items():
+            if value is None:
+                _refuse_unknown(made, loc_of(name))
+        return made
 
     def __repr__(self) -> str:
         """A line for people; `dump_scenario` gives all of it."""

@@ -64,7 +64,7 @@ class KeyFaults(ValueError):
             elif isinstance(cause, KeyFault):
                 found.append(((*loc, *cause.loc), str(cause)))
             else:
-                known = _known_keys(model, loc[:-1]) if details["type"] == "extra_forbidden" else ()
+                known = known_keys(model, loc[:-1]) if details["type"] == "extra_forbidden" else ()
                 found.append((loc, _sentence(details, known)))
         return cls(found)
 
@@ -90,17 +90,18 @@ def in_lines(every: Sequence[str], source: str) -> InputError:
     return InputError("\n".join(lines))
 
 
-def _known_keys(model: type[BaseModel], loc: Loc) -> tuple[str, ...]:
-    """Keys of the section at `loc`, as they are spelt in a file."""
+def known_keys(model: type[BaseModel], loc: Loc) -> tuple[str, ...]:
+    """Keys of the section at `loc`, as they are spelt in a file; none where there is no section."""
     schema = model.model_json_schema()
     part: Mapping[str, Any] = schema
     for step in loc:
-        inner = part.get("properties", {})
-        part = part["items"] if isinstance(step, int) else inner.get(step) or part["additionalProperties"]
+        inner = part.get("properties", {}).get(step) or part.get("additionalProperties")
+        inner = part.get("items") if isinstance(step, int) else inner
+        part = inner if isinstance(inner, dict) else {}
         for choice in part.get("anyOf", [part]):
             if "$ref" in choice:
                 part = schema["$defs"][choice["$ref"].rpartition("/")[2]]
-    return tuple(part["properties"])
+    return tuple(part.get("properties", ()))
 
 
 def _sentence(details: ErrorDetails, known: tuple[str, ...]) -> str:

@@ -323,7 +323,19 @@ def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
     faster = bare.with_({"aircraft.model": "c172p", "environment.wind.speed_mps": 5})
     assert faster == scenario_of(LEAST + "aircraft: {model: c172p}\nenvironment: {wind: {speed_mps: 5}}\n")
     assert faster.planner != bare.planner
-    assert faster.with_({"aircraft": None, "environment": None}) == bare
+    assert faster.with_({"aircraft": None, "environment": None, "planner.margin_m": None}) == bare
+
+
+def test_none_takes_keys_and_items_out_of_lists() -> None:
+    ring = "vertices_m: [[5000, 5000], [6000, 5000], [5000, 6000]]"
+    full = (
+        "obstacles:\n  - circle: {center_m: [5000, 1000], radius_m: 50}\n    velocity_mps: [1, 0]\n"
+        f"  - polygon: {{{ring}, holes_m: [[[5100, 5100], [5200, 5100], [5100, 5200]]]}}\n"
+        "  - circle: {center_m: [7000, 7000], radius_m: 60}\n    active_s: [60, 140]\n"
+    )
+    gone = {"obstacles[0]": None, "obstacles[1].polygon.holes_m": None, "obstacles[2].active_s": None}
+    left = f"obstacles:\n  - polygon: {{{ring}}}\n  - circle: {{center_m: [7000, 7000], radius_m: 60}}\n"
+    assert scenario_of(LEAST + full).with_(gone) == scenario_of(LEAST + left)
 
 
 @pytest.mark.parametrize(
@@ -335,6 +347,11 @@ def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
         ({"a..b": 1}, "with_: 'a..b' is not a key path"),
         ({"name.inner": 1}, "with_: name.inner: no such key"),
         ({"seed": math.nan}, "with_: seed: "),
+        ({"sensor.rangem": None}, "with_: sensor.rangem: unknown key; did you mean range_m?"),
+        ({"planner.marginm": None}, "with_: planner.marginm: unknown key; did you mean margin_m?"),
+        ({"no.such": None}, "with_: no: unknown key"),
+        ({"environment.wind.speed": None}, "with_: environment.wind.speed: unknown key"),
+        ({"obstacles[9999].active_s": None}, "with_: obstacles[9999]: does not exist"),
         ({1: 2}, "with_: must be given a mapping of key paths"),
         ([("seed", 2)], "with_: must be given a mapping of key paths"),
     ],
