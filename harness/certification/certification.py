@@ -13,6 +13,7 @@ import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import reduce
 from pathlib import Path
 from typing import Any, Final
 
@@ -34,11 +35,15 @@ from harness.files.versions import versions
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray, IntArray
 from harness.run_files.run_folder import TRACK
+from harness.scenario.sections import DeviationSpec
 
 CERTIFICATE: Final = "certificate.json"  # file of the verdict
 SCHEMA: Final = "wayproof/certificate/1"
-SECTIONS: Final = ("environment", "navigation", "uncertainty", "sensor", "aircraft")
-"""Sections of a scenario whose numbers may differ between days without being varied by name: conditions draw them."""
+DRAWN: Final = (
+    *("environment.wind.speed_mps", "environment.wind.from_deg", "environment.vertical_gusts.start_s"),
+    *(f"aircraft.deviation.{name}" for name in DeviationSpec.model_fields),
+)
+"""Keys of a scenario whose numbers conditions and uncertainty draw without their being varied by name."""
 DEFAULT_RUNS: Final = (1000, 10_000)
 """Default of the largest number of days to fly: by counting, and by subset simulation."""
 MOST_FOLDERS: Final = 20
@@ -299,15 +304,11 @@ def explained(failed: NDArray[np.bool_], quantities: Mapping[str, Sequence[Any]]
     return tuple(sorted(found, key=lambda each: -each.share))
 
 
-def differing(days: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Finds keys of plain scenarios, no lists, that differ between days; returns the values, one a day, by key path."""
-    flat = [dict(leaf for name in SECTIONS for leaf in _leaves(day.get(name), name)) for day in days]
-    keys = dict.fromkeys(key for each in flat for key in each)
-    columns = {key: [each.get(key) for each in flat] for key in keys}
-    return {key: values for key, values in columns.items() if len({*map(json.dumps, values)}) > 1}
-
-
-def _leaves(content: Any, key: str) -> list[tuple[str, Any]]:
-    if not isinstance(content, Mapping):
-        return [] if content is None or isinstance(content, list | tuple) else [(key, content)]
-    return [leaf for name, value in content.items() for leaf in _leaves(value, f"{key}.{name}")]
+def differing(days: Sequence[Any]) -> dict[str, list[Any]]:
+    """Returns those numbers of plain scenarios in `DRAWN` that differ between days, one a day, by key path."""
+    paths = {key: key.split(".") for key in DRAWN}
+    columns = {
+        key: [reduce(lambda at, name: (at or {}).get(name), path, day) for day in days]
+        for key, path in paths.items()
+    }
+    return {key: values for key, values in columns.items() if len({*values}) > 1}

@@ -38,8 +38,12 @@ def test_a_direction_explains_failures_on_both_sides_of_north() -> None:
 
 
 def test_what_conditions_draw_is_found_though_no_key_names_it() -> None:
+    """The range of the sensor is no quantity of its own: it follows from the wind."""
     days = [
-        {"environment": {"wind": {"speed_mps": speed, "from_deg": 270.0}}, "seed": seed}
-        for seed, speed in enumerate((1.0, 2.0))
+        {
+            "environment": {"wind": {"speed_mps": speed, "from_deg": 270.0}},
+            "sensor": {"range_m": 900.0 + speed},
+        }
+        for speed in (1.0, 2.0)
     ]
     assert differing(days) == {"environment.wind.speed_mps": [1.0, 2.0]}
