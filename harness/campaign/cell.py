@@ -158,7 +158,7 @@ def legend() -> list[str]:
 MAX_NUMBERS: Final = 8
 """A key with more different numbers than this is taken as drawn at random."""
 BINS: Final = 4
-"""More numbers drawn at random than this are grouped into this many quantiles, or directions into as many sectors."""
+"""More numbers drawn at random than this are grouped into this many quantiles, or into sectors if from all round."""
 NOT_SET: Final = "not set"  # label of runs without a value of a key
 DIRECTION_ENDS: Final = ("from_deg", "course_deg", "heading_deg")
 """Keys that end so hold directions, of which 359 degrees is beside 0."""
@@ -178,8 +178,7 @@ class Axis:
 
 def are_numbers(values: Sequence[Scalar]) -> bool:
     """Tells whether all values that are given are numbers."""
-    given = [value for value in values if value is not None]
-    return bool(given) and all(type(value) in (int, float) for value in given)
+    return set() < {type(value) for value in values if value is not None} <= {int, float}
 
 
 def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis, IntArray]:
@@ -197,18 +196,25 @@ def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis,
 
 
 def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
-    """Groups numbers into quantiles, or directions into quarters of the compass about its points."""
+    """Groups numbers into quantiles; directions from all round into quarters of the compass about its points."""
     numbers = np.array([np.nan if value is None else value for value in values], dtype=np.float64)
-    missing = np.isnan(numbers)
-    if key.endswith(DIRECTION_ENDS):
+    missing, turns = np.isnan(numbers), key.endswith(DIRECTION_ENDS)
+    if turns:
+        around = np.sort(numbers[~missing] % 360.0)
+        gaps = np.diff(around, append=around[0] + 360.0)
+    if turns and gaps.max() <= 90.0:
         labels, edges = COMPASS_SECTORS, ()
         index = np.floor(np.nan_to_num((numbers + 45.0) % 360.0) / 90.0)
     else:
+        if turns:  # they rise from behind the widest gap on
+            begin = around[gaps.argmax() + 1 - len(around)]
+            numbers = begin + (numbers % 360.0 - begin) % 360.0
         limits = np.unique(np.quantile(numbers[~missing], np.linspace(0.0, 1.0, BINS + 1)))
         edges = tuple(limits.tolist())
-        labels = tuple(f"{low} to {high}" for low, high in itertools.pairwise(_told_apart(edges, 4)))
+        ends = _told_apart((limits % 360.0 if turns else limits).tolist(), 4)
+        labels = tuple(f"{low} to {high}" for low, high in itertools.pairwise(ends))
         index = np.searchsorted(limits[1:-1], numbers, side="right")
-    group: IntArray = np.where(missing, len(labels), index).astype(np.int64)
+    group = np.where(missing, len(labels), index).astype(np.int64)
     return Axis(key, (*labels, NOT_SET) if missing.any() else labels, edges), group
 
 
