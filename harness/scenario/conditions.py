@@ -15,7 +15,14 @@ from aircraft.start import profile_share
 from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
 from harness.scenario.keys import NORMALS, ScenarioKeys
 from harness.scenario.navigation import Navigation
-from harness.scenario.sections import MOST_SHARE, MOST_SHIFT_M, ActuatorsSpec, DeviationSpec, UncertaintySpec
+from harness.scenario.sections import (
+    MOST_SHARE,
+    MOST_SHIFT_M,
+    ActuatorsSpec,
+    DeviationSpec,
+    Section,
+    UncertaintySpec,
+)
 
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe
@@ -86,21 +93,26 @@ DAYS: Final = {  # sources: `aircraft/README.md`
 # fmt: on
 
 
+def _written(section: Section | None) -> dict[str, Any]:
+    """Returns those keys of a section that the file gives a value."""
+    return {} if section is None else section.model_dump(exclude_unset=True, exclude_none=True)
+
+
 def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
-    """Adds the servos of its day to a scenario, where neither it nor the card of its aircraft (`frame`) names any."""
-    day = DAYS.get(keys.conditions)
-    if day is None or keys.aircraft.actuators is not None or frame.files.actuators:
+    """Fills in the servos of its day where a scenario leaves them out; those on its aircraft's card go before them."""
+    day, given = DAYS.get(keys.conditions), keys.aircraft.actuators
+    if day is None or (given is None and frame.files.actuators):
         return keys
-    servos = ActuatorsSpec(**day.servos)
+    servos = ActuatorsSpec(**day.servos | _written(given))
     return keys.updated(aircraft=keys.aircraft.model_copy(update={"actuators": servos}))
 
 
 def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
     """Fills in navigation, air and deviations of its day where a scenario leaves them out; its airspeed is known."""
     day = DAYS.get(keys.conditions)
+    keys = keys.updated(navigation=_navigation(keys.navigation, day))
     if day is not None:
-        air = _air(keys, day, _stream(keys, CONDITIONS_STREAM))
-        keys = keys.updated(environment=air, navigation=_navigation(keys, day))
+        keys = keys.updated(environment=_air(keys, day, _stream(keys, CONDITIONS_STREAM)))
     uncertainty = _uncertainty(keys.uncertainty, day, frame.mass_kg)
     deviation = _deviation(keys.aircraft.deviation, uncertainty, _stream(keys, DEVIATION_STREAM))
     aircraft = keys.aircraft.model_copy(update={"deviation": deviation})
@@ -108,41 +120,52 @@ def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
 
 
 def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
-    """Fills in wind, turbulence and gusts of the day; what is drawn does not depend on which of them the file gives."""
+    """Fills in wind, turbulence and gusts of the day; what is drawn does not depend on which of them the file gives.
+
+    A wind whose speed is given stays steady, and the same at all heights, where it leaves that out.
+    """
+    written = _written(keys.environment.wind)
     airspeed_mps, every_s = keys.aircraft.airspeed_mps, day.vertical_gust_every_s
     most_mps = day.most_wind * airspeed_mps / profile_share(keys.mission.altitude_m, WIND_FROM_M)
     if isinstance(day.wind_mps, tuple):
         mean_mps = float(rng.uniform(*day.wind_mps))
     else:
         mean_mps = float(rng.rayleigh(day.wind_mps / math.sqrt(math.pi / 2.0)))
-    mean_mps, from_deg = min(mean_mps, most_mps), float(rng.uniform(0.0, 360.0))
+    mean_mps, drawn_deg = min(mean_mps, most_mps), float(rng.uniform(0.0, 360.0))
+    from_deg = written.get("from_deg", drawn_deg)
     changes = []
     for number, (speed, turn) in enumerate(_clipped(rng, (CHANGES, 2)), start=1):
         speed_mps = min(mean_mps * (1.0 + day.speed_change * speed), most_mps)
         towards_deg = (from_deg + day.direction_change_deg * turn) % 360.0
         changes.append((CHANGE_EVERY_S * number, round(speed_mps, 3), round(towards_deg, 2)))
-    first = {"speed_mps": round(mean_mps, 3), "from_deg": round(from_deg, 2)}
+    wind: dict[str, Any] = {"from_deg": round(from_deg, 2)}
+    if "speed_mps" not in written:
+        wind |= {"speed_mps": round(mean_mps, 3), "measured_at_m": WIND_FROM_M, "changes": tuple(changes)}
     gusts = VerticalGustsSpec(
         speed_mps=day.vertical_gust_mps,
         duration_s=round(min(GUST_LENGTH_M / airspeed_mps, every_s), 3),
         every_s=every_s,
         start_s=round(float(rng.uniform(0.0, every_s)), 2),
     )
-    return keys.environment.filled(
-        wind=Wind(**first, measured_at_m=WIND_FROM_M, changes=tuple(changes)),
-        turbulence=Turbulence(intensity=day.turbulence),
-        vertical_gusts=gusts,
+    return Environment(
+        wind=Wind(**wind | written),
+        turbulence=Turbulence(**{"intensity": day.turbulence} | _written(keys.environment.turbulence)),
+        vertical_gusts=keys.environment.vertical_gusts or gusts,
     )
 
 
-def _navigation(keys: ScenarioKeys, day: Day) -> Navigation:
-    """Fills in the day's navigation where the file names no kind, else its latency alone; `perfect` stays as it is."""
-    given = keys.navigation
-    named = {name: getattr(given, name) for name in given.model_fields_set}
-    if "kind" not in named:
+def _navigation(given: Navigation, day: Day | None) -> Navigation:
+    """Fills in the day's navigation where the file names no kind, else its latency alone; `perfect` stays as it is.
+
+    Raises a KeyFault if then `perfect` has errors.
+    """
+    named = _written(given)
+    if day is not None and "kind" not in named:
         return Navigation(**day.navigation | named)
-    latency = {"latency_s": day.navigation["latency_s"]}
-    return given if given.kind == "perfect" else Navigation(**latency | named)
+    if given.kind == "perfect":
+        given.refuse_errors()
+        return given
+    return given if day is None else Navigation(**{"latency_s": day.navigation["latency_s"]} | named)
 
 
 def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float) -> UncertaintySpec | None:

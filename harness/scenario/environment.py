@@ -86,9 +86,9 @@ class Wind(Section):
     """Wind, the same everywhere at one height and time; steady unless changes are given."""
 
     speed_mps: WindSpeed = 0.0
-    """Wind speed; must be below 0.9 of the airspeed."""
+    """Wind speed; must be below 0.9 of the airspeed. Default: that of the conditions, its height and changes too."""
     from_deg: Direction = 270.0
-    """Direction it blows from."""
+    """Direction it blows from. Default: that of the conditions, 270 for ideal."""
     measured_at_m: Annotated[float | None, Field(ge=1, le=300)] = None
     """Height over ground of these speeds, for the profile of MIL-F-8785C. Default: the same at all heights."""
     changes: Annotated[tuple[Change, ...], Strict(False), Field(max_length=10_000)] = ()
@@ -135,7 +135,7 @@ class Turbulence(Section):
     model: Literal["tustin", "milspec"] = "tustin"
     """Dryden gusts: Tustin's discretisation, or MIL-F-8785C as JSBSim has it; over true ground they are one."""
     intensity: Literal["none", "light", "moderate", "severe"] = "moderate"
-    """How strong."""
+    """How strong. Default: that of the conditions, moderate for ideal."""
 
 
 class Environment(Section):

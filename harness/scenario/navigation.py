@@ -92,16 +92,10 @@ class Navigation(Section):
 
     @model_validator(mode="after")
     def _filled_in(self) -> Navigation:
-        """Fills in what the kind has, and holds the keys against each other."""
-        preset = PRESETS[self.kind]
-        for name, value in preset.items():
-            given = getattr(self, name)
-            if given is None:
+        """Fills in what the kind has, and holds the outages against each other."""
+        for name, value in PRESETS[self.kind].items():
+            if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
-            elif self.kind == "perfect" and name != "position_correlation_s" and given != value:
-                told = f"is {given:g}" if isinstance(given, float) else "is given"
-                right = "must be left out, or kind be gnss"
-                raise KeyFault((name,), f"{told}, but kind perfect has no error; {right}")
         last_s = -math.inf
         for index, (begin_s, end_s) in enumerate(self.outages_s):
             if begin_s <= last_s:
@@ -111,6 +105,15 @@ class Navigation(Section):
                 raise KeyFault(("outages_s", index), told)
             last_s = end_s
         return self
+
+    def refuse_errors(self) -> None:
+        """Raises a KeyFault if a key gives an error, which `perfect` has not."""
+        for name, value in _PERFECT.items():
+            given = getattr(self, name)
+            if name != "position_correlation_s" and given != value:
+                told = f"is {given:g}" if isinstance(given, float) else "is given"
+                right = "must be left out, or kind be gnss"
+                raise KeyFault(("navigation", name), f"{told}, but kind perfect has no error; {right}")
 
 
 def planning_margin_m(

@@ -158,12 +158,15 @@ class MissionSpec(Section):
 
 
 class ActuatorsSpec(Section):
-    """Servos of the surfaces and the throttle, all alike; 60 degrees of a servo's arm are full throttle."""
+    """Servos of the surfaces and the throttle, all alike; 60 degrees of a servo's arm are full throttle.
+
+    Keys that are left out: those of the conditions.
+    """
 
     lag_s: Annotated[float, Field(ge=0, le=10)] = 0.0
     """Time constant of the lag of a surface behind its command."""
     rate_limit_degps: Annotated[float | None, Field(gt=0, le=100_000)] = None
-    """Fastest motion of a surface. Default: no limit."""
+    """Fastest motion of a surface. Default: that of the conditions; no limit for ideal."""
     deadband_deg: Annotated[float, Field(ge=0, le=90)] = 0.0
     """Width of the band about the trim in which a command moves nothing."""
 

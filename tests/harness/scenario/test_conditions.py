@@ -11,6 +11,7 @@ import pytest
 
 import wayproof
 from harness.scenario.conditions import told
+from harness.scenario.environment import Turbulence, Wind
 from tests.scenarios import scenario_of
 
 BASE = """
@@ -94,6 +95,29 @@ def test_what_the_file_says_stays_and_ideal_adds_nothing() -> None:
     assert given.navigation.position_sigma_m == 0.017
     assert section(given, "aircraft.actuators.lag_s") == 0.2
     assert (deviation.mass, deviation.drag) == (0.0, 0.3)
+
+
+def test_what_a_section_leaves_out_is_the_days() -> None:
+    """The figures are those of the table in `aircraft/README.md`."""
+    more = (
+        "environment: {turbulence: {model: milspec}, wind: {KEY: 3}}\nnavigation: {position_sigma_m: 3}\n"
+        "aircraft: {actuators: {deadband_deg: 2}}\n"
+    )
+    (plain,), (given,) = drawn("typical", 1), drawn("typical", 1, more.replace("KEY", "speed_mps"))
+    assert section(given, "environment.turbulence") == Turbulence(model="milspec", intensity="light")
+    servos, seen = section(given, "aircraft.actuators"), given.navigation
+    assert (servos.lag_s, servos.rate_limit_degps, servos.deadband_deg) == (0.03, 300.0, 2.0)
+    assert (seen.kind, seen.position_sigma_m, seen.altitude_sigma_m) == ("gnss", 3.0, 2.1)
+    assert section(given, "environment.wind") == Wind(
+        speed_mps=3, from_deg=section(plain, "environment.wind.from_deg")
+    )
+    (turned,) = drawn("typical", 1, more.replace("KEY", "from_deg"))
+    wind, day = section(turned, "environment.wind"), section(plain, "environment.wind")
+    assert (wind.speed_mps, wind.from_deg, wind.measured_at_m) == (day.speed_mps, 3.0, 10.0)
+    for (_, speed, towards), (_, same, other) in zip(wind.changes, day.changes, strict=True):
+        assert speed == same
+        assert (towards - 3.0 - other + day.from_deg + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=0.03)
+    assert scenario_of(wayproof.dump_scenario(turned)) == turned
 
 
 def test_an_ideal_day_is_told_with_what_the_scenario_adds_to_it() -> None:
