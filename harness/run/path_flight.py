@@ -44,7 +44,7 @@ SAME_ALTITUDE_M = 1.0
 SPARE_BANK_DEG = 5.0
 """A mission is not flown slower than where altitude is kept at cruise's steepest bank less this."""
 FREE_SHARE = 0.25
-"""A corner may be passed off by this share of the cross-track threshold only to make its arc wider."""
+"""A corner may be passed off by this share of what is allowed only to make its arc wider."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +185,8 @@ def _planned_line(
     across_m = scenario.trackability.cross_track_m
     limit_m = across_m if corner_m is None else corner_m
     tightest = Tightest(frame.least_radius_m(speed), limit_m, complex(*steady_wind_mps(scenario)) / speed)
-    way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, FREE_SHARE * across_m, tightest)
+    free_m = FREE_SHARE * min(across_m, limit_m)
+    way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, tightest)
     if altitude_m is not None or not len(given.altitudes_m):
         profile = flat(scenario.mission.altitude_m, speed)
     else:

@@ -30,6 +30,7 @@ CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
 """Only this share of a corner's limit is used if the arc then has at least this many least radii, which leaves the rest
 of both for gusts."""
 SAME_TURN_RAD: Final = 0.01  # legs whose directions differ by less have no apex
+ARC_POINTS: Final = 17  # so many points of an arc are compared with the path
 WIND_SAMPLES: Final = 9
 """The ground speed is computed in this many directions of a turn."""
 
@@ -77,9 +78,9 @@ class FlyBy:
     """A polyline with an arc at every corner.
 
     Waypoints are the (k, 2) given points that are needed, with the indices `kept`; stations are the arc length that
-    belongs to each, of `segments`, (n, 6) as in `planner.interface.Path`. Corners are those that are cut by more than
-    was left free. `given_m` is (m, 3) the polyline with the points where arcs touch it: east, north, and the arc length
-    that belongs there; an arc is shared out over what it cuts off.
+    belongs to each, of `segments`, (n, 6) as in `planner.interface.Path`. Corners are those that an arc as wide as
+    wanted cuts by more than was left free, and kinks that are joined. `given_m` is (m, 3) the polyline with the points
+    where arcs touch it: east, north, and the arc length that belongs there; an arc is shared out over what it cuts off.
     """
 
     waypoints_m: FloatArray
@@ -107,7 +108,7 @@ def fly_by(
 
     The arc at a corner of angle `a` that touches the legs `t` before and after it has the radius
     `t / tan(a / 2)` and passes the corner at `radius (1 / cos(a / 2) - 1)`. It is as wide as it can be without
-    passing further off than `free_cut_m`, but not tighter than `radius_m` where there is room for that; both are > 0,
+    passing further off than `free_cut_m`, but not tighter than `radius_m`, > 0, where there is room for that; both are
     (m,) if they differ from point to point. Corners that would be cut by more than `LIMIT_SHARE` of what they may be
     passed at are flown more tightly, down to `tightest`. Neighbouring corners share the leg between them in proportion
     to what they need. Corners sharper than `PAST_RAD` are flown past the next leg and back onto it, the turn beginning
@@ -146,23 +147,32 @@ def fly_by(
             rows += arcs
     # Where along the rounded path each turn begins, passes its corner, ends.
     middles, over = begun + radius * shape.corner, begun + radius * (np.abs(turn) + 2.0 * shape.back_turn)
-    cut = radius * shape.cut
-    half = np.maximum(middles - begun, over - middles)
-    told = np.column_stack((points[own][1:-1], np.degrees(turn), radius, cut, middles, half))
-    corners = tuple(
-        CutCorner(int(of[i + 1]), *told[i].tolist())
-        for i in np.flatnonzero(every | (cut > free * (1.0 + 1e-9))).tolist()
-    )
     # The given line is judged, not the legs to an apex: where along it each turn begins, passes its corner, ends.
     along = np.append(0.0, np.cumsum(np.abs(np.diff(spots))))
     begins, ends = along[first][1:-1], along[last][1:-1]
     early = before - ((place - spots[first])[1:-1] / ahead[:-1]).real
     late = after + ((place - spots[last])[1:-1] / ahead[1:]).real
-    places = begins - np.maximum(early, 0.0), 0.5 * (begins + ends), ends + np.maximum(late, 0.0)
-    known = begun + np.minimum(early, 0.0), middles, over - np.minimum(late, 0.0)
-    inner = np.transpose((places, known), (0, 2, 1)).reshape(2, -1)
+    begins, ends = begins - np.maximum(early, 0.0), ends + np.maximum(late, 0.0)
+    joint = (first < last)[1:-1]
+    leaves, returns = begun + np.minimum(early, 0.0), over - np.minimum(late, 0.0)
+    # The middle of kinks that are joined is shared out, since their apex may lie far from all of them.
+    share = (middles - leaves) / np.maximum(returns - leaves, SHORTEST_M)
+    centre = np.where(joint, begins + share * (ends - begins), along[first][1:-1])
+    inner = np.transpose(((begins, centre, ends), (leaves, middles, returns)), (0, 2, 1)).reshape(2, -1)
     both = np.column_stack(((0.0, 0.0), inner, (along[-1], station)))
     knots, stations = np.maximum.accumulate(both, axis=1)  # an arc may reach beyond a short given leg
+    # Kinks that are joined are told as the sharpest of them.
+    sharp = own[1:-1]
+    passed = np.where(joint, np.interp(along[sharp], knots, stations), middles)
+    half = np.maximum(passed - leaves, returns - passed)
+    beside = 1j * np.sign(turn) * radius * ahead[:-1]
+    away = np.abs(spots[sharp] - place[1:-1] + before * ahead[:-1] - beside)
+    cut = np.where(joint, np.abs(away - radius), radius * shape.cut)
+    told = np.column_stack((points[sharp], np.degrees(_legs(spots)[2][sharp - 1]), radius, cut, passed, half))
+    corners = tuple(
+        CutCorner(int(of[i + 1]), *told[i].tolist())
+        for i in np.flatnonzero(every | (wanted * shape.cut > free * (1.0 + 1e-9)) | joint).tolist()
+    )
     every_m = np.union1d(along, knots)
     drawn, belongs = np.interp(every_m, along, spots), np.interp(every_m, knots, stations)
     given = np.column_stack((drawn.real, drawn.imag, belongs))
@@ -182,9 +192,9 @@ def _joined(
     """Joins kinks whose legs have no room for the least turn with the neighbours that make room for it.
 
     An aircraft that turns at such a kink overshoots by about R (1 - cos(turn)). Legs are left out one by one, until
-    an arc about the apex of those before and after fits, within the limit of the points or that overshoot. Corners
-    that are joined are flown as one: the sharpest of them, whose place becomes the apex. Returns all places, and the
-    index of the corner as which each is flown.
+    an arc about the apex of those before and after fits. If that way is off the points by no more than the overshoot,
+    the kinks are flown as one: the sharpest of them, whose place becomes the apex. Returns all places, and the index
+    of the corner as which each is flown.
     """
     length, ahead, turn = _legs(place)
     tangent = np.concatenate(([0.0], np.tan(0.5 * np.minimum(np.abs(turn), PAST_RAD)), [0.0]))
@@ -208,8 +218,8 @@ def _joined(
             fits = rooms[0] / (half + tangent[first - 1]), rooms[1] / (half + tangent[last + 1])
             if min(fits) >= radius:
                 apex = place[first] + ahead_m * legs[0]
-                off_m = _off_arc_m(place[first : last + 1], apex, legs, radius)
-                within_m = max(LIMIT_SHARE * float(limits.limit_m), radius * (1.0 - np.cos(turned)))
+                off_m = _off_given_m(place[first - 1 : last + 2], apex, legs, radius)
+                within_m = float(overshoot_m[first - 1 : last].max())
                 if first < last and off_m <= within_m:
                     sharpest = first + int(np.abs(turn[first - 1 : last]).argmax())
                     joined[sharpest], own[first : last + 1], done = apex, sharpest, last
@@ -218,14 +228,22 @@ def _joined(
     return joined, own
 
 
-def _off_arc_m(places: NDArray[Any], apex: complex, legs: NDArray[Any], radius_m: float) -> float:
-    """Returns how far places, and the middles between them, are at most from the arc that rounds an apex."""
-    every = np.concatenate((places, 0.5 * (places[1:] + places[:-1])))
+def _off_given_m(places: NDArray[Any], apex: complex, legs: NDArray[Any], radius_m: float) -> float:
+    """Returns how far the first and last leg, with the arc that rounds their apex, are at most from given places."""
+    import shapely
+
     turn = np.angle(legs[1] / legs[0])
-    reach = radius_m * np.tan(0.5 * abs(turn))
-    centre = apex - reach * legs[0] + 1j * np.sign(turn) * radius_m * legs[0]
-    inside = (((every - apex) / legs[0]).real > -reach) & (((every - apex) / legs[1]).real < reach)
-    return float((np.abs(np.abs(every - centre) - radius_m) * inside).max())
+    touch = apex - radius_m * np.tan(0.5 * abs(turn)) * legs[0]
+    swept = np.exp(1j * turn * np.linspace(0.0, 1.0, ARC_POINTS))
+    arc = touch + 1j * np.sign(turn) * radius_m * legs[0] * (1.0 - swept)
+    given = np.concatenate((places, 0.5 * (places[1:] + places[:-1])))
+    way = np.concatenate((places[:1], arc, places[-1:]))
+    pairs = (arc, places), (given[1:], way)
+    off_m = 0.0
+    for spots, corners in pairs:
+        line = shapely.LineString(np.column_stack((corners.real, corners.imag)))
+        off_m = max(off_m, float(shapely.distance(line, shapely.points(spots.real, spots.imag)).max()))
+    return off_m
 
 
 class _Shapes(NamedTuple):

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 import wayproof
 from tests.harness.run.given import off_polyline_m, waypoints_file
@@ -62,6 +63,41 @@ def test_a_corner_is_rounded_as_the_aircraft_can_turn(tolerance_m: float, radius
     nearest = float(np.hypot(*(track - SQUARE_CORNER[1]).T).min())
     assert corner["most_off_m"] == pytest.approx(nearest, abs=0.1)
     assert metrics["check"]["ok"] is ok
+
+
+@pytest.mark.parametrize(("corner_m", "ok"), [(3.0, False), (6.0, True)])
+def test_a_corners_limit_holds_where_the_path_may_be_off_by_more(corner_m: float, ok: bool) -> None:
+    """45 deg are cut by 5.3 m at the bank limit, LEAST_M (1 / cos 22.5 deg - 1), and 30 m are allowed elsewhere."""
+    path = [(0.0, 0.0), (3000.0, 0.0), (5121.0, 2121.0)]
+    metrics, track = flown(path, tolerance_m=30.0, corner_m=corner_m)
+    assert (float(np.hypot(*(track - path[1]).T).min()) <= corner_m) is ok
+    assert metrics["check"]["ok"] is ok
+
+
+@pytest.mark.parametrize(
+    ("aircraft", "corner_m", "path"),
+    [
+        (
+            "aerosonde",
+            60.0,
+            [(0, 0), (80, 0), (38.9, 598.6), (114.9, 642.9), (-113.7, 1087.6), (-128.1, 1091.7)],
+        ),
+        (
+            "ultrastick25e",
+            40.0,
+            [(0, 0), (600, 0), (664.4, 128.8), (940.1, -288.3), (982.9, -258), (1210.6, -703.2)],
+        ),
+    ],
+)
+def test_short_legs_are_flown_as_near_as_the_aircraft_can(
+    aircraft: str, corner_m: float, path: list[tuple[float, float]]
+) -> None:
+    """Legs of 50 to 90 m between turns to the right and left; shapely finds how far the track is off them."""
+    metrics, track = flown(path, aircraft=aircraft, corner_m=corner_m)
+    assert metrics["check"]["ok"], metrics["check"]["verdict"]
+    dense, line = (shapely.segmentize(shapely.LineString(each), 2.0) for each in (track, path))
+    most_m = metrics["deviation_from_given_m"]["max"]
+    assert most_m == pytest.approx(shapely.frechet_distance(dense, line), abs=1.5)
 
 
 def test_a_corner_that_is_cut_is_not_called_a_navigation_error() -> None:
