@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path as FilePath
@@ -15,7 +16,7 @@ import numpy as np
 from aircraft.interface import FloatArray
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
-from harness.files.strict_yaml import COMMAND_LINE, Loc, Node, node_of
+from harness.files.strict_yaml import COMMAND_LINE, Loc, Node, key_path, node_of
 from harness.flight.observer import Progress
 from harness.run.path_flight import PathCheck, fly_along, planned
 from harness.run.path_verdict import measured
@@ -29,6 +30,7 @@ from harness.run.scenario_flight import (
 )
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M
 from harness.run_files.path_files import PathAsGiven, read_path
+from harness.run_files.run_folder import MANIFEST
 from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of
 from harness.scenario.obstacles import WorldFile
@@ -45,8 +47,8 @@ WORLD_SECTIONS: Final = (
 )
 """Sections that a check takes from the scenario in which it flies a path; mission, aircraft and sensor are its own."""
 WORLD_KEYS: Final = (
-    *(("mission", "altitude_m"), ("planner", "clearance_m")),
-    *(("trackability", "cross_track_m"), ("trackability", "altitude_m")),
+    *(("mission", "altitude_m"), ("trackability", "altitude_m")),
+    *(("planner", "clearance_m"), ("trackability", "cross_track_m")),
 )
 """Single keys that a check takes from that scenario: the altitude, and the keys from which its limits follow."""
 UNUSED_KEYS: Final = re.compile(r"planner\.(?!clearance_m$)|mission\.(?!altitude_m$|goal_radius_m$)")
@@ -175,13 +177,26 @@ def _world_root(world: FilePath | None) -> Node:
     if world is None:
         return Node({}, COMMAND_LINE)
     root = strict_yaml.read(world)
-    validated(root, str(world), world.parent)  # its faults are told as those of a scenario
+    whole = validated(root, str(world), world.parent)  # its faults are told as those of a scenario
     assert isinstance(root.value, dict)
     base = Node({key: node for key, node in root.value.items() if key in WORLD_SECTIONS}, root.line)
+    derived = _derived_keys(whole) if (world.parent / MANIFEST).is_file() else ()
     for loc in WORLD_KEYS:
         written = root.at(loc)
-        base = base if written is None else with_key(base, loc, written)
+        base = base if written is None or loc in derived else with_key(base, loc, written)
     return base
+
+
+def _derived_keys(world: Scenario) -> tuple[Loc, ...]:
+    """Returns the keys of limits in a run folder's complete scenario that say what they would be if left out."""
+    for keys in (WORLD_KEYS[-2:], WORLD_KEYS[-1:]):
+        with suppress(InputError):  # with another clearance start and goal may be too near to obstacles
+            other = world.with_({key_path(key): None for key in keys})
+            if all(
+                getattr(getattr(other, part), key) == getattr(getattr(world, part), key) for part, key in keys
+            ):
+                return keys
+    return ()
 
 
 def _with_keys(root: Node, keys: Mapping[Loc, Any]) -> Node:
