@@ -23,6 +23,8 @@ INTERCEPT_SINE = 0.7
 """Sine of the steepest angle to the path at which the law `preview` approaches it from far off."""
 CURVATURE, LENGTH, START, STOP, TURNED = 4, 5, 6, 7, 8
 """Columns of a route's rows."""
+SMOOTH_RAD = 1e-6
+"""Rows of a route join smoothly at a lesser angle: the distance from them then differs by less than 1e-12 of it."""
 PREVIEW_GAINS = np.dtype(  # what the law `preview` is configured by
     [
         ("bandwidth_radps", np.float64),
@@ -94,7 +96,7 @@ def preview_update(
     """The law of `aircraft.guidance.preview`, from one update to the next: what `GuidanceOutput` consists of."""
     (east_m, north_m), (velocity_east_mps, velocity_north_mps) = place_m, velocity_mps
     has, kept = gains[0], memory[0]
-    row, along_m, cross, tangent_east, tangent_north = nearest_on_route(
+    row, along_m, cross, tangent_east, tangent_north, off = nearest_on_route(
         rows, kept.row, kept.along_m, east_m, north_m
     )
     arc_length = rows[row, START] + along_m
@@ -141,7 +143,7 @@ def preview_update(
     command = _within(has.bank_limit_rad, roll + has.roll_lag_updates * step)
     past_end = rows[row, LENGTH] == math.inf and along_m > 0.0
     kept.row, kept.along_m, kept.roll_reference_rad = row, along_m, roll
-    return command, cross, arc_length, allowed != wanted, past_end
+    return command, off, arc_length, allowed != wanted, past_end
 
 
 @compiled
@@ -156,44 +158,76 @@ def _mean_curvature(rows: FloatArray, row: int, arc_length_m: float, blend_m: fl
 @compiled
 def nearest_on_route(
     rows: FloatArray, row: int, along_m: float, east_m: float, north_m: float
-) -> tuple[int, float, float, float, float]:
+) -> tuple[int, float, float, float, float, float]:
     """The nearest point of a route from the last one onwards.
 
     Returns:
-        Row and distance along it, cross-track error (m, positive to the right), unit tangent east and north.
+        Row and distance along it, cross-track error (m, positive to the right), unit tangent east and north, and the
+        distance from the route with the error's sign, which is more where the nearest point is a corner.
     """
     while True:
-        east = east_m - rows[row, 0]
-        north = north_m - rows[row, 1]
-        tangent_east, tangent_north, curvature = rows[row, 2], rows[row, 3], rows[row, CURVATURE]
-        if curvature == 0.0:
-            along = east * tangent_east + north * tangent_north
-            cross = east * tangent_north - north * tangent_east
-        else:
-            # The centre lies 1/curvature to the left of the start; angles are counted along the flight.
-            radius = 1.0 / curvature
-            east, north = east + radius * tangent_north, north - radius * tangent_east
-            outward_east, outward_north = tangent_north * radius, -tangent_east * radius
-            angle = math.atan2(
-                outward_east * north - outward_north * east, outward_east * east + outward_north * north
-            )
-            # Within half a turn of the last one.
-            expected = along_m * curvature
-            since = np.fmod(angle - expected, math.tau)
-            if abs(since) > math.pi:
-                since -= math.copysign(math.tau, since)
-            angle = expected + since
-            away = math.sqrt(east * east + north * north)
-            cross = away - radius if radius > 0.0 else -radius - away
-            along = angle * radius
-            sine, cosine = math.sin(angle), math.cos(angle)
-            tangent_east, tangent_north = (
-                tangent_east * cosine - tangent_north * sine,
-                tangent_east * sine + tangent_north * cosine,
-            )
+        along, cross, tangent_east, tangent_north = _beside(rows, row, along_m, east_m, north_m)
         if along <= rows[row, LENGTH] or row == len(rows) - 1:
-            return row, max(along, 0.0), cross, tangent_east, tangent_north
+            off = cross if along >= 0.0 or row == 0 else _off_corner(rows, row, cross, east_m, north_m)
+            return row, max(along, 0.0), cross, tangent_east, tangent_north, off
         row, along_m = row + 1, 0.0
+
+
+@compiled
+def _beside(
+    rows: FloatArray, row: int, along_m: float, east_m: float, north_m: float
+) -> tuple[float, float, float, float]:
+    """Distance along and to the right of a row carried on at both ends, and unit tangent; it was last at `along_m`."""
+    east = east_m - rows[row, 0]
+    north = north_m - rows[row, 1]
+    tangent_east, tangent_north, curvature = rows[row, 2], rows[row, 3], rows[row, CURVATURE]
+    if curvature == 0.0:
+        along = east * tangent_east + north * tangent_north
+        return along, east * tangent_north - north * tangent_east, tangent_east, tangent_north
+    # The centre lies 1/curvature to the left of the start; angles are counted along the flight.
+    radius = 1.0 / curvature
+    east, north = east + radius * tangent_north, north - radius * tangent_east
+    outward_east, outward_north = tangent_north * radius, -tangent_east * radius
+    angle = math.atan2(
+        outward_east * north - outward_north * east, outward_east * east + outward_north * north
+    )
+    # Within half a turn of the last one.
+    expected = along_m * curvature
+    since = np.fmod(angle - expected, math.tau)
+    if abs(since) > math.pi:
+        since -= math.copysign(math.tau, since)
+    angle = expected + since
+    away = math.sqrt(east * east + north * north)
+    cross = away - radius if radius > 0.0 else -radius - away
+    along = angle * radius
+    sine, cosine = math.sin(angle), math.cos(angle)
+    turned_east = tangent_east * cosine - tangent_north * sine
+    return along, cross, turned_east, tangent_east * sine + tangent_north * cosine
+
+
+@compiled
+def _off_corner(rows: FloatArray, row: int, cross: float, east_m: float, north_m: float) -> float:
+    """Distance to the right of a route at a place before the start of a row: of the corner there, or of rows before.
+
+    Where the rows before join smoothly, it is the cross-track error.
+    """
+    turned = rows[row, TURNED] - rows[row - 1, TURNED]
+    sine, cosine = math.sin(turned), math.cos(turned)
+    end_east = rows[row - 1, 2] * cosine - rows[row - 1, 3] * sine
+    end_north = rows[row - 1, 2] * sine + rows[row - 1, 3] * cosine
+    if math.hypot(end_east - rows[row, 2], end_north - rows[row, 3]) < SMOOTH_RAD:
+        return cross
+    east, north = east_m - rows[row, 0], north_m - rows[row, 1]
+    right = east * (end_north + rows[row, 3]) - north * (end_east + rows[row, 2])
+    off = math.copysign(math.hypot(east, north), right)
+    while row > 0:
+        row -= 1
+        along, beside, _, _ = _beside(rows, row, rows[row, LENGTH], east_m, north_m)
+        if along >= 0.0 or row == 0:
+            return beside if along <= rows[row, LENGTH] and abs(beside) < abs(off) else off
+        away = math.hypot(east_m - rows[row, 0], north_m - rows[row, 1])
+        off = math.copysign(away, beside) if away < abs(off) else off
+    return off
 
 
 @compiled

@@ -140,7 +140,7 @@ def tracked(
             )
         beside_m = output.cross_track_m
         if progress is not None:  # a law that comes from elsewhere is not asked how well it flies
-            beside_m = progress.nearest(state.east_m, state.north_m).cross_track_m
+            beside_m = progress.nearest(state.east_m, state.north_m).off_m
         cross.append(abs(beside_m))
         altitude.append(abs(state.up_m - REFERENCE_ALTITUDE_M))
         cut += output.bank_saturated

@@ -19,9 +19,10 @@ class PathPoint(NamedTuple):
     tangent_east: float  # unit tangent in the direction of flight
     tangent_north: float
     curvature_1pm: float  # positive for a left turn
-    cross_track_m: float  # distance of the aircraft from the route, positive to its right
+    cross_track_m: float  # distance of the aircraft from the route's tangent there, positive to its right
     arc_length_m: float  # along the route; grows on in a loiter
     past_end: bool  # the route is flown out: the point lies on its last tangent, beyond the end
+    off_m: float  # distance of the aircraft from the route: more than `cross_track_m` where the point is a corner
 
 
 class RouteProgress:
@@ -53,15 +54,15 @@ class RouteProgress:
 
     def nearest(self, east_m: float, north_m: float) -> PathPoint:
         """The point nearest to an aircraft, from the last one onwards."""
-        row, along_m, cross_m, tangent_east, tangent_north = self._nearest(
+        row, along_m, cross_m, tangent_east, tangent_north, off_m = self._nearest(
             self.rows, self._row, self._along_m, east_m, north_m
         )
         self._row, self._along_m = row, along_m
         _, _, _, _, curvature_1pm, length_m, start_m, _, _ = self._segments[row]
         point = east_m - cross_m * tangent_north, north_m + cross_m * tangent_east
         past_end = length_m == math.inf and along_m > 0.0
-        values = (*point, tangent_east, tangent_north, curvature_1pm, cross_m, start_m + along_m, past_end)
-        return tuple.__new__(PathPoint, values)  # faster than by name
+        there = (*point, tangent_east, tangent_north, curvature_1pm, cross_m, start_m + along_m, past_end)
+        return tuple.__new__(PathPoint, (*there, off_m))  # faster than by name
 
 
 def measures_itself(law: object) -> bool:

@@ -43,7 +43,7 @@ class RouteLaw(ABC):
         self._roll_rad += min(max(allowed - self._roll_rad, -self._step_rad), self._step_rad)
         saturated = allowed != wanted
         return GuidanceOutput(
-            self._roll_rad, place.cross_track_m, place.arc_length_m, saturated, place.past_end, airspeed_mps
+            self._roll_rad, place.off_m, place.arc_length_m, saturated, place.past_end, airspeed_mps
         )
 
 

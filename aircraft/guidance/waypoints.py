@@ -191,7 +191,7 @@ class WaypointLaw:
             return Along(0.0, 0.0, False)
         if not self._mission:
             place = self._progress.nearest(state.east_m, state.north_m)
-            return Along(place.cross_track_m, place.arc_length_m, place.past_end)
+            return Along(place.off_m, place.arc_length_m, place.past_end)
         leg = self._legs[self._leg]
         first, last = leg.stations_m
         past_end = False
@@ -205,7 +205,7 @@ class WaypointLaw:
         station_m = first + min(max(share, 0.0), 1.0) * (last - first)
         self._progress.restart(station_m)
         beside = self._progress.nearest(state.east_m, state.north_m)
-        return Along(beside.cross_track_m, station_m, past_end and self._leg == len(self._legs) - 1)
+        return Along(beside.off_m, station_m, past_end and self._leg == len(self._legs) - 1)
 
     def _begin_next_leg(self) -> None:
         """Gives the law the route, or the point, of the next leg."""

@@ -210,9 +210,7 @@ class ClosedLoop:
             if not self._law_measures:  # a law that comes from elsewhere is not asked how well it flies
                 plans = self.plans
                 place = self._believed_error.place(self.believed, plans.entered_m, plans.index)
-                steering = steering._replace(
-                    cross_track_m=place.cross_track_m, arc_length_m=place.arc_length_m
-                )
+                steering = steering._replace(cross_track_m=place.off_m, arc_length_m=place.arc_length_m)
             self.steering = steering
         if self._roll_override_rad is not None:
             self.steering = self.steering._replace(roll_command_rad=self._roll_override_rad)

@@ -48,7 +48,7 @@ class CrossTrack:
 
     def of(self, state: AircraftState, arc_length_m: float, index: int) -> float:
         """Returns a state's distance (m) to the right of a plan, searched from an arc length on; NaN without a plan."""
-        return math.nan if index < 0 else self.place(state, arc_length_m, index).cross_track_m
+        return math.nan if index < 0 else self.place(state, arc_length_m, index).off_m
 
     def place(self, state: AircraftState, arc_length_m: float, index: int) -> PathPoint:
         """Returns the point of a plan that is nearest to a state, searched from an arc length on."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from aircraft import kernels
 from aircraft.airframes import airframe
@@ -16,6 +17,7 @@ from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
+from harness.scenario.kinds import guidance_kinds
 from planner.interface import Path
 from tests.routes import route_of, route_point
 
@@ -91,7 +93,25 @@ def test_a_point_beside_a_route_is_told_with_its_distance_and_curvature(seed: in
             (tangent_east, tangent_north), abs=1e-9
         )
         assert point.curvature_1pm in route.segments[[int(np.searchsorted(ends, arc_length))], 4]
+        assert point.off_m == point.cross_track_m  # to the last bit, where no corner is near
         assert not point.past_end
+
+
+@pytest.mark.parametrize(("turn_deg", "back"), [(60.0, -5.0), (-90.0, -5.0), (150.0, 1.0), (-179.0, 1.0)])
+def test_beyond_a_corner_the_distance_is_that_from_the_path(turn_deg: float, back: float) -> None:
+    """Flown 2 m outside of the first leg past the corner at the origin, and back; by shapely."""
+    turn, outside = math.radians(turn_deg), math.copysign(2.0, turn_deg)
+    points = np.array([(-1000.0, 0.0), (0.0, 0.0), (500.0 * math.cos(turn), 500.0 * math.sin(turn))])
+    route, laws = Route(Path.through(points).segments), ("preview", "l1")
+    progress, flown = RouteProgress(route), [guidance_kinds()[each].law(LIMITS) for each in laws]
+    for law in flown:
+        law.follow(route)
+    for east in (-500.0, -1.0, 1.0, 20.0, 60.0, back):
+        distance_m = shapely.LineString(points).distance(shapely.Point(east, -outside))
+        by_hand = math.copysign(distance_m, outside)  # a turn to the left is passed on the right
+        assert progress.nearest(east, -outside).off_m == pytest.approx(by_hand)
+        state = AircraftState(0.0, east, -outside, 300.0, 25.0, 0.0, 0.0, 0.5 * math.pi, 0.0, 0.0, 25.0, 1.0)
+        assert [law.update(state).cross_track_m for law in flown] == pytest.approx([by_hand, by_hand])
 
 
 @pytest.mark.parametrize("curvature", [1e-13, 1e-15, -1e-17, -1e-25])
