@@ -71,6 +71,7 @@ def certify(
 
     terms = Terms(probability, confidence)
     drawn = _drawn(vary or ())
+    given.check_beside(drawn)
     if is_path(subject) and not any(key == "aircraft.model" for key, _ in given.keys):
         say(f"no --aircraft: the path is flown by the {DEFAULT_AIRCRAFT}", err=True)
     place = None if world is None else scenario_path(world)

@@ -57,11 +57,12 @@ def falsify(
     from harness.scenario.kinds import source_words
 
     ranges = [range_of(text) for text in vary]
+    given.check_beside(key for key, *_ in ranges)
 
     def loaded(replaced: Any) -> Scenario:
         return load(scenario, [*given.keys, *replaced])
 
-    varied = vary_of(loaded, ranges, [name for name, _ in given.keys], tolerance)
+    varied = vary_of(loaded, ranges, tolerance)
     # Indices as `--set` takes them, which no shell takes for a pattern.
     keys = "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in varied)])
     folder = out or Path("runs") / loaded(()).name / f"{keys}{told_apart(given.keys, named=())}"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from typing import Annotated, Any, Final, Literal, TypeVar
@@ -71,6 +72,14 @@ class Given:
                         param_hint="--set",
                     )
         return replace(self, options=(*self.options, *more))
+
+    def check_beside(self, varied: Iterable[str]) -> None:
+        """Raises BadParameter where a key that --vary varies, or a key above or below it, is given a value too."""
+        for key, (name, value) in itertools.product(varied, self.keys):
+            one, other = f"{_place(key)}.", f"{_place(name)}."
+            if one.startswith(other) or other.startswith(one):
+                told = f"{key}: {name} is given a value too, {value.strip()[:60]}; give one of them"
+                raise typer.BadParameter(told, param_hint="--vary")
 
 
 NOTHING: Final = Given()  # no replacement
@@ -140,6 +149,11 @@ def _turbulence(text: str) -> dict[str, str]:
     return {"model": model if colon else "tustin", "intensity": intensity}
 
 
+def _place(name: str) -> str:
+    """Returns a key path with its indices between points."""
+    return name.replace("[", ".").replace("]", "")
+
+
 def _settings(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """Splits each KEY.PATH=VALUE into its two parts; a BadParameter says that one replaces another before it."""
     from harness.scenario.sections import GuidanceSpec, PlannerSpec
@@ -150,9 +164,9 @@ def _settings(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
         name, equals, value = text.partition("=")
         if not equals:
             raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
-        name, place = name.strip(), name.strip().replace("[", ".").replace("]", "")
+        name, place = name.strip(), _place(name.strip())
         for other, before in found:
-            there = other.replace("[", ".").replace("]", "")
+            there = _place(other)
             section, _, key = there.partition(".")
             own = place in shared and place == f"{section}.kind" and key not in ("", *shared[place])
             same = there == place and value.strip() == before.strip()

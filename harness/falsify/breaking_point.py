@@ -159,21 +159,22 @@ class Breaking:
 
 
 def vary_of(
-    load: Load, given: Sequence[tuple[str, float, float]], fixed: Sequence[str] = (), tolerance: float = 0.01
+    load: Load, given: Sequence[tuple[str, float, float]], tolerance: float = 0.01
 ) -> tuple[Vary, ...]:
     """Returns the keys to vary, having checked that nine conditions from end to end are scenarios; or an InputError.
 
-    `given`: key path, mild end and hard end of each; `fixed`: keys that are given a value.
+    `given`: key path, mild end and hard end of each.
     `tolerance`: values are flown rounded to a hundredth of this share of a range, so that what is printed was flown.
     """
-    valued = [_key_of("--set", each) for each in fixed]
     ranges: dict[str, tuple[float, float]] = {}
     for name, mild, hard in given:
-        key = _key_of("--vary", name)
+        try:
+            key = as_spelt(name)
+        except ValueError as error:
+            raise InputError(f"command line: --vary: {error}") from error
         faults = {
             "a seed is no condition; --seed gives another": key == "seed",
             "is given twice; give one range": key in ranges,
-            "is given a value too, with --set; give one of them": key in valued,
             f"both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}": mild == hard,
         }
         if fault := next(filter(faults.get, faults), None):
@@ -197,13 +198,6 @@ def condition(vary: Sequence[Vary], displacement: float) -> Values:
 def scenario_at(load: Load, vary: Sequence[Vary], values: Values) -> Scenario:
     """The scenario under a condition; an InputError where there is none."""
     return load([(each.key, number_text(value)) for each, value in zip(vary, values, strict=True)])
-
-
-def _key_of(option: str, key: str) -> str:
-    try:
-        return as_spelt(key)
-    except ValueError as error:
-        raise InputError(f"command line: {option}: {error}") from error
 
 
 def number_text(value: float) -> str:

@@ -30,7 +30,7 @@ def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Break
 
     out = other.pop("out", file.parent / "out")
     effort = Effort(other.pop("conditions", 40), other.pop("tolerance", 0.01))
-    return falsify(load, vary_of(load, ranges, (), effort.tolerance), out, effort=effort, **other)
+    return falsify(load, vary_of(load, ranges, effort.tolerance), out, effort=effort, **other)
 
 
 def stand_in(outcome: str = "reached", /, **other: Any) -> dict[str, Any]:

@@ -180,7 +180,7 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
         (["--vary", "mission.time_limit_s"], "'mission.time_limit_s' is not KEY.PATH=LO:HI with two numbers"),
         (
             ["--vary", "mission[goal_m].0=0:1", "--set", "mission.goal_m[0]=5"],
-            "--vary mission.goal_m[0]: is given a value too, with --set; give one of them",
+            "mission.goal_m[0] is given a value too, 5; give one of them",
         ),
         (
             ["--vary", "mission.goal_m[0]=0:1", "--vary", "mission.goal_m.0=0:1"],
