@@ -96,7 +96,8 @@ class Certificate:
     planner: str
     """Its kind; `given` for a path."""
     aircraft: str
-    conditions: str | None
+    conditions: str
+    """Every kind of day that was drawn: `ideal or rough`."""
     seed: int
     varied: Mapping[str, Any]
     failures: tuple[Failure, ...]
@@ -226,6 +227,7 @@ def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms)
     over = [(run, folder.over[run]) for run in range(tally.runs)]
     failing = [{**each.row, "run": run} for run, each in over if not each.held]
     first = days.scenario(0)
+    kinds = days.vary.get("conditions", {"choice": [first.conditions]})["choice"]
     return Certificate(
         claim=days.claim,
         runs=tally.runs,
@@ -237,7 +239,7 @@ def _certificate(days: Days, folder: CampaignFolder, tally: Tally, terms: Terms)
         subject=days.campaign.name,
         planner="given" if isinstance(days, PathDays) else first.planner.label,
         aircraft=Path(first.aircraft.model).name,
-        conditions=first.conditions,
+        conditions=" or ".join(dict.fromkeys(map(str, kinds))),
         seed=days.campaign.seed,
         varied=dict(days.vary),
         failures=failures(failing),

@@ -145,10 +145,9 @@ def _print(found: Certificate, title: str, folder: Path) -> None:
 def certificate_rows(certificate: Certificate) -> dict[str, str]:
     """Returns the rows of a certificate's table: text by name."""
     sure = f"{certificate.confidence:.4g}"
-    rows: dict[str, str] = {"claim": certificate.claim}
-    if certificate.conditions:
-        rows["conditions"] = plain(certificate.conditions)
-    rows |= {
+    rows: dict[str, str] = {
+        "claim": certificate.claim,
+        "conditions": plain(certificate.conditions),
         "held": f"on {certificate.held} of {certificate.runs} days",
         "probability": f"at least {share_text(certificate.probability_lower)}, at most "
         f"{share_text(certificate.probability_upper, up=True)} (each bound at confidence {sure})",

@@ -182,10 +182,11 @@ def test_keys_of_a_path_are_read_as_those_of_a_scenario(
         assert main([*words, "--set", key, "--out", str(tmp_path / "none")]) == 2
         assert told in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
-    keys = ["--set", "aircraft.model=ultrastick25e", "--set", "seed=7"]
+    keys = ["--set", "aircraft.model=ultrastick25e", "--set", "seed=7", "--vary", "conditions=typical,ideal"]
     assert main([*words, *keys, "--out", str(tmp_path / "out")]) == 1
     certificate = json.loads((tmp_path / "out" / "certificate.json").read_text())
     assert (certificate["aircraft"], certificate["seed"]) == ("ultrastick25e", 7)
+    assert certificate["conditions"] == "typical or ideal"
 
 
 @pytest.mark.parametrize(
