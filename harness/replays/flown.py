@@ -37,6 +37,7 @@ class FlownFlight:
     columns: Mapping[str, FloatArray]
     """(n,) each: `time_s`, `east_m`, `north_m`, `up_m`, `ve_mps`, `vn_mps`, and any of `OPTIONAL`."""
     notes: tuple[str, ...] = ()  # what was inferred, a sentence each
+    in_degrees: bool = False  # so were the places in the file
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]
@@ -61,10 +62,11 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     """
     suffix = path.suffix.lower()
     if suffix in TABLES:
-        columns, notes = _of_table(path, plane)
+        columns, notes, in_degrees = _of_table(path, plane)
     else:
         check_kind(path)
         columns, notes = read_log(path, plane or LocalPlane(0.0, 0.0))
+        in_degrees = True
     if len(columns["time_s"]) < 3 or not (np.diff(columns["time_s"]) > 0.0).all():
         raise InputError(f"{path}: time_s: must have at least 3 rows, each later than the one before")
     if "ve_mps" not in columns or "vn_mps" not in columns:
@@ -74,10 +76,19 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     if "up_m" not in columns:
         notes.append("altitude: the table has none; taken to be 0 m")
         columns["up_m"] = np.zeros_like(columns["time_s"])
-    by_autopilot = columns.get("autonomous", columns.get("lap", columns["time_s"] + 1.0)) > 0.0
+    if "airspeed_tas_mps" not in columns:
+        none = f"the log has none ({', '.join(AIRSPEED_COLUMNS)}); taken to be constant where wind is fitted"
+        notes.append(f"airspeed: {'indicated; taken as true' if 'airspeed_ias_mps' in columns else none}")
+    targets = columns.get("target_index", np.zeros_like(columns["time_s"]))
+    if (unknown := np.isnan(targets)).any():
+        rows = counted(int(unknown.sum()), "row")
+        notes.append(f"{rows} without target_index: that of the row before is taken")
+        targets = targets[np.maximum.accumulate(np.where(unknown, 0, np.arange(len(targets))))]
+        columns["target_index"] = targets
+    by_autopilot = columns.get("autonomous", columns.get("lap", 1.0 - (targets < 0.0))) > 0.0
     if not by_autopilot.any():
-        raise InputError(f"{path}: autonomous, lap: no row is flown by the autopilot")
-    return FlownFlight(path, columns, tuple(notes)).rows(np.flatnonzero(by_autopilot))
+        raise InputError(f"{path}: autonomous, lap, target_index: no row is flown by the autopilot")
+    return FlownFlight(path, columns, tuple(notes), in_degrees).rows(np.flatnonzero(by_autopilot))
 
 
 def check_kind(path: Path) -> None:
@@ -88,8 +99,8 @@ def check_kind(path: Path) -> None:
         raise InputError(f"{path}: is no flight log that is read; must end in {told}")
 
 
-def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArray], list[str]]:
-    """Reads the columns of a table, without the rows that have no time or place; how many those are is a note."""
+def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArray], list[str], bool]:
+    """Reads the columns of a table that have values, with notes on its rows, and whether its places are in degrees."""
     import pyarrow.parquet as parquet
 
     with reading(path):
@@ -100,16 +111,23 @@ def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArra
     if (twice := next((name for name in wanted.values() if names.count(name) > 1), None)) is not None:
         raise InputError(f"{path}: {twice}: stands {names.count(twice)} times; must stand once")
     columns = {new: _numbers(table, name, path) for new, name in wanted.items()}
-    known = np.isfinite([columns[name] for name in ("time_s", "east_m", "north_m")]).all(axis=0)
-    columns = {name: each[known] for name, each in columns.items()}
-    dropped = int((~known).sum())
-    notes = [f"{counted(dropped, 'row')} without time or place passed over"] if dropped else []
+    columns, notes = _known_rows(columns)
     if place in DEGREES:
         pairs = np.column_stack((columns["east_m"], columns["north_m"])).tolist()
         plane = plane or LocalPlane(*pairs[0])
         placed = np.array([plane.plane(*pair) for pair in pairs]).reshape(-1, 2)
         columns["east_m"], columns["north_m"] = placed.T
-    return columns, notes
+    return columns, notes, place in DEGREES
+
+
+def _known_rows(columns: dict[str, FloatArray]) -> tuple[dict[str, FloatArray], list[str]]:
+    """Returns the columns that have values, in the rows with a time, a place and, of flights in laps, a lap; a note."""
+    has = {name: each for name, each in columns.items() if name not in OPTIONAL or np.isfinite(each).any()}
+    needed = [name for name in ("time_s", "east_m", "north_m", "lap") if name in has]
+    known = np.isfinite([has[name] for name in needed]).all(axis=0)
+    dropped = int((~known).sum())
+    notes = [f"{counted(dropped, 'row')} without {', '.join(needed)} passed over"] if dropped else []
+    return {name: each[known] for name, each in has.items()}, notes
 
 
 def _csv_table(path: Path) -> pa.Table:

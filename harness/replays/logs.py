@@ -48,8 +48,6 @@ def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list
     notes: list[str] = []
     with reading(path):
         found, others = READERS[path.suffix.lower()](path, notes)
-    if not any(name.startswith("airspeed") for name, series in others.items() if len(series)):
-        notes.append("airspeed: the log has none; taken to be constant where wind is fitted")
     places = found.reshape(-1, 4)
     _, latitude, longitude, _ = places.T
     known = np.isfinite(places).all(axis=1) & (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)

@@ -18,6 +18,8 @@ FIRST_SETTLED_LAP: Final = 2
 """Laps before this one are not compared, since the autopilot has just been switched on."""
 PASSED_M: Final = 5.0
 """Without a known radius, a corner passed within a quarter of the shortest leg counts as reached this far on."""
+LONGEST_GAP_S: Final = 1.0
+"""A lap with a longer time between two rows, and longer than three times the usual one, is not whole."""
 FIGURES = {
     "outside_p95_m": "outside the corners, p95, m",
     "outside_max_mean_m": "mean of the largest of each lap, m",
@@ -34,13 +36,15 @@ FIGURES = {
 def legs_of(
     columns: Mapping[str, FloatArray], corners_m: FloatArray, first: int, radius_m: float | None
 ) -> FloatArray:
-    """(n,) number of corners reached at each row of a flown flight, by its targets, else by its places.
+    """(n,) number of corners reached at each row of a flown flight, by its known targets, else by its places.
 
     `first` is the number of the corner that the first row heads for; one counts as reached from `radius_m`.
     """
     if "target_index" in columns:
-        target = columns["target_index"]
-        return np.cumsum(np.diff(target, prepend=target[0]) != 0.0).astype(np.float64)
+        known = np.flatnonzero(columns["target_index"] >= 0.0)
+        on, steps = np.diff(columns["target_index"][known]), np.zeros(len(columns["time_s"]))
+        steps[known[1:]] = np.where(on != 0.0, np.maximum(on % len(corners_m), 1.0), 0.0)
+        return np.cumsum(steps)
     near_m = 0.25 * float(np.hypot(*np.diff(corners_m, axis=0).T).min())
     found, reached, nearest_m = np.empty(len(columns["time_s"])), 0, np.inf
     for row, place in enumerate(zip(columns["east_m"], columns["north_m"], strict=True)):
@@ -78,6 +82,7 @@ class Side:
     legs: FloatArray  # (n,) corners reached before each row
     laps: FloatArray  # (n,) number of the lap of each row
     height_m: float  # that was commanded
+    begun: bool  # the first row is at the begin of its lap
     ended: bool  # the last row has come to the end of its lap
 
     @cached_property
@@ -93,14 +98,25 @@ class Side:
 
     @cached_property
     def whole_laps(self) -> list[int]:
-        """The settled laps in which every corner was flown to."""
-        return [
-            lap
-            for lap in np.unique(self.laps).astype(int).tolist()
-            if lap >= FIRST_SETTLED_LAP
-            and np.ptp(self.legs[self.laps == lap]) + 1 >= len(self.corners_m)
-            and (self.ended or lap != self.laps[-1])
-        ]
+        """The settled laps that were flown from begin to end, to every corner."""
+        laps = np.unique(self.laps).astype(int).tolist()
+        return [lap for lap in laps if lap >= FIRST_SETTLED_LAP and lap not in self.lacking]
+
+    @cached_property
+    def lacking(self) -> dict[int, str]:
+        """What the settled laps that are not whole lack."""
+        steps_s, found = np.diff(self.columns["time_s"]), {}
+        for lap in np.unique(self.laps[self.laps >= FIRST_SETTLED_LAP]).astype(int).tolist():
+            rows = np.flatnonzero(self.laps == lap)
+            flown, corners = len(np.unique(self.legs[rows])), len(self.corners_m)
+            gap_s = float(steps_s[max(rows[0] - 1, 0) : rows[-1] + 1].max(initial=0.0))
+            if (rows[0] == 0 and not self.begun) or (rows[-1] == len(steps_s) and not self.ended):
+                found[lap] = f"{'begins before' if rows[0] == 0 and not self.begun else 'ends after'} the log"
+            elif gap_s > max(LONGEST_GAP_S, 3.0 * float(np.median(steps_s))):
+                found[lap] = f"has no row flown by the autopilot for {gap_s:.1f} s"
+            elif flown < corners:
+                found[lap] = f"flies to {flown} of the mission's {corners} corners"
+        return found
 
     def figures(self, chosen: NDArray[np.bool_]) -> dict[str, float]:
         """Returns the figures of some rows."""
@@ -139,8 +155,9 @@ def compared(flown: Side, simulated: Side) -> dict[str, Any]:
     """Returns laps and figures of both flights; InputError if they have no settled lap in common."""
     settled = [lap for lap in flown.whole_laps if lap in simulated.whole_laps]
     if not settled:
-        missing = "the log" if not flown.whole_laps else "the simulated flight"
-        raise InputError(f"{missing} has no whole lap after lap 1; there is nothing to compare")
+        missing, side = ("the log", flown) if not flown.whole_laps else ("the simulated flight", simulated)
+        why = "".join(f"; lap {lap} {lack}" for lap, lack in list(side.lacking.items())[:3])
+        raise InputError(f"{missing} has no whole lap after lap 1{why}; there is nothing to compare")
     rows: list[dict[str, Any]] = [
         {"lap": lap, "flown": flown.lap(lap), "simulated": simulated.lap(lap)} for lap in settled
     ]

@@ -7,14 +7,17 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import AliasPath, BaseModel, ConfigDict, Field, FiniteFloat, PlainValidator, ValidationError
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import MAX_JSON_BYTES, InputError, parsed_json, read_text, shown
 from harness.files.mavlink.commands import FLOWN, JUMP, WAYPOINT, name_of
+from harness.files.mavlink.items import Place
 from harness.flight.record import FloatArray
 from harness.replays.flown import FlownFlight
 from harness.replays.logs import Command, logged_mission
+from harness.run_files.mission.program import Program
 from harness.run_files.path_files import read_path
 
 CRUISE_PARAMETERS: Final = {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}
@@ -36,13 +39,14 @@ class Origin(BaseModel):
 
 
 def _corners(given: object) -> FloatArray:
-    """(k, 2) east and north of two corners or more; else ValueError."""
+    """(k, 2) east and north of two corners or more, without a last that is the first again; else ValueError."""
     found = np.array(given)
     if found.dtype.kind not in "if" or found.ndim != 2 or found.shape[1] != 2 or len(found) < 2:
         raise ValueError
     if not np.isfinite(found).all():
         raise ValueError
-    return found.astype(np.float64)
+    closed = len(found) > 2 and np.hypot(*(found[-1] - found[0])) < 1.0
+    return found[: len(found) - closed].astype(np.float64)
 
 
 def _key(name: str) -> Any:
@@ -65,27 +69,83 @@ class FlownMission(BaseModel):
     bank_limit_deg: FiniteFloat | None = _key("bank_limit_deg")  # of the autopilot; None: the aircraft's
     origin: Origin | None = Field(default=None, validation_alias=AliasPath("frame", "origin"))  # of the plane
 
+    def nearest_m(self, flight: FlownFlight) -> FloatArray:
+        """(k,) how near a flight comes to each corner."""
+        east_m, north_m = flight["east_m"], flight["north_m"]
+        return np.array([np.hypot(east_m - east, north_m - north).min() for east, north in self.corners_m])
 
-def read_mission(path: Path) -> FlownMission:
-    """Reads a JSON with `mission.corners_east_north_m`, or a file that `wayproof check` takes; else InputError."""
+    def check_flown(self, flight: FlownFlight) -> None:
+        """Raises InputError for a flight that stays away from a corner: it lies in another plane."""
+        nearest_m = self.nearest_m(flight)
+        legs_m = np.hypot(*(np.roll(self.corners_m, -1, axis=0) - self.corners_m).T)
+        if nearest_m.max() > max(self.acceptance_m or 0.0, 0.5 * legs_m.max()):
+            told = f"comes no nearer than {nearest_m.max():.0f} m to corner {nearest_m.argmax() + 1} of its mission"
+            raise InputError(f"{flight.source}: {told}; give both in one plane, or in degrees")
+
+    def corner_at(self, flight: FlownFlight, rows: NDArray[np.intp], told: int) -> tuple[int, float]:
+        """Number of the corner that some rows lie at, that told unless another is half as far; and how far, m."""
+        places = np.column_stack((flight["east_m"][rows], flight["north_m"][rows]))
+        away = np.linalg.norm(places[:, None] - self.corners_m, axis=2).mean(axis=0)
+        corner = int((away * np.where(np.arange(len(away)) == told, 0.5, 1.0)).argmin())
+        return corner, float(away[corner])
+
+
+Given = tuple[FlownMission, list[str], list[Place]]
+"""A mission with notes on it, and places that `east_m` and `north_m` of a log may be counted from."""
+
+
+def read_mission(path: Path, origin_deg: Place | None = None) -> Given:
+    """Reads a JSON with `mission.corners_east_north_m`, or a file that `wayproof check` takes; else InputError.
+
+    The plane of a mission in degrees lies about `origin_deg`, else about its first waypoint. A mission in degrees does
+    not say where a log in metres is counted from: its home, or else its first waypoint.
+    """
     if path.suffix.lower() == ".json":
         text = read_text(path, MAX_JSON_BYTES, "a mission, in JSON")
         if '"mission"' in text and '"Plan"' not in text:
-            return _of_json(text, str(path))
-    given = read_path(path)
-    points = given.points_m
-    if len(points) > 2 and np.hypot(*(points[-1] - points[0])) < 1.0:
-        points = points[:-1]
-    steps = given.mission.steps if given.mission else ()
-    radius = next((step.acceptance_m for step in steps if step.acceptance_m > 0.0), None)
+            return _of_json(text, str(path)), [], []
+    given, notes = read_path(path, origin_deg=origin_deg), []
+    points, radii = _lap_of_program(given.points_m, given.mission)
+    radius = next((each for each in radii if each > 0.0), None)
+    if radius is not None and len(radii) > 1:
+        told = ", ".join(f"{each:g}" for each in radii)
+        notes = [f"mission: its acceptance radii differ ({told} m); {radius:g} m is taken for all corners"]
     height_m = float(given.altitudes_m[0]) if len(given.altitudes_m) else None
     place = given.origin_deg
     origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
-    return FlownMission(corners_m=points, acceptance_m=radius, height_m=height_m, origin=origin)
+    found = FlownMission(corners_m=points, acceptance_m=radius, height_m=height_m, origin=origin)
+    home = given.mission.home if given.mission else None
+    return found, notes, [each for each in (home, place) if each is not None]
 
 
-def mission_of_log(path: Path) -> tuple[FlownMission, str]:
-    """The mission that a log has: of ArduPilot's, the waypoints between a jump and its target; and a note on it.
+def placed(path: Path, origins: Sequence[Place], flight: FlownFlight) -> tuple[FlownMission, str]:
+    """A mission in degrees about the origin with which a flight in metres comes nearest to its corners; and a note."""
+    every = [read_mission(path, origin)[0] for origin in origins]
+    missed_m = [float(each.nearest_m(flight).max()) for each in every]
+    best = int(np.argmin(missed_m))
+    latitude, longitude = origins[best]
+    what = "home" if len(origins) > 1 and best == 0 else "the first waypoint"
+    told = f"the log's east = north = 0 is taken to be {what}, {latitude:.6f}, {longitude:.6f}"
+    note = f"mission: in degrees; {told}; the flight comes within {missed_m[best]:.0f} m of its corners"
+    return every[best], note
+
+
+def _lap_of_program(points: FloatArray, mission: Program | None) -> tuple[FloatArray, list[float]]:
+    """Returns the corners of a lap, and the acceptance radii that they have.
+
+    A mission that jumps back has laps of what it flies between the last two times at one item, in the file's order.
+    """
+    if mission is None:
+        return points, []
+    steps = [each for each in mission.steps if each.position]
+    again = [k for k, each in enumerate(steps[:-1]) if each.item == steps[-1].item]
+    lap = range(again[-1], len(steps) - 1) if again else range(len(steps))
+    order = sorted(lap, key=lambda k: steps[k].item)
+    return points[order], list(dict.fromkeys(steps[k].acceptance_m for k in order))
+
+
+def mission_of_log(path: Path) -> Given:
+    """The mission that a log has: of ArduPilot's, the waypoints between a jump and its target; with a note on it.
 
     Raises:
         InputError: the log has none, or more than waypoints is flown in it.
@@ -103,7 +163,7 @@ def mission_of_log(path: Path) -> tuple[FlownMission, str]:
         origin=origin,
     )
     told = f"{radius:g} m" if radius > 0.0 else "by the rule of the law"
-    return found, f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {told}"
+    return found, [f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {told}"], []
 
 
 def mission_of_targets(flight: FlownFlight) -> tuple[FlownMission, str]:
@@ -117,7 +177,7 @@ def mission_of_targets(flight: FlownFlight) -> tuple[FlownMission, str]:
             f"{flight.source}: its mission is not known; give --mission FILE, or a column target_index"
         )
     target = flight["target_index"]
-    reached = np.flatnonzero((np.diff(target) != 0.0) & (target[:-1] >= 0.0))
+    reached = np.flatnonzero((np.diff(target) != 0.0) & (target[:-1] >= 0.0) & (target[1:] >= 0.0))
     numbers = np.unique(target[reached])
     if len(numbers) < 2 or (numbers != np.arange(len(numbers))).any():
         told = ", ".join(f"{each:g}" for each in numbers[:8].tolist()) or "none"

@@ -11,11 +11,12 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 from harness.replays.flown import TABLES, FlownFlight, check_kind, read_flown
 from harness.replays.measures import Replay, Side, compared, legs_of, rows_of
-from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, read_mission
+from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, placed, read_mission
 from harness.replays.simulated import Task, fly_anew, scenario_for
 from harness.replays.wind import FittedWind, fit_wind, fit_windows
 
@@ -61,8 +62,9 @@ def replay(
     columns = fly_anew(scenario, task, laps, out / SIMULATED)
     corners_m, legs = flown_mission.corners_m, columns["leg"]
     ended = bool(legs[-1] >= laps * len(corners_m))
+    left_out = [f"lap {lap} is left out: it {lack}" for lap, lack in flown.lacking.items()]
     numbers = flown.laps[0] + _laps(legs, task)
-    simulated = Side(columns, corners_m, legs, numbers, scenario.mission.altitude_m, ended)
+    simulated = Side(columns, corners_m, legs, numbers, scenario.mission.altitude_m, flown.begun, ended)
     told = {
         "schema": SCHEMA,
         "complete": True,
@@ -74,7 +76,7 @@ def replay(
         "airspeed_mps": task.airspeed_mps,
         "latency_s": scenario.navigation.latency_s,
         **compared(flown, simulated),
-        "notes": [*notes, *flight.notes],
+        "notes": [*notes, *flight.notes, *left_out],
     }
     found = Replay(told, flown.columns, columns, corners_m, out)
     _write(found, {"flown": flown, "simulated": simulated}, recording)
@@ -82,21 +84,36 @@ def replay(
 
 
 def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, list[str]]:
-    """Returns the mission, the flown flight, and a note on the mission if it is from the log."""
+    """Returns the mission from where laps begin, the flown flight, and notes on the mission."""
     check_kind(log)
     if mission is None and log.suffix.lower() in TABLES:
         flight = read_flown(log)
         found, note = mission_of_targets(flight)
-        return found, flight, [note]
-    found, *notes = (read_mission(mission),) if mission else mission_of_log(log)
-    origin = found.origin
-    plane = LocalPlane(origin.latitude_deg, origin.longitude_deg) if origin else LocalPlane(0.0, 0.0)
-    return found, read_flown(log, plane), notes
+        notes = [note]
+    else:
+        found, notes, origins = read_mission(mission) if mission else mission_of_log(log)
+        origin = found.origin
+        plane = LocalPlane(origin.latitude_deg, origin.longitude_deg) if origin else LocalPlane(0.0, 0.0)
+        flight = read_flown(log, plane)
+        if origin is None and flight.in_degrees:
+            told = "is in degrees and the mission in metres; give a mission in degrees, or with frame.origin"
+            raise InputError(f"{log}: {told} (latitude_deg, longitude_deg)")
+        if mission and origins and not flight.in_degrees:
+            found, note = placed(mission, origins, flight)
+            notes.append(note)
+    found.check_flown(flight)
+    laps = flight["lap"] if "lap" in flight else np.zeros(0)
+    if (begins := np.flatnonzero((np.diff(laps) > 0.0) & (laps[:-1] >= 1.0)) + 1).size:
+        first, away_m = found.corner_at(flight, begins, 0)
+        found = found.model_copy(update={"corners_m": np.roll(found.corners_m, -first, axis=0)})
+        told = f"laps begin at corner {first + 1} of the mission, {away_m:.0f} m from where lap changes"
+        notes += [told] if first else []
+    return found, flight, notes
 
 
 def _task_of(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Task:
     """Finds where the simulated flight begins, and its airspeed and height."""
-    airspeed, commanded, corners = flight.airspeed_mps, mission.airspeed_mps, mission.corners_m
+    airspeed, commanded = flight.airspeed_mps, mission.airspeed_mps
     if airspeed is None:
         commanded = wind.airspeed_mps
     elif commanded is None:
@@ -107,12 +124,20 @@ def _task_of(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind]
         height_m = mission.height_m + float(np.nanmedian(flight["up_m"] - flight["baro_height_m"]))
     else:
         height_m = float(np.nanmedian(flight["up_m"]))
-    if "target_index" in flight and flight["target_index"][0] >= 0:
-        first = int(flight["target_index"][0]) % len(corners)
-    else:  # the corner after the nearest
-        away = np.hypot(*(corners - (flight["east_m"][0], flight["north_m"][0])).T)
-        first = (int(away.argmin()) + 1) % len(corners)
-    return Task(flight, mission, first, winds, commanded, height_m)
+    return Task(flight, mission, _first_corner(flight, mission), winds, commanded, height_m)
+
+
+def _first_corner(flight: FlownFlight, mission: FlownMission) -> int:
+    """Number of the corner that a flight heads for: where its first target is reached, else after the nearest."""
+    targets, corners = flight.columns.get("target_index", np.zeros(0)), len(mission.corners_m)
+    known = np.flatnonzero(targets >= 0.0)
+    if not known.size:
+        away = np.hypot(*(mission.corners_m - (flight["east_m"][0], flight["north_m"][0])).T)
+        return (int(away.argmin()) + 1) % corners
+    first = targets[known[0]]
+    reached = known[targets[known] != first][:1]
+    number = int(first) % corners
+    return mission.corner_at(flight, reached, number)[0] if reached.size else number
 
 
 def _flown(task: Task) -> tuple[Side, int]:
@@ -121,17 +146,18 @@ def _flown(task: Task) -> tuple[Side, int]:
     columns = dict(flight.columns)
     legs = legs_of(columns, mission.corners_m, task.first, mission.acceptance_m)
     laps = columns["lap"] if "lap" in columns else 1.0 + _laps(legs, task)
-    # The log ends where a lap does: as near to corner 0, in two rows, as counts as reached or as the laps before ended.
-    step_s = float(np.diff(flight["time_s"])[-1])
-    step_m = float(np.hypot(flight["ve_mps"][-1], flight["vn_mps"][-1])) * step_s
+    # The log begins or ends where a lap does: as near to corner 0, in two rows, as counts as reached or as laps ended.
+    ends = [0, -1]
+    steps_m = np.hypot(flight["ve_mps"], flight["vn_mps"])[ends] * np.diff(flight["time_s"])[ends]
     away_m = np.hypot(*(mission.corners_m[:1] - np.column_stack((flight["east_m"], flight["north_m"]))).T)
     turned_m = away_m[1:][(np.diff(laps) > 0) & (laps[:-1] >= 1)]
     near_m = mission.acceptance_m if mission.acceptance_m is not None else turned_m.max(initial=0.0)
-    ended = bool(away_m[-1] <= near_m + 2.0 * step_m)
+    begun, ended = (away_m[ends] <= near_m + 2.0 * steps_m).tolist()
     columns["time_s"] = columns["time_s"] - columns["time_s"][0]
     if flight.airspeed_mps is not None:
         columns["airspeed_mps"] = flight.airspeed_mps
-    return Side(columns, mission.corners_m, legs, laps, task.height_m, ended), int(laps[-1] - laps[0]) + 1
+    side = Side(columns, mission.corners_m, legs, laps, task.height_m, begun, ended)
+    return side, int(laps[-1] - laps[0]) + 1
 
 
 def _laps(legs: FloatArray, task: Task) -> FloatArray:

@@ -129,7 +129,7 @@ def _of_mission(flown: Program, source: str, origin_deg: Place | None) -> PathAs
         _check_degrees([fence.name] * len(fence.places), fence.places, source)
     fences, notes = in_plane(flown.fences, place, source), flown.notes
     steps = tuple(replace(step, position=step.position and place(step.position)) for step in flown.steps)
-    if not flown.has_home and any(step.height_m is not None and step.above == HOME for step in flown.steps):
+    if flown.home is None and any(step.height_m is not None and step.above == HOME for step in flown.steps):
         notes = (*notes, "has no home: altitudes above home are counted from the sea")
     return PathAsGiven(
         source, points, origin, mission=replace(flown, steps=steps, fences=fences), notes=notes

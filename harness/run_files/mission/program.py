@@ -80,14 +80,14 @@ class ItemFate:
 class Program:
     """A mission as an aeroplane flies it: its steps, and the treatment of every item, in the order of the file.
 
-    The altitude of home, which may have no position, is above mean sea level. Fences come with it, and notes on what
-    else does.
+    The altitude of home is above mean sea level; its latitude and longitude are None where the file does not say.
+    Fences come with it, and notes on what else does.
     """
 
     steps: tuple[MissionStep, ...]
     items: tuple[ItemFate, ...]
     home_altitude_m: float = 0.0
-    has_home: bool = True
+    home: tuple[float, float] | None = None
     fences: Fences = field(default_factory=Fences)
     notes: tuple[str, ...] = ()
 
@@ -110,7 +110,7 @@ def program(
         number = counted(len(run.steps), "item")
         raise InputError(f"{source}: has {number} to fly to{told}; a path has at least 2")
     every = tuple(run.told.get(item.number) or run.not_reached(item) for item in items)
-    return Program(tuple(run.steps), every, home_altitude_m, home is not None)
+    return Program(tuple(run.steps), every, home_altitude_m, home)
 
 
 Flown = tuple[MissionStep | None, str]

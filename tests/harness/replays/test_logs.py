@@ -95,7 +95,8 @@ def test_a_log_is_the_track_that_was_written(
     assert course == pytest.approx([math.degrees(math.atan2(1, 3))] * len(kept), abs=5.0)
     if airspeed:
         assert found[airspeed] == pytest.approx(15.0 + 0.5 * kept, abs=1e-5)
-        assert found.notes == ("velocity over the ground: from the positions",)
+        indicated = ("airspeed: indicated; taken as true",) if ending == ".bin" else ()
+        assert found.notes == ("velocity over the ground: from the positions", *indicated)
     else:
         assert found.airspeed_mps is None
 
@@ -119,6 +120,11 @@ def mission_in(folder: Path) -> Path:
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n", "time_s: must have at least 3 rows"),
         ("a.csv", b"time_s,x_m,y_m\n2,1,2\n1,1,2\n0,1,2\n", "each later than the one before"),
         ("a.csv", b"time_s,x_m,y_m\n0,1\n", "a.csv:2: has 2 cells, the header 3"),
+        (
+            "a.csv",
+            b"time_s,latitude_deg,longitude_deg\n0,47,8\n1,47,8.1\n2,47,8.2\n",
+            "is in degrees and the mission in metres; give a mission in degrees, or with frame.origin",
+        ),
         ("a.parquet", b"PAR1", "cannot be read as .parquet"),
         ("a.bin", b"not a log", "is no DataFlash log: such a file begins with a3 95 80"),
     ],
@@ -148,7 +154,7 @@ def test_a_row_without_a_place_is_no_row_and_told(tmp_path: Path) -> None:
     track = read_flown(tmp_path / "a.csv", PLANE)
     assert track["time_s"].tolist() == [0.0, 2.0, 3.0]
     assert (track["east_m"].tolist(), track["north_m"].tolist()) == ([0.0, 10.0, 20.0], [10.0, 30.0, 50.0])
-    assert track.notes[0] == "1 row without time or place passed over"
+    assert track.notes[0] == "1 row without time_s, east_m, north_m passed over"
     assert "altitude: the table has none; taken to be 0 m" in track.notes
 
 
@@ -164,7 +170,9 @@ def test_of_two_receivers_the_first_is_taken_where_it_has_a_fix(tmp_path: Path) 
     found = read_flown(tmp_path / "a.bin", PLANE)
     assert len(found["time_s"]) == 18
     assert np.hypot(found["east_m"] - EAST_M[2:], found["north_m"] - NORTH_M[2:]).max() < 0.05
-    assert "airspeed: the log has none; taken to be constant where wind is fitted" in found.notes
+    assert found.notes[-1].startswith(
+        "airspeed: the log has none (airspeed_tas_mps, airspeed_ias_mps); taken"
+    )
 
 
 @pytest.mark.parametrize(

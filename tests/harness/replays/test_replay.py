@@ -193,13 +193,57 @@ def test_a_log_of_positions_alone_shows_the_same_wind_and_laps(tmp_path: Path) -
     assert told["wind"]["from_deg"] == pytest.approx(fitted["from_deg"], abs=3.0)
     assert told["simulated"]["lap_mean_s"] == pytest.approx(told["flown"]["lap_mean_s"], rel=0.03)
     assert told["distance_between_m"]["p50"] < 3.0
-    assert told["notes"] == ["velocity over the ground: from the positions"]
+    assert told["notes"][0] == "velocity over the ground: from the positions"
+    assert told["notes"][1].startswith("airspeed: the log has none (airspeed_tas_mps, airspeed_ias_mps)")
+
+
+@needs_flown
+@pytest.mark.parametrize(
+    ("column", "begin_s", "end_s", "laps", "note"),
+    [
+        ("alpha_probe_deg", 50.0, 50.0, [2, 3], "is taken to be home, 45.328422, -93.229244"),
+        ("target_index", 50.0, 50.0, [2, 3], "1 row without target_index"),
+        ("time_s", -20.0, 45.0, [3], "lap 2 is left out: it begins before the log"),
+        ("autonomous", 50.0, 58.0, [3], "lap 2 is left out: it has no row flown by the autopilot for 8.0 s"),
+        ("airspeed_tas_mps", -20.0, 200.0, [2, 3], "airspeed: indicated; taken as true"),
+        ("lap", 50.0, 50.0, [2, 3], "1 row without time_s, east_m, north_m, lap"),
+    ],
+)
+def test_a_log_that_lacks_values_has_thors_own_laps_or_leaves_them_out(
+    column: str, begin_s: float, end_s: float, laps: list[int], note: str, tmp_path: Path
+) -> None:
+    """The mission is in degrees, and of a log with laps it begins with their second corner."""
+    facts = json.loads((FLOWN / "thor75.json").read_text())
+    origin, table = facts["frame"]["origin"], pq.read_table(FLOWN / "thor75.parquet")
+    time_s = table["time_s"].to_numpy()
+    lost = np.where((time_s > begin_s - 0.01) & (time_s < end_s + 0.01), np.nan, table[column])
+    table = table.set_column(table.column_names.index(column), column, pa.array(lost.astype(float)))
+    from_targets = column == "target_index"
+    pq.write_table(
+        table.drop_columns(["lap", "autonomous"] if from_targets else []), tmp_path / "log.parquet"
+    )
+    corners = SQUARE if from_targets else SQUARE[1:] + SQUARE[:1]
+    plane = LocalPlane(origin["latitude_deg"], origin["longitude_deg"])
+    places = [" ".join(map(str, plane.geodetic(*corner))) for corner in ((0.0, 0.0), *corners)]
+    rows = [f"{k} 0 {3 * (k > 0)} 16 0 10 0 0 {place} 68 1" for k, place in enumerate(places)]
+    text = "\n".join([*rows, "5 0 3 177 1 -1 0 0 0 0 0 1"]).replace(" ", "\t")
+    (tmp_path / "a.waypoints").write_text(f"QGC WPL 110\n{text}\n")
+    log, mission = tmp_path / "log.parquet", tmp_path / "a.waypoints"
+    told = wayproof.replay(log, "ultrastick25e", mission, out=tmp_path / "out").told
+    assert told["settled_laps"] == laps
+    assert any(note in each for each in told["notes"])
+    lap, known = told["laps"][-1]["flown"], facts["laps"]["3"]
+    assert lap["time_s"] == pytest.approx(known["time_s"], abs=0.021)
+    sides = [each["outside_max_m"] for each in lap["corners"]]
+    assert sides == pytest.approx([*known["outside_by_side_max_m"].values()], abs=0.02)
+    assert told["distance_between_m"]["p95"] < 10.0
 
 
 @pytest.mark.parametrize(
     ("change", "told"),
     [
         ({"mission": {"corners_east_north_m": SQUARE}, "frame": "ENU"}, "frame: is 'ENU'; must be a mapping"),
+        ({"mission": {"corners_east_north_m": [[600, 0], [750, 150], [600, 150]]}}, "comes no nearer than 5"),
         ({"mission": {}, "corners_m": SQUARE}, "mission.corners_east_north_m: is missing"),
         ({"mission": {"corners_east_north_m": [[0, 0], [1]]}}, "must be two or more pairs"),
         ({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": "45"}}, "bank_limit_deg: is '45'"),
