@@ -49,6 +49,7 @@ class MissionEnd:
         self._measured = (0.0, 0.0, 0.0, 0.0)
         self._above_before: Position | None = None  # where it was at the last look at the ground
         self._looked: tuple[Fix, float] | None = None  # at the last look of all: surely so much clearance
+        self._place: complex | None = None  # then: east + i north
         self.contact_m = math.inf
 
     def to_go_m(self, state: AircraftState) -> float:
@@ -67,10 +68,11 @@ class MissionEnd:
         clearance = self._surely_clear_m(east, north, state.time_s)
         if touched := self._touched(state, clearance):
             return Ending(Outcome.COLLISION, touched)
-        if not world.inside_bounds(east, north):
+        passed = self._passed_goal(complex(east, north))
+        if not passed and not world.inside_bounds(east, north):
             return Ending(Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m")
         to_go = self.to_go_m(state)
-        if to_go <= mission.goal_radius_m:
+        if passed or to_go <= mission.goal_radius_m:
             return Ending(Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s")
         if state.time_s >= self._time_limit_s:
             return Ending(
@@ -88,6 +90,17 @@ class MissionEnd:
             self._appears_s = world.next_appearance(state.time_s)
         self._next_look_s = min(state.time_s + wait, self._appears_s, self._time_limit_s)
         return None
+
+    def _passed_goal(self, here: complex) -> bool:
+        """Tells whether the way since the last look was in the goal circle, inside the area, before it ends."""
+        before, self._place = self._place, here
+        if before is None or before == here:
+            return False
+        goal, way = complex(*self._mission.goal_m), here - before
+        share = min(max(((goal - before) / way).real, 0.0), 1.0)
+        nearest = before + share * way
+        in_circle = share < 1.0 and abs(nearest - goal) <= self._mission.goal_radius_m
+        return in_circle and self._world.inside_bounds(nearest.real, nearest.imag)
 
     def _touched(self, state: AircraftState, clearance_m: float) -> str:
         """A sentence if the aircraft touches something, or did since the last look; else empty."""
