@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, ConfigDict, FailFast, Field, Strict, model_validator
 
-from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity, in_order
+from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity, given, in_order
 
 Height = Annotated[float, Field(ge=-1000, le=30_000)]
 Shift = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -40,7 +40,7 @@ def _simple(points: tuple[Point, ...]) -> tuple[Point, ...]:
     return ring
 
 
-Ring = Annotated[tuple[Point, ...], Strict(False), AfterValidator(_simple)]
+Ring = Annotated[tuple[Point, ...], Strict(False), Field(min_length=3), AfterValidator(_simple)]
 
 
 class Polygon(Section):
@@ -102,9 +102,7 @@ class WorldFile(Section):
 class Obstacle(Section):
     """One obstacle, unknown to the planner until sensed: a circle, a polygon, or what a file holds."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"oneOf": [{"required": [shape]} for shape in ("circle", "polygon", "file")]}
-    )
+    model_config = ConfigDict(json_schema_extra={"oneOf": [given(e) for e in ("circle", "polygon", "file")]})
 
     circle: Circle | None = None
     """Its shape, if it is round."""

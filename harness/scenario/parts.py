@@ -17,6 +17,7 @@ from harness.files.errors import PlannerError, sentence
 from harness.scenario.kinds import GUIDANCE, PLANNER, Kind, guidance_kinds, is_source, planner_kinds
 from harness.scenario.sections import (
     MAX_COORDINATE_M,
+    SHIELDED,
     AircraftSpec,
     GuidanceSpec,
     PartSpec,
@@ -237,7 +238,8 @@ def with_own_keys(schema: dict[str, Any]) -> dict[str, Any]:
 
 def _choice(shared: dict[str, Any], kind: Kind) -> dict[str, Any]:
     own = _keys_section(kind).model_json_schema()["properties"]
-    named = {**shared["properties"]["kind"], "const": kind.kind}
+    names = [kind.kind, kind.kind + SHIELDED] if isinstance(kind, PlannerKind) else [kind.kind]
+    named = {**shared["properties"]["kind"], "enum": names}
     usual = kind.kind == named["default"]
     if not usual:
         del named["default"]

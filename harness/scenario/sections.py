@@ -70,6 +70,11 @@ Longitude = Annotated[float, Field(ge=-180, le=180)]
 PitchLimits = tuple[Annotated[float, Field(ge=-90, lt=0)], Annotated[float, Field(gt=0, le=90)]]
 
 
+def given(key: str) -> dict[str, Any]:
+    """The JSON Schema of a mapping that has a key, and not as null."""
+    return {"required": [key], "properties": {key: {"not": {"type": "null"}}}}
+
+
 def in_order(span: tuple[float, float]) -> tuple[float, float]:
     """Returns a range as it is; a ValueError says that its ends stand the wrong way round."""
     if span[0] > span[1]:
@@ -124,9 +129,7 @@ class MissionSpec(Section):
     """From where to where."""
 
     model_config = ConfigDict(
-        json_schema_extra={
-            "allOf": [{"oneOf": [{"required": [e]}, {"required": [f"{e}_m"]}]} for e in ("start", "goal")]
-        }
+        json_schema_extra={"allOf": [{"oneOf": [given(e), given(f"{e}_m")]} for e in ("start", "goal")]}
     )
 
     start: Geodetic | None = None
@@ -214,8 +217,15 @@ class DeviationSpec(Section):
     """How far the centre of gravity lies behind that of the model. Default: that of the conditions, 0 for ideal."""
 
 
+def _at_least_0(schema: dict[str, Any]) -> None:
+    for key in schema["properties"].values():
+        key["minimum"] = 0
+
+
 class UncertaintySpec(DeviationSpec):
     """1 sigma of each deviation of the flown aircraft, at least 0; they are drawn from the seed."""
+
+    model_config = ConfigDict(json_schema_extra=_at_least_0)
 
     @model_validator(mode="after")
     def _none_below_zero(self) -> UncertaintySpec:

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 import aircraft
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
+from harness.files.strict_yaml import dump
 from harness.run.scenario_flight import make_loop
 from harness.scenario.kinds import planner_kinds
 from harness.scenario.performance import mission_of, performance_of
@@ -274,6 +275,39 @@ def test_the_schema_describes_every_key_with_its_default() -> None:
     assert schema["required"] == ["schema", "name", "area", "mission"]
 
 
+RING = "vertices_m: [[5000, 5000], [6000, 5000], [5000, 6000]]"
+
+
+@pytest.mark.parametrize(
+    ("more", "is_right"),
+    [
+        ("planner: {kind: vfh_plus+shield}", True),
+        ("planner: {kind: vfh_plus+other}", False),
+        (f"obstacles: [{{circle: null, polygon: {{{RING}}}}}]", True),
+        ("obstacles: [{circle: null}]", False),
+        ("mission: {start: null, start_m: [1000, 1000], goal_m: [31000, 1000]}", True),
+        ("mission: {start: null, goal_m: [31000, 1000]}", False),
+        ("uncertainty: {mass: 0.2, centre_of_gravity_m: 0}", True),
+        ("uncertainty: {mass: -0.2}", False),
+        (
+            f"obstacles: [{{polygon: {{{RING}, holes_m: [[[5100, 5100], [5200, 5100], [5100, 5200]]]}}}}]",
+            True,
+        ),
+        (f"obstacles: [{{polygon: {{{RING}, holes_m: [[[5100, 5100]]]}}}}]", False),
+    ],
+)
+def test_an_editor_marks_what_the_loader_refuses(more: str, is_right: bool) -> None:
+    """Whether a file follows the schema is said by the package `jsonschema`."""
+    jsonschema = pytest.importorskip("jsonschema")
+    plain = {**yaml.safe_load(LEAST), **yaml.safe_load(more)}
+    assert jsonschema.Draft202012Validator(scenario_schema()).is_valid(plain) is is_right
+    if is_right:
+        scenario_of(dump(plain))
+    else:
+        with pytest.raises(InputError):
+            scenario_of(dump(plain))
+
+
 def test_editors_find_the_schema_beside_the_scenarios() -> None:
     folder = Path(__file__).parents[3] / "scenarios"
     assert json.loads((folder / "scenario.schema.json").read_text()) == scenario_schema()
@@ -327,14 +361,13 @@ def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
 
 
 def test_none_takes_keys_and_items_out_of_lists() -> None:
-    ring = "vertices_m: [[5000, 5000], [6000, 5000], [5000, 6000]]"
     full = (
         "obstacles:\n  - circle: {center_m: [5000, 1000], radius_m: 50}\n    velocity_mps: [1, 0]\n"
-        f"  - polygon: {{{ring}, holes_m: [[[5100, 5100], [5200, 5100], [5100, 5200]]]}}\n"
+        f"  - polygon: {{{RING}, holes_m: [[[5100, 5100], [5200, 5100], [5100, 5200]]]}}\n"
         "  - circle: {center_m: [7000, 7000], radius_m: 60}\n    active_s: [60, 140]\n"
     )
     gone = {"obstacles[0]": None, "obstacles[1].polygon.holes_m": None, "obstacles[2].active_s": None}
-    left = f"obstacles:\n  - polygon: {{{ring}}}\n  - circle: {{center_m: [7000, 7000], radius_m: 60}}\n"
+    left = f"obstacles:\n  - polygon: {{{RING}}}\n  - circle: {{center_m: [7000, 7000], radius_m: 60}}\n"
     assert scenario_of(LEAST + full).with_(gone) == scenario_of(LEAST + left)
 
 
