@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -46,6 +46,7 @@ def resolve(
     sensor = keys.sensor
     simulation = keys.simulation.filled(rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
     mission = _ends_in_plane(keys.mission, keys.area)
+    ends = {f"{end}_m": end if getattr(keys.mission, end) else f"{end}_m" for end in ("start", "goal")}
     aircraft = keys.aircraft.model_copy(update={"model": model_or_folder(keys.aircraft.model, folder)})
     nominal = _airframe(aircraft.model_copy(update={"actuators": None, "autopilot": None}))
     keys = with_servos(keys.updated(simulation=simulation, mission=mission, aircraft=aircraft), nominal)
@@ -95,7 +96,7 @@ def resolve(
         check_level_flight(scenario)
     scenario, names = with_files_expanded(scenario, folder)
     if ends_checked:
-        check_start_and_goal(scenario.area, scenario.obstacles, mission, clearance_m, names)
+        check_start_and_goal(scenario, mission, clearance_m, names, ends)
         sideways_mps2 = GRAVITY_MPS2 * math.tan(limits_of(aircraft).bank_limit_rad)
         check_start_leads_in(scenario.area, mission, fastest_mps**2 / sideways_mps2)  # downwind
     told = mission_of(scenario, performance)
@@ -165,24 +166,30 @@ def check_local_plane(area: Area) -> None:
 
 
 def check_start_and_goal(
-    area: Area, obstacles: Sequence[Obstacle], mission: MissionSpec, clearance_m: float, names: Sequence[str]
+    keys: ScenarioKeys,
+    mission: MissionSpec,
+    clearance_m: float,
+    names: Sequence[str],
+    written: Mapping[str, str],
 ) -> None:
     """Raises a KeyFault unless start and goal lie in the area and clear of obstacles, which messages call by `names`.
 
-    The start must be clear of what is there at time 0, the goal of what is there for ever.
+    The start must be clear of what is there at time 0, the goal of what is there for ever. `written` has the keys of
+    `start_m` and `goal_m` in the file, where they may stand in degrees.
     """
-    xmin, ymin, xmax, ymax = area.bounds_m
-    ends = {"start_m": mission.start_m, "goal_m": mission.goal_m}
+    xmin, ymin, xmax, ymax = bounds_m = keys.area.bounds_m
+    obstacles, ends = keys.obstacles, {"start_m": mission.start_m, "goal_m": mission.goal_m}
     for name, (east, north) in ends.items():
         if min(east - xmin, xmax - east, north - ymin, ymax - north) < 0.0:
-            told = f"is {[east, north]}; must lie inside area.bounds_m {list(area.bounds_m)}"
-            raise KeyFault(("mission", name), told)
+            lies = "is" if name in written.values() else "lies at"
+            told = f"{lies} {[east, north]}; must lie inside area.bounds_m {list(bounds_m)}"
+            raise KeyFault(("mission", written[name]), told)
     straight_m = math.dist(mission.start_m, mission.goal_m)
     if straight_m <= mission.goal_radius_m:
-        raise KeyFault(
-            ("mission", "goal_m"),
-            f"is {straight_m:g} m from start_m, inside goal_radius_m {mission.goal_radius_m:g} m; must be further away",
+        told = (
+            f"is {straight_m:g} m from {written['start_m']}, inside goal_radius_m {mission.goal_radius_m:g} m"
         )
+        raise KeyFault(("mission", written["goal_m"]), f"{told}; must be further away")
     at_first = [(each.active_s or (0.0,))[0] <= 0.0 for each in obstacles]
     there = {"start_m": at_first, "goal_m": [each.fixed for each in obstacles]}
     for end, point in ends.items():
@@ -191,7 +198,7 @@ def check_start_and_goal(
             if distance_m < clearance_m:
                 where = f"{distance_m:.6g} m from" if distance_m > 0 else "inside"
                 raise KeyFault(
-                    ("mission", end),
+                    ("mission", written[end]),
                     f"lies {where} {told}; must be {clearance_m:g} m (planner.clearance_m) away",
                 )
 

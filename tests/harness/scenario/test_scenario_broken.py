@@ -41,6 +41,7 @@ environment:
 trackability: {cross_track_m: 10, altitude_m: 15, airspeed_mps: 2, load_factor: 2.5}
 """
 
+NORTH, IN_DISC = "{latitude_deg: 48, longitude_deg: 8}", "{latitude_deg: 47.045, longitude_deg: 8.105}"
 SPEED = "airspeed_mps: 25"
 SQUARE = "[[12000, 3000], [14000, 3000], [14000, 5000], [12000, 5000]]"
 
@@ -53,6 +54,8 @@ BROKEN = {
     "no bounds": ("  bounds_m: [0, 0, 20000, 10000]\n", "", "4: area.bounds_m", "is missing"),
     "no start": ("  start_m: [1000, 5000]\n", "", "11: mission.start_m", "is missing"),
     "no goal": ("  goal_m: [19000, 5000]\n", "", "11: mission.goal_m", "is missing"),
+    "goal in degrees outside": ("goal_m: [19000, 5000]", f"goal: {NORTH}", "14: mission.goal:", "lies at [0.0, 11"),
+    "start in degrees inside": ("start_m: [1000, 5000]", f"start: {IN_DISC}", "12: mission.start:", "lies inside"),
     "name in capitals": ("name: good", "name: Good", "2: name", "must have only a-z, 0-9"),
     "name climbs out": ("name: good", "name: ..", "2: name", "and not only dots"),
     "name is a number": ("name: good", "name: 7", "2: name", "must be text; put it in quotes"),
