@@ -149,7 +149,8 @@ def prepare_check(
             root, files = _without_files(root, folder, scenario.ground)
         scenario = validly(root)
     named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
-    return PathCheck(given, scenario, plan, bool(named or world), corner_m, files)
+    again = partial(prepare_check, given, settings, world=world, altitude_m=altitude_m, name=name)
+    return PathCheck(given, scenario, plan, again, bool(named or world), corner_m, files)
 
 
 def _refuse_unused(settings: Sequence[tuple[str, str]]) -> None:
@@ -250,13 +251,20 @@ def fly_check(
     progress: Progress | None = None,
     command: str | None = None,
 ) -> dict[str, Any]:
-    """Flies a path, into a run folder if one is named, and returns its `metrics.json`; errors as `fly_to_folder`."""
+    """Flies a path, into a run folder if one is named, and returns its `metrics.json`; errors as `fly_to_folder`.
+
+    With a folder, the corner limit that a no tells has been flown.
+    """
     scenario, profile = check.scenario, check.plan.profile
     model = partial(jsbsim_aircraft, scenario, climb_limit_mps=check.plan.climb_limit_mps)
     make = partial(make_loop, make_model=model)
     if out is None:
         flight = fly_along(check.plan, make(scenario), (), progress)
         return measured(check, flight, flight_limits(scenario, planned=False))
+
+    def flown_at(corner_m: float) -> dict[str, Any]:
+        return fly_check(check.again(corner_m=corner_m), progress=progress)
+
     return fly_to_folder(
         scenario,
         out,
@@ -267,7 +275,7 @@ def fly_check(
         flown=FlownAs(
             GIVEN,
             partial(fly_along, check.plan),
-            partial(measured, check),
+            partial(measured, check, flown_at=flown_at),
             None if profile.level else profile.altitudes,
         ),
     )

@@ -85,6 +85,8 @@ class PathCheck:
     given: PathAsGiven
     scenario: Scenario
     plan: PathPlan
+    again: Callable[..., PathCheck]
+    """Prepares the same check with another `corner_m`."""
     bounded: bool = False
     """The bounds of the area were named, and must not be crossed."""
     corner_m: float | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
@@ -39,12 +39,22 @@ MOST_ALTITUDE_LAYERS: Final = 40
 """Layers are deeper than `LEAST_LAYER_M` where the altitudes of a flight would need more than this many."""
 WIDER, MOST_WIDER = 1.05, 3.0
 """A limit that does not hold far enough is made larger by the first factor, up to the second times the need."""
+MOST_FLIGHTS: Final = 4
+"""A path is flown at most so often again to find the corner limit with which it can be flown."""
 MOST_LIMITS_TRIED: Final = 50
 """A corner limit that would be kept is looked for in at most this many steps, each of which makes it larger."""
 
 
-def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str, Any]:
-    """The content of `metrics.json` of a path that was flown: that of any flight, and what is asked of a path."""
+def measured(
+    check: PathCheck,
+    flight: Flight,
+    limits: FlightLimits,
+    flown_at: Callable[[float], Mapping[str, Any]] | None = None,
+) -> dict[str, Any]:
+    """The content of `metrics.json` of a path that was flown: that of any flight, and what is asked of a path.
+
+    `flown_at` returns it for another corner limit; without it, `corner_m_that_would_do` is a guess.
+    """
     track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
     corners = [replace(each, allowed_cut_m=check.allowed_cut_m(each.waypoint)) for each in way.corners]
     line = way.given_m, SPACING_SHARE * tolerance, WINDOW_RADII * limits.turn_radius_m
@@ -65,7 +75,8 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         figures["reason"] = f"touched {first.name} after {first.start_s:.0f} s; {flight.reason}"
     told = _told(check, flight, limits, asked, passing)
     figures["trackable"] &= figures["outcome"] == "reached" and all(each["kept"] for each in told["corners"])
-    told["ok"], told["verdict"] = verdict(figures, told, seen, limits)
+    told["corner_m_that_would_do"], sure = _tried(told["corner_m_that_would_do"], flown_at)
+    told["ok"], told["verdict"] = verdict(figures, told, seen, limits, sure)
     return {
         **figures,
         "total_system_error_m": error_figures(found.rows_m),
@@ -90,7 +101,7 @@ def _told(
     worst_m, most_m = float(passing.off_m[row]), float(asked.allowed_m[row])
     line, speed = _given_line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
     corners = [passing.of(corner) for corner in passing.corners]
-    return {
+    found = {
         "ok": False,
         "verdict": "",
         "drawn": given.mission is None,
@@ -109,29 +120,31 @@ def _told(
             "altitude": float(np.abs(track.up_m - asked.altitude_m).max()) / limits.max_altitude_error_m,
             "bank": _bank_used(check, flight, limits, asked),
         },
-        "corner_m_that_would_do": _sufficient_m(passing, corners),
         "given": dataclasses.asdict(smoothness(polyline_profile(line, speed), speed)),
         "corners": corners,
         "fences": [fence.plain() for fence in given.fences.every],
         "items": [dataclasses.asdict(item) for item in given.mission.items] if given.mission else [],
         "notes": [*given.notes, *plan.notes],
     }
+    return {**found, "corner_m_that_would_do": _sufficient_m(passing, found)}
 
 
 def verdict(
-    figures: Mapping[str, Any], told: Mapping[str, Any], seen: Kept, limits: FlightLimits
+    figures: Mapping[str, Any], told: Mapping[str, Any], seen: Kept, limits: FlightLimits, sure: bool = False
 ) -> tuple[bool, str]:
-    """Whether a path can be flown as given, and a sentence that says so or why not."""
+    """Whether a path can be flown as given, and a sentence that says so or why not.
+
+    `sure`: it is a yes with `corner_m_that_would_do`.
+    """
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
     touched, high_m = _breaches_told(seen), figures["altitude_error_m"]["max"]
     ended = [] if figures["outcome"] in ("reached", "collision") else [str(figures["reason"])]
     share = told["limit_used"]["altitude"]
     high = [f"{high_m:.3g} m off in altitude where {high_m / share:.3g} m are allowed"] if share > 1.0 else []
-    alone = not (touched or ended or high) and _speed_and_load_held(figures["trackability"], limits)
     faults = [
         *touched,
         *([tallied(bad, "legs")] if bad else []),
-        *_deviation_told(told, alone),
+        *_deviation_told(told, sure),
         *high,
         *ended,
     ]
@@ -182,17 +195,8 @@ def _bank_used(check: PathCheck, flight: Flight, limits: FlightLimits, asked: As
     return demand(flight.track.part(*flown), flight.plans, force).windy
 
 
-def _speed_and_load_held(legs: Sequence[Mapping[str, Any]], limits: FlightLimits) -> bool:
-    """Whether load factor and mean airspeed error stayed within their limits on every leg."""
-    return all(
-        leg["max_load_factor"] <= limits.max_load_factor
-        and (leg["max_airspeed_error_mps"] or 0.0) <= limits.max_airspeed_error_mps
-        for leg in legs
-    )
-
-
-def _deviation_told(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
-    """Says how far off the path and a corner an aircraft was, if too far; `corners_alone`: nothing else is wrong."""
+def _deviation_told(told: Mapping[str, Any], sure: bool) -> list[str]:
+    """Says how far off the path and a corner an aircraft was, if too far, and which limit would do."""
     worst, enough_m = told["worst"], told["corner_m_that_would_do"]
     missed = next((corner for corner in told["corners"] if not corner["kept"]), None)
     noun, faults = "waypoint" if told["drawn"] else "item", []
@@ -204,14 +208,37 @@ def _deviation_told(told: Mapping[str, Any], corners_alone: bool) -> list[str]:
         how = f"passed {missed['most_off_m']:.3g} m off" if came else "not reached"
         faults.append(f"{noun} {missed['waypoint']} {how}, {missed['allowed_cut_m']:.3g} m are allowed")
     if faults and enough_m is not None:
-        would = "be yes" if corners_alone else "do for the corners alone"
+        would = "be yes" if sure else "do for the corners alone"
         faults.append(f"--corner-m {enough_m:g} would {would}")
     return faults
 
 
-def _sufficient_m(passing: _Passing, reached: Sequence[Mapping[str, Any]]) -> float | None:
-    """The limit at all corners that would have been kept, rounded up to 1 m; None where none would, or no other."""
-    if all(each["kept"] for each in reached) or any(each["flown_cut_m"] is None for each in reached):
+def _tried(
+    limit_m: float | None, flown_at: Callable[[float], Mapping[str, Any]] | None
+) -> tuple[float | None, bool]:
+    """Flies with a corner limit, and with a wider one as long as that does not hold; returns it, and if it is a yes."""
+    if limit_m is None or flown_at is None:
+        return limit_m, False
+    for _ in range(MOST_FLIGHTS):
+        found = flown_at(limit_m)["check"]
+        if _is_kept(found):
+            return limit_m, found["ok"]
+        limit_m = found["corner_m_that_would_do"]
+        if limit_m is None:
+            break
+    return None, False
+
+
+def _is_kept(told: Mapping[str, Any]) -> bool:
+    """Whether nothing of the track is further off the path or its corners than allowed."""
+    worst = told["worst"]
+    return worst["off_m"] <= worst["allowed_m"] and all(each["kept"] for each in told["corners"])
+
+
+def _sufficient_m(passing: _Passing, told: Mapping[str, Any]) -> float | None:
+    """The limit at all corners that this track keeps, rounded up to 1 m; None where there is none, or no need."""
+    corners = told["corners"]
+    if not corners or _is_kept(told) or any(each["flown_cut_m"] is None for each in corners):
         return None
     limit_m = 0.0
     for _ in range(MOST_LIMITS_TRIED):

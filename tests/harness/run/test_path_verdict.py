@@ -215,6 +215,30 @@ def test_a_corner_limit_is_called_a_yes_where_nothing_else_is_wrong(up_m: float,
     assert again["check"]["ok"] is (up_m == 0.0)
 
 
+CROOKED = [
+    (0.0, 0),
+    (-126.89, 404.85),
+    (271.09, 426.46),
+    (427.19, 307.03),
+    (513.05, 644.98),
+    (746.6, 848.51),
+]
+
+
+@pytest.mark.parametrize("by_l1", [False, True])
+def test_the_corner_limit_that_is_told_is_a_yes_once_it_is_given(by_l1: bool, tmp_path: Path) -> None:
+    """Rounded for another limit, a corner of a line is passed otherwise; L1 keeps corners, and is off beyond them."""
+    path: Any = [*CROOKED, (573.29, 1175.36)]
+    options: dict[str, Any] = {"aircraft": "ultrastick25e"}
+    if by_l1:
+        path = waypoints_file(tmp_path, SQUARE[:3], acceptance_m=60.0)
+        options = {"settings": {**BY_WAYPOINTS, "guidance.kind": "l1"}}
+    metrics, _ = flown(path, **options)
+    limit_m = metrics["check"]["corner_m_that_would_do"]
+    assert metrics["check"]["verdict"].endswith(f"; --corner-m {limit_m:g} would be yes")
+    assert flown(path, corner_m=limit_m, **options)[0]["check"]["ok"]
+
+
 def rounded_corner(radius_m: float) -> np.ndarray[Any, Any]:
     """900 m north, an arc to the right, 900 m east."""
     angle = np.linspace(0.0, 0.5 * math.pi, round(0.4 * radius_m))
