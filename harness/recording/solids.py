@@ -174,10 +174,7 @@ def log_ground(rec: rr.RecordingStream, field: HeightField) -> None:
     if min(heights.shape) < 2:
         return
     right, up = (step * each for each in field.spacing_m)
-    east, north = np.meshgrid(
-        field.corner_m[0] + right * np.arange(heights.shape[1]),
-        field.corner_m[1] + up * np.arange(heights.shape[0]),
-    )
+    east, north = field.places(*np.meshgrid(*(step * np.arange(float(size)) for size in heights.shape[::-1])))
     rec.log(
         f"{look.WORLD}/ground",
         rr.Mesh3D(

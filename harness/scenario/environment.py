@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Annotated, Literal
+import math
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, Strict, model_validator
 
@@ -22,9 +23,9 @@ class GroundSpec(Section):
     """The true height of the ground on a grid, bilinear in between; wayproof writes it from terrain files."""
 
     corner_m: Point
-    """South-western node: east, north."""
+    """South-western node, or with a lattice the place that it counts from: east, north."""
     spacing_m: Annotated[tuple[Spacing, Spacing], Strict(False)]
-    """From node to node: east, north."""
+    """From node to node: east, north; with a lattice the least between two columns and between two rows."""
     rows: Annotated[int, Field(ge=1, le=100_000)]
     """Nodes from south to north."""
     columns: Annotated[int, Field(ge=1, le=100_000)]
@@ -33,6 +34,10 @@ class GroundSpec(Section):
     """Height of the number 0, above mean sea level."""
     step_m: Annotated[float, Field(gt=0, le=10)] = HEIGHT_STEP_M
     """Height from a number to the next."""
+    lattice: Annotated[tuple[float, ...], Strict(False), Field(max_length=162)] | None = None
+    """Column and row of a place: for each k x k coefficients, by powers of east and north. Default: upright."""
+    scale_m: Spacing = 1.0
+    """Length that east and north are divided by for the lattice."""
     heights: Annotated[str, Field(min_length=1)]
     """Heights: base64 of zlib of 16-bit little-endian steps from the west, row by row from the south; 65535: none."""
 
@@ -42,11 +47,18 @@ class GroundSpec(Section):
         return self
 
     def field(self) -> HeightField:
-        """Unpacks the heights; raises a ValueError if the text does not hold them."""
+        """Unpacks the heights; raises a ValueError if the text does not hold them, or the lattice is none."""
+        import numpy as np
+
         from harness.world_files.height_field import HeightField, unpacked
 
         heights_m = unpacked(self.heights, self.rows, self.columns, self.lowest_m, self.step_m)
-        return HeightField(self.corner_m, self.spacing_m, heights_m)
+        if self.lattice is None:
+            return HeightField(self.corner_m, self.spacing_m, heights_m)
+        side = math.isqrt(len(self.lattice) // 2)
+        lattice = np.array(self.lattice).reshape(2, side, side)
+        np.linalg.inv(lattice[:, [1, 0], [0, 1]])
+        return HeightField(self.corner_m, self.spacing_m, heights_m, lattice, self.scale_m)
 
     @classmethod
     def of(cls, field: HeightField) -> GroundSpec:
@@ -57,9 +69,16 @@ class GroundSpec(Section):
 
         (rows, columns), lowest_m = field.heights_m.shape, float(np.floor(np.nanmin(field.heights_m)))
         step_m = max(HEIGHT_STEP_M, float(np.nanmax(field.heights_m) - lowest_m) / 60_000)
-        nodes = {"corner_m": field.corner_m, "spacing_m": field.spacing_m, "rows": rows, "columns": columns}
+        nodes: dict[str, Any] = {
+            "corner_m": field.corner_m,
+            "spacing_m": field.spacing_m,
+            "rows": rows,
+            "columns": columns,
+        }
         heights = packed(field.heights_m, lowest_m, step_m)
-        return cls.model_construct(**nodes, lowest_m=lowest_m, step_m=step_m, heights=heights)
+        lattice = None if field.lattice is None else tuple(field.lattice.ravel().tolist())
+        nodes |= {"lowest_m": lowest_m, "step_m": step_m, "heights": heights}
+        return cls.model_construct(**nodes, lattice=lattice, scale_m=field.scale_m)
 
 
 class SourceSpec(Section):

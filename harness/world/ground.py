@@ -59,8 +59,7 @@ class Ground:
         never too large.
         """
         east, north, up = position
-        row = math.floor((north - self.field.corner_m[1]) / self.field.spacing_m[1])
-        column = math.floor((east - self.field.corner_m[0]) / self.field.spacing_m[0])
+        column, row = (math.floor(each[0]) for each in self.field.cells(np.array([east]), np.array([north])))
         best = 0.0
         for cells in SQUARES:
             near = self._solid_m[

@@ -15,15 +15,16 @@ import shapely
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files import kinds
-from harness.world_files.height_field import HeightField, cell_sides, height_field
+from harness.world_files.height_field import HeightField, cell_sides, height_field, window_of
 from harness.world_files.parts import BoolArray, Box, Contents, FileSpec, FloatArray, Raster
 from harness.world_files.plane import Mapping, Place, geodetic
-from harness.world_files.solids import Layer, Solid, clipped, placed_cells, simplified, sliced_parts
+from harness.world_files.solids import Layer, Solid, clipped, placed_cells, quarters, simplified, sliced_parts
 
 MARGIN: Final = 0.02
 """Parts of a file that lie outside the area by more than this share of its longer side are left out."""
 DECIMALS: Final = 3
 """Decimals of a corner in metres: corners are rounded to a millimetre."""
+STRIP_ROWS: Final = 256
 MAX_CORNERS: Final = 900_000  # more in all files are refused: such a scenario could not be read again
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
 """A polygon without a known bottom or top gets these, in metres above mean sea level."""
@@ -100,7 +101,10 @@ def expanded(
                 raise FileFault(index, sentence, key)
             loaded.append((contents, Mapping(contents.crs, place, spec.shift_m)))
             _check_place(*loaded[-1], box)
-    field, notes = height_field([(each.terrain, at) for each, at in loaded if each.terrain is not None], box)
+    with blaming(0):
+        field, notes = height_field(
+            [(each.terrain, at) for each, at in loaded if each.terrain is not None], box
+        )
     field = field or ground
     sources: list[Source] = []
     for index, (spec, (contents, mapping)) in enumerate(zip(specs, loaded, strict=True)):
@@ -198,8 +202,13 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
     solids = sliced_parts(contents.parts, mapping, layer, box)
     tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
     if (raster := contents.raster) is not None:
-        solid, heights_m = _solid_cells(raster, spec, layer.low_m, notes)
-        solids += [Solid(shape, *heights_m) for shape in placed_cells(raster, solid, mapping, box)]
+        near = raster.window(*window_of(raster, mapping, box))
+        if missing := int(np.isnan(raster.values).sum()):
+            taken, key = (spec.unknown, "unknown") if raster.occupancy else (spec.nodata, "nodata")
+            notes.append(f"{counted(missing, 'cell')} without a value taken as {taken} ({key})")
+        heights_m = HEIGHTS_M if raster.occupancy else (layer.low_m, layer.low_m)
+        shapes = placed_cells(near, _solid_cells(near, spec, layer.low_m), mapping)
+        solids += [Solid(shape, *heights_m) for shape in shapes]
         if spec.tolerance_m is None:
             rows, columns = raster.values.shape
             tolerance_m = max(cell_sides(raster, mapping, columns / 2, rows / 2) or (tolerance_m,))
@@ -213,17 +222,20 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
     return Source(spec, contents.kind, contents.sha256, tuple(polygons), heights, tuple(notes))
 
 
-def _solid_cells(
-    raster: Raster, spec: FileSpec, low_m: float, notes: list[str]
-) -> tuple[BoolArray, tuple[float, float]]:
-    """Returns which cells of a raster are solid, occupied or no lower than the aircraft may fly, and their heights."""
-    missing = np.isnan(raster.values)
-    least, taken, key, heights_m = low_m, spec.nodata, "nodata", (low_m, low_m)
+def _solid_cells(raster: Raster, spec: FileSpec, low_m: float) -> BoolArray:
+    """Returns which cells of a raster are occupied, or which quarters of cells are somewhere as high as `low_m`."""
+    values = raster.values
     if raster.occupancy:
-        least, taken, key, heights_m = 0.5, spec.unknown, "unknown", HEIGHTS_M
-    if missing.any():
-        notes.append(f"{counted(int(missing.sum()), 'cell')} without a value taken as {taken} ({key})")
-    return (raster.values >= least) | (missing & (taken != "free")), heights_m
+        return (values >= 0.5) | (np.isnan(values) & (spec.unknown != "free"))
+    solid = np.zeros((2 * values.shape[0], 2 * values.shape[1]), dtype=np.bool_)
+    for first in range(
+        0, len(values) if values.size else 0, STRIP_ROWS
+    ):  # so that little memory is used at a time
+        before = min(first, 1)
+        highest = quarters(values[first - before : first + STRIP_ROWS + 1])[1][2 * before :][: 2 * STRIP_ROWS]
+        missing = np.isnan(highest) & (spec.nodata != "free")
+        solid[2 * first : 2 * (first + STRIP_ROWS)] = (highest >= low_m) | missing
+    return solid
 
 
 def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:

@@ -7,38 +7,70 @@ import binascii
 import math
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.polynomial.polynomial import polyvander2d
 
+from harness.files.input_file import InputError
 from harness.world_files.parts import Box, FloatArray, Raster
 
 if TYPE_CHECKING:
     from harness.world_files.plane import Mapping
 
 NO_HEIGHT: Final = 65_535  # this number stands for a height that is not known
-MAX_NODES: Final = 4_000_000  # a field with more heights than this is refused
-COARSER_NODES: Final = 1_000_000
-"""A field that would have more heights than this is made coarser than its file, and a note says so."""
+MAX_NODES: Final = 4_000_000
+"""A text with more heights is refused; a field that would have more has fewer than its file, and a note says so."""
+MAX_CELLS: Final = 60_000_000  # cells of all files together in an area; with more it is refused
+LARGEST_DEGREE: Final = 8  # of the polynomials that say where the cells of a file lie
+PLACE_ERROR_CELLS: Final = 1e-3  # polynomials of the least degree with at most this error are taken
+SAMPLES: Final = 41  # a side of the box, for the polynomials
+ALIGNED_CELLS: Final = 0.01  # cells of a file no further than this from those of another are the same
+OTHER_CELLS: Final = "where a file has other cells than the finest, the ground is kept no lower than it"
+NEWTON_STEPS: Final = 10  # to the place of a node, with the slope in the middle
 
 
 @dataclass(frozen=True, eq=False)
 class HeightField:
-    """Heights at the nodes of a regular grid, bilinear in between, (rows, columns) from south to north; NaN: not known.
+    """Heights at the nodes of a grid, bilinear in between, (rows, columns) from south to north; NaN: not known.
 
-    The corner is the south-western node, the spacing is east and north from a node to the next.
+    The corner is the south-western node, the spacing is east and north from a node to the next. With a `lattice` the
+    nodes are the middles of a file's cells, which lie askew: it has (2, k, k) coefficients of column and row by powers
+    of east and of north, both counted from the corner, now in the middle, and over `scale_m`; the spacing is then the
+    least between two lines of nodes.
     """
 
     corner_m: tuple[float, float]
     spacing_m: tuple[float, float]
     heights_m: FloatArray
+    lattice: FloatArray | None = None
+    scale_m: float = 1.0
 
     def at(self, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
         """(k,) heights of the ground; NaN outside of the grid and where one of the four nodes round a place is NaN."""
-        column = (np.asarray(east_m, dtype=np.float64) - self.corner_m[0]) / self.spacing_m[0]
-        row = (np.asarray(north_m, dtype=np.float64) - self.corner_m[1]) / self.spacing_m[1]
-        return bilinear(self.heights_m, column, row)
+        return bilinear(self.heights_m, *self.cells(east_m, north_m))
+
+    def cells(self, east_m: FloatArray, north_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Columns and rows of places, 0 at the first node."""
+        right, up = np.subtract(east_m, self.corner_m[0]), np.subtract(north_m, self.corner_m[1])
+        if self.lattice is None:
+            return right / self.spacing_m[0], up / self.spacing_m[1]
+        degrees = np.arange(self.lattice.shape[1])
+        u, v = (np.power.outer(each / self.scale_m, degrees) for each in (right, up))
+        column, row = ((u @ each * v).sum(axis=-1) for each in self.lattice)
+        return column, row
+
+    def places(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """East and north (m) of columns and rows."""
+        (x, y), (right, up) = self.corner_m, self.spacing_m
+        if self.lattice is None:
+            return x + right * column, y + up * row
+        inverse = self.scale_m * np.linalg.inv(self.lattice[:, [1, 0], [0, 1]])
+        place = np.full((2, *np.shape(column)), np.reshape(self.corner_m, (2, *(1,) * np.ndim(column))))
+        for _ in range(NEWTON_STEPS):
+            place += np.tensordot(inverse, np.subtract((column, row), self.cells(*place)), 1)
+        return place[0], place[1]
 
 
 def bilinear(values: FloatArray, column: FloatArray, row: FloatArray) -> FloatArray:
@@ -71,7 +103,7 @@ def packed(heights_m: FloatArray, lowest_m: float, step_m: float) -> str:
     numbers = np.round((heights_m - lowest_m) / step_m)
     whole = np.where(np.isfinite(numbers), numbers, NO_HEIGHT).astype(np.uint16)
     differences = np.diff(whole, axis=1, prepend=np.uint16(0)).astype("<u2")
-    return base64.b64encode(zlib.compress(differences.tobytes(), 9)).decode("ascii")
+    return base64.b64encode(zlib.compress(differences.tobytes(), 6)).decode("ascii")
 
 
 def unpacked(text: str, rows: int, columns: int, lowest_m: float, step_m: float) -> FloatArray:
@@ -92,35 +124,119 @@ def unpacked(text: str, rows: int, columns: int, lowest_m: float, step_m: float)
 
 
 def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[HeightField | None, list[str]]:
-    """Returns the ground in a box of the plane, at about the files' own spacing, and notes on what was changed.
+    """Returns the ground in a box of the plane, with nodes in the middles of the files' cells, and notes on changes.
 
-    A height is bilinear between the middles of a file's cells, and that of the next middle within half a cell of the
-    edge. Of several files the first that knows a place counts. None where no file reaches into the box.
+    A height is bilinear between the middles of a file's cells, and that of the next middle within a cell beyond them.
+    Of several files the first that knows a place counts, and the nodes are those of the finest. Where nodes are not
+    those of a file, they are no lower than it is within a node's cell about. None where no file reaches into the box.
     """
-    known = [each for each in (_spacing(raster, mapping, box) for raster, mapping in sources) if each]
-    if not known:
+    near = [(sides, at) for at in sources if (sides := _spacing(*at, box))]
+    if not near:
         return None, []
-    xmin, ymin, xmax, ymax = box
-    right, up = (_rounded(min(each[k] for each in known)) for k in (0, 1))
-    notes = []
-    nodes = ((xmax - xmin) / right + 1) * ((ymax - ymin) / up + 1)
-    if nodes > COARSER_NODES:
-        factor = math.ceil(math.sqrt(nodes / COARSER_NODES))
-        right, up = factor * right, factor * up
-        notes.append(f"the ground is kept every {right:g} m, coarser than the file: its area is large")
-    columns, rows = int((xmax - xmin) / right) + 2, int((ymax - ymin) / up) + 2
-    east, north = np.meshgrid(xmin + right * np.arange(columns), ymin + up * np.arange(rows))
-    heights = np.full(rows * columns, np.nan)
-    for raster, mapping in sources:
-        missing = np.flatnonzero(np.isnan(heights))
-        x, y = mapping.from_plane(east.ravel()[missing], north.ravel()[missing], raster.middle_x)
-        places, sizes = np.array(raster.cells(x, y)), np.array(raster.values.shape[::-1])[:, None]
-        inside = ((places >= 0) & (places <= sizes)).all(axis=0)
-        column, row = np.clip(places - 0.5, 0.0, sizes - 1.0)
-        heights[missing[inside]] = bilinear(raster.values, column[inside], row[inside])
+    finest, mapping = min(near, key=lambda each: min(each[0]))[1]
+    field, low, high = _lattice(finest, mapping, box)
+    reaches = np.array([_reach(field, *at, box) for _, at in near])
+    low, high = np.maximum(low, reaches[:, 0].min(axis=0)), np.minimum(high, reaches[:, 1].max(axis=0))
+    columns, rows = (np.arange(low[k], high[k] + 1) for k in (0, 1))
+    if len(rows) * len(columns) > MAX_CELLS:
+        raise InputError(f"has {len(rows)} x {len(columns)} cells in the area; make area.bounds_m smaller")
+    heights, notes = _heights(near, columns, rows)
     if not np.isfinite(heights).any():
         return None, []
-    return HeightField((xmin, ymin), (right, up), heights.reshape(rows, columns)), notes
+    if (step := math.ceil(math.sqrt(heights.size / MAX_NODES))) > 1:
+        heights = _highest(heights, step)[::step, ::step]
+        notes.append(f"the ground is kept every {step} cells, no lower than between: its area is large")
+    assert field.lattice is not None
+    lattice = field.lattice / step
+    lattice[:, 0, 0] -= low / step
+    if np.linalg.det(lattice[:, [1, 0], [0, 1]]) < 0.0:  # rows go from the north, as in most files
+        heights, lattice[1] = heights[::-1], -lattice[1]
+        lattice[1, 0, 0] += len(heights) - 1
+    spacing = field.spacing_m[0] * step, field.spacing_m[1] * step
+    return replace(field, heights_m=heights, lattice=lattice, spacing_m=spacing), notes
+
+
+def _heights(
+    near: Sequence[tuple[tuple[float, float], tuple[Raster, Mapping]]], columns: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, list[str]]:
+    """Returns the heights at columns and rows of the finest of some files, given with their cells' sides, and notes."""
+    sides_m, (finest, mapping) = min(near, key=lambda each: min(each[0]))
+    heights, notes = np.full((len(rows), len(columns)), np.nan), []
+    for beyond in (0, 1):
+        for each_m, (raster, at) in near:
+            missing = np.isnan(heights)
+            if raster is finest:
+                last = np.subtract(raster.values.shape, 1)
+                i, j = np.clip(rows, 0, last[0]), np.clip(columns, 0, last[1])
+                missing &= (np.abs(rows - i) <= beyond)[:, None] & (np.abs(columns - j) <= beyond)
+                np.copyto(heights, raster.values[np.ix_(i, j)], where=missing)
+            elif missing.any():
+                row, column = (each[missing] for each in np.meshgrid(rows, columns, indexing="ij"))
+                x, y = mapping.to_plane(*finest.places(column + 0.5, row + 0.5))
+                x, y = at.from_plane(x, y, raster.middle_x)
+                places = np.array(raster.cells(x, y)) - 0.5
+                heights[missing], same = _taken(raster, places, beyond, math.ceil(max(sides_m) / min(each_m)))
+                notes += [OTHER_CELLS] * (not same)
+    return heights, list(dict.fromkeys(notes))
+
+
+def _lattice(raster: Raster, mapping: Mapping, box: Box) -> tuple[HeightField, FloatArray, FloatArray]:
+    """Returns a field without heights whose nodes are the cells of a file, and its first and last node in a box."""
+    (west, south, east, north), shape = box, (2, SAMPLES, SAMPLES)
+    x, y = np.linspace(west, east, SAMPLES), np.linspace(south, north, SAMPLES)
+    middle, scale_m = (0.5 * (west + east), 0.5 * (south + north)), 0.5 * max(east - west, north - south)
+    places = np.array([each.ravel() for each in np.meshgrid(x, y)])
+    wanted = np.array(raster.cells(*mapping.from_plane(places[0], places[1], raster.middle_x))) - 0.5
+    known = np.isfinite(wanted).all(axis=0)
+    u, v = (places - np.reshape(middle, (2, 1))) / scale_m
+    for degree in range(1, LARGEST_DEGREE + 1):
+        powers = polyvander2d(u, v, (degree, degree))
+        powers *= np.add.outer(np.arange(degree + 1), np.arange(degree + 1)).ravel() <= degree
+        solved = np.linalg.lstsq(powers[known][::2], wanted[:, known][:, ::2].T, rcond=None)[0]
+        lattice = np.asarray(solved.T, dtype=np.float64)
+        found = lattice @ powers.T
+        if np.abs(found - wanted)[:, known].max() <= PLACE_ERROR_CELLS:
+            break
+    slopes = np.hypot(*np.gradient(found.reshape(shape), y, x, axis=(1, 2))).max(axis=(1, 2))
+    spacing = 0.999 / float(slopes[0]), 0.999 / float(slopes[1])
+    shaped = lattice.reshape(2, degree + 1, degree + 1)
+    field = HeightField(middle, spacing, np.zeros((0, 0)), shaped, scale_m)
+    return field, np.floor(found.min(axis=1)).astype(int) - 1, np.ceil(found.max(axis=1)).astype(int) + 1
+
+
+def _reach(field: HeightField, raster: Raster, mapping: Mapping, box: Box) -> tuple[FloatArray, FloatArray]:
+    """Returns the first and the last node, a cell beyond the outer middles, that a file gives a field near a box."""
+    rows, columns = window_of(raster, mapping, box)
+    column, row = np.meshgrid(*(np.linspace(each.start, each.stop, 9) for each in (columns, rows)))
+    found = field.cells(*mapping.to_plane(*raster.places(column, row)))
+    low, high = ([f(each) for each in found] for f in (np.nanmin, np.nanmax))
+    return np.floor(np.array(low) + 0.01).astype(int), np.ceil(np.array(high) - 0.01).astype(int)
+
+
+def _taken(raster: Raster, places: FloatArray, beyond: int, cells: int) -> tuple[FloatArray, bool]:
+    """Returns heights of a file at columns and rows (2, k) counted from middles, and whether those are its cells.
+
+    If not, none is lower than the file is within so many of its cells.
+    """
+    sizes = np.array(raster.values.shape[::-1])[:, None]
+    clipped = np.clip(places, 0.0, sizes - 1.0)
+    inside = (np.abs(places - clipped) <= beyond + ALIGNED_CELLS).all(axis=0)
+    same = not inside.any() or bool(np.abs(places - np.rint(places))[:, inside].max() <= ALIGNED_CELLS)
+    values, clipped = (raster.values, np.rint(clipped)) if same else (_highest(raster.values, cells), clipped)
+    found = np.full(places.shape[1], np.nan)
+    found[inside] = bilinear(values, *clipped[:, inside])
+    return found, same
+
+
+def _highest(values: FloatArray, cells: int) -> FloatArray:
+    """Returns the highest value within so many columns and rows of each; NaN where none is known."""
+    from scipy import ndimage
+
+    found: FloatArray = ndimage.maximum_filter(
+        np.where(np.isnan(values), -np.inf, values), 2 * cells + 1, mode="nearest"
+    )
+    found[np.isneginf(found)] = np.nan
+    return found
 
 
 def window_of(raster: Raster, mapping: Mapping, box: Box) -> tuple[slice, slice]:
@@ -151,9 +267,3 @@ def cell_sides(raster: Raster, mapping: Mapping, column: float, row: float) -> t
     east, north = mapping.to_plane(x, y)
     sides = np.hypot(east[1:] - east[0], north[1:] - north[0]).tolist()
     return (sides[0], sides[1]) if np.isfinite(sides).all() else None
-
-
-def _rounded(spacing_m: float) -> float:
-    """Rounds a spacing down to two significant digits."""
-    digits = 1 - math.floor(math.log10(spacing_m))
-    return math.floor(spacing_m * 10.0**digits) / 10.0**digits

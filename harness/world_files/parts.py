@@ -7,7 +7,7 @@ before latitude), or metres in a plane of its own.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Any, Final
@@ -79,6 +79,12 @@ class Raster:
         """X of the raster's middle, in the coordinates of the file."""
         rows, columns = self.values.shape
         return float(self.affine[0] * columns / 2 + self.affine[1] * rows / 2 + self.affine[2])
+
+    def window(self, rows: slice, columns: slice) -> Raster:
+        """Returns some of the rows and columns."""
+        (x,), (y,) = self.places(np.array([columns.start]), np.array([rows.start]))
+        a, b, _, d, e, _ = self.affine
+        return replace(self, values=self.values[rows, columns], affine=(a, b, float(x), d, e, float(y)))
 
     def places(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
         """X and y of places given in columns and rows from the upper left corner."""

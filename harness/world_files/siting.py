@@ -23,6 +23,7 @@ from harness.world_files.expansion import (
     unused_keys,
 )
 from harness.world_files.free_room import ROOM_RADII, WAY_RADII, FreeRoom, ends, free_room
+from harness.world_files.height_field import window_of
 from harness.world_files.parts import WGS84, Box, Contents, FileSpec, FloatArray
 from harness.world_files.plane import CIRCLE_DEG, Mapping, Place, geodetic, short_way
 from harness.world_files.solids import placed_cells
@@ -233,7 +234,8 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
     solid = [each for source in found.sources for each in source.polygons]
     for each, mapping in files.placed():
         if each.raster is not None and each.raster.occupancy:  # what is not known is no place for a start
-            solid += placed_cells(each.raster, np.isnan(each.raster.values), mapping, bounds)
+            near = each.raster.window(*window_of(each.raster, mapping, bounds))
+            solid += placed_cells(near, np.isnan(near.values), mapping)
     room = free_room(solid, bounds)
     turn_m, clearance_m = craft.turn_radius_m, craft.clearance_m
     if (chosen := ends(room, turn_m, clearance_m, turning=True)) is not None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ import shapely
 
 from harness.files.input_file import InputError
 from harness.files.wording import counted
-from harness.world_files.height_field import HeightField, window_of
+from harness.world_files.height_field import HeightField, bilinear
 from harness.world_files.parts import BoolArray, Box, Datum, FloatArray, Part, Raster
 from harness.world_files.plane import Mapping
 
@@ -98,18 +99,22 @@ def _solid(part: Part, shape: Any, layer: Layer) -> list[Solid] | None:
         shape = shapely.intersection(shape, shapely.box(*layer.known_in))
         if shape.is_empty:
             return []
-    heights, corner = _ground_below(part, shape, layer) if on_ground else (np.zeros((1, 1)), (0.0, 0.0))
-    if not heights.size or np.isnan(heights).any():
+    ground, first = _ground_below(part, shape, layer) if on_ground else (np.zeros((2, 1, 1)), (0.0, 0.0))
+    if not ground.size or np.isnan(ground).any():
         return None
-    lows, tops = (each.height_m + heights * (each.datum is Datum.GROUND) for each in (bottom, top))
+    lows, tops = (
+        each.height_m + heights * (each.datum is Datum.GROUND)
+        for each, heights in zip((bottom, top), ground, strict=True)
+    )
     solid = Solid(shape, float(lows.min()), float(tops.max()))
     mask = (lows <= layer.high_m) & (tops >= layer.low_m)
     if part.rigid:  # it stands level, as low and as high as its limits are anywhere
         mask = np.array([[solid.low_m <= layer.high_m]]) & (solid.high_m >= layer.low_m)
     if layer.field is None or len(np.unique(mask)) == 1:
         return [solid] * bool(mask.all())
-    spacing = layer.field.spacing_m
-    placed = shapely.transform(outlines(mask), lambda p: p * spacing + corner)
+    drawn = shapely.segmentize(np.array(outlines(mask), dtype=object), LONGEST_EDGE_CELLS)
+    at = layer.field.places
+    placed = shapely.transform(drawn, lambda p: np.column_stack(at(*(0.5 * p + first).T)))
     return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]
 
 
@@ -119,25 +124,42 @@ def _is_out(part: Part, layer: Layer) -> bool:
     return above or (part.top.datum is Datum.SEA and part.top.height_m < layer.low_m)
 
 
-def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, tuple[float, float]]:
-    """Returns heights of the ground below a part, NaN where not known, and the first corner (m) of their cells.
+def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, FloatArray]:
+    """Returns the lowest and highest ground below a part, (2, ...), NaN where not known, and its first column and row.
 
-    Of what is rigid they are those at its corners, of which some may lie outside of the terrain; else those of the
-    nodes whose cells (the node in the middle) cover it.
+    Of what is rigid it is that at its corners, of which some may lie outside of the terrain; else that in the quarters
+    of the cells (the node in the middle) that cover it.
     """
-    heights, corner = np.array([[math.nan]]), (0.0, 0.0)
+    heights, first = np.full((2, 1, 1), math.nan), np.zeros(2)
     if ground.field is not None and part.rigid:
-        heights = ground.field.at(*shapely.get_coordinates(shape).T)
-        heights = heights[np.isfinite(heights)]
+        known = ground.field.at(*shapely.get_coordinates(shape).T)
+        heights = np.tile(known[np.isfinite(known)], (2, 1))
     elif ground.field is not None:
-        first, step = np.array(ground.field.corner_m), np.array(ground.field.spacing_m)
-        low, high = np.floor((shapely.bounds(shape).reshape(2, 2) - first) / step + 0.5)
-        x, y = (np.arange(low[k], high[k] + 1.0) * step[k] + first[k] for k in (0, 1))
-        heights = ground.field.at(*np.meshgrid(x, y))
-        corner = tuple((first + (low - 0.5) * step).tolist())
+        places = np.array(ground.field.cells(*shapely.get_coordinates(shape).T))
+        low, high = np.floor(places.min(axis=1) + 0.5), np.floor(places.max(axis=1) + 0.5)
+        about = np.meshgrid(*(np.arange(low[k] - 1.0, high[k] + 2.0) for k in (0, 1)))
+        heights = np.array(quarters(bilinear(ground.field.heights_m, *about)))[:, 2:-2, 2:-2]
+        first = low - 0.5
     if ground.flat_m is not None:
         heights = np.where(np.isfinite(heights), heights, ground.flat_m)
-    return heights, corner
+    return heights, first
+
+
+def quarters(heights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Returns the lowest and the highest ground in each quarter of a cell, (2 rows, 2 columns), NaN where not known.
+
+    The ground is bilinear between the middles of cells, so that a quarter's corners have both.
+    """
+    fine = _with_edges(_with_edges(heights).T).T
+    corners = fine[:-1, :-1], fine[1:, :-1], fine[:-1, 1:], fine[1:, 1:]
+    return reduce(np.fmin, corners), reduce(np.fmax, corners)
+
+
+def _with_edges(middles: FloatArray) -> FloatArray:
+    """Puts between the values in the middles of cells those on the edges, (2 rows + 1, columns), the outer as near."""
+    fine = np.repeat(np.pad(middles, ((1, 1), (0, 0)), mode="edge"), 2, axis=0)[1:-2]
+    fine[::2] = 0.5 * (fine[::2] + np.vstack((fine[1::2], fine[-1:])))
+    return fine
 
 
 def outlines(mask: BoolArray) -> list[Any]:
@@ -162,13 +184,12 @@ def outlines(mask: BoolArray) -> list[Any]:
     return list(shapely.get_parts(shapely.simplify(shapely.union_all(boxes), 0.0)))
 
 
-def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -> list[Any]:
-    """Returns the outlines in the plane of the solid cells, (rows, columns), of a raster near a box."""
-    rows, columns = window_of(raster, mapping, box)
-    first = columns.start, rows.start
-    shapes = np.array(outlines(solid[rows, columns]), dtype=object)
+def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping) -> list[Any]:
+    """Returns the outlines in the plane of the solid cells of a raster, or of the solid parts of its cells."""
+    shapes = np.array(outlines(solid), dtype=object)
     dense = shapely.segmentize(shapes, LONGEST_EDGE_CELLS) if mapping.crs else shapes
-    placed = shapely.transform(dense, lambda p: np.column_stack(raster.places(*(p + first).T)))
+    parts = solid.shape[0] // max(len(raster.values), 1)
+    placed = shapely.transform(dense, lambda p: np.column_stack(raster.places(*(p / parts).T)))
     return list(mapping.geometries(placed))
 
 

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from scipy.interpolate import RegularGridInterpolator
 
 from aircraft.frames import LocalPlane
+from harness.scenario.environment import GroundSpec
 from harness.world_files import solids
 from harness.world_files.expansion import Expanded, FileFault, corners_of, expanded, loaded_file
 from harness.world_files.parts import FileSpec
@@ -91,7 +93,7 @@ def test_the_ground_is_rasterios_under_true_north() -> None:
         x, y = rasterio.transform.xy(dataset.transform, rows, columns)
     east, north = mapping.to_plane(np.array(x), np.array(y))
     error = found.ground.at(east, north) - heights[rows, columns]
-    assert np.abs(error).mean() < 1.0  # it is kept on a grid of its own, askew to the file's by 2 degrees
+    assert np.abs(error).max() < 0.02
     east, north = mapping.to_plane(np.array([782e3, 782e3]), np.array([187e3, 188e3]))
     turned_deg = math.degrees(math.atan2(float(east[1] - east[0]), float(north[1] - north[0])))
     assert turned_deg == pytest.approx(1.73, abs=0.05)  # grid north lies east of true north
@@ -197,6 +199,32 @@ def at_slope(file: Path, *more: FileSpec, altitude_m: float = 1200.0) -> Expande
     latitude, longitude = geodetic("EPSG:21781", x, y)
     place = Place(float(latitude[0]), float(longitude[0]))
     return expanded([FileSpec(file), *more], place, (-1800.0, -1800.0, 1800.0, 1800.0), altitude_m)
+
+
+def test_peaks_are_as_high_as_in_the_file_and_what_reaches_up_between_middles_is_solid(
+    tmp_path: Path,
+) -> None:
+    """Single cells that stand out, askew to the plane, held against SciPy's bilinear interpolation."""
+    heights = 50.0 + 450.0 * (np.random.default_rng(3).random((20, 20)) < 0.1)
+    file, x0, y0 = (
+        geotiff(tmp_path / "p.tif", heights, (781_000.0, 189_500.0), 200.0, 21781),
+        781e3,
+        189_500.0,
+    )
+    found = at_slope(file, altitude_m=200.0)
+    assert found.ground is not None
+    again = GroundSpec.of(found.ground).field()  # as the run folder's scenario keeps it
+    middles = 100.0 + 200.0 * np.arange(20)
+    true = RegularGridInterpolator((middles, middles), heights)
+    down, right = np.random.default_rng(4).uniform(300.0, 3700.0, (2, 20_000))
+    down[:256], right[:256] = (each.ravel() for each in np.meshgrid(middles[2:-2], middles[2:-2]))
+    latitude, longitude = geodetic("EPSG:21781", np.array([783e3]), np.array([187_500.0]))
+    mapping = Mapping("EPSG:21781", Place(float(latitude[0]), float(longitude[0])))
+    east, north = mapping.to_plane(x0 + right, y0 - down)
+    assert np.abs(again.at(east, north) - true((down, right))).max() < 0.6
+    inside = (np.abs(east) < 1790.0) & (np.abs(north) < 1790.0) & (true((down, right)) > 190.0)
+    assert inside.sum() > 500
+    assert shapely.covers(union(found), shapely.points(east[inside], north[inside])).all()
 
 
 def zone_on_slope(folder: Path, **limits: Any) -> FileSpec:
