@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from planner.geometry.curves import Point
 from planner.interface import BoolArray, FloatArray, Path
 from planner.kernels import segments
+
+EXIT_M = 1e-3
+"""Where a path leaves an area is found this much before it, or less."""
 
 
 def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -26,7 +31,23 @@ def first_breach(path: Path, points_m: FloatArray, keep_m: float | FloatArray, f
 
 def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bool:
     """Whether a path stays inside a rectangle xmin, ymin, xmax, ymax."""
-    return segments.inside_bounds(path.segments, *bounds_m)
+    return segments.rows_inside(path.segments, *bounds_m) == len(path.segments)
+
+
+def first_exit_m(path: Path, bounds_m: tuple[float, float, float, float]) -> float:
+    """Arc length (m) up to which a path stays inside a rectangle, to `EXIT_M` below; infinite if it never leaves."""
+    count = segments.rows_inside(path.segments, *bounds_m)
+    if count == len(path.segments):
+        return math.inf
+    piece = path.segments[count : count + 1].copy()
+    inside_m, outside_m = 0.0, float(piece[0, 5])
+    while outside_m - inside_m > EXIT_M:
+        piece[0, 5] = 0.5 * (inside_m + outside_m)
+        if segments.rows_inside(piece, *bounds_m):
+            inside_m = float(piece[0, 5])
+        else:
+            outside_m = float(piece[0, 5])
+    return float(path.segments[:count, 5].sum()) + inside_m
 
 
 def behind(places_m: FloatArray, eye_m: Point, edges_m: FloatArray, beside_m: float) -> BoolArray:

@@ -102,14 +102,13 @@ def comes_too_near(rows: FloatArray, buckets: Buckets) -> bool:
 
 
 @compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
-def inside_bounds(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax: float) -> bool:
-    """Whether a path stays inside a rectangle."""
-    for which in range(len(rows) + 1):
-        end = which == len(rows)
-        x, y, _, _ = pose(rows, which - 1, rows[which - 1, 5]) if end else pose(rows, which, 0.0)
-        if not (xmin <= x <= xmax and ymin <= y <= ymax):
-            return False
+def rows_inside(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax: float) -> int:
+    """How many segments of a path stay inside a rectangle before one that does not."""
     for which in range(len(rows)):
+        for end in (0.0, rows[which, 5]):
+            x, y, _, _ = pose(rows, which, end)
+            if not (xmin <= x <= xmax and ymin <= y <= ymax):
+                return which
         curvature = rows[which, 4]
         if abs(curvature) <= 1e-12:
             continue
@@ -122,8 +121,8 @@ def inside_bounds(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax:
             if xmin <= x <= xmax and ymin <= y <= ymax:
                 continue
             if to_segment(rows, which, x, y)[0] < 1e-6 * radius:
-                return False
-    return True
+                return which
+    return len(rows)
 
 
 @compiled(ROWS, ROWS, rare=True)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.geometry.clearance import first_breach
+from planner.geometry.clearance import first_breach, first_exit_m
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, between, on_loiter, place_on, poses_at
 from planner.geometry.joining import lead_of
@@ -210,7 +210,7 @@ class Shield(CertifiedPlanner):
         """The way as certified into the goal circle, where all of it up to there is seen to be free; else None."""
         mission = self._mission
         inside_m = mission.goal_radius_m - mission.tracking_error_m
-        at = np.arange(0.0, min(way.length_m, cut_m), 0.1 * max(inside_m, 1.0))
+        at = np.arange(0.0, min(way.length_m, cut_m, mission.sensor_range_m), 0.1 * max(inside_m, 1.0))
         inside = np.hypot(*(poses_at(way, at)[:, :2] - mission.goal_m).T) <= inside_m
         if not inside.any():
             return None
@@ -256,14 +256,6 @@ def why_not(free_m: float, cut_m: float) -> str:
     if cut_m <= free_m:
         return "the path comes too near to something or leaves the area"
     return "no turn off the path that gets on has been seen to be free"
-
-
-def first_exit_m(path: Path, bounds_m: tuple[float, float, float, float]) -> float:
-    """Arc length before which a path stays in an area, to a hundredth of its length; infinite where it never leaves."""
-    at = np.linspace(0.0, path.length_m, 101)
-    places = poses_at(path, at)[:, :2]
-    outside = ((places < bounds_m[:2]) | (places > bounds_m[2:])).any(axis=1)
-    return float(at[max(int(outside.argmax()) - 1, 0)]) if outside.any() else math.inf
 
 
 def _nearest_m(path: Path, place: Point, before_m: float) -> float:

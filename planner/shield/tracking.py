@@ -18,7 +18,8 @@ STEP_RADII, AHEAD_RADII = 1.0 / 12.0, 0.6
 """Length of a step of the track, and look-ahead distance of the pursuit, in turn radii."""
 
 SMOOTH_RAD, SMOOTH_M = math.radians(2.0), 1.0
-"""A path whose joints turn and jump by no more than this can be flown as it is."""
+"""A path can be flown as it is if none of its stretches, joints included, turns by more than this beyond what the turn
+radius allows over its length, and if its joints jump by no more than this in all."""
 
 MOST_TRACK_RADII = 30.0
 """Longest track of a path, in turn radii; the sensing range limits it as well."""
@@ -83,14 +84,21 @@ def tracked(
 
 
 def can_be_flown(path: Path, pose: Pose, limits: Limits) -> bool:
-    """Whether a path has no corner and no turn that is too tight, and begins at a pose."""
-    rows = path.segments
-    if np.abs(rows[:, 4]).max(initial=0.0) > (1.0 + 1e-6) / limits.radius_m:
+    """Whether a path turns no tighter than the limits, at joints or between them, and begins at a pose.
+
+    The direction of such a path is nowhere further than half of `SMOOTH_RAD` from that of one without a joint.
+    """
+    most = (1.0 + 1e-6) / limits.radius_m
+    if path.max_curvature_1pm > most:
         return False
-    for row in rows.tolist():
-        turn = abs(pose.tangent_east * row[3] - pose.tangent_north * row[2])
-        ahead = pose.tangent_east * row[2] + pose.tangent_north * row[3]
-        if math.dist(pose[:2], row[:2]) > SMOOTH_M or turn > math.sin(SMOOTH_RAD) or ahead < 0.0:
+    left = right = jumped_m = 0.0  # turn beyond what is allowed, of that stretch up to here which has most
+    for row in path.rows:
+        aside = pose.tangent_east * row[3] - pose.tangent_north * row[2]
+        turn = math.atan2(aside, pose.tangent_east * row[2] + pose.tangent_north * row[3])
+        left, right = max(left, 0.0) + turn, max(right, 0.0) - turn
+        jumped_m += math.dist(pose[:2], row[:2])
+        if jumped_m > SMOOTH_M or max(left, right) > SMOOTH_RAD:
             return False
+        left, right = left + (row[4] - most) * row[5], right - (row[4] + most) * row[5]
         pose = along(row, row[5])
     return True

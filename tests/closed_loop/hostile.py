@@ -81,4 +81,14 @@ class Teleporting(Straight):
         return self.through((east + 3000.0, north), self.mission.goal_m)
 
 
+class Dense(Straight):
+    """A slalom of half circles of 60 m, tighter than can be flown, of straights of 1 m: no joint turns by a degree."""
+
+    def plan(self, request: PlanRequest) -> Plan:
+        side = (-1.0) ** (np.arange(900) // 180 + request.time_s // 20.0)
+        ahead = complex(*request.direction) * np.exp(1j * (side.cumsum() - side[0]) / 60.0)
+        places = complex(*request.position_m) + np.concatenate(([0.0], ahead.cumsum()))
+        return self.through(*zip(places.real.tolist(), places.imag.tolist(), strict=True))
+
+
 HOSTILE = (Straight, Anywhere, Outwards, Raising, NotANumber, Kinked, Teleporting)

@@ -10,7 +10,7 @@ import pytest
 import wayproof
 from planner.shield import shield as shield_module
 from planner.shield.certificate import Certified, Certifier
-from tests.closed_loop import shield_table
+from tests.closed_loop import hostile, shield_table
 from tests.closed_loop.hostile import HOSTILE, Kinked, NotANumber, Outwards, Raising, Straight, Teleporting
 from wayproof import Path
 
@@ -32,7 +32,7 @@ def flown(inner: type[Straight]) -> wayproof.Run:
     return wayproof.fly(scenario, planner=inner)
 
 
-@pytest.mark.parametrize("inner", HOSTILE)
+@pytest.mark.parametrize("inner", [*HOSTILE, hostile.Dense])
 def test_whatever_a_planner_answers_nothing_is_hit_and_the_area_not_left(inner: type[Straight]) -> None:
     run = flown(inner)
     assert run.outcome in ("reached", "timeout"), run.reason

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.geometry.clearance import behind, distances, first_breach, inside_bounds
+from planner.geometry.clearance import behind, distances, first_breach, first_exit_m, inside_bounds
 from planner.geometry.curves import Pose, along, full_turn, pose_at
 from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, Path
@@ -120,6 +120,17 @@ def test_the_boundary_belongs_to_the_area() -> None:
     assert inside_bounds(STRAIGHT, (0.0, 0.0, 1000.0, 10.0))
     assert not inside_bounds(STRAIGHT, (0.0, 0.0, 999.9, 10.0))
     assert not inside_bounds(STRAIGHT, (0.1, -1.0, 1000.0, 10.0))
+
+
+def test_where_a_path_leaves_an_area() -> None:
+    """By hand: on a circle of 100 m to the right it is 50 m east after 60 degrees, however long it goes on after it."""
+    rows = [(0.0, 0.0, 0.0, 1.0, 0.0, 7.0), (0.0, 7.0, 0.0, 1.0, -0.01, 200.0 * math.pi)]
+    path = Path(np.array([*rows, (0.0, 7.0, 0.0, 1.0, 0.01, 2e5)]))
+    leaves_m = first_exit_m(path, (-1000.0, -1000.0, 50.0, 1000.0))
+    assert leaves_m == pytest.approx(7.0 + 100.0 * math.pi / 3.0, abs=0.002)
+    assert first_exit_m(path, (-1000.0, -1000.0, 200.001, 1000.0)) == math.inf
+    assert first_exit_m(path, (-1000.0, -1000.0, 1000.0, 6.0)) == pytest.approx(6.0, abs=0.002)
+    assert first_exit_m(path, (-1000.0, 1.0, 1000.0, 1000.0)) == 0.0
 
 
 def test_what_lies_behind_an_edge_point() -> None:

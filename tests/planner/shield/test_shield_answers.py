@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from planner import contract
-from planner.geometry.curves import sample
+from planner.geometry.curves import Limits, Pose, sample
 from planner.interface import FloatArray, MapView, Path, Plan, PlanRequest, PlanStatus
 from planner.shield import shield as shield_module
 from planner.shield.shield import Shield
+from planner.shield.tracking import can_be_flown
 
 Known = Callable[[FloatArray], MapView]
 MISSION = replace(
@@ -71,6 +72,23 @@ def test_a_refused_planner_is_told_where_and_why(known: Known) -> None:
     assert "too near to something" in refused.reason
     assert math.hypot(*refused.place_m) < 300.0
     assert shield._log.refused_plans == 2
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "chord_m", "flown"),
+    [(40.0, 1.0, False), (98.0, 1.0, False), (101.0, 1.0, True), (101.0, 3.0, True), (300.0, 20.0, False)],
+)
+def test_a_circle_of_chords_is_flown_if_it_is_no_tighter_than_the_turn(
+    radius_m: float, chord_m: float, flown: bool
+) -> None:
+    """The turn radius is 100 m; at chords of 20 m a joint turns by 3.8 degrees: that is a corner on any circle."""
+    angle = 2.0 * math.asin(0.5 * chord_m / radius_m) * np.arange(int(math.tau * radius_m / chord_m))
+    for side in (1.0, -1.0):
+        path = Path.through(radius_m * np.column_stack((np.sin(angle), side * (1.0 - np.cos(angle)))))
+        start = Pose(0.0, 0.0, *path.segments[0, 2:4].tolist())
+        assert can_be_flown(path, start, Limits(100.0, 15.0)) is flown
+    slides = Path(np.array([(0.1 * i, 0.09 * i, 1.0, 0.0, 0.0, 0.1) for i in range(100)]))
+    assert not can_be_flown(slides, Pose(0.0, 0.0, 1.0, 0.0), Limits(100.0, 15.0))
 
 
 @pytest.mark.parametrize(("straight_m", "refused"), [(0.0, 0), (300.0, 1)])
