@@ -63,17 +63,35 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
     if letters > MOST_REASON_LETTERS:
         told = f"the planner's plan has a reason of {letters:,} characters"
         raise WrongAnswerError(f"{told}; it must have at most {MOST_REASON_LETTERS:,}")
-    reason, more = str.__str__(reason), bool(wants_more_time)
+    said, more = reason, bool(wants_more_time)
+    reason = str.encode(said, "utf-8", "replace").decode()  # a lone surrogate cannot be written
     if status is not PlanStatus.FOUND:
-        return answer if type(answer) is Plan else Plan(status, reason, wants_more_time=more)
+        same = type(answer) is Plan and type(said) is str and said == reason
+        return answer if same else Plan(status, reason, wants_more_time=more)
     waypoints_m = _waypoints(answer.waypoints_m)
     path = _path(answer.path, position_m, start_tolerance_m(mission))
     return Plan(status, reason, waypoints_m, path, _picture(answer.picture), wants_more_time=more)
 
 
+def type_name(value: object) -> str:
+    """The name of a value's type, cut to 100 letters, without calling any code of the value or of its type."""
+    name: str = type.__dict__["__name__"].__get__(type(value))
+    return name[:100]
+
+
+def text_of(error: BaseException) -> str:
+    """The text of an error that code of others raised, cut to `MOST_REASON_LETTERS`; telling it may raise again."""
+    try:
+        return str.__str__(str(error))[:MOST_REASON_LETTERS]
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # it may call sys.exit, too
+        return "it cannot be told what"
+
+
 def _type_text(value: object) -> str:
-    """Names the type of a value in an error, without calling any code of the value."""
-    return "None" if value is None else f"an object of type {type(value).__name__[:100]}"
+    """Names the type of a value in an error."""
+    return "None" if value is None else f"an object of type {type_name(value)}"
 
 
 def _shape_text(value: Any) -> str:

@@ -37,7 +37,7 @@ def sentence(error: BaseException) -> str:
         said = "it cannot be told what"
     if isinstance(error, PlannerError):
         return in_a_line(said)
-    name = type(error).__name__[:MOST_CHARACTERS]
+    name = type.__dict__["__name__"].__get__(type(error))[:MOST_CHARACTERS]  # its metaclass may say otherwise
     return in_a_line(f"{name}: {said}" if said else name)
 
 

@@ -25,7 +25,7 @@ from planner.geometry.joining import lead_of
 from planner.geometry.terrain import WorkCount
 from planner.interface import Mission, NoWayToBegin, Path, Plan, Planner, PlanRequest, PlanStatus, Refused
 from planner.memory import ObstacleMemory
-from planner.plan_checks import WrongAnswerError, checked_plan
+from planner.plan_checks import MOST_REASON_LETTERS, WrongAnswerError, checked_plan, text_of, type_name
 from planner.shield.certificate import PROGRESS_SHARE, Certified, Certifier, hold_centre
 from planner.shield.certified_planner import CertifiedPlanner
 from planner.shield.committed_plan import BROKEN_SHARE, CommittedPlan, PlanMonitor, Start
@@ -105,11 +105,11 @@ class Shield(CertifiedPlanner):
         except KeyboardInterrupt:
             raise
         except NoWayToBegin as error:
-            return Plan(PlanStatus.NO_PATH, str(error))
+            return Plan(PlanStatus.NO_PATH, text_of(error))
         except WrongAnswerError as error:
-            reason = str(error)
+            reason = text_of(error)
         except BaseException as error:  # whatever an inner planner raises, the certified plan can be flown
-            reason = f"the inner planner raised {type(error).__name__}: {error}"[:300]
+            reason = f"the inner planner raised {type_name(error)}: {text_of(error)}"[:300]
         self._refuse(request.position_m, reason)
         return Plan(PlanStatus.NO_PATH, reason)
 
@@ -236,7 +236,8 @@ class Shield(CertifiedPlanner):
         if answer.status is PlanStatus.UNREACHABLE and self._refused is None and not self._places:
             return answer
         self._show_refused(request)
-        return Plan(PlanStatus.NO_PATH, f"stuck in the turn since {self._log.since_s:.0f} s: {why}")
+        told = f"stuck in the turn since {self._log.since_s:.0f} s: {why}"
+        return Plan(PlanStatus.NO_PATH, told[:MOST_REASON_LETTERS])
 
     def _show_refused(self, request: PlanRequest) -> None:
         """After a full holding turn, adds the place refused last to the edges the planner sees, if not near."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import tracemalloc
 from types import SimpleNamespace
 from typing import Any
@@ -208,6 +209,14 @@ def test_a_class_of_the_planners_own_is_read_once_and_left_behind() -> None:
     assert type(plan.reason) is str
     assert type(checked_plan(Own(PlanStatus.KEPT, "goes on"), (0.0, 0.0), MISSION)) is Plan
     assert "has a reason of 5,000 characters" in said_of(Own(PlanStatus.KEPT, Talkative("x" * 5000)))
+
+
+@pytest.mark.parametrize("status", [PlanStatus.FOUND, PlanStatus.NO_PATH])
+def test_a_reason_can_be_written(status: PlanStatus) -> None:
+    """A file name that is not UTF-8, as Python gives it, has letters that UTF-8 has no bytes for."""
+    reason = os.fsdecode(b"no way: caf\xe9.csv")
+    plan = Plan(status, reason, np.zeros((1, 2)), Path(np.array([EAST])))
+    assert checked_plan(plan, (0.0, 0.0), MISSION).reason == "no way: caf?.csv"
 
 
 def picture(**keys: Any) -> PlanPicture:

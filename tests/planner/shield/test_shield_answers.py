@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from planner import contract
 from planner.geometry.curves import Limits, Pose, sample
-from planner.interface import FloatArray, MapView, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import FloatArray, MapView, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
+from planner.plan_checks import WrongAnswerError, checked_plan
 from planner.shield import shield as shield_module
 from planner.shield.shield import Shield
 from planner.shield.tracking import can_be_flown
@@ -72,6 +74,30 @@ def test_a_refused_planner_is_told_where_and_why(known: Known) -> None:
     assert "too near to something" in refused.reason
     assert math.hypot(*refused.place_m) < 300.0
     assert shield._log.refused_plans == 2
+
+
+def mute(kind: type[Exception]) -> Exception:
+    """An error that raises when it is told."""
+    error: Exception = type("Mute", (kind,), {"__str__": lambda _: 1 / 0})()
+    return error
+
+
+@pytest.mark.parametrize(
+    "error", [*map(mute, (OSError, NoWayToBegin, WrongAnswerError)), NoWayToBegin("x" * 9000)]
+)
+def test_whatever_a_planner_raises_the_certified_plan_goes_on(known: Known, error: Exception) -> None:
+    inner = Once((0.0, 0.0), (3000.0, 0.0))
+    shield = Shield(inner, MISSION)
+    request = PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), known(np.zeros((0, 2))))
+    flown = shield.plan(request)
+    assert flown.path is not None
+    inner.plan = Mock(side_effect=error)  # type: ignore[method-assign]
+    east, north, ux, uy = flown.path.segments[-1, :4].tolist()
+    in_turn_m = flown.path.length_m - 100.0
+    request = request._replace(time_s=60.0, position_m=(east, north), direction=(ux, uy), flown=flown)
+    told = shield.plan(request._replace(arc_length_m=in_turn_m))
+    assert told.status is PlanStatus.NO_PATH
+    assert checked_plan(told, (east, north), MISSION) is told
 
 
 @pytest.mark.parametrize(
