@@ -66,7 +66,7 @@ class Given:
         ]
         for name, value in self.settings:
             for key, other in told:
-                if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
+                if f"{key}.".startswith(f"{name}.") and not _is_same(value, other):
                     raise typer.BadParameter(
                         f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
                         param_hint="--set",
@@ -128,7 +128,7 @@ def given_by(
         aircraft__model=aircraft,
         guidance__kind=guidance and kind_of(guidance, "guidance"),
         environment__wind=wind and _wind(wind),
-        environment__turbulence=turbulence and _turbulence(turbulence),
+        **_turbulence(turbulence),
         seed=seed,
         conditions=conditions,
     )
@@ -143,10 +143,18 @@ def _wind(text: str) -> dict[str, float]:
     return {"speed_mps": speed, "from_deg": direction}
 
 
-def _turbulence(text: str) -> dict[str, str]:
-    """Returns the value of `environment.turbulence` for --turbulence [MODEL:]INTENSITY."""
-    model, colon, intensity = text.rpartition(":")
-    return {"model": model if colon else "tustin", "intensity": intensity}
+def _turbulence(text: str | None) -> dict[str, str]:
+    """Returns the keys that --turbulence [MODEL:]INTENSITY replaces; without a MODEL the scenario's stays."""
+    model, colon, intensity = (text or "").rpartition(":")
+    given = {"intensity": intensity} | ({"model": model} if colon else {})
+    return {f"environment__turbulence__{key}": value for key, value in given.items() if text}
+
+
+def _is_same(value: str, other: str) -> bool:
+    """Whether two texts are the same value as YAML; an InputError says that `value` is no YAML."""
+    from harness.files.strict_yaml import parse
+
+    return bool(value.strip()) and parse(value, "--set").plain() == parse(other, "--set").plain()
 
 
 def _place(name: str) -> str:

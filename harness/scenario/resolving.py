@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -28,7 +29,7 @@ from harness.scenario.performance import (
     wind_mps_of,
 )
 from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec, Point
-from harness.scenario.validation import KeyFault
+from harness.scenario.validation import KeyFault, shown
 from planner.keys import MARGIN_SHARE
 
 if TYPE_CHECKING:
@@ -135,11 +136,25 @@ def _airframe(spec: AircraftSpec, latency_s: float | None = None) -> Airframe:
         if latency_s is not None:
             told = f"is {latency_s:g}; must be less, or aircraft.autopilot.state_latency_s be given: {error}"
             raise KeyFault(("navigation", "latency_s"), told) from error
-        for key in ("actuators", "autopilot"):
-            if getattr(spec, key) is not None:
-                _airframe(spec.model_copy(update={key: None}))
-                raise KeyFault(("aircraft", key), str(error)) from error
+        for section in ("actuators", "autopilot"):
+            if getattr(spec, section) is not None:
+                _airframe(spec.model_copy(update={section: None}))
+                raise _fault_in(section, spec, error) from error
         raise KeyFault(("aircraft", "model"), str(error)) from error
+
+
+def _fault_in(section: str, spec: AircraftSpec, error: Exception) -> KeyFault:
+    """Returns the fault of a section of the aircraft: of the key without which it could be flown, if there is one."""
+    from aircraft.airframes import AircraftError
+
+    part = getattr(spec, section)
+    for key, value in part.model_dump(exclude_defaults=True).items():
+        other = part.model_copy(update={key: type(part).model_fields[key].default})
+        with suppress(AircraftError):
+            airframe_of(spec.model_copy(update={section: other}))
+            told = f"is {shown(value)}; must be another, or left out: {error}"
+            return KeyFault(("aircraft", section, key), told)
+    return KeyFault(("aircraft", section), str(error))
 
 
 def _rounded_up(value: float, step: int) -> float:

@@ -309,7 +309,8 @@ class PlannerSpec(PartSpec):
         if not isinstance(data, dict) or not str(data.get("kind", "")).endswith(SHIELDED):
             return data
         if data.get("shield", "loiter") != "loiter":
-            raise ValueError(f"shield is {data['shield']}, and kind {data['kind']}")
+            told = f"shield is {data['shield']}, and kind {data['kind']}"
+            raise ValueError(f"{told}; must be loiter or left out, or kind without {SHIELDED}")
         return {**data, "kind": data["kind"].removesuffix(SHIELDED), "shield": "loiter"}
 
     @property

@@ -16,7 +16,9 @@ from typing import Any
 import pytest
 
 from harness.cli.app import main
+from harness.cli.replacing import given_by
 from harness.scenario import scenario
+from harness.scenario.environment import Turbulence
 from tests.harness.cli.test_terminal import METRICS
 from tests.processes import ROOT, python
 
@@ -77,6 +79,7 @@ def test_what_flies_nothing_imports_nothing_slow(words: list[str], slow: set[str
     code = f"""
 import sys
 from harness.cli.app import main
+from harness.cli.replacing import given_by
 assert main({words!r}) == 0
 print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
 """
@@ -141,6 +144,16 @@ def test_bad_usage_is_one_line_and_writes_nothing(
     assert sentence in said.err
     assert len(said.err.splitlines()) <= 2
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("given", "model"), [("severe", "milspec"), ("tustin:severe", "tustin"), ("milspec:severe", "milspec")]
+)
+def test_turbulence_keeps_the_scenarios_model_unless_it_names_one(given: str, model: str) -> None:
+    replaced = given_by(turbulence=given, wind="5,270", settings=["environment.wind.speed_mps=5"])
+    found = scenario.load_scenario("one_of_everything", replaced.keys).environment
+    assert found.turbulence == Turbulence(model=model, intensity="severe")  # type: ignore[arg-type]
+    assert (found.wind.speed_mps, found.wind.from_deg) == (5.0, 270.0)  # type: ignore[union-attr]
 
 
 def test_a_campaign_is_viewed_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
