@@ -68,14 +68,22 @@ class Mapping:
         return Transformer.from_crs(_pyproj_crs(self.crs or WGS84).to_2d(), plane, always_xy=True)
 
 
-def check_metres(crs: str, unit: str = "") -> None:
-    """Raises InputError unless heights are in metres: by `unit` if given, else the upward axis, else the plane's."""
+def check_metres(crs: str, unit: str = "") -> tuple[str, ...]:
+    """Raises InputError unless heights are in metres: by `unit` if given, else the upward axis, else the plane's.
+
+    Returns notes: that they are heights above the ellipsoid, if so.
+    """
     axes = _pyproj_crs(crs).axis_info
     unit = unit or next((axis.unit_name for axis in axes if axis.direction == "up"), axes[0].unit_name)
     if unit.strip().lower() not in METRES:
         raise InputError(
             f"has heights in {unit[:20]}; make them metres, or give a crs with heights in metres, as EPSG:2263+5703"
         )
+    if any("ellipsoid" in axis.name.lower() for axis in axes):
+        return (
+            "has heights above the ellipsoid, up to 110 m beside those above mean sea level: taken as they are",
+        )
+    return ()
 
 
 def in_degrees(name: str | None) -> bool:

@@ -47,7 +47,7 @@ def read(spec: FileSpec) -> Contents:
     if crs is None:
         notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
     else:
-        check_metres(crs)
+        notes += check_metres(crs)
     return Contents(crs, tuple(parts), notes=tuple(notes))
 
 

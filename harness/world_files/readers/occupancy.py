@@ -20,6 +20,8 @@ FREE_CELLS, BLOCKED_CELLS = b".GS", b"@OTW"
 """Ground and shallow water are free; out of bounds, trees and deep water block (MovingAI format, Sturtevant, 2012)."""
 MODES: Final = ("trinary", "scale")
 """Modes of ROS map_server that tell occupied, free and unknown from a grey; `raw` is not read."""
+WHITE: Final = re.compile(rb"P[256](?:(?:\s|#.*\n)+(\d+)){3}")  # matches a PGM or PPM by the number for white
+MAX_HEADER: Final = 10_000
 IMAGES: Final = {b"P": "PNM", b"\x89": "PNG"}  # GDAL's driver of an image by its first byte
 
 
@@ -90,8 +92,11 @@ def _greys(path: Path) -> FloatArray:
         with raster.opened(path, IMAGES.get(read_bytes(path, first=1), "PNM")) as source:
             if source.colorinterp[0].name == "palette" or source.count in (2, 4):
                 raise InputError("has a palette or is not opaque; save it as plain grey PGM or PNG")
-            greys: FloatArray = source.read().astype(np.float64).mean(axis=0)
-            return greys / (255.0 if source.dtypes[0] == "uint8" else 65_535.0)
+            greys: FloatArray = source.read()
+            bits = source.tags(1, ns="IMAGE_STRUCTURE").get("NBITS") or greys.dtype.itemsize * 8
+            white = WHITE.match(read_bytes(path, first=MAX_HEADER))
+            whole = float(white[1]) if white else 2.0 ** int(bits) - 1.0
+            return np.asarray(greys.mean(axis=0) / whole)
     except InputError as error:
         if "pip install" in str(error):
             raise

@@ -68,7 +68,7 @@ def read(spec: FileSpec) -> Contents:
         if source.transform.is_identity:
             raise InputError("says not where it lies (no transformation); warp it with gdalwarp")
         if (crs := spec.crs or _crs(source, affine)) is not None:
-            check_metres(crs, source.units[0] or "")
+            notes = check_metres(crs, source.units[0] or "")
         elif source.driver != "AAIGrid":
             raise InputError("names no coordinate reference system; give crs, as EPSG:32632")
         else:

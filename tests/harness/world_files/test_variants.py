@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from harness.world_files.kinds import read
 from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, FileSpec, Limit
@@ -308,6 +309,32 @@ def test_a_city_is_in_metres_and_its_templates_are_told(tmp_path: Path) -> None:
     (part,) = found.parts
     assert (part.bottom.height_m, part.top.height_m) == (10.0, 40.0)
     assert found.notes == ("passed over: 1 GeometryInstance",)
+    (note,) = set(read_any(path, crs="EPSG:4979").notes) - set(found.notes)
+    assert "has heights above the ellipsoid" in note
+
+
+@pytest.mark.parametrize("white", [1, 100, 255, 1023, 65_535])
+@pytest.mark.parametrize(("negate", "solid"), [(0, [1.0, 1.0, np.nan, 0.0]), (1, [0.0, 0.0, np.nan, 1.0])])
+def test_a_grey_of_a_ros_map_is_a_share_of_its_images_white(
+    white: int, negate: int, solid: list[float], tmp_path: Path
+) -> None:
+    """By netpbm's pgm(5); of greys 0, a fifth, a half and white, with thresholds of 0.65 and 0.25."""
+    pytest.importorskip("rasterio")
+    greys = [math.floor(share * white) for share in (0.0, 0.2, 0.5, 1.0)]
+    known = [0, 3] if white == 1 else [0, 1, 2, 3]
+    if white == 1:
+        Image.fromarray(np.array([greys], dtype=np.bool_)).save(
+            tmp_path / "a.pgm", format="PNG"
+        )  # of one bit
+    else:
+        data = np.array(greys, dtype=">u2" if white > 255 else "u1").tobytes()
+        (tmp_path / "a.pgm").write_bytes(b"P5 # by hand\n4\n1 %d\n" % white + data)
+    path = written(
+        tmp_path / "a.yaml", f"image: a.pgm\nresolution: 1.0\nnegate: {negate}\norigin: [0, 0, 0]\n"
+    )
+    raster = read_any(path, kind="ros_map").raster
+    assert raster is not None
+    assert np.array_equal(raster.values[0, known], np.array(solid)[known], equal_nan=True)
 
 
 @pytest.mark.parametrize(
