@@ -80,11 +80,6 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
         none = f"the log has none ({', '.join(AIRSPEED_COLUMNS)}); taken to be constant where wind is fitted"
         notes.append(f"airspeed: {'indicated; taken as true' if 'airspeed_ias_mps' in columns else none}")
     targets = columns.get("target_index", np.zeros_like(columns["time_s"]))
-    if (unknown := np.isnan(targets)).any():
-        rows = counted(int(unknown.sum()), "row")
-        notes.append(f"{rows} without target_index: that of the row before is taken")
-        targets = targets[np.maximum.accumulate(np.where(unknown, 0, np.arange(len(targets))))]
-        columns["target_index"] = targets
     by_autopilot = columns.get("autonomous", columns.get("lap", 1.0 - (targets < 0.0))) > 0.0
     if not by_autopilot.any():
         raise InputError(f"{path}: autonomous, lap, target_index: no row is flown by the autopilot")
@@ -121,13 +116,23 @@ def _of_table(path: Path, plane: LocalPlane | None) -> tuple[dict[str, FloatArra
 
 
 def _known_rows(columns: dict[str, FloatArray]) -> tuple[dict[str, FloatArray], list[str]]:
-    """Returns the columns that have values, in the rows with a time, a place and, of flights in laps, a lap; a note."""
+    """Returns the columns that have values, in the rows with a time, a place and, of flights in laps, a lap; and notes.
+
+    A target that is not known is that of the row before.
+    """
     has = {name: each for name, each in columns.items() if name not in OPTIONAL or np.isfinite(each).any()}
     needed = [name for name in ("time_s", "east_m", "north_m", "lap") if name in has]
     known = np.isfinite([has[name] for name in needed]).all(axis=0)
     dropped = int((~known).sum())
-    notes = [f"{counted(dropped, 'row')} without {', '.join(needed)} passed over"] if dropped else []
-    return {name: each[known] for name, each in has.items()}, notes
+    told = f"{', '.join(needed[:-1])} or {needed[-1]}"
+    notes = [f"{counted(dropped, 'row')} without {told} passed over"] if dropped else []
+    has = {name: each[known] for name, each in has.items()}
+    if "target_index" in has and (unknown := np.isnan(has["target_index"])).any():
+        rows = np.maximum.accumulate(np.where(unknown, 0, np.arange(len(unknown))))
+        has["target_index"] = has["target_index"][rows]
+        told = counted(int(unknown.sum()), "row")
+        notes.append(f"{told} without target_index: that of the row before is taken")
+    return has, notes
 
 
 def _csv_table(path: Path) -> pa.Table:

@@ -97,25 +97,20 @@ class Side:
         return found
 
     @cached_property
-    def whole_laps(self) -> list[int]:
-        """The settled laps that were flown from begin to end, to every corner."""
-        laps = np.unique(self.laps).astype(int).tolist()
-        return [lap for lap in laps if lap >= FIRST_SETTLED_LAP and lap not in self.lacking]
-
-    @cached_property
-    def lacking(self) -> dict[int, str]:
-        """What the settled laps that are not whole lack."""
-        steps_s, found = np.diff(self.columns["time_s"]), {}
+    def lacks(self) -> dict[int, str]:
+        """What each settled lap lacks to be whole; "" where it was flown from begin to end, to every corner."""
+        steps_s, found, corners = np.diff(self.columns["time_s"]), {}, len(self.corners_m)
         for lap in np.unique(self.laps[self.laps >= FIRST_SETTLED_LAP]).astype(int).tolist():
             rows = np.flatnonzero(self.laps == lap)
-            flown, corners = len(np.unique(self.legs[rows])), len(self.corners_m)
+            flown = len(np.unique(self.legs[rows]))
             gap_s = float(steps_s[max(rows[0] - 1, 0) : rows[-1] + 1].max(initial=0.0))
-            if (rows[0] == 0 and not self.begun) or (rows[-1] == len(steps_s) and not self.ended):
-                found[lap] = f"{'begins before' if rows[0] == 0 and not self.begun else 'ends after'} the log"
-            elif gap_s > max(LONGEST_GAP_S, 3.0 * float(np.median(steps_s))):
+            found[lap] = "" if flown >= corners else f"flies to {flown} of the mission's {corners} corners"
+            if gap_s > max(LONGEST_GAP_S, 3.0 * float(np.median(steps_s))):
                 found[lap] = f"has no row flown by the autopilot for {gap_s:.1f} s"
-            elif flown < corners:
-                found[lap] = f"flies to {flown} of the mission's {corners} corners"
+            if rows[-1] == len(steps_s) and not self.ended:
+                found[lap] = "ends after the log"
+            if rows[0] == 0 and not self.begun:
+                found[lap] = "begins before the log"
         return found
 
     def figures(self, chosen: NDArray[np.bool_]) -> dict[str, float]:
@@ -153,10 +148,12 @@ class Side:
 
 def compared(flown: Side, simulated: Side) -> dict[str, Any]:
     """Returns laps and figures of both flights; InputError if they have no settled lap in common."""
-    settled = [lap for lap in flown.whole_laps if lap in simulated.whole_laps]
+    settled = [lap for lap, lack in flown.lacks.items() if lack == simulated.lacks.get(lap) == ""]
     if not settled:
-        missing, side = ("the log", flown) if not flown.whole_laps else ("the simulated flight", simulated)
-        why = "".join(f"; lap {lap} {lack}" for lap, lack in list(side.lacking.items())[:3])
+        missing, side = (
+            ("the simulated flight", simulated) if "" in flown.lacks.values() else ("the log", flown)
+        )
+        why = "".join(f"; lap {lap} {lack}" for lap, lack in list(side.lacks.items())[:3] if lack)
         raise InputError(f"{missing} has no whole lap after lap 1{why}; there is nothing to compare")
     rows: list[dict[str, Any]] = [
         {"lap": lap, "flown": flown.lap(lap), "simulated": simulated.lap(lap)} for lap in settled

@@ -104,12 +104,8 @@ def read_mission(path: Path, origin_deg: Place | None = None) -> Given:
         text = read_text(path, MAX_JSON_BYTES, "a mission, in JSON")
         if '"mission"' in text and '"Plan"' not in text:
             return _of_json(text, str(path)), [], []
-    given, notes = read_path(path, origin_deg=origin_deg), []
-    points, radii = _lap_of_program(given.points_m, given.mission)
-    radius = next((each for each in radii if each > 0.0), None)
-    if radius is not None and len(radii) > 1:
-        told = ", ".join(f"{each:g}" for each in radii)
-        notes = [f"mission: its acceptance radii differ ({told} m); {radius:g} m is taken for all corners"]
+    given = read_path(path, origin_deg=origin_deg)
+    points, radius, notes = _lap_of_program(given.points_m, given.mission)
     height_m = float(given.altitudes_m[0]) if len(given.altitudes_m) else None
     place = given.origin_deg
     origin = None if place is None else Origin(latitude_deg=place[0], longitude_deg=place[1])
@@ -118,30 +114,38 @@ def read_mission(path: Path, origin_deg: Place | None = None) -> Given:
     return found, notes, [each for each in (home, place) if each is not None]
 
 
-def placed(path: Path, origins: Sequence[Place], flight: FlownFlight) -> tuple[FlownMission, str]:
-    """A mission in degrees about the origin with which a flight in metres comes nearest to its corners; and a note."""
+def placed(path: Path, origins: Sequence[Place], flight: FlownFlight, notes: list[str]) -> FlownMission:
+    """A mission in degrees about the origin with which a flight in metres comes nearest to its corners; notes it."""
     every = [read_mission(path, origin)[0] for origin in origins]
     missed_m = [float(each.nearest_m(flight).max()) for each in every]
     best = int(np.argmin(missed_m))
     latitude, longitude = origins[best]
     what = "home" if len(origins) > 1 and best == 0 else "the first waypoint"
     told = f"the log's east = north = 0 is taken to be {what}, {latitude:.6f}, {longitude:.6f}"
-    note = f"mission: in degrees; {told}; the flight comes within {missed_m[best]:.0f} m of its corners"
-    return every[best], note
+    notes.append(
+        f"mission: in degrees; {told}; the flight comes within {missed_m[best]:.0f} m of its corners"
+    )
+    return every[best]
 
 
-def _lap_of_program(points: FloatArray, mission: Program | None) -> tuple[FloatArray, list[float]]:
-    """Returns the corners of a lap, and the acceptance radii that they have.
+def _lap_of_program(
+    points: FloatArray, mission: Program | None
+) -> tuple[FloatArray, float | None, list[str]]:
+    """Returns the corners of a lap, from where they are reached, and a note if not all are reached from there.
 
     A mission that jumps back has laps of what it flies between the last two times at one item, in the file's order.
     """
     if mission is None:
-        return points, []
+        return points, None, []
     steps = [each for each in mission.steps if each.position]
     again = [k for k, each in enumerate(steps[:-1]) if each.item == steps[-1].item]
     lap = range(again[-1], len(steps) - 1) if again else range(len(steps))
     order = sorted(lap, key=lambda k: steps[k].item)
-    return points[order], list(dict.fromkeys(steps[k].acceptance_m for k in order))
+    radii = list(dict.fromkeys(steps[k].acceptance_m for k in order))
+    radius = next((each for each in radii if each > 0.0), None)
+    told = ", ".join(f"{each:g}" for each in radii)
+    note = f"mission: its acceptance radii differ ({told} m); {radius or 0.0:g} m is taken for all corners"
+    return points[order], radius, [note] if len(radii) > 1 else []
 
 
 def mission_of_log(path: Path) -> Given:
@@ -166,8 +170,8 @@ def mission_of_log(path: Path) -> Given:
     return found, [f"mission: items {lap[0].number} to {lap[-1].number} of the log, reached from {told}"], []
 
 
-def mission_of_targets(flight: FlownFlight) -> tuple[FlownMission, str]:
-    """Corners ahead of where `target_index` changes, so that it changes there again; and a note.
+def mission_of_targets(flight: FlownFlight) -> Given:
+    """Corners ahead of where `target_index` changes, so that it changes there again; with a note.
 
     Raises:
         InputError: the table has no such column, or its targets are not 0, 1, ... in turn.
@@ -190,7 +194,7 @@ def mission_of_targets(flight: FlownFlight) -> tuple[FlownMission, str]:
     corners = np.array([places[target[reached] == number].mean(axis=0) for number in numbers])
     far = f"{TARGET_RADIUS_M:g} m"
     note = f"mission: {len(corners)} corners, {far} ahead of where target_index changes, reached from {far}"
-    return FlownMission(corners_m=corners, acceptance_m=TARGET_RADIUS_M), note
+    return FlownMission(corners_m=corners, acceptance_m=TARGET_RADIUS_M), [note], []
 
 
 def _lap(commands: Sequence[Command], path: Path) -> list[Command]:

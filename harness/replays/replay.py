@@ -62,7 +62,7 @@ def replay(
     columns = fly_anew(scenario, task, laps, out / SIMULATED)
     corners_m, legs = flown_mission.corners_m, columns["leg"]
     ended = bool(legs[-1] >= laps * len(corners_m))
-    left_out = [f"lap {lap} is left out: it {lack}" for lap, lack in flown.lacking.items()]
+    left_out = [f"lap {lap} is left out: it {lack}" for lap, lack in flown.lacks.items() if lack]
     numbers = flown.laps[0] + _laps(legs, task)
     simulated = Side(columns, corners_m, legs, numbers, scenario.mission.altitude_m, flown.begun, ended)
     told = {
@@ -88,8 +88,7 @@ def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, l
     check_kind(log)
     if mission is None and log.suffix.lower() in TABLES:
         flight = read_flown(log)
-        found, note = mission_of_targets(flight)
-        notes = [note]
+        found, notes, _ = mission_of_targets(flight)
     else:
         found, notes, origins = read_mission(mission) if mission else mission_of_log(log)
         origin = found.origin
@@ -99,16 +98,21 @@ def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, l
             told = "is in degrees and the mission in metres; give a mission in degrees, or with frame.origin"
             raise InputError(f"{log}: {told} (latitude_deg, longitude_deg)")
         if mission and origins and not flight.in_degrees:
-            found, note = placed(mission, origins, flight)
-            notes.append(note)
+            found = placed(mission, origins, flight, notes)
     found.check_flown(flight)
-    laps = flight["lap"] if "lap" in flight else np.zeros(0)
-    if (begins := np.flatnonzero((np.diff(laps) > 0.0) & (laps[:-1] >= 1.0)) + 1).size:
-        first, away_m = found.corner_at(flight, begins, 0)
-        found = found.model_copy(update={"corners_m": np.roll(found.corners_m, -first, axis=0)})
-        told = f"laps begin at corner {first + 1} of the mission, {away_m:.0f} m from where lap changes"
-        notes += [told] if first else []
-    return found, flight, notes
+    return _from_where_laps_begin(found, flight, notes), flight, notes
+
+
+def _from_where_laps_begin(mission: FlownMission, flight: FlownFlight, notes: list[str]) -> FlownMission:
+    """Returns the mission with its corners from that at which the column `lap` changes; notes it."""
+    laps = flight.columns.get("lap", np.zeros(0))
+    begins = np.flatnonzero((np.diff(laps) > 0.0) & (laps[:-1] >= 1.0)) + 1
+    first, away_m = mission.corner_at(flight, begins, 0) if begins.size else (0, 0.0)
+    if first:
+        notes.append(
+            f"laps begin at corner {first + 1} of the mission, {away_m:.0f} m from where lap changes"
+        )
+    return mission.model_copy(update={"corners_m": np.roll(mission.corners_m, -first, axis=0)})
 
 
 def _task_of(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Task:
@@ -131,13 +135,10 @@ def _first_corner(flight: FlownFlight, mission: FlownMission) -> int:
     """Number of the corner that a flight heads for: where its first target is reached, else after the nearest."""
     targets, corners = flight.columns.get("target_index", np.zeros(0)), len(mission.corners_m)
     known = np.flatnonzero(targets >= 0.0)
-    if not known.size:
-        away = np.hypot(*(mission.corners_m - (flight["east_m"][0], flight["north_m"][0])).T)
-        return (int(away.argmin()) + 1) % corners
-    first = targets[known[0]]
-    reached = known[targets[known] != first][:1]
-    number = int(first) % corners
-    return mission.corner_at(flight, reached, number)[0] if reached.size else number
+    if (reached := known[targets[known] != targets[known[:1]]][:1]).size:
+        return mission.corner_at(flight, reached, int(targets[known[0]]) % corners)[0]
+    away = np.hypot(*(mission.corners_m - (flight["east_m"][0], flight["north_m"][0])).T)
+    return (int(away.argmin()) + 1) % corners
 
 
 def _flown(task: Task) -> tuple[Side, int]:

@@ -120,11 +120,7 @@ def mission_in(folder: Path) -> Path:
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n", "time_s: must have at least 3 rows"),
         ("a.csv", b"time_s,x_m,y_m\n2,1,2\n1,1,2\n0,1,2\n", "each later than the one before"),
         ("a.csv", b"time_s,x_m,y_m\n0,1\n", "a.csv:2: has 2 cells, the header 3"),
-        (
-            "a.csv",
-            b"time_s,latitude_deg,longitude_deg\n0,47,8\n1,47,8.1\n2,47,8.2\n",
-            "is in degrees and the mission in metres; give a mission in degrees, or with frame.origin",
-        ),
+        ("a.csv", b"time_s,latitude_deg,longitude_deg\n0,1,2\n1,2,3\n2,3,4\n", "and the mission in metres"),
         ("a.parquet", b"PAR1", "cannot be read as .parquet"),
         ("a.bin", b"not a log", "is no DataFlash log: such a file begins with a3 95 80"),
     ],
@@ -154,7 +150,7 @@ def test_a_row_without_a_place_is_no_row_and_told(tmp_path: Path) -> None:
     track = read_flown(tmp_path / "a.csv", PLANE)
     assert track["time_s"].tolist() == [0.0, 2.0, 3.0]
     assert (track["east_m"].tolist(), track["north_m"].tolist()) == ([0.0, 10.0, 20.0], [10.0, 30.0, 50.0])
-    assert track.notes[0] == "1 row without time_s, east_m, north_m passed over"
+    assert track.notes[0] == "1 row without time_s, east_m or north_m passed over"
     assert "altitude: the table has none; taken to be 0 m" in track.notes
 
 
