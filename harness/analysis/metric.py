@@ -16,6 +16,8 @@ UNKNOWN_AFTER: Final = ("collision", "lost_control", "planner_failed", "error")
 """Outcomes after which nobody can say that nothing is touched: `no-contact` does not hold."""
 LEAST_MARGIN: Final = 1e-9
 """A claim that holds has at least this margin, whatever its figure says."""
+CROSSED: Final = {"exclusion": "enters", "inclusion": "leaves", "area": "leaves"}
+"""What an aircraft does to cross the line of a breach of that kind; obstacles and terrain it touches."""
 ERROR: Final = "error"
 """Outcome of a flight whose software failed before its end; the other outcomes are those of `metrics.json`."""
 SEVERITY: Final[Mapping[str, float]] = {
@@ -135,6 +137,21 @@ def holds(claim: Claim, metrics: Mapping[str, Any]) -> bool:
     if claim == "trackable":
         return metrics["outcome"] == "reached" and bool(metrics["trackable"])
     return bool(metrics.get("check", {}).get("ok"))
+
+
+def cause_of(claim: Claim, metrics: Mapping[str, Any]) -> str:
+    """Names why a claim does not hold of a flight, without times and figures; may be empty.
+
+    Of a given path: what was touched first, as given also crossed first; else why legs were not tracked, or the first
+    corner that was not kept.
+    """
+    for each in metrics.get("contacts") or (metrics.get("breaches") if claim == "as-given" else ()) or ():
+        return f"{CROSSED.get(each['kind'], 'touches')} {each['name']}"
+    legs = sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]})
+    corners = metrics.get("check", {}).get("corners", ())
+    return "; ".join(
+        legs or [f"corner {each['waypoint']} not kept" for each in corners if not each["kept"]][:1]
+    )
 
 
 def margin(claim: Claim, metrics: Mapping[str, Any]) -> float | None:

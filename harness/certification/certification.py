@@ -57,7 +57,7 @@ class Failure:
 
     outcome: str
     cause: str
-    """Why legs were not tracked, what the check of a given path found, or why nothing was flown; may be empty."""
+    """As `harness.analysis.metric.cause_of` has it, or why nothing was flown; may be empty."""
     count: int
     runs: tuple[int, ...]
 
@@ -277,9 +277,8 @@ def failures(rows: Sequence[Mapping[str, Any]]) -> tuple[Failure, ...]:
     """Groups rows of days that failed by outcome and cause, the most frequent first, each with its first five runs."""
     alike: dict[tuple[str, str], list[int]] = {}
     for row in rows:
-        flown = row.get("trackability.causes") or row.get("check.verdict") or ""
-        cause = flown if row.get("digest") else row["reason"]
-        alike.setdefault((str(row["outcome"]), str(cause)), []).append(int(row["run"]))
+        told = row.get("cause", row["reason"])
+        alike.setdefault((str(row["outcome"]), str(told)), []).append(int(row["run"]))
     ordered = sorted(alike.items(), key=lambda each: -len(each[1]))
     return tuple(Failure(*key, len(runs), tuple(runs[:5])) for key, runs in ordered)
 

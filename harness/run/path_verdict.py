@@ -17,6 +17,7 @@ from harness.analysis.breaches import CONTACT, Breach, Kept, compared, crossings
 from harness.analysis.deviation import Rows, Stations, deviation
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
+from harness.analysis.metric import CROSSED
 from harness.analysis.metrics import error_figures, metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.wording import tallied
@@ -155,15 +156,14 @@ def verdict(
 
 def _breaches_told(seen: Kept) -> list[str]:
     """Says what was touched, entered and left: the deepest of each kind, and how many more there are."""
-    kinds = (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves"))
-    crossed = [([each for each in seen.crossings if each.kind == kind], verb) for kind, verb in kinds]
+    crossed = {kind: [each for each in seen.crossings if each.kind == kind] for kind in CROSSED}
     found = []
-    for some, verb in ((seen.contacts, "touches"), *crossed):
+    for kind, some in {CONTACT: seen.contacts, **crossed}.items():
         if some:
             deepest = max(some, key=lambda each: each.depth_m)
             more = f", {len(some) - 1} more" if len(some) > 1 else ""
             where = f"{deepest.name} at {deepest.start_s:.0f} s"
-            found.append(f"{verb} {where}, by {deepest.depth_m:.3g} m{more}")
+            found.append(f"{CROSSED.get(kind, 'touches')} {where}, by {deepest.depth_m:.3g} m{more}")
     return found
 
 

@@ -173,6 +173,22 @@ def test_the_days_of_a_path_have_the_limits_of_its_check(tmp_path: Path) -> None
     assert [day["check.ok"] for day in days] == [max(each) <= 10.0 for each in off_m]
 
 
+def test_days_that_touch_the_same_obstacle_fail_alike_whenever_and_however_deep(tmp_path: Path) -> None:
+    """The obstacle reaches 10 m over the line; with a tolerance of 1 mm the turn before it is not tracked either."""
+    (tmp_path / "world.yaml").write_text(
+        "schema: wayproof/scenario/1\nname: world\narea: {bounds_m: [-500, -500, 2500, 2500]}\n"
+        "obstacles: [{circle: {center_m: [1040, 900], radius_m: 50}}]\n"
+        "mission: {start_m: [0, 0], goal_m: [2000, 0]}\n"
+    )
+    drawn = "--vary aircraft.airspeed_mps=22:28 --vary trackability.cross_track_m=0.001,50 --seed 6 --runs 4"
+    words = ("--scenario", str(tmp_path / "world.yaml"), *drawn.split())
+    found, days = certify_path(tmp_path, "0,0\n1000,0\n1000,1500", *words)
+    assert len({day["trackability.causes"] for day in days}) == 2
+    assert len({day["check.verdict"] for day in days}) == 4
+    (alike,) = found["failures"]
+    assert (alike["outcome"], alike["cause"], alike["count"]) == ("collision", "touches obstacles[0]", 4)
+
+
 def test_keys_of_a_path_are_read_as_those_of_a_scenario(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
