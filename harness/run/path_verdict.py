@@ -123,6 +123,7 @@ def _told(
         },
         "given": dataclasses.asdict(smoothness(polyline_profile(line, speed), speed)),
         "corners": corners,
+        "profile": {name: getattr(plan.profile, name).tolist() for name in ("arc_length_m", "altitude_m")},
         "fences": [fence.plain() for fence in given.fences.every],
         "items": [dataclasses.asdict(item) for item in given.mission.items] if given.mission else [],
         "notes": [*given.notes, *plan.notes],

@@ -22,6 +22,7 @@ FORWARD_M: Final = 0.5
 """A planned point less than this ahead of the one before is left out, as where a new plan takes effect."""
 TOLERANCE_M: Final = 0.25
 """A point is left out only if it is nearer than this to the remaining path, seen from above."""
+CLIMB_M: Final = 1.0  # nor if its altitude is further than this from that of the remaining path
 DIGITS: Final = 9
 """Degrees in files have this many decimal places, a tenth of a millimetre."""
 MISSIONS: Final = ("plan", "waypoints")  # formats that an autopilot flies
@@ -33,12 +34,16 @@ PX4, FIXED_WING = 12, 1
 
 
 class ExportedPath(NamedTuple):
-    """A path, "flown" or "planned": (n, 2) latitude and longitude (WGS84), (n,) altitudes above mean sea level."""
+    """A path, "flown" or "planned": (n, 2) latitude and longitude (WGS84), (n,) altitudes above mean sea level.
+
+    Those that were to be held there are for missions.
+    """
 
     what: str
     scenario: Scenario
     degrees: FloatArray
     altitude_m: FloatArray
+    held_m: FloatArray
 
 
 def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
@@ -52,24 +57,34 @@ def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
         notes.append(f"the run did not reach its goal, and its mission would not either ({ended})")
     if origin == Origin():  # nobody knows any more whether it was given
         place = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
-        notes.append(f"area.origin is {place}, as where a scenario gives none: the file lies there")
+        notes.append(
+            f"area.origin is {place}, also the default of scenarios without one: the file lies there"
+        )
     return FORMATS[form](path).encode(), notes
 
 
 def _path_of(run: Run, what: str) -> ExportedPath:
     """Returns the path of a run with no more points than it needs."""
     scenario = parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"), as_flown=True)
-    track, altitude_m = run.track, run.track.up_m
+    track, level_m = run.track, scenario.mission.altitude_m
+    profile = (run.metrics.get("check") or {}).get("profile") or {
+        "arc_length_m": [0.0],
+        "altitude_m": [level_m],
+    }
+    held_m = np.interp(np.nan_to_num(track.arc_length_m), profile["arc_length_m"], profile["altitude_m"])
     points, rows = np.column_stack((track.east_m, track.north_m)), np.arange(len(track))
     if what == "planned":
         points, rows = planned_points(run)
-        altitude_m = np.full(len(track), scenario.mission.altitude_m)
+    held_m, altitude_m = held_m[rows], (held_m if what == "planned" else track.up_m)[rows]
     if len(points) > 1:
+        along_m = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
         kept = needed(points, TOLERANCE_M)
-        points, rows = points[kept], rows[kept]
+        for heights in (held_m, altitude_m):
+            kept = np.union1d(kept, needed(np.column_stack((along_m, heights)), CLIMB_M))
+        points, held_m, altitude_m = points[kept], held_m[kept], altitude_m[kept]
     plane = LocalPlane(scenario.area.origin.latitude_deg, scenario.area.origin.longitude_deg)
     degrees = np.array([plane.geodetic(*point) for point in points.tolist()]).reshape(-1, 2).round(DIGITS)
-    return ExportedPath(what, scenario, degrees, altitude_m[rows].round(3))
+    return ExportedPath(what, scenario, degrees, altitude_m.round(3), held_m.round(3))
 
 
 def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
@@ -92,13 +107,18 @@ def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
     return points[kept], np.array(kept, dtype=np.int64)
 
 
+def _places(path: ExportedPath) -> list[list[float]]:
+    """Returns latitude, longitude and altitude of a mission's waypoints."""
+    places: list[list[float]] = np.column_stack((path.degrees, path.held_m)).tolist()
+    return places
+
+
 def plan_text(path: ExportedPath) -> str:
     """Returns a plan of QGroundControl, without fences."""
-    held = path.scenario.mission.altitude_m
     simple = {"autoContinue": True, "command": WAYPOINT, "frame": ABOVE_SEA, "type": "SimpleItem"}
     items = [
-        {**simple, "doJumpId": number, "params": [0, 0, 0, None, *place, held]}
-        for number, place in enumerate(path.degrees.tolist(), start=1)
+        {**simple, "doJumpId": number, "params": [0, 0, 0, None, *place]}
+        for number, place in enumerate(_places(path), start=1)
     ]
     mission = {
         "cruiseSpeed": path.scenario.aircraft.airspeed_mps,
@@ -123,8 +143,8 @@ def plan_text(path: ExportedPath) -> str:
 
 def waypoints_text(path: ExportedPath) -> str:
     """Returns a mission plain-text file, https://mavlink.io/en/file_formats; item 0 is home, at the path's start."""
-    degrees, held = path.degrees.tolist(), path.scenario.mission.altitude_m
-    places = [(*degrees[0], 0.0), *((*place, held) for place in degrees)]
+    places = _places(path)
+    places = [[*places[0][:2], 0.0], *places]
     rows = [
         (number, int(number == 0), ABOVE_SEA, WAYPOINT, 0, 0, 0, 0, *place, 1)
         for number, place in enumerate(places)

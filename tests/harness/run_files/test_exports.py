@@ -17,6 +17,7 @@ import shapely
 from pymavlink import mavwp
 from pyproj import CRS, Transformer
 
+import wayproof
 from aircraft.frames import LocalPlane
 from harness.cli.app import main
 from harness.flight.record import FloatArray
@@ -117,6 +118,26 @@ def test_waypoints_are_read_by_pymavlink(what: str, export: Export, run: Run) ->
 
 
 @pytest.mark.parametrize("what", ["flown", "planned"])
+@pytest.mark.parametrize("form", ["waypoints", "geojson"])
+def test_the_altitudes_of_a_checked_path_are_written(form: str, what: str, tmp_path: Path) -> None:
+    """400 m north at 300 m, then up to 360 m on 1600 m, straight on: a degree of latitude here has 111,177 m."""
+    wayproof.check([(0, 0, 300), (0, 400, 300), (0, 2000, 360)], out=tmp_path / "run")
+    out = tmp_path / "out"
+    arguments = ["--format", form, "--what", what, "--out", str(out)]
+    assert main(["export", str(tmp_path / "run"), *arguments]) == 0
+    if form == "geojson":
+        (feature,) = geojson.loads(out.read_text()).features
+        _, latitude, up = np.array(feature.geometry.coordinates).T
+    else:
+        loader = mavwp.MAVWPLoader()
+        loader.load(str(out))
+        latitude, up = np.array([(loader.wp(i).x, loader.wp(i).z) for i in range(1, loader.count())]).T
+    north = np.arange(0.0, 1991.0, 10.0)
+    drawn = 300.0 + 60.0 * np.maximum(north - 400.0, 0.0) / 1600.0
+    assert np.interp(north, (latitude - 47.0) * 111_177.0, up) == pytest.approx(drawn, abs=2.5)
+
+
+@pytest.mark.parametrize("what", ["flown", "planned"])
 def test_geojson_is_read_by_geojson(what: str, export: Export, run: Run) -> None:
     collection = geojson.loads(Path(export("geojson", what)).read_text())
     assert collection.is_valid
@@ -172,7 +193,7 @@ def test_what_its_user_should_know_is_said(
     """A file of degrees lies somewhere, though nobody said where; a mission may be flown."""
     copy = tmp_path / "copy"
     shutil.copytree(run.folder, copy)
-    place = "area.origin is 47, 8, as where a scenario gives none: the file lies there\n"
+    place = "area.origin is 47, 8, also the default of scenarios without one: the file lies there\n"
     text = run.scenario_yaml.replace("latitude_deg: 61.0", "latitude_deg: 47.0").replace("178.45", "8.0")
     assert scenario_of(text).area.origin == Origin()
     (copy / "scenario.yaml").write_text(text)
