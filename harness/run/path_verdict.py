@@ -34,10 +34,8 @@ SPACING_SHARE: Final = 0.25
 """Points along the given path are measured so close together, in limits of the cross-track error."""
 WINDOW_RADII: Final = 4.0
 """Track and path are compared where they are no further apart than this along the path, in turn radii."""
-LEAST_LAYER_M: Final = 10.0
-"""Least depth of a layer: what of a part reaches into it, or its clearance does, is solid all through."""
-MOST_ALTITUDE_LAYERS: Final = 40
-"""Layers are deeper than `LEAST_LAYER_M` where the altitudes of a flight would need more than this many."""
+LAYER_M: Final = 10.0
+"""Depth of a layer: what of a part reaches into it, or its clearance does, is solid all through."""
 WIDER, MOST_WIDER = 1.05, 3.0
 """A limit that does not hold far enough is made larger by the first factor, up to the second times the need."""
 MOST_FLIGHTS: Final = 4
@@ -351,17 +349,29 @@ def layer_contacts(
     origin = scenario.area.origin
     place = Place(origin.latitude_deg, origin.longitude_deg)
     known = None if scenario.ground is None else scenario.ground.field()
-    deep = max(LEAST_LAYER_M, float(np.ptp(track.up_m)) / MOST_ALTITUDE_LAYERS) if specs else LEAST_LAYER_M
-    thick = [replace(spec, vertical_clearance_m=spec.vertical_clearance_m + 0.5 * deep) for spec in specs]
-    layer = np.floor(track.up_m / deep).astype(np.int64)
+    layer = np.floor(track.up_m / LAYER_M).astype(np.int64)
     found: list[Breach] = []
     least = math.inf
-    for number in np.unique(layer).tolist() if specs else ():
-        sources = expanded(thick, place, scenario.area.bounds_m, (number + 0.5) * deep, ground=known).sources
-        for source in sources:
-            if source.polygons:
-                solid = shapely.union_all(source.polygons)
-                margin: FloatArray = np.where(layer == number, -inside_m(track, solid), np.inf)
-                least = min(least, float(margin.min()))
-                found += crossings(track, margin, solid, CONTACT, source.spec.path.name)
+    # Many layers are cut as one first: what is not solid there, or far away, is so in each of them.
+    waiting = [(int(layer.min()), int(layer.max()))] if specs else []
+    while waiting:
+        low, high = waiting.pop()
+        rows = (layer >= low) & (layer <= high)
+        if not rows.any():
+            continue
+        half_m = 0.5 * LAYER_M * (high + 1 - low)
+        cut = [replace(each, vertical_clearance_m=each.vertical_clearance_m + half_m) for each in specs]
+        sources = expanded(cut, place, scenario.area.bounds_m, low * LAYER_M + half_m, ground=known).sources
+        solids = [
+            (each.spec.path.name, shapely.union_all(each.polygons)) for each in sources if each.polygons
+        ]
+        margins = [np.where(rows, -inside_m(track, solid), np.inf) for _, solid in solids]
+        nearest = min((float(each.min()) for each in margins), default=math.inf)
+        if low == high:
+            least = min(least, nearest)
+            for (name, solid), margin in zip(solids, margins, strict=True):
+                found += crossings(track, margin, solid, CONTACT, name)
+        elif nearest < max(least, 0.0):
+            middle = (low + high) // 2
+            waiting += [(middle + 1, high), (low, middle)]
     return tuple(found), least

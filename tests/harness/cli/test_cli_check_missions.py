@@ -141,8 +141,8 @@ def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Chec
     house = {"type": "Feature", "properties": {"building": "yes", "height": 120}, "geometry": shape}
     town.write_text(json.dumps({"type": "FeatureCollection", "features": [house]}))
     solid = f"obstacles=[{{file: {{path: {town}, ground_m: 0}}}}]"
-    for low_m, contacts in ((60.0, 1), (150.0, 0)):
-        places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5]]
+    for low_m, later, contacts in ((60.0, [], 1), (150.0, [], 0), (141.0, [[8, 47.12, 1000]], 0)):
+        places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5], *later]
         line = {"type": "LineString", "coordinates": places}
         path = tmp_path / "line.geojson"
         path.write_text(json.dumps(line))
