@@ -266,13 +266,14 @@ def without(node: Node, loc: Loc) -> Node:
     replaced(node, loc, Node(None, IN_PYTHON))
     *way, last = loc
     parent = node.at(tuple(way))
-    if parent is None or isinstance(parent.value, Scalar):
+    if parent is None or parent.inner(last) is None:
         return node
-    if isinstance(parent.value, dict):
-        kept: dict[str, Node] | tuple[Node, ...] = {k: v for k, v in parent.value.items() if k != last}
+    left: Any = parent.value
+    if isinstance(left, tuple):
+        left = tuple(each for index, each in enumerate(left) if index != last)
     else:
-        kept = tuple(each for index, each in enumerate(parent.value) if index != last)
-    return replaced(node, tuple(way), Node(kept, parent.line))
+        left = {key: each for key, each in left.items() if key != last}
+    return replaced(node, tuple(way), Node(left, parent.line))
 
 
 # Writes text in quotes wherever a YAML 1.2 reader would take it for something else, and no aliases: those are refused.

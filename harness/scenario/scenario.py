@@ -65,15 +65,14 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
         raise InputError('with_: must be given a mapping of key paths, such as {"planner.clearance_m": 60}')
     plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}
     root = node_of(plain, IN_PYTHON)
-    places = {loc_of(name, "with_"): value for name, value in keys.items()}
-    items = [loc for loc, value in places.items() if value is None and isinstance(loc[-1], int)]
-    for loc, value in places.items():
-        if value is not None:
-            root = with_key(root, loc, node_of(_plain(value), IN_PYTHON))
-        elif loc not in items:
-            root = strict_yaml.without(root, loc)
-    for loc in sorted(items, key=lambda loc: (len(loc), loc[-1]), reverse=True):
-        root = strict_yaml.without(root, loc)
+
+    def turn(entry: tuple[Loc, Any]) -> tuple[int, ...]:
+        loc, value = entry
+        return (1, -len(loc), -loc[-1]) if value is None and isinstance(loc[-1], int) else (0,)
+
+    for loc, value in sorted(((loc_of(name, "with_"), value) for name, value in keys.items()), key=turn):
+        new = node_of(_plain(value), IN_PYTHON)
+        root = strict_yaml.without(root, loc) if value is None else with_key(root, loc, new)
     return root
 
 
