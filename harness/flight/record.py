@@ -87,7 +87,7 @@ class Track:
     load_factor: FloatArray = _column("normal load factor, 1 in level flight")
     roll_command_deg: FloatArray = _column("what guidance asked of the inner loops")
     cross_track_m: FloatArray = _column(
-        "distance from the plan being flown, straight on beyond its ends, positive right; NaN before the first"
+        "distance from the plan being flown, carried on beyond its ends, positive right; NaN before the first"
     )
     clearance_m: FloatArray = _column(
         "true distance to the nearest active obstacle edge, negative inside, inf with none"
