@@ -126,7 +126,8 @@ def test_a_path_that_meets_terrain_is_told_where(tmp_path: Path, checked: Checke
     assert (status, contact["kind"], metrics["outcome"]) == (1, "terrain", "collision")
     assert contact["depth_m"] == pytest.approx(60.0, abs=3.0)
     assert 1600.0 < contact["north_m"] < 2400.0
-    assert metrics["check"]["verdict"].startswith("no: touches the ground at 74 s")
+    # Between cell middles at 1750 m (300 m) and 1850 m (500 m) the ground is 440 m high at 1820 m: 72.8 s at 25 m/s.
+    assert metrics["check"]["verdict"].startswith("no: touches the ground at 73 s")
     path.write_text("x_m,y_m,altitude_m\n0,0,500\n0,1500,550\n0,3500,550\n")
     status, metrics = checked(path, "--set", terrain)
     assert (status, metrics["contact"]) == (0, False)
