@@ -110,6 +110,7 @@ class LocalWorkers(Workers):
     """
 
     def __init__(self, number: int) -> None:
+        self._others = set(multiprocessing.active_children())
         super().__init__(_pool(number))
         self._number = number
         self._again: deque[Job] = deque()
@@ -152,7 +153,11 @@ class LocalWorkers(Workers):
         return found
 
     def end(self) -> None:
-        """Ends the pool and waits for its thread, which Python's exit would wake without a lock."""
+        """Ends the processes, in mid-flight if need be, and the pool: nothing is written any more."""
+        for child in set(multiprocessing.active_children()) - self._others:
+            child.terminate()
+            child.join()
+        # The pool's thread, which is waited for here, would be woken without a lock by Python's exit.
         self._executor.shutdown(cancel_futures=True)
 
     def _renew(self) -> None:
@@ -172,7 +177,6 @@ def _died(future: Future[Answer | None]) -> bool:
 def local_workers(number: int) -> Iterator[LocalWorkers]:
     """Starts processes of this machine at once, which end with the context, in mid-flight if need be."""
     open_standard_files()
-    before = set(multiprocessing.active_children())
     kept = {name: os.environ[name] for name in ONE_THREAD_ENVIRONMENT if name in os.environ}
     os.environ.update(ONE_THREAD_ENVIRONMENT)
     workers = LocalWorkers(number)
@@ -183,9 +187,6 @@ def local_workers(number: int) -> Iterator[LocalWorkers]:
         for name in ONE_THREAD_ENVIRONMENT:
             os.environ.pop(name)
         os.environ.update(kept)
-        for child in set(multiprocessing.active_children()) - before:
-            child.terminate()
-            child.join()
         workers.end()
 
 

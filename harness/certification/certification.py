@@ -26,7 +26,7 @@ from harness.campaign.cell import grouped
 from harness.campaign.flight import Answer
 from harness.campaign.folder import CampaignFolder, fly_missing, told_left
 from harness.campaign.results import RUNS
-from harness.campaign.workers import Workers, fly_jobs
+from harness.campaign.workers import LocalWorkers, fly_jobs
 from harness.certification.bounds import Verdict, clopper_pearson, sequential_bounds, verdict
 from harness.certification.days import Days, PathDays
 from harness.certification.rare import Rare, subset_simulation
@@ -153,7 +153,7 @@ class Tally:
 def certify(
     days: Days,
     out: Path,
-    workers: Workers,
+    workers: LocalWorkers,
     terms: Terms,
     *,
     resume: bool = False,
@@ -205,11 +205,12 @@ def _simulate(days: Days, folder: CampaignFolder, fly: Callable[[range], None], 
     return subset_simulation(margins, days.normals, len(days), days.campaign.seed, confidence)
 
 
-def _keep_failing(days: Days, out: Path, failing: Sequence[int], workers: Workers) -> None:
+def _keep_failing(days: Days, out: Path, failing: Sequence[int], workers: LocalWorkers) -> None:
     """Keeps the run folders of failing days; after a subset simulation some of them are flown again for that."""
     if days.rare:
         missing = (run for run in failing[:MOST_FOLDERS] if not (out / RUNS / str(run)).exists())
         fly_jobs((replace(days.job(run, out), recordings="all") for run in missing), workers, lambda *_: None)
+    workers.end()  # a day in flight would make its folder anew
     for each in (out / RUNS).glob("*"):  # of days that were flown ahead of the day that decided
         if each.name.isdecimal() and int(each.name) not in failing:
             shutil.rmtree(each, ignore_errors=True)

@@ -14,7 +14,7 @@ import pytest
 
 from harness.campaign.flight import Answer
 from harness.campaign.folder import fly_missing
-from harness.campaign.workers import finished
+from harness.campaign.workers import LocalWorkers, finished
 
 FLYING = 3000
 """So many futures that most of the time goes to locking and unlocking them."""
@@ -111,3 +111,19 @@ def test_an_interrupt_leaves_no_future_locked(delay_s: float, tmp_path: Path) ->
     crowd.end()
     assert locked(crowd.given) == 0
     assert tables, "what is done is in the tables"
+
+
+def test_a_job_that_is_given_up_in_mid_flight_writes_no_more(tmp_path: Path) -> None:
+    """As a day that is in flight when a claim is decided: its folder would stand among those of failures."""
+    workers = LocalWorkers(1)
+    workers._executor.submit(_fly_slowly, tmp_path)
+    while not (tmp_path / "begun").exists():
+        time.sleep(0.01)
+    workers.end()
+    assert [each.name for each in tmp_path.iterdir()] == ["begun"]
+
+
+def _fly_slowly(folder: Path) -> None:
+    (folder / "begun").touch()
+    time.sleep(2.0)
+    (folder / "written").touch()
