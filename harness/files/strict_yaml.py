@@ -128,9 +128,8 @@ def parse(text: str, source: str) -> Node:
     """Parses one YAML document; faults, InputErrors, name it by `source`, usually the path."""
     if match := _UNPRINTABLE.search(text):
         line = text.count("\n", 0, match.start()) + 1
-        raise InputError(
-            f"{source}:{line}: has the control character 0x{ord(match[0]):02x}; must be plain text"
-        )
+        told = f"{source}:{line}: has the control character 0x{ord(match[0]):02x}; must be plain text"
+        raise InputError(told)
     return _Composer(text, source).document()
 
 

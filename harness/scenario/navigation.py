@@ -99,10 +99,8 @@ class Navigation(Section):
         last_s = -math.inf
         for index, (begin_s, end_s) in enumerate(self.outages_s):
             if begin_s <= last_s:
-                told = (
-                    f"is [{begin_s:g}, {end_s:g}]; must begin after {last_s:g} s, the end of the one before"
-                )
-                raise KeyFault(("outages_s", index), told)
+                wanted = f"must begin after {last_s:g} s, the end of the one before"
+                raise KeyFault(("outages_s", index), f"is [{begin_s:g}, {end_s:g}]; {wanted}")
             last_s = end_s
         return self
 

@@ -34,9 +34,8 @@ def _simple(points: tuple[Point, ...]) -> tuple[Point, ...]:
         raise ValueError("encloses no area: its vertices lie on one line; must be a polygon")
     if not shape.is_valid:
         where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")
-        raise ValueError(
-            f"crosses or touches itself at ({where}); give the vertices in order round the shape"
-        )
+        told = f"crosses or touches itself at ({where}); give the vertices in order round the shape"
+        raise ValueError(told)
     return ring
 
 

@@ -97,7 +97,7 @@ def resolve(
         check_level_flight(scenario)
     scenario, names = with_files_expanded(scenario, folder)
     if ends_checked:
-        check_start_and_goal(scenario, mission, clearance_m, names, ends)
+        check_start_and_goal(scenario, names, ends)
         sideways_mps2 = GRAVITY_MPS2 * math.tan(limits_of(aircraft).bank_limit_rad)
         check_start_leads_in(scenario.area, mission, fastest_mps**2 / sideways_mps2)  # downwind
     told = mission_of(scenario, performance)
@@ -173,27 +173,20 @@ def check_local_plane(area: Area) -> None:
     xmin, ymin, xmax, ymax = area.bounds_m
     reach_m = math.hypot(max(abs(xmin), abs(xmax)), max(abs(ymin), abs(ymax)))
     if reach_m > PLANE_REACH_M:
-        raise KeyFault(
-            ("area", "bounds_m"),
-            f"reaches {reach_m / 1e3:.0f} km from area.origin; the plane is right to a metre up to "
-            f"{PLANE_REACH_M / 1e3:.0f} km: lay the origin nearer to the area's middle, or take a smaller area",
-        )
+        told = f"reaches {reach_m / 1e3:.0f} km from area.origin; the plane is right to a metre up to "
+        told += f"{PLANE_REACH_M / 1e3:.0f} km: lay the origin nearer to the area's middle, or take a smaller area"
+        raise KeyFault(("area", "bounds_m"), told)
 
 
-def check_start_and_goal(
-    keys: ScenarioKeys,
-    mission: MissionSpec,
-    clearance_m: float,
-    names: Sequence[str],
-    written: Mapping[str, str],
-) -> None:
+def check_start_and_goal(keys: ScenarioKeys, names: Sequence[str], written: Mapping[str, str]) -> None:
     """Raises a KeyFault unless start and goal lie in the area and clear of obstacles, which messages call by `names`.
 
     The start must be clear of what is there at time 0, the goal of what is there for ever. `written` has the keys of
     `start_m` and `goal_m` in the file, where they may stand in degrees.
     """
+    mission, obstacles, clearance_m = keys.mission, keys.obstacles, keys.planner.clearance_m
     xmin, ymin, xmax, ymax = bounds_m = keys.area.bounds_m
-    obstacles, ends = keys.obstacles, {"start_m": mission.start_m, "goal_m": mission.goal_m}
+    ends = {"start_m": mission.start_m, "goal_m": mission.goal_m}
     for name, (east, north) in ends.items():
         if min(east - xmin, xmax - east, north - ymin, ymax - north) < 0.0:
             lies = "is" if name in written.values() else "lies at"
@@ -201,10 +194,8 @@ def check_start_and_goal(
             raise KeyFault(("mission", written[name]), told)
     straight_m = math.dist(mission.start_m, mission.goal_m)
     if straight_m <= mission.goal_radius_m:
-        told = (
-            f"is {straight_m:g} m from {written['start_m']}, inside goal_radius_m {mission.goal_radius_m:g} m"
-        )
-        raise KeyFault(("mission", written["goal_m"]), f"{told}; must be further away")
+        told = f"is {straight_m:g} m from {written['start_m']}, inside goal_radius_m {mission.goal_radius_m:g} m;"
+        raise KeyFault(("mission", written["goal_m"]), f"{told} must be further away")
     at_first = [(each.active_s or (0.0,))[0] <= 0.0 for each in obstacles]
     there = {"start_m": at_first, "goal_m": [each.fixed for each in obstacles]}
     for end, point in ends.items():
@@ -212,10 +203,8 @@ def check_start_and_goal(
             distance_m = _distance_to(obstacle, point, clearance_m) if counts else math.inf
             if distance_m < clearance_m:
                 where = f"{distance_m:.6g} m from" if distance_m > 0 else "inside"
-                raise KeyFault(
-                    ("mission", written[end]),
-                    f"lies {where} {told}; must be {clearance_m:g} m (planner.clearance_m) away",
-                )
+                wanted = f"must be {clearance_m:g} m (planner.clearance_m) away"
+                raise KeyFault(("mission", written[end]), f"lies {where} {told}; {wanted}")
 
 
 def _distance_to(obstacle: Obstacle, point: Point, wanted_m: float) -> float:
@@ -237,17 +226,13 @@ def check_start_leads_in(area: Area, mission: MissionSpec, turn_radius_m: float)
     """Raises a KeyFault, with a course that would do, if straight on and tightest turns to both sides lead out."""
     if _stays_inside(area, mission.start_m, mission.course_deg, turn_radius_m):
         return
-    courses = range(0, 360, COURSE_STEP_DEG)
+    courses, wanted = range(0, 360, COURSE_STEP_DEG), "none would do: start farther from the border"
     good = (each for each in courses if _stays_inside(area, mission.start_m, each, turn_radius_m))
-    course = next(good, None)
-    told = (
-        "none would do: start farther from the border" if course is None else f"must be another, as {course}"
-    )
-    raise KeyFault(
-        ("mission", "course_deg"),
-        f"is {mission.course_deg:.0f}, which leads out of area.bounds_m at once: no turn of {turn_radius_m:.0f} m from "
-        f"start_m {list(mission.start_m)} stays inside; {told}",
-    )
+    if (course := next(good, None)) is not None:
+        wanted = f"must be another, as {course}"
+    told = f"is {mission.course_deg:.0f}, which leads out of area.bounds_m at once: no turn of {turn_radius_m:.0f} m"
+    told += f" from start_m {list(mission.start_m)} stays inside; {wanted}"
+    raise KeyFault(("mission", "course_deg"), told)
 
 
 def _stays_inside(area: Area, start: Point, course_deg: float, radius_m: float) -> bool:

@@ -177,9 +177,8 @@ def plan_fences(plan: Keys, source: str) -> tuple[tuple[Fence, ...], bool, int]:
 
 def _geofence(geofence: Keys, source: str) -> tuple[Fence, ...]:
     for key in (key for key, value in geofence.items() if value and key not in GEOFENCE_KEYS):
-        raise InputError(
-            f"{source}geoFence.{shown(key)}: is not known; must be one of {', '.join(GEOFENCE_KEYS)}"
-        )
+        told = f"{source}geoFence.{shown(key)}: is not known; must be one of {', '.join(GEOFENCE_KEYS)}"
+        raise InputError(told)
     found = []
     if old := geofence.get("polygon"):  # before version 2: one, to stay inside of
         found.append(_polygon({"polygon": old, "inclusion": True}, source, "geoFence"))
