@@ -134,6 +134,10 @@ def _columns(header: list[str], where: str, any_altitude: bool) -> list[str]:
 
 def read_geojson(text: str, source: str) -> PathAsRead:
     """Reads the path of a GeoJSON file, its one LineString."""
+    from harness.world_files.parts import WGS84
+    from harness.world_files.plane import geodetic
+    from harness.world_files.readers.maps import crs_named
+
     content = parsed_json(text, source)
     try:
         shapes = list(_shapes(content))
@@ -150,6 +154,13 @@ def read_geojson(text: str, source: str) -> PathAsRead:
         longitude, latitude, *altitude = (finite(value, at) for value in point)
         points.append((latitude, longitude, altitude[0] if altitude else None))
     others = Counter(kind for _, kind, _ in shapes if kind != "LineString")
+    if (crs := crs_named(content)) != WGS84:
+        y, x = np.array([point[:2] for point in points]).T
+        try:
+            places = np.column_stack(geodetic(crs, x, y)).tolist()
+        except InputError as error:
+            raise InputError(f"{source}: {error}") from error
+        points = [(*place, altitude) for place, (*_, altitude) in zip(places, points, strict=True)]
     return PathAsRead(where, points, _notes_on_others(others))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import shapely
@@ -35,10 +35,13 @@ def read_geojson(spec: FileSpec) -> Contents:
     parts = limits.parts_of([each for each in shapes if each[1] is not None], spec, notes)
     if passed := sum(shape is None for _, shape in shapes):
         notes.append(f"{counted(passed, 'point or line')} without an area passed over")
-    # An older file may name a system that is not WGS84.
+    return Contents(spec.crs or crs_named(content), parts, notes=tuple(notes))
+
+
+def crs_named(content: Mapping[str, Any]) -> str:
+    """Returns the crs of a GeoJSON, which is not WGS84 where an older file names another."""
     named = re.search(r"EPSG:+(?:[\d.]*:)?(\d+)", str(content.get("crs")))
-    crs = spec.crs or (f"EPSG:{named[1]}" if named else WGS84)
-    return Contents(crs, parts, notes=tuple(notes))
+    return f"EPSG:{named[1]}" if named else WGS84
 
 
 def features_of(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:

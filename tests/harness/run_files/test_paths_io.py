@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from pyproj import Geod
 
@@ -108,6 +109,16 @@ def test_every_format_gives_the_same_path(name: str, tmp_path: Path) -> None:
         azimuth, _, distance = WGS84.inv(8.0, 47.0, longitude, latitude)
         assert east == pytest.approx(distance * math.sin(math.radians(azimuth)), abs=0.1)
         assert north == pytest.approx(distance * math.cos(math.radians(azimuth)), abs=0.1)
+
+
+def test_a_geojson_may_name_another_crs(tmp_path: Path) -> None:
+    """Zimmerwald (swisstopo): LV03 602030.68, 191775.03 is 46 52 37.5405 N, 7 27 54.9835 E."""
+    content = json.loads(geojson([[602_030.68, 191_775.03], [603_030.68, 191_775.03]]))
+    named = {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::21781"}}, **content}
+    (tmp_path / "a.geojson").write_text(json.dumps(named))
+    given = read_path(tmp_path / "a.geojson")
+    assert given.origin_deg == pytest.approx((46.877_094_6, 7.465_273_2), abs=2e-5)
+    assert np.hypot(*given.points_m[1]) == pytest.approx(1000.0, abs=0.2)
 
 
 @pytest.mark.parametrize("columns", ["x_m,y_m", "east_m, north_m"])
