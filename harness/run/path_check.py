@@ -236,6 +236,16 @@ def _without_files(
     """Takes the files out of the obstacles, for a path of several altitudes; returns the keys left, and the files."""
     if ground is not None:
         root = _with_keys(root, {("ground",): ground.model_dump()})
+    cut = root.at(("sources",))
+    if (
+        cut is not None
+        and isinstance(cut.value, tuple)
+        and any(each.at(("altitude_m",)) for each in cut.value)
+    ):
+        raise InputError(
+            "command line: the obstacles are files cut at one altitude, as a run folder has them, and the path has "
+            "several: give the scenario that names the files"
+        )
     listed = root.at(("obstacles",))
     every = listed.value if listed is not None and isinstance(listed.value, tuple) else ()
     files = [file for each in every if (file := each.at(("file",))) is not None]

@@ -92,6 +92,8 @@ class SourceSpec(Section):
     """SHA-256 of its bytes."""
     polygons: Annotated[int, Field(ge=0)]
     """How many obstacles were made of it."""
+    altitude_m: float | None = None
+    """Altitude they are cut at; the scenario flies at no other. Default: they are the same at all."""
     notes: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Strict(False)] = ()
     """What was assumed or passed over. Default: nothing."""
 

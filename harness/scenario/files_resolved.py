@@ -6,7 +6,7 @@ import importlib.util
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 from harness.files.strict_yaml import Loc
 from harness.scenario.environment import GroundSpec, SourceSpec
@@ -20,8 +20,12 @@ if TYPE_CHECKING:
     from harness.world_files.parts import FileSpec
 
 
+SAME_ALTITUDE_M: Final = 0.5  # files cut at altitudes no further apart are taken as the same
+
+
 def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[ScenarioKeys, Sequence[str]]:
     """Makes the files of a scenario into obstacles and ground; returns it, and each obstacle's name in messages."""
+    _check_altitude(keys)
     at = [index for index, each in enumerate(keys.obstacles) if each.file is not None]
     if not at:
         return keys, [f"obstacles[{index}]" for index in range(len(keys.obstacles))]
@@ -46,12 +50,22 @@ def with_files_expanded(keys: ScenarioKeys, folder: Path | None) -> tuple[Scenar
             source = next(sources)
             parts = _parts(source, each.active_s)
             name = f"what {name} has of {source.spec.path.name}"
-            whence = {"path": each.file.path, "kind": source.kind, "sha256": source.sha256}
-            told.append(SourceSpec(**whence, polygons=len(parts), notes=source.notes))
+            whence: dict[str, Any] = {"path": each.file.path, "kind": source.kind, "sha256": source.sha256}
+            cut_m = keys.mission.altitude_m if source.by_altitude else None
+            told.append(SourceSpec(**whence, altitude_m=cut_m, polygons=len(parts), notes=source.notes))
         every += parts
         names += [name] * len(parts)
     ground = GroundSpec.of(found.ground) if found.ground else keys.ground
     return keys.updated(obstacles=tuple(every), ground=ground, sources=tuple(told)), names
+
+
+def _check_altitude(keys: ScenarioKeys) -> None:
+    """Raises a KeyFault if obstacles were cut out of files at another altitude than that of the mission."""
+    altitude_m = keys.mission.altitude_m
+    for each in keys.sources or ():
+        if each.altitude_m is not None and abs(each.altitude_m - altitude_m) > SAME_ALTITUDE_M:
+            told = f"is {altitude_m:g}; the obstacles are {each.path} cut at {each.altitude_m:g} m"
+            raise KeyFault(("mission", "altitude_m"), f"{told}: give the scenario that names the file")
 
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:

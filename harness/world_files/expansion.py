@@ -16,7 +16,16 @@ from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.height_field import HeightField, cell_sides, height_field, window_of
-from harness.world_files.parts import BoolArray, Box, Contents, FileSpec, FloatArray, Raster
+from harness.world_files.parts import (
+    NO_BOTTOM,
+    NO_TOP,
+    BoolArray,
+    Box,
+    Contents,
+    FileSpec,
+    FloatArray,
+    Raster,
+)
 from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.solids import Layer, Solid, clipped, placed_cells, quarters, simplified, sliced_parts
 
@@ -64,6 +73,7 @@ class Source:
     polygons: tuple[Any, ...]
     heights_m: tuple[tuple[float, float], ...]
     notes: tuple[str, ...]
+    by_altitude: bool  # whether what is solid depends on the altitude
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +229,9 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
     else:
         notes.append(f"nothing of it is solid in the area between {layer.low_m:g} and {layer.high_m:g} m")
     heights = tuple(_heights(polygons, solids))
-    return Source(spec, contents.kind, contents.sha256, tuple(polygons), heights, tuple(notes))
+    limited = any((part.bottom, part.top) != (NO_BOTTOM, NO_TOP) for part in contents.parts)
+    by_altitude = limited or contents.terrain is not None
+    return Source(spec, contents.kind, contents.sha256, tuple(polygons), heights, tuple(notes), by_altitude)
 
 
 def _solid_cells(raster: Raster, spec: FileSpec, low_m: float) -> BoolArray:

@@ -16,7 +16,7 @@ from harness.run.scenario_flight import fly_to_folder
 from harness.run_files.run_folder import load_run
 from harness.world.world import World
 from tests.harness.world_files.making import feature, geojson, geotiff, osm
-from wayproof import dump_scenario, load_scenario
+from wayproof import InputError, dump_scenario, load_scenario
 
 
 def hill(folder: Path) -> Path:
@@ -64,7 +64,7 @@ def test_a_hill_is_flown_round_and_the_expanded_scenario_flies_alone(
     assert again["min_altitude_above_ground_m"] == figures["min_altitude_above_ground_m"]
 
 
-def test_what_is_solid_follows_the_altitude(tmp_path: Path) -> None:
+def test_what_is_solid_follows_the_altitude(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "hill.yaml"
     assert run_world(out, str(hill(tmp_path)), "--altitude-m", "1250") == 0
 
@@ -79,6 +79,18 @@ def test_what_is_solid_follows_the_altitude(tmp_path: Path) -> None:
     assert area_m2("1250") == pytest.approx(math.pi * 700.0**2 * math.log(500 / 240), rel=0.02)
     assert area_m2("1400") == pytest.approx(math.pi * 700.0**2 * math.log(500 / 390), rel=0.03)
     assert area_m2("1600") == 0.0
+    expanded = tmp_path / "expanded.yaml"  # as a run folder has it
+    expanded.write_text(dump_scenario(load_scenario(out)))
+    load_scenario(expanded)
+    with pytest.raises(
+        InputError, match=r"mission.altitude_m: is 1400; the obstacles are hill.tif cut at 1250 m"
+    ):
+        load_scenario(expanded, [("mission.altitude_m", "1400")])
+    drawn, over = tmp_path / "a.csv", ["--aircraft", "aerosonde", "--scenario", str(expanded)]
+    for second_m, told in ((1400, "is 1400; the obstacles"), (1250, "are files cut at one altitude")):
+        drawn.write_text(f"x_m,y_m,altitude_m\n0,0,{second_m}\n900,0,{second_m}\n2000,0,1400\n")
+        assert main(["check", str(drawn), *over, "--out", str(tmp_path / "run")]) == 2
+        assert told in capsys.readouterr().err
 
 
 def test_start_and_goal_may_be_given_in_degrees(tmp_path: Path) -> None:
