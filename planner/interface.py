@@ -125,6 +125,8 @@ class Mission:
     """Smallest radius of a full turn that ends a plan; None: that of any turn."""
     least_spaced_radius_m: float | None = None
     """Smallest radius of turns with a straight between them on which the aircraft rolls; None: that of any turn."""
+    edge_error_m: float = 0.0
+    """An edge point may lie this far beside the edge of the obstacle that was seen."""
 
     @property
     def hold_radius_m(self) -> float:

@@ -64,6 +64,7 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
     performance = performance or performance_of(scenario)
     margin_m, radius_m = scenario.navigation.margin_m or 0.0, performance.turn_radius_m
     clearance_m = max(scenario.planner.clearance_m + margin_m, LEAST_CLEARANCE_RADII * radius_m)
+    half_beam_m = 0.5 * math.radians(scenario.sensor.beam_deg) * scenario.sensor.range_m
     return Mission(
         goal_m=scenario.mission.goal_m,
         goal_radius_m=scenario.mission.goal_radius_m,
@@ -79,6 +80,7 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
         wind_mps=wind_mps_of(scenario),
         least_hold_radius_m=performance.hold_radius_m,
         least_spaced_radius_m=performance.spaced_radius_m,
+        edge_error_m=half_beam_m + scenario.sensor.range_noise_m + margin_m,
     )
 
 

@@ -82,10 +82,11 @@ class AnytimeSearch:
         if self._effort or self._widest_first:
             # In vain so far: what is closed to the narrowest way is closed to all.
             attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._widest_first)
-        for i, attempt in enumerate(attempts):
-            if attempt.distance_m + attempt.margin_m >= closed_m:
+        for i, attempt in enumerate((*attempts, *self._local.last_attempts)):
+            if attempt.distance_m + attempt.margin_m >= closed_m or (attempt.doubtful and found):
                 continue  # what is closed to a narrow way is closed to a wide one
             before, known, points = len(self.candidates), memory.known, memory.points_m
+            known *= not attempt.doubtful  # any edge may cut it
             route = yield from self._local.route(
                 attempt, self._effort, self._now, self.candidates, self._closed
             )
@@ -105,7 +106,7 @@ class AnytimeSearch:
             if route is None and self.candidates:
                 route = yield from self._local.beginning(self._now, self.candidates[0])
             if route is not None:
-                yield self._course(route, memory.known, shortest=False)
+                yield self._course(route, memory.known * (not self._local.last_attempts), shortest=False)
 
     def _offered(self, found: list[_Found]) -> Generator[Course | None, None, None]:
         """Yields courses along routes; before the first of a search, the one with room for holds if that goes first."""

@@ -22,6 +22,10 @@ POINTS_A_CALL = 500
 THINNING_SHARE = 0.1
 """One point is taken in per square of this share of the clearance. Fewer points prove less, but nothing false."""
 
+MOST_ERROR_SHARE = 1.0 / 3.0
+"""Nothing is proved where edge points may be further off than this share of the clearance: a gap that is wide enough
+may then lie within three beams, of which the map takes one without a return for a wall."""
+
 NODE_LISTS = 4096
 """Number of lists that nodes are put into by the square in which they lie (a hash table)."""
 
@@ -82,6 +86,11 @@ class Proof:
         self._ends: tuple[Point, Point] | None = None
         self._begin()
 
+    def keep(self, keeps_m: float) -> None:
+        """Begins anew, for another distance."""
+        self._keeps_m = keeps_m
+        self._begin()
+
     def _begin(self) -> None:
         """Begins the proof anew, with no point taken in."""
         self._barrier: Barrier | None = None
@@ -119,14 +128,26 @@ class Proof:
 class Proofs:
     """The proofs that a planner makes from the edge points seen.
 
-    `no_way`: no vehicle can pass; every gap that it counts as open is wider than `no_way_gap_m`. `no_room_to_turn`:
-    none can that keeps a hold radius beside the clearance (`turning_gap_m`). `only_given_up`: no way but through places
-    that were given up.
+    `no_way`: no vehicle can pass at the clearance, wherever edge points lie that may be off: no gap is wider than
+    `no_way_gap_m`. That takes points that are `exact`. `none_to_find`: the search counts no gap as open, for none looks
+    wider than `closed_gap_m`; that proves nothing. `no_room_to_turn`: no vehicle can pass that keeps a hold radius
+    beside the clearance (`turning_gap_m`). `only_given_up`: none is to be found but through places that were given up.
     """
 
     def __init__(self, mission: Mission, memory: ObstacleMemory, least_keeps_m: float) -> None:
-        turns_keep_m = mission.clearance_m + mission.hold_radius_m
-        self.no_way = Proof(mission, memory, least_keeps_m)
+        clearance_m = mission.clearance_m
+        turns_keep_m = clearance_m + mission.hold_radius_m
+        error_m = min(mission.edge_error_m, MOST_ERROR_SHARE * clearance_m)
+        self.exact, self.surely_m = error_m == mission.edge_error_m, clearance_m - error_m
+        self.no_way = Proof(mission, memory, self.surely_m)
+        self.none_to_find = Proof(mission, memory, least_keeps_m)
         self.no_room_to_turn = Proof(mission, memory, turns_keep_m, mission.hold_radius_m)
         self.only_given_up = Proof(mission, memory, least_keeps_m, with_refused=True)
-        self.no_way_gap_m, self.turning_gap_m = 2.0 * least_keeps_m, 2.0 * turns_keep_m
+        self.no_way_gap_m, self.turning_gap_m = 2.0 * clearance_m, 2.0 * turns_keep_m
+        self.closed_gap_m = 2.0 * least_keeps_m
+
+    def find_down_to(self, least_keeps_m: float) -> None:
+        """The search finds ways that keep no more than this from now on."""
+        self.closed_gap_m = 2.0 * least_keeps_m
+        self.none_to_find.keep(least_keeps_m)
+        self.only_given_up.keep(least_keeps_m)

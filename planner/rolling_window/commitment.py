@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from planner.geometry.course import Course
-from planner.geometry.curves import Point, Pose, place_on
+from planner.geometry.curves import Point
 from planner.interface import MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.multi_step_search import Candidate
@@ -100,10 +100,6 @@ class Commitment:
         off_m = CONCENTRIC_SHARE * self._mission.hold_radius_m
         arcs = (segment for segment in path.segments[:-1].tolist() if segment[4])
         return math.fsum(arc[5] for arc in arcs if math.dist(hold_centre(arc), circle) <= off_m)
-
-    def unseen(self, course: Course, seen: MapView) -> Pose:
-        """The first place of a course that has not been seen to be free."""
-        return place_on(course.path, self.in_view_m(course, seen))[0]
 
     def in_view_m(self, course: Course, seen: MapView) -> float:
         """Arc length (m) up to which a course has been seen to be free."""

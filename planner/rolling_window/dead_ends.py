@@ -24,6 +24,9 @@ MOST_EFFORT = 4
 MOST_RETRIES = 8
 """All given-up places are tried again this many times before a flight ends for want of room to turn."""
 
+MOST_LOOKS = 16
+"""So many places before gaps that look too narrow are given up before a flight ends because no way is found."""
+
 
 class GivingUp:
     """Gives up places that the aircraft turned away from, and decides what follows a search in vain."""
@@ -35,6 +38,7 @@ class GivingUp:
         self._retry_s = math.inf
         self.retries = 0  # how often all given-up places have been tried again
         self.given_up_at_m = 0.0  # arc length of the plan in effect at which a place was given up last
+        self.refusals = 0  # how often a place has been given up
         self._stability = stability
         self.effort = 0  # how often the work of a wide search is doubled; grows with every search in vain
         self.tried_again = False  # what was given up has been tried again for want of another way
@@ -64,6 +68,7 @@ class GivingUp:
 
     def refuse(self, place: Pose) -> None:
         """Gives up a place on a course, and places to its sides as far as a turn takes room."""
+        self.refusals += 1
         east, north, along_east, along_north = place
         clearance_m, radius_m = self._mission.clearance_m, self._mission.turn_radius_m
         beside = int(radius_m / clearance_m)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
@@ -31,6 +31,9 @@ track points keep all of the margin."""
 LEAST_HUG_SHARE, LEAST_MARGIN_SHARE = 0.005, 0.4
 """Track points lie further out than straight steps by at least the first share of the clearance. The second share of
 the margin is still kept where there is no room for all of it."""
+
+GAP_LOOKED_AT_SHARE = 0.5
+"""Gaps narrower than twice this share of the clearance are not looked at again from nearer by."""
 
 MOST_TRACKS = 300
 """A search expands at most this many track points (a wide one in proportion more), and as many after the first find."""
@@ -65,12 +68,14 @@ ROOM_WORTH_HOLDS = 0.5
 class Attempt:
     """Distance kept from every edge point, and a margin beyond it: shares are given up for steps and curves; m.
 
-    Track points lie `inside_m` inside the area.
+    Track points lie `inside_m` inside the area. The way of a `doubtful` one is flown only as far as it keeps the
+    clearance: to look from nearer by at a gap that seems too narrow.
     """
 
     distance_m: float
     margin_m: float
     inside_m: float = 0.0
+    doubtful: bool = False
 
 
 Now = Callable[[], tuple[Start, Course | None]]
@@ -120,6 +125,7 @@ class LocalPlanning:
         self._most_growth_m = math.tau * mission.hold_radius_m if mission.wind_mps else 0.0
         self._hug_m = LEAST_HUG_SHARE * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN_SHARE * margin_m)
+        self.last_attempts: list[Attempt] = []  # made where all others were in vain
         self.limits = Limits.of(mission)
         self._laid: tuple[Start | None, FloatArray, FloatArray] = None, NO_POINTS, NO_POINTS
         self._terrains: dict[float, Terrain] = {}  # for the start and points of `_laid`, by distance kept
@@ -128,7 +134,19 @@ class LocalPlanning:
     @property
     def least_keeps_m(self) -> float:
         """Least distance (m) from every edge point of a way that can be found at all."""
-        return self._mission.clearance_m + SEARCH_SHARE * LEAST_MARGIN_SHARE * self._margin_m
+        return self._mission.clearance_m + SEARCH_SHARE * self._tight.margin_m
+
+    def make_do_with(self, margin_m: float) -> bool:
+        """Goes down to the least share of a margin from now on; returns whether that is less than it was."""
+        before, least_m = self._tight.margin_m, LEAST_MARGIN_SHARE * margin_m
+        self._tight = replace(self._tight, margin_m=min(before, least_m))
+        return least_m < before
+
+    def doubt(self) -> bool:
+        """Looks at gaps that are too narrow from nearer by from now on; returns whether that is new."""
+        keeps_m = GAP_LOOKED_AT_SHARE * self._mission.clearance_m
+        before, self.last_attempts = self.last_attempts, [Attempt(keeps_m, 0.0, doubtful=True)]
+        return not before
 
     def attempts(self) -> list[Attempt]:
         """Distances to search with, in order of preference.
@@ -292,7 +310,8 @@ class LocalPlanning:
         for end in range(len(candidate.nodes) - 1, 1, -1):
             start, _ = now()
             nodes = (start.pose[:2], *candidate.nodes[1:end])
-            route = self.fitted(start, self._tight, nodes, self.memory.points_m)
+            last = [self._tight, *self.last_attempts][-1]
+            route = self.fitted(start, last, nodes, self.memory.points_m)
             if route is not None:
                 return route
             yield
@@ -300,7 +319,7 @@ class LocalPlanning:
 
     def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:
         """The terrain of an attempt among (m, 2) points: of each no more is kept than it lies from start and goal."""
-        keep = self._mission.clearance_m + PATH_SHARE * attempt.margin_m
+        keep = min(self._mission.clearance_m, attempt.distance_m) + PATH_SHARE * attempt.margin_m
         room = self._room_m(start, points)
         terrain = Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.work_count)
         return self._terrains.setdefault(keep, terrain)
@@ -333,7 +352,7 @@ class LocalPlanning:
         if len(candidates) > before:
             if doubtful():
                 yield self._searched(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
-        elif not closed():
+        elif attempt.doubtful or not closed():
             around = window.nearest_obstacles(MOST_AROUND)
             yield self._searched(window, attempt, WIDE_FACTOR * 2**effort, around)
 

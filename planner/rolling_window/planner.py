@@ -11,10 +11,11 @@ flown until something seen contradicts it. Edge points lie on a finite grid, so 
 course that nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
 searches (`dead_ends`), with a disc of the clearance or more about it: these are finitely many as well. They are tried
 again only where no other way is left, the widest first. A search in vain is repeated with twice the effort. Where no
-way is left, a closed chain of edges proves it (`barrier`); where none is left but those given up, one with room to
-turn everywhere must remain, or such a chain shows that there is none, and the flight ends. Assumed: a world that
-stands still, a sensor that sees every gap narrower than twice the clearance as one wall, and a way to the goal along
-which a disc of the turn radius can be moved at the clearance, within the area.
+way is left, a closed chain of edges proves it (`barrier`). From afar a gap may look narrower than it is: what only
+looks closed is looked at again from nearer by. Where none is left but those given up, one with room to turn everywhere
+must remain, or such a chain shows that there is none, and the flight ends. Assumed: a world that stands still, a sensor
+that sees every gap narrower than twice the clearance as one wall, and a way to the goal along which a disc of the turn
+radius can be moved at the clearance, within the area.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from __future__ import annotations
 import math
 
 from planner.geometry.course import Course
-from planner.geometry.curves import on_loiter, place_on
+from planner.geometry.curves import Pose, on_loiter, place_on
 from planner.geometry.joining import lead_of
 from planner.interface import FloatArray, MapView, Mission, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
@@ -31,10 +32,10 @@ from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proofs
 from planner.rolling_window.commitment import Commitment
 from planner.rolling_window.config import RollingWindowConfig
-from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
+from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_LOOKS, MOST_RETRIES, GivingUp
 from planner.rolling_window.local_planning import LocalPlanning
 from planner.rolling_window.rolling_search import RollingSearch, Work
-from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
+from planner.rolling_window.situation import NoRoomToTurn, NoWayFound, PlanningState, Situation
 from planner.shield.certified_planner import CertifiedPlanner
 from planner.shield.committed_plan import CommittedPlan, PlanMonitor, Start
 from planner.shield.escape import meets, room_m
@@ -71,8 +72,9 @@ class RollingWindow(CertifiedPlanner):
         self._start_tolerance_m = start_tolerance_m(mission)
         self._commitment = Commitment(mission, self._local, lead_m + 2.0 * widest_m, shielded)
         self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
+        self._usual_margin_m = RollingWindowConfig().margin(mission)
         self._giving_up = GivingUp(mission, memory, self._stability)
-        parts = (self._local, self._commitment, self._monitor, self._giving_up, self._proofs.no_way)
+        parts = (self._local, self._commitment, self._monitor, self._giving_up, self._proofs.none_to_find)
         self._search = RollingSearch(mission, *parts)
         self._loitered: CommittedPlan | None = None  # the plan whose turn was entered last
         self._served: tuple[object, ...] = ()  # by what the plan in effect served, as long as nothing is due
@@ -230,9 +232,16 @@ class RollingWindow(CertifiedPlanner):
         first, self._loitered = plan is not self._loitered, plan
         if not plan.course.to_goal or not first:
             return
-        place = self._commitment.unseen(plan.course, now.request.seen)
+        place = self._stopped_at(plan.course, now.request.seen)
         if self._giving_up.turned_twice(place[:2]):
             self._giving_up.refuse(place)
+
+    def _stopped_at(self, course: Course, seen: MapView) -> Pose:
+        """The first place of a course that has not been seen to be free, or where a doubtful one comes too near."""
+        at_m = self._commitment.in_view_m(course, seen)
+        if self._local.last_attempts and not course.known:
+            at_m = min(at_m, self._search.cut_m(course))
+        return place_on(course.path, at_m)[0]
 
     def _no_way_found(self, now: Situation) -> Plan:
         """After a search without a plan: goes on searching, escapes, proves that there is no way, or gives up."""
@@ -275,8 +284,24 @@ class RollingWindow(CertifiedPlanner):
         return tried and proofs.no_room_to_turn.closed(position), only_given_up
 
     def _proved_closed(self, now: PlanRequest) -> bool:
-        """Whether the world stands still and the edge points seen leave no way at all."""
-        return self._stability.settled(now.time_s) and self._proofs.no_way.closed(now.position_m)
+        """Whether the world stands still and the edge points seen surely leave no way at the clearance.
+
+        Where they only leave none to be found, a smaller margin is made do with; then gaps are looked at from near by.
+        """
+        local, proofs = self._local, self._proofs
+        if not (self._stability.settled(now.time_s) and proofs.none_to_find.closed(now.position_m)):
+            return False
+        if local.make_do_with(self._usual_margin_m):
+            proofs.find_down_to(local.least_keeps_m)
+            self._search.anew = True
+            return False
+        if proofs.exact and proofs.no_way.closed(now.position_m, self._memory.known):
+            return True
+        if not self._shielded:
+            raise NoWayFound(proofs.closed_gap_m, self._mission.edge_error_m)
+        if local.doubt():
+            self._giving_up.refusals, self._search.anew = 0, True
+        return False
 
     def _give_up(
         self, now: Situation, plan: CommittedPlan, search: AnytimeSearch, no_room: bool, only_given_up: bool
@@ -290,10 +315,13 @@ class RollingWindow(CertifiedPlanner):
         giving_up, arc_length_m = self._giving_up, now.request.arc_length_m
         # More than a whole turn has been flown since the loiter was entered or a place was given up.
         turned = arc_length_m - max(plan.loiter_entry_m, giving_up.given_up_at_m) > giving_up.whole_turn_m
+        looked = self._local.last_attempts and giving_up.refusals >= MOST_LOOKS
+        if looked and self._proofs.none_to_find.closed(now.request.position_m, self._memory.known):
+            return self._end_without_room_to_turn(now)
         if search.stuck is not None:
             if turned:
                 giving_up.given_up_at_m = arc_length_m
-                giving_up.refuse(self._commitment.unseen(search.stuck, now.request.seen))
+                giving_up.refuse(self._stopped_at(search.stuck, now.request.seen))
             return Plan(PlanStatus.NO_PATH, NO_WAY_ON)
         narrow = giving_up.narrow(no_room, now.request.time_s)
         if narrow and giving_up.retries == MOST_RETRIES:
@@ -315,9 +343,12 @@ class RollingWindow(CertifiedPlanner):
         """GIVING_UP -> PROVING: a closed chain of edges with no gap that is seen to have room for a turn.
 
         Raises:
-            NoRoomToTurn: gaps are left that are wide enough for a vehicle. That is no proof.
+            NoRoomToTurn, NoWayFound: gaps are left that may be wide enough for a vehicle. That is no proof.
         """
-        if self._proofs.no_way.closed(now.request.position_m, self._memory.known):
+        position, known, proofs = now.request.position_m, self._memory.known, self._proofs
+        if proofs.exact and proofs.no_way.closed(position, known):
             return self._prove_no_way()
         self.state = PlanningState.PROVING
-        raise NoRoomToTurn(self._proofs.turning_gap_m)
+        if proofs.none_to_find.closed(position, known):
+            raise NoWayFound(proofs.closed_gap_m, self._mission.edge_error_m)
+        raise NoRoomToTurn(proofs.turning_gap_m)

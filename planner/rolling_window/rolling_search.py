@@ -49,11 +49,11 @@ class RollingSearch:
         commitment: Commitment,
         monitor: PlanMonitor,
         giving_up: GivingUp,
-        no_way: Proof,
+        none_to_find: Proof,
     ) -> None:
         self._mission, self._memory = mission, local.memory
         self._local, self._commitment = local, commitment
-        self._monitor, self._giving_up, self._no_way = monitor, giving_up, no_way
+        self._monitor, self._giving_up, self._none_to_find = monitor, giving_up, none_to_find
         self._asked: tuple[PlanRequest, Start] | None = None  # the last request, and where a plan would begin
         self.running: AnytimeSearch | None = None  # the search that is not done yet
         self.last: AnytimeSearch | None = None  # the one that was at work last
@@ -143,7 +143,7 @@ class RollingSearch:
         """Begins a search, with the effort and the order that searches in vain have led to."""
         self.gone = self._memory.cleared
         effort, widest_first = self._giving_up.effort, self._giving_up.tried_again
-        closed = partial(self._no_way.closed, position)
+        closed = partial(self._none_to_find.closed, position)
         # Among pockets, the shortest ways first leave none out; past them a way with room for holds may go first.
         past = math.dist(position, self._mission.goal_m) < self.turned_m - self._mission.sensor_range_m
         open_to_m = self._open_to_m if past and not widest_first else None

@@ -31,6 +31,17 @@ class NoRoomToTurn(RuntimeError):
         )
 
 
+class NoWayFound(RuntimeError):
+    """Gaps are left that may be wide enough for a vehicle at the clearance, but none that is seen to be."""
+
+    def __init__(self, gap_m: float, edge_error_m: float) -> None:
+        super().__init__(
+            "no way is found: of the gaps between obstacles that part the aircraft from the goal, none looks wider "
+            f"than {gap_m:.0f} m, and seen from afar a gap may look narrower than it is by {2.0 * edge_error_m:.0f} m. "
+            "That does not prove the goal unreachable"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Situation:
     """A request, the plan in effect, and the arc length (m) of the aircraft on it, whole turns taken off."""

@@ -8,7 +8,7 @@ from harness.flight.record import Flight
 from tests.closed_loop.small import flown_by_point_mass, small_world
 
 
-def flown(width_m: float, length_m: float) -> Flight:
+def flown(width_m: float, length_m: float, margin_m: float | None = None) -> Flight:
     """5.2 km to the east and the length of the lane, which begins 1,600 m ahead of the start."""
     x0, x1, half = 2000.0, 2000.0 + length_m, 0.5 * width_m
     blocks = [
@@ -25,7 +25,7 @@ def flown(width_m: float, length_m: float) -> Flight:
             "time_limit_s": 1500.0,
         },
         sensor={"range_m": 1200.0},
-        planner={"clearance_m": 50.0},
+        planner={"clearance_m": 50.0, "margin_m": margin_m},
     )
     return flown_by_point_mass(scenario)
 
@@ -48,3 +48,17 @@ def test_a_lane_whose_end_is_out_of_sight_is_not_called_a_proof() -> None:
     assert flight.plans[-1].plan.path is not None
     assert flight.plans[-1].plan.path.loiter
     assert flight.track.east_m.max() < 2200.0
+
+
+@pytest.mark.parametrize(
+    ("width_m", "margin_m", "outcome"),
+    [(85.0, None, "unreachable"), (102.0, None, "planner_failed"), (120.0, 50.0, "reached")],
+)
+def test_a_gap_that_can_be_passed_at_the_clearance_is_not_called_closed(
+    width_m: float, margin_m: float | None, outcome: str
+) -> None:
+    """A point passes what is wider than twice the clearance of 50 m. Seen from 1.2 km it looks narrower."""
+    flight = flown(width_m, 200.0, margin_m)
+    assert flight.outcome.value == outcome, flight.reason
+    assert ("That does not prove the goal unreachable" in flight.reason) is (outcome == "planner_failed")
+    assert flight.track.clearance_m.min() > 0.99 * 50.0 or outcome != "reached"

@@ -22,10 +22,10 @@ from planner.interface import (
     PlanStatus,
 )
 from planner.memory import ObstacleMemory
-from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
+from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_LOOKS, MOST_RETRIES, GivingUp
 from planner.rolling_window.planner import NO_BETTER, THINKING_ON, RollingWindow
 from planner.rolling_window.rolling_search import Work
-from planner.rolling_window.situation import NoRoomToTurn, PlanningState, Situation
+from planner.rolling_window.situation import NoRoomToTurn, NoWayFound, PlanningState, Situation
 from planner.shield.certificate import CertificateBroken
 from planner.shield.committed_plan import Start
 from planner.shield.escape import Escape
@@ -79,7 +79,8 @@ def searched_in_vain(pilot: RollingWindow, *, done: bool = True, stuck: object =
 
 def proved(pilot: RollingWindow, *, no_way: bool = False, no_room: bool = False) -> None:
     """So much is proved of the edges seen."""
-    pilot._proofs.no_way.closed = lambda position, most=0: no_way  # type: ignore[method-assign]
+    for proof in (pilot._proofs.no_way, pilot._proofs.none_to_find):
+        proof.closed = lambda position, most=0: no_way  # type: ignore[method-assign]
     pilot._proofs.no_room_to_turn.closed = lambda position, most=0: no_room  # type: ignore[method-assign]
 
 
@@ -257,6 +258,22 @@ def test_a_closed_chain_of_edges_is_the_proof_that_there_is_no_way() -> None:
     answer = pilot._no_way_found(now)
     assert (answer.status, pilot.state) == (PlanStatus.UNREACHABLE, PlanningState.PROVING)
     assert "no gap in it is wider than" in answer.reason
+
+
+@pytest.mark.parametrize("far_off", [False, True])
+def test_a_chain_that_edge_points_may_be_too_far_off_to_close_is_told_as_no_proof(far_off: bool) -> None:
+    pilot, now = in_the_loiter()
+    proved(pilot, no_way=True)
+    if far_off:
+        pilot._proofs.exact = False
+    else:
+        pilot._proofs.no_way.closed = lambda position, most=0: False  # type: ignore[method-assign]
+    searched_in_vain(pilot)
+    assert pilot._no_way_found(now).status is PlanStatus.NO_PATH
+    assert pilot._local.last_attempts
+    pilot._giving_up.refusals = MOST_LOOKS
+    with pytest.raises(NoWayFound, match="does not prove the goal unreachable"):
+        pilot._no_way_found(now)
 
 
 def test_want_of_room_to_turn_is_proved_after_all_was_tried_again() -> None:
