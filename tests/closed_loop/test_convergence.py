@@ -289,12 +289,12 @@ def fast(start: StartConditions, air: Atmosphere) -> PointMass:
 
 
 def assert_converges(seed: int, *, proved: bool = True) -> None:
-    """A goal out of reach is proved to be so or, unless it must be `proved`, told to lack room for a turn."""
+    """A goal out of reach is proved to be so or, unless it must be `proved`, told to lack room."""
     world = drawn(seed)
     flight = fly(make_loop(world.scenario, fast))
     wanted = Outcome.REACHED if world.reachable else Outcome.UNREACHABLE
     if not world.reachable and not proved:
-        no_room = "raised NoRoomToTurn" in (flight.reason or "")
+        no_room = any(f"raised {each}" in flight.reason for each in ("NoRoomToTurn", "NoWayFound"))
         wanted = Outcome.TIMEOUT if seed in ENDLESS else Outcome.PLANNER_FAILED if no_room else wanted
     assert flight.outcome is wanted, f"{flight.reason}\n{dump_scenario(world.scenario)}"
     assert flight.track.clearance_m.min() >= (1.0 - BLUR) * CLEARANCE_M, dump_scenario(world.scenario)
