@@ -178,7 +178,8 @@ class Buildings:
         """
         tags = {key.lower(): value for key, value in tags.items()}
         top = self._length_m(tags, _HEIGHTS)
-        if not top and (levels := self._length_m(tags, _LEVELS)):
+        levels = 0.0 if top else self._length_m(tags, _LEVELS)
+        if levels or (not top and any(metres_of(tags.get(name)) == 0.0 for name in _LEVELS)):  # 0: all roof
             roof = self._length_m(tags, ("roof:height", "roof_height"))
             top = LEVEL_M * levels + (roof or LEVEL_M * self._length_m(tags, ("roof:levels",)))
         if not top:

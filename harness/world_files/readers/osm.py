@@ -26,10 +26,17 @@ TALL_MAN_MADE: Final = frozenset(
 )  # fmt: skip
 """Values of `man_made` for what stands up like a building, which piers, pipelines and the like do not."""
 
+TALL: Final = {
+    "power": ("tower", "pole", "portal", "catenary_mast", "line", "minor_line"),
+    "man_made": ("crane", "antenna", "flagpole"),
+    "generator:source": ("wind",),
+}
+"""Values of tags for what stands up, or hangs between what does, and has no area; every aerialway is such, too."""
 NODE: Final = re.compile(
     rb"<node\s" + b"".join(rb"(?=[^>]*\b%s=['\"](-?\d+\.?\d*)['\"])" % key for key in (b"id", b"lat", b"lon"))
 )
 """Matches a node of an XML file by its id, latitude and longitude, in any order."""
+KINDS: Final = {"n": "point", "w": "way"}
 NOT_THERE: Final = 2**31 - 1  # coordinate that osmium gives a node which a way names and the file has not
 
 
@@ -80,7 +87,7 @@ def _imported_osmium() -> Any:
 def read_pbf(spec: FileSpec) -> Contents:
     """Reads an OpenStreetMap PBF file."""
     osmium = _imported_osmium()
-    keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
+    keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "aerialway", "height")
     found = _Found(limits.Buildings(spec), osmium.geom.WKBFactory())
     with _osmium_errors():
         for each in osmium.FileProcessor(str(spec.path)).with_locations().with_areas().with_filter(keys):
@@ -99,18 +106,19 @@ class _Found:
     shape_of: Any
     parts: list[Part] = field(default_factory=list)
     tall: int = 0
+    below: int = 0
     ways: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = field(default_factory=dict)
 
     def take(self, each: Any, tags: dict[str, str]) -> None:
         """Takes an object of osmium: adds it if it is a building's area, keeps it in `ways`, or counts it as tall."""
-        if each.is_area():
+        if tags.get("location") == "underground":
+            self.below += not each.is_area()
+        elif each.is_area():
             name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
             if is_building(tags) and each.num_rings()[0]:
                 self._add(tags, shapely.from_wkb(self.shape_of.create_multipolygon(each)), name)
                 self.ways.pop(name, None)
-            return
-        kind = {"n": "point", "w": "way"}.get(each.type_str(), "relation")
-        if is_building(tags) and kind != "point":
+        elif is_building(tags) and (kind := KINDS.get(each.type_str(), "relation")) != "point":
             places = [
                 on_earth(node.location.lon_without_check(), node.location.lat_without_check())
                 for node in getattr(each, "nodes", ())
@@ -120,8 +128,8 @@ class _Found:
         else:
             self.tall += (
                 is_building(tags)
-                or tags.get("power") == "tower"
-                or tags.get("generator:source") == "wind"
+                or any(tags.get(key) in values for key, values in TALL.items())
+                or tags.get("aerialway", "no") != "no"
                 or limits.metres_of(tags.get("height")) is not None
             )
 
@@ -142,7 +150,10 @@ class _Found:
         if broken := len(self.ways) - len(whole):
             notes.append(f"{counted(broken, 'building')} whose outline is not there passed over")
         if self.tall:
-            notes.append(f"{counted(self.tall, 'object')} with a height and no area passed over")
+            told = "that stand up, or hang, without an area passed over"
+            notes.append(f"{counted(self.tall, 'object')} {told}: masts, lines, cranes and the like")
+        if self.below:
+            notes.append(f"{counted(self.below, 'object')} underground passed over")
         return Contents(WGS84, tuple(self.parts), notes=tuple(notes))
 
 

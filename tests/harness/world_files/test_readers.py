@@ -72,6 +72,7 @@ RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
         ({"building": "yes", "height": "0.3 km"}, -math.inf, 300.0),
         ({"building": "yes", "building:levels": "4"}, -math.inf, 12.0),
         ({"building": "yes", "building:levels": "4", "roof:levels": "1"}, -math.inf, 15.0),
+        ({"building": "yes", "building:levels": "0", "roof:levels": "11"}, -math.inf, 33.0),
         (
             {"building": "yes", "building:levels": "4", "roof:height": "5.5", "roof:levels": "2"},
             -math.inf,
@@ -86,8 +87,16 @@ RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
 def test_heights_of_buildings_follow_the_rule(
     tags: dict[str, str], bottom_m: float, top_m: float, tmp_path: Path
 ) -> None:
-    found = read_any(osm(tmp_path / "a.osm", [(tags, RING), ({"highway": "path"}, RING)]))
+    others = (("highway", "path"), ("power", "line"), ("aerialway", "gondola"), ("man_made", "crane"))
+    cellar = {"building": "yes", "height": "9", "location": "underground"}
+    found = read_any(
+        osm(tmp_path / "a.osm", [(each, RING) for each in (tags, cellar, *({k: v} for k, v in others))])
+    )
     assert found.kind == "osm"
+    assert [note.partition(" that")[0] for note in found.notes[-2:]] == [
+        "3 objects",
+        "1 object underground passed over",
+    ]
     (part,) = found.parts
     assert part.rigid
     assert part.top.height_m == pytest.approx(top_m)
