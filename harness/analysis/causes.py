@@ -17,7 +17,7 @@ from aircraft.interface import GRAVITY_MPS2
 from harness.analysis.flight_limits import LOAD_AVERAGED_S, AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.flight.record import SURFACES, AcceptedPlan, FloatArray, Track
-from harness.run_files.given_path import CutCorner
+from harness.run_files.given_path import CutCorner, Tightest, least_m
 
 LEAD_S = 5.0
 """The cause is looked for from this time before the error became too large up to where it is largest."""
@@ -31,6 +31,8 @@ LATE_SHARE = 0.25
 """Share of the largest error there already when the plan took effect that makes the plan too late."""
 ROUNDING = 1.001
 """A demand larger than what is in force by no more than this factor is not larger."""
+STRAIGHT_DEG = 30.0
+"""An aircraft that turns by more than this at a corner is not off it for the cross-wind."""
 ROLLED_SHARE = 0.1
 """If a plan asks for a faster roll than is in force, this share of the lead time at that rate makes it the cause."""
 AT_STOP = 0.995
@@ -91,9 +93,17 @@ def is_allowed_for(causes: Collection[str], error_m: float | None, margin_m: flo
 
 
 def cross_track_cause(
-    track: Track, peak: int, plans: Sequence[AcceptedPlan], limits: FlightLimits, force: InForce
+    track: Track,
+    peak: int,
+    plans: Sequence[AcceptedPlan],
+    limits: FlightLimits,
+    force: InForce,
+    wide: bool = False,
 ) -> str:
-    """Names the cause for which the aircraft is off the plan, at the row where it is most: the first that applies."""
+    """Names the cause for which the aircraft is off the plan, at the row where it is most: the first that applies.
+
+    `wide`: it passes a corner that needs no tight arc, which may have been rounded more tightly where the wind helps.
+    """
     within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= limits.cross_track_threshold_m)
     grows = int(within[-1]) if len(within) else 0
     first = int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S))
@@ -103,7 +113,7 @@ def cross_track_cause(
     if at_start_m > limits.cross_track_threshold_m and at_start_m >= LATE_SHARE * most_m:
         return "planner too late"
     asked = demand(lead, plans, force)
-    if asked.calm > ROUNDING:
+    if asked.calm > ROUNDING and not (wide and asked.windy <= ROUNDING):
         seen_late = limits.sensor_range_m < limits.horizon_m
         near = lead.clearance_m.min() <= limits.sensor_range_m
         return "sensor horizon" if seen_late and near else "turn radius too tight"
@@ -112,7 +122,9 @@ def cross_track_cause(
         return speed_cause(lead, fast_mps, limits)
     if asked.windy > ROUNDING:
         return "wind drift"
-    return _limit_reached(lead, limits, force, asked.roll_rate > ROUNDING)
+    turned_deg = abs(float(lead.course_deg[-1] - lead.course_deg[0] + 180.0) % 360.0 - 180.0)
+    turns = wide and turned_deg > STRAIGHT_DEG
+    return _limit_reached(lead, limits, force, asked.roll_rate > ROUNDING, turns)
 
 
 def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) -> str | None:
@@ -120,10 +132,12 @@ def corner_cause(corner: CutCorner, allowed_m: float, row: int, force: InForce) 
     half_rad = math.radians(abs(corner.turn_deg)) / 2.0
     outside = 1.0 / max(math.cos(half_rad), 1e-9) - 1.0
     needed = GRAVITY_MPS2 * math.tan(force.bank_limit_rad) * allowed_m / max(outside, 1e-9)
-    speed, wind = float(force.commanded_mps[row]), float(np.hypot(*force.wind_mps[row]))
+    speed, wind_mps = float(force.commanded_mps[row]), complex(*force.wind_mps[row])
     if speed**2 > needed:
         return "turn radius too tight"
-    return "wind drift" if (speed + wind) ** 2 > needed else None
+    ahead = np.full(2, np.exp(1j * math.radians(90.0 - corner.course_deg)))
+    in_wind = least_m(ahead, np.radians([corner.turn_deg]), Tightest(speed**2, 0.0, wind_mps / speed))
+    return "wind drift" if in_wind[0] > needed else None
 
 
 def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven | None) -> str:
@@ -175,8 +189,13 @@ def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) 
     return "climb too steep" if up >= down else "descent too steep"
 
 
-def _limit_reached(lead: Track, limits: FlightLimits, force: InForce, rolls_too_fast: bool) -> str:
-    """Returns the limit that the aircraft was at while it came off a plan that asks for no more than is in force."""
+def _limit_reached(
+    lead: Track, limits: FlightLimits, force: InForce, rolls_too_fast: bool, turns: bool
+) -> str:
+    """Returns the limit that the aircraft was at while it came off a plan that asks for no more than is in force.
+
+    Where it `turns` at a corner that has room for that in the wind, the drift is no reason.
+    """
     rate = np.abs(np.diff(lead.roll_deg)) / np.maximum(np.diff(lead.time_s), 1e-9)
     rolling = np.append(False, rate >= ROLL_RATE_SHARE * math.degrees(force.roll_rate_radps))
     rolled = float(rolling.mean())
@@ -196,7 +215,7 @@ def _limit_reached(lead: Track, limits: FlightLimits, force: InForce, rolls_too_
         "roll rate": too_fast and (full_aileron or rolled >= ROLLED_SHARE),
         "control saturation": _stop_share(lead, SURFACES) >= SATURATED_SHARE,
         "bank limit": banked >= max(SATURATED_SHARE, rolled),
-        "wind drift": abs(drift) >= blown and drift * lead.cross_track_m[-1] > 0,
+        "wind drift": not turns and abs(drift) >= blown and drift * lead.cross_track_m[-1] > 0,
         "actuator": lateral_servos >= SATURATED_SHARE,
         "load factor": rolled < SATURATED_SHARE and load > limits.max_load_factor,
     }

@@ -221,6 +221,7 @@ class _Flown:
         allowed_m, along_m = float(given.allowed_m[worst]), float(track.arc_length_m[worst])
         if believed_m is not None and believed_m[worst] <= max(allowed_m, track.navigation_error_m[worst]):
             return NAVIGATION_ERROR
+        wide = False
         for corner in given.corners:
             reach_m = max(corner.half_m, CORNER_REACH * allowed_m)
             after_m = reach_m + LEAD_S * float(track.groundspeed_mps[worst])
@@ -228,7 +229,8 @@ class _Flown:
                 cause = corner_cause(corner, max(allowed_m, corner.allowed_cut_m), worst, self.force)
                 if cause is not None:
                     return cause
-        return cross_track_cause(track, worst, self.plans, self.limits, self.force)
+                wide = True
+        return cross_track_cause(track, worst, self.plans, self.limits, self.force, wide)
 
 
 def _is_misled(believed: FloatArray | None, true: FloatArray, most: float, row: int) -> bool:

@@ -59,7 +59,7 @@ class CutCorner:
     The turn asked for is positive to the left. The arc that is flown instead has the radius, 0 where a loiter's circle
     is joined without one, and passes the corner at `cut_m`. The place that belongs to the corner is `arc_length_m`
     along the flown path, which is off the two legs for at most `half_m` before and after. Where the path is judged, the
-    corner may be passed at `allowed_cut_m`.
+    corner may be passed at `allowed_cut_m`. The course is that before the corner.
     """
 
     waypoint: int
@@ -71,6 +71,7 @@ class CutCorner:
     arc_length_m: float
     half_m: float
     allowed_cut_m: float = 0.0
+    course_deg: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +169,11 @@ def fly_by(
     beside = 1j * np.sign(turn) * radius * ahead[:-1]
     away = np.abs(spots[sharp] - place[1:-1] + before * ahead[:-1] - beside)
     cut = np.where(joint, np.abs(away - radius), radius * shape.cut)
-    told = np.column_stack((points[sharp], np.degrees(_legs(spots)[2][sharp - 1]), radius, cut, passed, half))
+    _, onto, sharpest = _legs(spots)
+    course = np.degrees(np.angle(1j * onto[sharp - 1].conj())) % 360.0
+    told = np.column_stack(
+        (points[sharp], np.degrees(sharpest[sharp - 1]), radius, cut, passed, half, 0.0 * half, course)
+    )
     corners = tuple(
         CutCorner(int(of[i + 1]), *told[i].tolist())
         for i in np.flatnonzero(every | (wanted * shape.cut > free * (1.0 + 1e-9)) | joint).tolist()
@@ -198,7 +203,7 @@ def _joined(
     """
     length, ahead, turn = _legs(place)
     tangent = np.concatenate(([0.0], np.tan(0.5 * np.minimum(np.abs(turn), PAST_RAD)), [0.0]))
-    least = _least_m(ahead, turn, tightest)
+    least = least_m(ahead, turn, tightest)
     overshoot_m = (least - _fitting(length, least, _shapes(turn))) * (1.0 - np.cos(turn))
     joined, own, done = place.copy(), np.arange(len(place)), 0
     for kink in (1 + np.flatnonzero(overshoot_m > (1.0 - LIMIT_SHARE) * tightest.limit_m)).tolist():
@@ -214,7 +219,7 @@ def _joined(
             ahead_m = gap.real - beyond * onto.real
             half = float(np.tan(0.5 * abs(turned)))
             rooms = length[first - 1] + ahead_m, length[last] + beyond
-            radius = float(_least_m(legs, np.array([turned]), limits)[0])
+            radius = float(least_m(legs, np.array([turned]), limits)[0])
             fits = rooms[0] / (half + tangent[first - 1]), rooms[1] / (half + tangent[last + 1])
             if min(fits) >= radius:
                 apex = place[first] + ahead_m * legs[0]
@@ -291,15 +296,15 @@ def _tightened(
     wanted_m: FloatArray, shape: _Shapes, ahead: NDArray[Any], turn: FloatArray, tightest: Tightest
 ) -> FloatArray:
     """(k,) radii that keep every corner within its limit, as far as the aircraft turns so tightly in the wind."""
-    least_m = _least_m(ahead, turn, tightest)
+    tight_m = least_m(ahead, turn, tightest)
     limit_m = tightest.limit_m / np.maximum(shape.furthest, LEAST_CUT)
-    careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * least_m)
+    careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * tight_m)
     most_m = np.minimum(careful_m, LIMIT_SHARE * limit_m)
-    tight: FloatArray = np.maximum(np.minimum(wanted_m, most_m), least_m)
+    tight: FloatArray = np.maximum(np.minimum(wanted_m, most_m), tight_m)
     return tight
 
 
-def _least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> FloatArray:
+def least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> FloatArray:
     """(k,) least radii in the wind.
 
     A steady turn at one bank has the radius of calm air times the square of ground speed over airspeed, where that is
@@ -309,8 +314,8 @@ def _least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> Float
     course = ahead[:-1, None] * np.exp(1j * turn[:, None] * along)
     seen = np.conj(course) * np.asarray(tightest.wind)[..., None]
     ground_speed = seen.real + np.sqrt(np.maximum(1.0 - seen.imag**2, 0.0))
-    least_m: FloatArray = tightest.radius_m * np.square(ground_speed).max(axis=1)
-    return least_m
+    least: FloatArray = tightest.radius_m * np.square(ground_speed).max(axis=1)
+    return least
 
 
 def _arcs(begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float) -> list[SegmentRow]:

@@ -215,8 +215,9 @@ class _RouteBuilder:
         self._add(Vertex(edge, altitude, None, centre=circle.center))
         self.flush()
         self._pose = edge, circle.direction(edge)
-        turn_deg = -90.0 * circle.side
-        self._corners.append(CutCorner(item, edge.real, edge.imag, turn_deg, 0.0, 0.0, self._length_m, 0.0))
+        turn_deg, course_deg = -90.0 * circle.side, 90.0 - math.degrees(cmath.phase(circle.center - edge))
+        shape = (turn_deg, 0.0, 0.0, self._length_m, 0.0, 0.0, course_deg % 360.0)
+        self._corners.append(CutCorner(item, edge.real, edge.imag, *shape))
 
     def _is_near(self, touch: complex, turn_m: float) -> bool:
         """Tells whether a corner at the last waypoint has no room before the next place."""

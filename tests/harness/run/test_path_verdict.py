@@ -141,6 +141,23 @@ def test_a_law_that_overshoots_a_wide_corner_is_not_told_that_the_turn_is_too_ti
     assert causes == ["tracking error", "tracking error"]
 
 
+@pytest.mark.parametrize(
+    ("from_deg", "least", "cause"), [(45.0, 0.46, "tracking error"), (225.0, 1.96, "wind drift")]
+)
+def test_a_wind_is_the_cause_at_a_corner_only_where_it_widens_the_turn(
+    from_deg: float, least: float, cause: str, tmp_path: Path
+) -> None:
+    """From north to east against 10 m/s, at most sqrt(25^2 - 50) - 7.1 = 16.9 m/s over the ground, and with it 35 m/s.
+
+    A right angle that may be passed at 30 m has room for an arc of 72 m: for 63.7 m times the square of that over 25.
+    """
+    assert (LEAST_M * least > 30.0 / (math.sqrt(2.0) - 1.0)) is (cause == "wind drift")
+    path = waypoints_file(tmp_path, [(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], acceptance_m=5.0)
+    settings = {**BY_WAYPOINTS, "guidance.kind": "l1"}
+    metrics, _ = flown(path, wind=(10.0, from_deg), corner_m=30.0, settings=settings)
+    assert {leg["cause"] for leg in metrics["trackability"]} == {cause}
+
+
 def test_a_path_is_flown_beside_where_it_is_by_a_position_that_is_wrong_from_the_start() -> None:
     """The believed position is 60 m north of the true one: so far south of the path it is flown, right to 1 m."""
     settings = {"navigation": "{kind: rtk, position_bias_m: [0, 60]}"}
