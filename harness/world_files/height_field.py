@@ -143,8 +143,11 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
     heights, notes = _heights(near, columns, rows)
     if not np.isfinite(heights).any():
         return None, []
-    if (step := math.ceil(math.sqrt(heights.size / MAX_NODES))) > 1:
-        heights = _highest(heights, step)[::step, ::step]
+    if (step := math.ceil(math.sqrt(heights.size / (0.95 * MAX_NODES)))) > 1:
+        whole = [
+            (0, (1 - size) % step) for size in heights.shape
+        ]  # so that the last node is at the edge or beyond
+        heights = np.pad(_highest(heights, step), whole, mode="edge")[::step, ::step]
         notes.append(f"the ground is kept every {step} cells, no lower than between: its area is large")
     assert field.lattice is not None
     lattice = field.lattice / step
@@ -232,9 +235,8 @@ def _highest(values: FloatArray, cells: int) -> FloatArray:
     """Returns the highest value within so many columns and rows of each; NaN where none is known."""
     from scipy import ndimage
 
-    found: FloatArray = ndimage.maximum_filter(
-        np.where(np.isnan(values), -np.inf, values), 2 * cells + 1, mode="nearest"
-    )
+    known = np.where(np.isnan(values), -np.inf, values)
+    found: FloatArray = ndimage.maximum_filter(known, 2 * cells + 1, mode="nearest")
     found[np.isneginf(found)] = np.nan
     return found
 

@@ -14,7 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from aircraft.frames import LocalPlane
 from harness.scenario.environment import GroundSpec
-from harness.world_files import solids
+from harness.world_files import height_field, solids
 from harness.world_files.expansion import Expanded, FileFault, corners_of, expanded, loaded_file
 from harness.world_files.parts import FileSpec
 from harness.world_files.plane import Mapping, Place, geodetic
@@ -202,7 +202,7 @@ def at_slope(file: Path, *more: FileSpec, altitude_m: float = 1200.0) -> Expande
 
 
 def test_peaks_are_as_high_as_in_the_file_and_what_reaches_up_between_middles_is_solid(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Single cells that stand out, askew to the plane, held against SciPy's bilinear interpolation."""
     heights = 50.0 + 450.0 * (np.random.default_rng(3).random((20, 20)) < 0.1)
@@ -225,6 +225,11 @@ def test_peaks_are_as_high_as_in_the_file_and_what_reaches_up_between_middles_is
     inside = (np.abs(east) < 1790.0) & (np.abs(north) < 1790.0) & (true((down, right)) > 190.0)
     assert inside.sum() > 500
     assert shapely.covers(union(found), shapely.points(east[inside], north[inside])).all()
+    monkeypatch.setattr(height_field, "MAX_NODES", 150)  # then it is kept coarser, and nowhere lower
+    coarse = at_slope(file, altitude_m=200.0).ground
+    assert coarse is not None
+    assert coarse.heights_m.size <= 150
+    assert (coarse.at(east[inside], north[inside]) >= true((down, right))[inside] - 0.6).all()
 
 
 def zone_on_slope(folder: Path, **limits: Any) -> FileSpec:
