@@ -229,7 +229,7 @@ class _Flown:
                 cause = corner_cause(corner, max(allowed_m, corner.allowed_cut_m), worst, self.force)
                 if cause is not None:
                     return cause
-                wide = True
+                wide |= corner.turn_deg != 0.0
         return cross_track_cause(track, worst, self.plans, self.limits, self.force, wide)
 
 

@@ -66,12 +66,9 @@ def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
 def _path_of(run: Run, what: str) -> ExportedPath:
     """Returns the path of a run with no more points than it needs."""
     scenario = parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"), as_flown=True)
-    track, level_m = run.track, scenario.mission.altitude_m
-    profile = (run.metrics.get("check") or {}).get("profile") or {
-        "arc_length_m": [0.0],
-        "altitude_m": [level_m],
-    }
-    held_m = np.interp(np.nan_to_num(track.arc_length_m), profile["arc_length_m"], profile["altitude_m"])
+    track, profile = run.track, (run.metrics.get("check") or {}).get("profile") or {}
+    known = profile.get("arc_length_m", [0.0]), profile.get("altitude_m", [scenario.mission.altitude_m])
+    held_m = np.interp(np.nan_to_num(track.arc_length_m), *known)
     points, rows = np.column_stack((track.east_m, track.north_m)), np.arange(len(track))
     if what == "planned":
         points, rows = planned_points(run)
