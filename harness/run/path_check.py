@@ -31,7 +31,6 @@ from harness.run.scenario_flight import (
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M
 from harness.run_files.path_files import PathAsGiven, read_path
 from harness.run_files.run_folder import MANIFEST
-from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of
 from harness.scenario.obstacles import WorldFile
 from harness.scenario.scenario import Scenario, load_scenario, overridden, validated, with_key
@@ -146,7 +145,7 @@ def prepare_check(
             _with_keys(base, {**_mission_keys(plan.way.given_m[:, :2], base), **keys}), settings
         )
         if not plan.profile.level:
-            root, files = _without_files(root, folder, scenario.ground)
+            root, files = _without_files(root, folder, scenario)
         scenario = validly(root)
     named = [key for key, _ in settings if key.strip().startswith("area") and "origin" not in key]
     again = partial(prepare_check, given, settings, world=world, altitude_m=altitude_m, name=name)
@@ -180,6 +179,12 @@ def _world_root(world: FilePath | None) -> Node:
     root = strict_yaml.read(world)
     whole = validated(root, str(world), world.parent)  # its faults are told as those of a scenario
     assert isinstance(root.value, dict)
+    layered = [each.path for each in whole.sources or () if each.in_layers]
+    if layered:
+        raise InputError(
+            f"{world}: sources: the obstacles of {layered[0]} were looked at in layers along a path, and none "
+            "stand here; give the scenario that names the file"
+        )
     base = Node({key: node for key, node in root.value.items() if key in WORLD_SECTIONS}, root.line)
     derived = _derived_keys(whole) if (world.parent / MANIFEST).is_file() else ()
     for loc in WORLD_KEYS:
@@ -231,11 +236,11 @@ def _mission_keys(points_m: FloatArray, base: Node) -> dict[Loc, Any]:
 
 
 def _without_files(
-    root: Node, folder: FilePath | None, ground: GroundSpec | None
+    root: Node, folder: FilePath | None, scenario: Scenario
 ) -> tuple[Node, tuple[FileSpec, ...]]:
     """Takes the files out of the obstacles, for a path of several altitudes; returns the keys left, and the files."""
-    if ground is not None:
-        root = _with_keys(root, {("ground",): ground.model_dump()})
+    if scenario.ground is not None:
+        root = _with_keys(root, {("ground",): scenario.ground.model_dump()})
     cut = root.at(("sources",))
     if (
         cut is not None
@@ -251,6 +256,10 @@ def _without_files(
     files = [file for each in every if (file := each.at(("file",))) is not None]
     kept = tuple(each for each in every if each.at(("file",)) is None)
     specs = tuple(spec_of(WorldFile.model_validate(file.plain()), folder) for file in files)
+    if files:
+        told = {"polygons": 0, "altitude_m": None, "in_layers": True}
+        layered = [{**each.model_dump(), **told} for each in scenario.sources or ()]
+        root = _with_keys(root, {("sources",): layered})
     return with_key(root, ("obstacles",), Node(kept, root.line)), specs
 
 

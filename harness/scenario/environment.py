@@ -94,6 +94,8 @@ class SourceSpec(Section):
     """How many obstacles were made of it."""
     altitude_m: float | None = None
     """Altitude they are cut at; the scenario flies at no other. Default: they are the same at all."""
+    in_layers: bool = False
+    """It was looked at in layers along a path of several altitudes: none of its obstacles stand in the scenario."""
     notes: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Strict(False)] = ()
     """What was assumed or passed over. Default: nothing."""
 

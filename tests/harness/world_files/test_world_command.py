@@ -88,9 +88,17 @@ def test_what_is_solid_follows_the_altitude(tmp_path: Path, capsys: pytest.Captu
         load_scenario(expanded, [("mission.altitude_m", "1400")])
     drawn, over = tmp_path / "a.csv", ["--aircraft", "aerosonde", "--scenario", str(expanded)]
     for second_m, told in ((1400, "is 1400; the obstacles"), (1250, "are files cut at one altitude")):
-        drawn.write_text(f"x_m,y_m,altitude_m\n0,0,{second_m}\n900,0,{second_m}\n2000,0,1400\n")
+        drawn.write_text(f"x_m,y_m,altitude_m\n0,0,{second_m}\n900,0,{second_m}\n1900,0,1400\n")
         assert main(["check", str(drawn), *over, "--out", str(tmp_path / "run")]) == 2
         assert told in capsys.readouterr().err
+    over[-1] = str(out)  # it names the file, which is looked at in layers
+    assert main(["check", str(drawn), *over, "--no-recording", "--out", str(tmp_path / "run")]) < 2
+    assert [Path(each["path"]).name for each in load_run(tmp_path / "run").manifest["sources"]] == [
+        "hill.tif"
+    ]
+    over[-1] = str(tmp_path / "run" / "scenario.yaml")
+    assert main(["check", str(drawn), *over, "--out", str(tmp_path / "again")]) == 2
+    assert "hill.tif were looked at in layers along a path, and none stand here" in capsys.readouterr().err
 
 
 def test_start_and_goal_may_be_given_in_degrees(tmp_path: Path) -> None:
