@@ -83,8 +83,8 @@ class AnytimeSearch:
             # In vain so far: what is closed to the narrowest way is closed to all.
             attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._widest_first)
         for i, attempt in enumerate((*attempts, *self._local.last_attempts)):
-            if attempt.distance_m + attempt.margin_m >= closed_m or (attempt.doubtful and found):
-                continue  # what is closed to a narrow way is closed to a wide one
+            if needless(attempt, closed_m, found):
+                continue
             before, known, points = len(self.candidates), memory.known, memory.points_m
             known *= not attempt.doubtful  # any edge may cut it
             route = yield from self._local.route(
@@ -157,3 +157,8 @@ class AnytimeSearch:
         """The course along a route, after the stretch of the plan in effect up to its start."""
         path = Path(np.array([*self._now()[0].prefix, *route.path.segments.tolist()]))
         return Course(path, route.nodes, known, shortest)
+
+
+def needless(attempt: Attempt, closed_m: float, found: bool) -> bool:
+    """Whether an attempt need not be made: it is closed to a narrower way, or doubtful and one is found."""
+    return attempt.distance_m + attempt.margin_m >= closed_m or (attempt.doubtful and found)
