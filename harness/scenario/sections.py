@@ -217,22 +217,20 @@ class DeviationSpec(Section):
     """How far the centre of gravity lies behind that of the model. Default: that of the conditions, 0 for ideal."""
 
 
-def _at_least_0(schema: dict[str, Any]) -> None:
-    for key in schema["properties"].values():
-        key["minimum"] = 0
+Sigma = Annotated[float, Field(ge=0, le=MOST_SHARE)]
 
 
 class UncertaintySpec(DeviationSpec):
     """1 sigma of each deviation of the flown aircraft, at least 0; they are drawn from the seed."""
 
-    model_config = ConfigDict(json_schema_extra=_at_least_0)
-
-    @model_validator(mode="after")
-    def _none_below_zero(self) -> UncertaintySpec:
-        for name, value in self:
-            if value is not None and value < 0.0:
-                raise KeyFault((name,), f"is {value:g}; must be at least 0")
-        return self
+    mass: Sigma = DERIVED
+    thrust: Sigma = DERIVED
+    drag: Sigma = DERIVED
+    lift_slope: Sigma = DERIVED
+    elevator: Sigma = DERIVED
+    aileron: Sigma = DERIVED
+    rudder: Sigma = DERIVED
+    centre_of_gravity_m: Annotated[float, Field(ge=0, le=MOST_SHIFT_M)] = DERIVED
 
 
 class AircraftSpec(Section):
