@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
@@ -126,22 +125,21 @@ def start_conditions(scenario: ScenarioKeys) -> StartConditions:
 
 def steady_wind_mps(scenario: ScenarioKeys) -> tuple[float, float]:
     """Components (east, north) of the wind at time 0, at the height at which it is measured."""
-    wind = scenario.environment.wind
-    return _wind_components(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0)
+    wind = scenario.environment.wind or Wind()
+    return _wind_components(wind.speed_mps, wind.from_deg)
 
 
 def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
     """The air of a scenario, its turbulence from a seed."""
     air = scenario.environment
-    wind, vertical = air.wind, air.vertical_gusts
-    changes = wind.changes if wind else ()
+    wind, vertical = air.wind or Wind(), air.vertical_gusts
     return Atmosphere(
         *steady_wind_mps(scenario),
         turbulence=air.turbulence.model if air.turbulence and air.gusts else None,
         intensity=air.gusts,
         seed=seed,
-        changes=tuple((time_s, *_wind_components(speed, degrees)) for time_s, speed, degrees in changes),
-        measured_at_m=wind.measured_at_m if wind else None,
+        changes=tuple((time_s, *_wind_components(speed, degrees)) for time_s, speed, degrees in wind.changes),
+        measured_at_m=wind.measured_at_m,
         vertical_gusts=VerticalGusts(**dict(vertical)) if vertical else None,
     )
 
@@ -172,6 +170,7 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
         raise KeyFault(("aircraft", "model"), str(error)) from error
     if fault is None:
         return
+    from aircraft.trials import farthest  # loads JSBSim
 
     def flies(altitude_m: float, files: ModelFiles = frame.files) -> bool:
         return _trim_fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
@@ -180,18 +179,11 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
         raise KeyFault(("aircraft", "deviation"), f"must be smaller: {fault}")
     if not flies(SURVEY_ALTITUDE_M):
         raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
-    told = _altitude_limit(flies, start.altitude_m)
+    steps = farthest(flies, SURVEY_ALTITUDE_M, start.altitude_m, ALTITUDE_STEP_M) / ALTITUDE_STEP_M
+    told = f"at least {ALTITUDE_STEP_M * math.ceil(steps):g}"
+    if start.altitude_m > SURVEY_ALTITUDE_M:
+        told = f"at most {ALTITUDE_STEP_M * math.floor(steps):g}"
     raise KeyFault(("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {told}: {fault}")
-
-
-def _altitude_limit(flies: Callable[[float], bool], bad: float) -> str:
-    """Finds the limit of altitudes by bisection from the survey's to a bad one; says "at most" or "at least" it."""
-    good = SURVEY_ALTITUDE_M
-    while abs(good - bad) > ALTITUDE_STEP_M:
-        middle = 0.5 * (good + bad)
-        good, bad = (middle, bad) if flies(middle) else (good, middle)
-    steps = math.floor(good / ALTITUDE_STEP_M) if bad > good else math.ceil(good / ALTITUDE_STEP_M)
-    return f"{'at most' if bad > good else 'at least'} {ALTITUDE_STEP_M * steps:g}"
 
 
 def _is_as_surveyed(deviation: DeviationSpec | None, mass_kg: float) -> bool:
