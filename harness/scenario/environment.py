@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
 
@@ -67,18 +67,12 @@ class GroundSpec(Section):
 
         from harness.world_files.height_field import packed
 
-        (rows, columns), lowest_m = field.heights_m.shape, float(np.floor(np.nanmin(field.heights_m)))
-        step_m = max(HEIGHT_STEP_M, float(np.nanmax(field.heights_m) - lowest_m) / 60_000)
-        nodes: dict[str, Any] = {
-            "corner_m": field.corner_m,
-            "spacing_m": field.spacing_m,
-            "rows": rows,
-            "columns": columns,
-        }
-        heights = packed(field.heights_m, lowest_m, step_m)
+        keys = {name: getattr(field, name) for name in ("corner_m", "spacing_m", "scale_m")}
+        keys["rows"], keys["columns"] = field.heights_m.shape
+        keys["lowest_m"] = low_m = float(np.floor(np.nanmin(field.heights_m)))
+        keys["step_m"] = step_m = max(HEIGHT_STEP_M, float(np.nanmax(field.heights_m) - low_m) / 60_000)
         lattice = None if field.lattice is None else tuple(field.lattice.ravel().tolist())
-        nodes |= {"lowest_m": lowest_m, "step_m": step_m, "heights": heights}
-        return cls.model_construct(**nodes, lattice=lattice, scale_m=field.scale_m)
+        return cls.model_construct(**keys, lattice=lattice, heights=packed(field.heights_m, low_m, step_m))
 
 
 class SourceSpec(Section):

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from harness.world_files.expansion import Source
     from harness.world_files.parts import FileSpec
 
-
 SAME_ALTITUDE_M: Final = 0.5  # files cut at altitudes no further apart are taken as the same
 
 

@@ -20,6 +20,7 @@ from typing import Any
 
 from aircraft.guidance.registry import BUILT_IN as LAWS
 from aircraft.guidance.registry import GuidanceKind
+from harness.files.errors import sentence
 from planner.registry import BUILT_IN as PLANNERS
 from planner.registry import PlannerKind
 
@@ -54,8 +55,8 @@ class LoopPart:
                 with redirect_stdout(sys.stderr):
                     kind = point.load()
             except Exception as error:
-                reason = " ".join(f"{type(error).__name__}: {error}".split())
-                raise PluginError(f"{told} cannot be loaded: {reason}; {PLUGIN_REMEDY}") from error
+                told += f" cannot be loaded: {sentence(error)}"
+                raise PluginError(f"{told}; {PLUGIN_REMEDY}") from error
             if not isinstance(kind, self.kind):
                 raise PluginError(f"{told} is no {self.kind.__name__}; {PLUGIN_REMEDY}")
             found.setdefault(kind.kind, (kind, owner))
@@ -215,8 +216,7 @@ def _imported(place: str, source: str) -> Any:
         if isinstance(error, ModuleNotFoundError) and error.name in (place, place.partition(".")[0]):
             told = f"{source}: there is no module {place}; give FILE.py:NAME or MODULE:NAME"
             raise ValueError(told) from error
-        told = f"{type(error).__name__}: {' '.join(str(error).split())}"
-        raise ValueError(f"{place} cannot be imported: {told}") from error
+        raise ValueError(f"{place} cannot be imported: {sentence(error)}") from error
 
 
 def _module_of_file(path: Path) -> Any:

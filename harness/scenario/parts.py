@@ -79,8 +79,7 @@ def flown_airframe(spec: AircraftSpec) -> Airframe:
     frame = airframe_of(spec)
     if spec.deviation is None:
         return frame
-    shares = {name: value or 0.0 for name, value in spec.deviation}
-    return replace(frame, files=replace(frame.files, deviation=Deviation(**shares)))
+    return replace(frame, files=replace(frame.files, deviation=Deviation(**dict(spec.deviation))))
 
 
 def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
@@ -113,10 +112,8 @@ def resolved_planner(spec: PlannerSpec, mission: Mission, as_flown: bool = False
     return spec.model_copy(update={"shield": chosen, **own})
 
 
-def resolved_guidance(spec: GuidanceSpec, aircraft: AircraftSpec, as_flown: bool = False) -> GuidanceSpec:
+def resolved_guidance(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceSpec:
     """Checks the guidance section and fills in its defaults; the aircraft's airspeed must be filled in."""
-    if as_flown and spec.kind not in guidance_kinds():
-        return spec
     kind = _named("guidance", spec, guidance_kinds())
     return spec.model_copy(update=_resolved_keys("guidance", spec, kind, limits_of(aircraft)))
 

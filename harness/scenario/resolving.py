@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from aircraft.airframe import Airframe
 
 POUND_KG: Final = 0.45359237
-
 TOLERANCE_M: Final = 10.0  # allowed error of altitude, and off the path where no clearance is written
 
 
@@ -58,10 +57,10 @@ def resolve(
         autopilot = (aircraft.autopilot or AutopilotSpec()).filled(state_latency_s=latency_s)
         aircraft = aircraft.model_copy(update={"autopilot": autopilot})
         _airframe(aircraft, latency_s)
-    guidance = resolved_guidance(keys.guidance, aircraft, as_flown)
-    scenario = keys.updated(aircraft=aircraft, guidance=guidance)
-    if as_flown and guidance.kind not in guidance_kinds():
+    scenario = keys.updated(aircraft=aircraft)
+    if as_flown and keys.guidance.kind not in guidance_kinds():
         return scenario  # what follows from how the law tracks stands there
+    scenario = scenario.updated(guidance=resolved_guidance(keys.guidance, aircraft))
 
     performance = performance_of(scenario)
     radius_m, wind_mps = performance.turn_radius_m, wind_mps_of(scenario)
@@ -226,10 +225,10 @@ def check_start_leads_in(area: Area, mission: MissionSpec, turn_radius_m: float)
     """Raises a KeyFault, with a course that would do, if straight on and tightest turns to both sides lead out."""
     if _stays_inside(area, mission.start_m, mission.course_deg, turn_radius_m):
         return
-    courses, wanted = range(0, 360, COURSE_STEP_DEG), "none would do: start farther from the border"
+    courses = range(0, 360, COURSE_STEP_DEG)
     good = (each for each in courses if _stays_inside(area, mission.start_m, each, turn_radius_m))
-    if (course := next(good, None)) is not None:
-        wanted = f"must be another, as {course}"
+    others = (f"must be another, as {each}" for each in good)
+    wanted = next(others, "none would do: start farther from the border")
     told = f"is {mission.course_deg:.0f}, which leads out of area.bounds_m at once: no turn of {turn_radius_m:.0f} m"
     told += f" from start_m {list(mission.start_m)} stays inside; {wanted}"
     raise KeyFault(("mission", "course_deg"), told)
