@@ -35,7 +35,6 @@ TRUE_AIRSPEED: Final = "true_airspeed_m_s"
 """Field of the topics `AIRSPEED_TOPICS` of PX4."""
 AIRSPEED_TOPICS: Final = ("airspeed_validated", "airspeed")  # the first that a log has counts
 
-
 Series = tuple[FloatArray, dict[str, FloatArray]]
 """(n, 4) time (s), latitude, longitude (deg), altitude (m); (m, 2) time and value, by column of `flown`."""
 

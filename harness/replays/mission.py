@@ -41,9 +41,8 @@ class Origin(BaseModel):
 def _corners(given: object) -> FloatArray:
     """(k, 2) east and north of two corners or more, without a last that is the first again; else ValueError."""
     found = np.array(given)
-    if found.dtype.kind not in "if" or found.ndim != 2 or found.shape[1] != 2 or len(found) < 2:
-        raise ValueError
-    if not np.isfinite(found).all():
+    pairs = found.dtype.kind in "if" and found.ndim == 2 and found.shape[1] == 2 and len(found) >= 2
+    if not pairs or not np.isfinite(found).all():
         raise ValueError
     closed = len(found) > 2 and np.hypot(*(found[-1] - found[0])) < 1.0
     return found[: len(found) - closed].astype(np.float64)

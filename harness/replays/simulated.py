@@ -22,6 +22,7 @@ from harness.replays.wind import FittedWind
 from harness.run.path_flight import GivenPath
 from harness.run.scenario_flight import FlownAs, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run
+from harness.scenario.navigation import Navigation
 from harness.scenario.scenario import Scenario, scenario_of
 from planner.interface import Path as PlannedPath
 
@@ -29,13 +30,7 @@ DEFAULT_LAW: Final = "bearing"
 """The guidance law of a simulated flight, with gain 1.5 and no switch by passing."""
 LATENCY_S: Final = 0.2
 """Age of the state that the law works with: ArduPilot's for an unknown receiver (AP_GPS_Backend::get_lag)."""
-ZERO_SIGMAS: Final = (
-    "position_sigma_m",
-    "altitude_sigma_m",
-    "heading_sigma_deg",
-    "velocity_sigma_mps",
-    "airspeed_sigma_mps",
-)
+ZERO_SIGMAS: Final = tuple(name for name in Navigation.model_fields if "_sigma_" in name)
 """A replay sets these keys of `navigation` to zero and keeps only the latency."""
 AREA_MARGIN_M: Final = 1000.0  # the area reaches this far beyond the flown track
 LEAST_ALTITUDE_M: Final = 50.0  # lower heights of a log are not above the sea
@@ -92,7 +87,7 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
     bounds = (*(places.min(axis=0) - AREA_MARGIN_M).tolist(), *(places.max(axis=0) + AREA_MARGIN_M).tolist())
     start, goal = places[0], mission.corners_m[task.first]
     far = max(float(np.hypot(*(goal - start))), 2.0)
-    altitude_m = task.height_m + (origin.altitude_m if origin else 0.0)
+    reached_m, altitude_m = mission.acceptance_m, task.height_m + (origin.altitude_m if origin else 0.0)
     changes = [[wind.time_s, wind.speed_mps, wind.from_deg] for wind in task.winds if wind.time_s > 0.0]
     wind = {"speed_mps": task.winds[0].speed_mps, "from_deg": task.winds[0].from_deg, "changes": changes}
     keys: dict[str, Any] = {
@@ -110,16 +105,12 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
         "aircraft": {
             "model": aircraft,
             "airspeed_mps": task.airspeed_mps,
-            "autopilot": {"state_latency_s": 0.0},
+            "autopilot": {"state_latency_s": 0.0, "bank_limit_deg": mission.bank_limit_deg},
         },
-        "guidance": {"kind": DEFAULT_LAW, "follow": "waypoints"},
+        "guidance": {"kind": DEFAULT_LAW, "follow": "waypoints", "acceptance_radius_m": reached_m},
         "navigation": {"kind": "gnss", **dict.fromkeys(ZERO_SIGMAS, 0.0), "latency_s": LATENCY_S},
         "environment": {"wind": wind},
     }
-    if mission.bank_limit_deg is not None:
-        keys["aircraft"]["autopilot"]["bank_limit_deg"] = mission.bank_limit_deg
-    if mission.acceptance_m is not None:
-        keys["guidance"]["acceptance_radius_m"] = mission.acceptance_m
     if origin:
         keys["area"]["origin"] = origin.model_dump(exclude={"altitude_m"})
     scenario = scenario_of(keys, overrides)
