@@ -88,9 +88,8 @@ def parsed_json(text: str, source: str) -> Any:
     def single(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len(found := dict(pairs)) < len(pairs):
             key, line, first = _key_twice(text)
-            raise fault(
-                f"has the key {shown(key)!r} twice in one place, first in line {first}; keep one", line
-            )
+            told = f"has the key {shown(key)!r} twice in one place, first in line {first}; keep one"
+            raise fault(told, line)
         return found
 
     try:

@@ -190,16 +190,13 @@ def fly_to_folder(
             sources = [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
             radius_m = loop.mission.turn_radius_m
             folder = stack.enter_context(RunFolder.create(out, text, told, sources, radius_m))
-            so_far, observers = _FlownSoFar(), [*watching]
-            scene = (
-                replace(scene_of(scenario, loop, text, pilot), profile=flown.profile) if recording else None
-            )
-            log = None if scene is None else _recording(scene, loop, folder, named)
-            if log is not None:
+            so_far, log = _FlownSoFar(), None
+            if recording:
+                scene = replace(scene_of(scenario, loop, text, pilot), profile=flown.profile)
+                log = _recording(scene, loop, folder, named)
                 stack.callback(log.end)
-                observers.append(log)
             try:
-                flight = flown.flown_by(loop, [so_far, *observers], progress)
+                flight = flown.flown_by(loop, [so_far, *watching, *([log] if log else [])], progress)
             except KeyboardInterrupt:
                 so_far.leave_in(folder)
                 raise

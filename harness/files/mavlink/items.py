@@ -59,10 +59,9 @@ class Item:
     def above(self) -> str:
         """The datum of its altitude; an InputError says that its frame has none."""
         if self.frame not in FRAMES:
-            raise InputError(
-                f"{self.place}: item {self.number} has the frame {self.frame}; must be one of "
-                f"{', '.join(map(str, sorted(FRAMES)))} (a path in local metres can be given as CSV)"
-            )
+            wanted = f"{', '.join(map(str, sorted(FRAMES)))} (a path in local metres can be given as CSV)"
+            told = f"item {self.number} has the frame {self.frame}; must be one of {wanted}"
+            raise InputError(f"{self.place}: {told}")
         return FRAMES[self.frame]
 
 
