@@ -16,24 +16,14 @@ from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.height_field import HeightField, cell_sides, height_field, window_of
-from harness.world_files.parts import (
-    NO_BOTTOM,
-    NO_TOP,
-    BoolArray,
-    Box,
-    Contents,
-    FileSpec,
-    FloatArray,
-    Raster,
-)
+from harness.world_files.parts import NO_BOTTOM, NO_TOP, Box, Contents, FileSpec
 from harness.world_files.plane import Mapping, Place, geodetic
-from harness.world_files.solids import Layer, Solid, clipped, placed_cells, quarters, simplified, sliced_parts
+from harness.world_files.solids import Layer, Solid, clipped, occupied, placed_cells, simplified, sliced_parts
 
 MARGIN: Final = 0.02
 """Parts of a file that lie outside the area by more than this share of its longer side are left out."""
 DECIMALS: Final = 3
 """Decimals of a corner in metres: corners are rounded to a millimetre."""
-STRIP_ROWS: Final = 256
 MAX_CORNERS: Final = 900_000  # more in all files are refused: such a scenario could not be read again
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
 """A polygon without a known bottom or top gets these, in metres above mean sea level."""
@@ -57,9 +47,8 @@ def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:
         if contents.crs is not None and key in ("shift_m", "metres_per_cell"):
             told[key] = f"has its place on earth, which {key} does not move; leave {key} out"
         elif contents.kind not in used_by:
-            told[key] = (
-                f"is of the kind {contents.kind}; {key} is used by {', '.join(used_by)} only: leave it out"
-            )
+            users = ", ".join(used_by)
+            told[key] = f"is of the kind {contents.kind}; {key} is used by {users} only: leave it out"
     return told
 
 
@@ -111,10 +100,9 @@ def expanded(
                 raise FileFault(index, sentence, key)
             loaded.append((contents, Mapping(contents.crs, place, spec.shift_m)))
             _check_place(*loaded[-1], box)
+    terrain = [(each.terrain, mapping) for each, mapping in loaded if each.terrain is not None]
     with blaming(0):
-        field, notes = height_field(
-            [(each.terrain, at) for each, at in loaded if each.terrain is not None], box
-        )
+        field, notes = height_field(terrain, box)
     field = field or ground
     sources: list[Source] = []
     for index, (spec, (contents, mapping)) in enumerate(zip(specs, loaded, strict=True)):
@@ -172,23 +160,9 @@ def _loaded(spec: FileSpec, stamp: tuple[int, int]) -> Contents:
         raise InputError("is nested too deeply; must be a map") from error
 
 
-def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
-    """Returns x and y, in the file, of the corners of its raster and of each part's box; empty where it has neither."""
-    found = [np.zeros((0, 2))]
-    if (raster := contents.raster) is not None:
-        rows, columns = raster.values.shape
-        x, y = raster.places(np.array([0.0, columns, columns, 0.0]), np.array([0.0, 0.0, rows, rows]))
-        found.append(np.column_stack((x, y)))
-    if contents.parts:
-        bounds = shapely.bounds(np.array([part.footprint for part in contents.parts], dtype=object))
-        found += [bounds[:, [i, j]] for i in (0, 2) for j in (1, 3)]
-    x, y = np.concatenate(found).T
-    return x, y
-
-
 def _check_place(contents: Contents, mapping: Mapping, box: Box) -> None:
     """Raises InputError if nothing of a file lies anywhere near the area."""
-    east, north = mapping.to_plane(*corners_of(contents))
+    east, north = mapping.to_plane(*contents.corners)
     known = np.isfinite(east) & np.isfinite(north)
     if not known.any():
         raise InputError("lies where its coordinates have no place on earth; its crs may be another")
@@ -198,7 +172,7 @@ def _check_place(contents: Contents, mapping: Mapping, box: Box) -> None:
     where = f"lies outside the area, at east {xmin:,.0f} to {xmax:,.0f} m, north {ymin:,.0f} to {ymax:,.0f} m"
     if contents.crs is None:
         raise InputError(f"{where}; must reach into it: give shift_m")
-    latitude, longitude = geodetic(contents.crs, *corners_of(contents))
+    latitude, longitude = geodetic(contents.crs, *contents.corners)
     middle = f"{np.nanmean(latitude):.4f}, longitude_deg: {np.nanmean(longitude):.4f}"
     raise InputError(f"{where}; area.origin {{latitude_deg: {middle}}} is in its middle")
 
@@ -217,7 +191,7 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
             taken, key = (spec.unknown, "unknown") if raster.occupancy else (spec.nodata, "nodata")
             notes.append(f"{counted(missing, 'cell')} without a value taken as {taken} ({key})")
         heights_m = HEIGHTS_M if raster.occupancy else (layer.low_m, layer.low_m)
-        shapes = placed_cells(near, _solid_cells(near, spec, layer.low_m), mapping)
+        shapes = placed_cells(near, occupied(near, spec, layer.low_m), mapping)
         solids += [Solid(shape, *heights_m) for shape in shapes]
         if spec.tolerance_m is None:
             rows, columns = raster.values.shape
@@ -232,22 +206,6 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
     limited = any((part.bottom, part.top) != (NO_BOTTOM, NO_TOP) for part in contents.parts)
     by_altitude = limited or contents.terrain is not None
     return Source(spec, contents.kind, contents.sha256, tuple(polygons), heights, tuple(notes), by_altitude)
-
-
-def _solid_cells(raster: Raster, spec: FileSpec, low_m: float) -> BoolArray:
-    """Returns which cells of a raster are occupied, or which quarters of cells are somewhere as high as `low_m`."""
-    values = raster.values
-    if raster.occupancy:
-        return (values >= 0.5) | (np.isnan(values) & (spec.unknown != "free"))
-    solid = np.zeros((2 * values.shape[0], 2 * values.shape[1]), dtype=np.bool_)
-    for first in range(
-        0, len(values) if values.size else 0, STRIP_ROWS
-    ):  # so that little memory is used at a time
-        before = min(first, 1)
-        highest = quarters(values[first - before : first + STRIP_ROWS + 1])[1][2 * before :][: 2 * STRIP_ROWS]
-        missing = np.isnan(highest) & (spec.nodata != "free")
-        solid[2 * first : 2 * (first + STRIP_ROWS)] = (highest >= low_m) | missing
-    return solid
 
 
 def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:

@@ -144,9 +144,7 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
     if not np.isfinite(heights).any():
         return None, []
     if (step := math.ceil(math.sqrt(heights.size / (0.95 * MAX_NODES)))) > 1:
-        whole = [
-            (0, (1 - size) % step) for size in heights.shape
-        ]  # so that the last node is at the edge or beyond
+        whole = [(0, (1 - size) % step) for size in heights.shape]  # the last node is at the edge or beyond
         heights = np.pad(_highest(heights, step), whole, mode="edge")[::step, ::step]
         notes.append(f"the ground is kept every {step} cells, no lower than between: its area is large")
     assert field.lattice is not None

@@ -12,17 +12,8 @@ from typing import Final
 from harness.files.input_file import InputError
 from harness.world_files import bounded
 from harness.world_files.parts import Contents, FileSpec
-from harness.world_files.readers import (
-    city_json,
-    fences,
-    footprints,
-    maps,
-    occupancy,
-    open_air,
-    osm,
-    raster,
-    zones,
-)
+from harness.world_files.readers import city_json, fences, maps, occupancy, open_air, osm, raster, zones
+from harness.world_files.readers.footprints import finished
 
 Reader = Callable[[FileSpec], Contents]
 GROUPS: Final[dict[str, dict[str, Reader]]] = {
@@ -102,7 +93,7 @@ def read(spec: FileSpec) -> Contents:
     found = kind if kind in KINDS else kind_of(spec.path)
     if kind in GROUPS and found not in GROUPS[kind]:
         raise InputError(f"is of the kind {found}, not {kind}; leave kind out, or give {found}")
-    contents = footprints.finished(KINDS[found](spec))
+    contents = finished(KINDS[found](spec))
     return replace(contents, kind=found, notes=_together(contents.notes))
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
@@ -113,6 +114,20 @@ class Contents:
     def terrain(self) -> Raster | None:
         """The raster if it holds heights of the ground, else None."""
         return None if self.raster is None or self.raster.occupancy else self.raster
+
+    @property
+    def corners(self) -> tuple[FloatArray, FloatArray]:
+        """X and y, in the file, of the corners of its raster and of each part's box; empty where it has neither."""
+        found = [np.zeros((0, 2))]
+        if self.raster is not None:
+            rows, columns = self.raster.values.shape
+            across, down = np.array([0.0, columns, columns, 0.0]), np.array([0.0, 0.0, rows, rows])
+            found.append(np.column_stack(self.raster.places(across, down)))
+        if self.parts:
+            bounds = shapely.bounds(np.array([part.footprint for part in self.parts], dtype=object))
+            found += [bounds[:, [i, j]] for i in (0, 2) for j in (1, 3)]
+        x, y = np.concatenate(found).T
+        return x, y
 
 
 @dataclass(frozen=True)

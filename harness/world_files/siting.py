@@ -13,15 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from harness.files.input_file import InputError
-from harness.world_files.expansion import (
-    Expanded,
-    FileFault,
-    blaming,
-    corners_of,
-    expanded,
-    loaded_file,
-    unused_keys,
-)
+from harness.world_files.expansion import Expanded, FileFault, blaming, expanded, loaded_file, unused_keys
 from harness.world_files.free_room import ROOM_RADII, WAY_RADII, FreeRoom, ends, free_room
 from harness.world_files.height_field import window_of
 from harness.world_files.parts import WGS84, Box, Contents, FileSpec, FloatArray
@@ -149,7 +141,7 @@ def _origin(contents: Sequence[Contents], given: FloatArray | None) -> Place:
     """Returns the plane's origin: between start and goal, else in the middle of the files."""
     if given is not None:
         return _rounded_place(float(np.mean(given[:, 0])), float(np.mean(short_way(given[:, 1]))))
-    found = np.hstack([np.stack(geodetic(str(each.crs), *corners_of(each))) for each in contents])
+    found = np.hstack([np.stack(geodetic(str(each.crs), *each.corners)) for each in contents])
     latitude, longitude = found[:, np.isfinite(found).all(axis=0)]
     if not len(latitude):
         raise InputError("nothing of these files has a place on earth; their crs may be another")
@@ -197,7 +189,7 @@ def _areas(files: _Files, craft: Craft, given: FloatArray | None) -> Iterator[tu
 def _most_crowded(files: _Files, half: FloatArray) -> list[FloatArray]:
     """Returns the mean of the obstacles' box corners in the part with the most of them; nothing for rasters alone."""
     drawn = ((replace(each, raster=None), mapping) for each, mapping in files.placed())
-    places = np.hstack([np.stack(mapping.to_plane(*corners_of(each))) for each, mapping in drawn]).T
+    places = np.hstack([np.stack(mapping.to_plane(*each.corners)) for each, mapping in drawn]).T
     places = places[np.isfinite(places).all(axis=1)]
     if not len(places):
         return []
@@ -212,7 +204,7 @@ def _file_boxes(files: _Files) -> tuple[list[Box], list[Box]]:
     around: list[Box] = []
     for each, mapping in files.placed():
         raster = each.raster
-        east, north = mapping.to_plane(*corners_of(each if raster is None else replace(each, parts=())))
+        east, north = mapping.to_plane(*(each if raster is None else replace(each, parts=())).corners)
         known = np.isfinite(east) & np.isfinite(north)
         if known.any():
             # Of a raster the largest upright rectangle within its four corners, which may lie askew.

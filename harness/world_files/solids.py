@@ -17,10 +17,11 @@ import shapely
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files.height_field import HeightField, bilinear
-from harness.world_files.parts import BoolArray, Box, Datum, FloatArray, Part, Raster
+from harness.world_files.parts import BoolArray, Box, Datum, FileSpec, FloatArray, Part, Raster
 from harness.world_files.plane import Mapping
 
 MAX_RUNS: Final = 400_000  # a mask of cells with more runs of solid cells along its rows than this is refused
+STRIP_ROWS: Final = 256  # of a raster are looked at at a time, so that little memory is used
 LONGEST_EDGE_CELLS: Final = 64
 """Edges of cells' outlines longer than this get points between, which keeps them within 0.01 cell in the plane."""
 MOST_GROWTH: Final = 0.005  # filling a polygon's notches may add at most this share of its area
@@ -182,6 +183,20 @@ def outlines(mask: BoolArray) -> list[Any]:
     last = np.append(first[1:], len(rows)) - 1
     boxes = shapely.box(begins[first], rows[first], ends[first], rows[last] + 1)
     return list(shapely.get_parts(shapely.simplify(shapely.union_all(boxes), 0.0)))
+
+
+def occupied(raster: Raster, spec: FileSpec, low_m: float) -> BoolArray:
+    """Returns which cells of a raster are occupied, or which quarters of cells are somewhere as high as `low_m`."""
+    values = raster.values
+    if raster.occupancy:
+        return (values >= 0.5) | (np.isnan(values) & (spec.unknown != "free"))
+    solid = np.zeros((2 * values.shape[0], 2 * values.shape[1]), dtype=np.bool_)
+    for first in range(0, len(values) if values.size else 0, STRIP_ROWS):
+        before = min(first, 1)
+        highest = quarters(values[first - before : first + STRIP_ROWS + 1])[1][2 * before :][: 2 * STRIP_ROWS]
+        missing = np.isnan(highest) & (spec.nodata != "free")
+        solid[2 * first : 2 * (first + STRIP_ROWS)] = (highest >= low_m) | missing
+    return solid
 
 
 def placed_cells(raster: Raster, solid: BoolArray, mapping: Mapping) -> list[Any]:

@@ -94,10 +94,8 @@ def read(spec: FileSpec) -> Contents:
     parts = [each.parts(notes) for each in spaces]
     if not any(parts):
         raise InputError("has no airspace with an area; must be OpenAir with some")
-    classes = ", ".join(dict.fromkeys(each.kind[:12] for each in spaces))
-    notes.append(
-        f"airspaces of every class are solid at all times ({classes}): take out what may be flown in"
-    )
+    kinds = ", ".join(dict.fromkeys(each.kind[:12] for each in spaces))
+    notes.append(f"airspaces of every class are solid at all times ({kinds}): take out what may be flown in")
     if ignored:
         words = ", ".join(repr(word[:12]) for word in [*ignored][:4])
         notes.append(f"{counted(ignored.total(), 'line')} of commands that draw nothing passed over: {words}")

@@ -54,9 +54,7 @@ class _Zones:
         """Returns all zones as parts, with the notes on them."""
         if not self.parts:
             raise InputError("has no zone with an area that forbids something; must have some")
-        told = [
-            f"{counted(self.told[why], what)} {sentence}" for why, what, sentence in NOTES if self.told[why]
-        ]
+        told = [f"{counted(self.told[why], noun)} {says}" for why, noun, says in NOTES if self.told[why]]
         return Contents(WGS84, tuple(self.parts), notes=(*self.notes, *told))
 
 
@@ -93,11 +91,8 @@ def _add_volume(found: _Zones, volume: Any, name: str) -> None:
     unit, is_round = _unit(volume.get("uomDimensions")), projection.get("type") == "Circle"
     if is_round and unit != "m":
         found.notes.append(f"{name}: its radius is taken as metres, its limits as feet")
-    shape = (
-        _disc(projection, "center")
-        if is_round
-        else polygon_of(projection, f"zone {name!r}: horizontalProjection")
-    )
+    at = f"zone {name!r}: horizontalProjection"
+    shape = _disc(projection, "center") if is_round else polygon_of(projection, at)
     if shape is None:
         raise InputError(f"has zone {name!r} whose projection is neither a circle nor a polygon with an area")
     found.add(shape, volume, unit, name)

@@ -15,7 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 from aircraft.frames import LocalPlane
 from harness.scenario.environment import GroundSpec
 from harness.world_files import height_field, solids
-from harness.world_files.expansion import Expanded, FileFault, corners_of, expanded, loaded_file
+from harness.world_files.expansion import Expanded, FileFault, expanded, loaded_file
 from harness.world_files.parts import FileSpec
 from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.solids import outlines, simplified
@@ -34,10 +34,10 @@ def cut(path: Path, altitude_m: float, **keys: Any) -> tuple[Expanded, Mapping]:
     contents = loaded_file(spec)
     place = Place(47.0, 8.0)
     if contents.crs:
-        latitude, longitude = geodetic(contents.crs, *corners_of(contents))
+        latitude, longitude = geodetic(contents.crs, *contents.corners)
         place = Place(*(round(float(each.min() + each.max()) / 2, 5) for each in (latitude, longitude)))
     mapping = Mapping(contents.crs, place)
-    east, north = mapping.to_plane(*corners_of(contents))
+    east, north = mapping.to_plane(*contents.corners)
     bounds = (float(east.min()), float(north.min()), float(east.max()), float(north.max()))
     return expanded([spec], place, bounds, altitude_m), mapping
 
