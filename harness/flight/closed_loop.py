@@ -197,7 +197,7 @@ class ClosedLoop:
                 steering = self._guidance.update(self.believed)
                 numbers = steering.roll_command_rad + steering.cross_track_m + steering.arc_length_m
                 finite = math.isfinite(numbers) and not math.isinf(steering.airspeed_mps)
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 self._law_error = trace(error)
                 return Ending(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
             if not finite:

@@ -119,7 +119,7 @@ class Plans:
         try:
             self.entered_m = late_s * state.groundspeed_mps
             guidance.follow(route, arc_length_m=self.entered_m)
-        except Exception as error:  # a law of somebody else's may raise anything
+        except (Exception, SystemExit) as error:  # a law of somebody else's may raise anything
             self.error = trace(error)
             return Ending(
                 Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)} when it was given a plan"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,8 @@ class Broken:
     def update(self, state: AircraftState) -> GuidanceOutput:
         self._updates += 1
         output = GuidanceOutput(0.0, 0.0, 25.0 * state.time_s, False, False)
+        if self._updates == self._after and self._then is None:
+            sys.exit("enough")
         return output if self._updates < self._after else self._then
 
 
@@ -58,6 +61,7 @@ FINE = GuidanceOutput(0.0, 0.0, 0.0, False, False)
         ({"then": FINE._replace(airspeed_mps=math.inf)}, "an airspeed of inf m/s"),
         ({"then": FINE._replace(cross_track_m=math.nan)}, "nan m beside its route"),
         ({"then": "left"}, "the guidance law raised AttributeError"),
+        ({"then": None}, "the guidance law raised SystemExit: enough"),
     ],
 )
 def test_ends_as_lost_control(law: dict[str, Any], after: int, said: str, tmp_path: Path) -> None:
