@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,13 +158,12 @@ def _wanted_columns(names: Sequence[str], path: Path) -> tuple[tuple[str, str], 
     place = next((pair for pair in (*reversed(LOCAL), *DEGREES) if set(pair) <= set(names)), None)
     if "time_s" not in names or place is None:
         missing = next((name for name in ("time_s", *LOCAL[1]) if name not in names), "")
-        raise InputError(
-            f"{path}: has no column {missing}; must have time_s, and east_m, north_m or latitude_deg, longitude_deg"
-        )
-    wanted = {"time_s": "time_s", "east_m": place[0], "north_m": place[1]}
+        wanted = "time_s, and east_m, north_m or latitude_deg, longitude_deg"
+        raise InputError(f"{path}: has no column {missing}; must have {wanted}")
+    found = {"time_s": "time_s", "east_m": place[0], "north_m": place[1]}
     heights = [name for name in ("up_m", *ALTITUDES) if name in names]
-    wanted |= dict(zip(("up_m",), heights, strict=False)) | {name: name for name in OPTIONAL if name in names}
-    return place, wanted
+    found |= dict(zip(("up_m",), heights, strict=False)) | {name: name for name in OPTIONAL if name in names}
+    return place, found
 
 
 def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:
@@ -176,11 +176,9 @@ def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:
     if any(is_so(column.type) for is_so in plain):
         values: FloatArray = column.cast("float64", safe=False).to_numpy()
         return values
-    rows = enumerate(column.to_pylist(), start=1)
-    where = f"{path}: {name}: row"
-    return np.array(
-        [
-            np.nan if each in (None, "", "nan") else finite(each, f"{where} {row}", isinstance(each, str))
-            for row, each in rows
-        ]
-    )
+
+    def number(row: int, cell: Any) -> float:
+        empty = cell in (None, "", "nan")
+        return math.nan if empty else finite(cell, f"{path}: {name}: row {row}", isinstance(cell, str))
+
+    return np.array([number(*each) for each in enumerate(column.to_pylist(), start=1)])

@@ -56,9 +56,8 @@ def read_log(path: Path, plane: LocalPlane) -> tuple[dict[str, FloatArray], list
         raise InputError(f"{path}: has {len(places)} rows with a position; a track has at least 2")
     times = places[:, 0]
     if times[-1] - times[0] > LONGEST_S:
-        raise InputError(
-            f"{path}: its times reach from {times[0]:g} to {times[-1]:g} s; a flight may take {LONGEST_S:g} s at most"
-        )
+        told = f"its times reach from {times[0]:g} to {times[-1]:g} s"
+        raise InputError(f"{path}: {told}; a flight may take {LONGEST_S:g} s at most")
     east, north = np.array([plane.plane(*place) for place in places[:, 1:3].tolist()]).T
     columns = {"time_s": times - times[0], "east_m": east, "north_m": north, "up_m": places[:, 3]}
     return columns | {name: np.interp(times, *each.T) for name, each in others.items() if len(each)}, notes

@@ -121,9 +121,8 @@ def placed(path: Path, origins: Sequence[Place], flight: FlownFlight, notes: lis
     latitude, longitude = origins[best]
     what = "home" if len(origins) > 1 and best == 0 else "the first waypoint"
     told = f"the log's east = north = 0 is taken to be {what}, {latitude:.6f}, {longitude:.6f}"
-    notes.append(
-        f"mission: in degrees; {told}; the flight comes within {missed_m[best]:.0f} m of its corners"
-    )
+    near = f"the flight comes within {missed_m[best]:.0f} m of its corners"
+    notes.append(f"mission: in degrees; {told}; {near}")
     return every[best]
 
 
@@ -176,17 +175,15 @@ def mission_of_targets(flight: FlownFlight) -> Given:
         InputError: the table has no such column, or its targets are not 0, 1, ... in turn.
     """
     if "target_index" not in flight:
-        raise InputError(
-            f"{flight.source}: its mission is not known; give --mission FILE, or a column target_index"
-        )
+        told = "its mission is not known; give --mission FILE, or a column target_index"
+        raise InputError(f"{flight.source}: {told}")
     target = flight["target_index"]
     reached = np.flatnonzero((np.diff(target) != 0.0) & (target[:-1] >= 0.0) & (target[1:] >= 0.0))
     numbers = np.unique(target[reached])
     if len(numbers) < 2 or (numbers != np.arange(len(numbers))).any():
         told = ", ".join(f"{each:g}" for each in numbers[:8].tolist()) or "none"
-        raise InputError(
-            f"{flight.source}: target_index: is changed from {told}; must be from 0, 1 and so on; give --mission FILE"
-        )
+        told = f"is changed from {told}; must be from 0, 1 and so on; give --mission FILE"
+        raise InputError(f"{flight.source}: target_index: {told}")
     going = np.column_stack((flight["ve_mps"], flight["vn_mps"]))[reached]
     ahead = TARGET_RADIUS_M * going / np.hypot(*going.T)[:, None]
     places = np.column_stack((flight["east_m"], flight["north_m"]))[reached] + ahead
@@ -207,9 +204,8 @@ def _lap(commands: Sequence[Command], path: Path) -> list[Command]:
         told = f"item {other.number} of its mission, {name_of(other.command)}, is no corner"
         raise InputError(f"{path}: {told}; give --mission FILE with the corners")
     if len(lap) < 2:
-        raise InputError(
-            f"{path}: its mission has fewer than 2 waypoints before its jump; give --mission FILE"
-        )
+        told = "its mission has fewer than 2 waypoints before its jump"
+        raise InputError(f"{path}: {told}; give --mission FILE")
     return lap
 
 

@@ -109,9 +109,8 @@ def _from_where_laps_begin(mission: FlownMission, flight: FlownFlight, notes: li
     begins = np.flatnonzero((np.diff(laps) > 0.0) & (laps[:-1] >= 1.0)) + 1
     first, away_m = mission.corner_at(flight, begins, 0) if begins.size else (0, 0.0)
     if first:
-        notes.append(
-            f"laps begin at corner {first + 1} of the mission, {away_m:.0f} m from where lap changes"
-        )
+        where = f"{away_m:.0f} m from where lap changes"
+        notes.append(f"laps begin at corner {first + 1} of the mission, {where}")
     return mission.model_copy(update={"corners_m": np.roll(mission.corners_m, -first, axis=0)})
 
 
@@ -178,20 +177,16 @@ def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
     if recording:
         from harness.recording.tracks import write_tracks
 
+        above = {name: side.columns["up_m"] - side.height_m for name, side in sides.items()}
         tracks = {
-            name: {
-                **side.columns,
-                "height_m": side.columns["up_m"] - side.height_m,
-                "outside_m": side.outside,
-            }
+            name: {**side.columns, "height_m": above[name], "outside_m": side.outside}
             for name, side in sides.items()
         }
         write_tracks(f"replay of {told['log']}", found.corners_m, tracks, found.folder / RECORDING)
     between = told["distance_between_m"]
-    caption = (
-        f"The settled laps {', '.join(map(str, told['settled_laps']))}: flown and simulated, "
-        f"{between['p50']:.1f} m apart in the median, {between['p95']:.1f} m at 95 %."
-    )
+    apart = f"{between['p50']:.1f} m apart in the median, {between['p95']:.1f} m at 95 %"
+    laps = ", ".join(map(str, told["settled_laps"]))
+    caption = f"The settled laps {laps}: flown and simulated, {apart}."
     picture = Picture(svg(replay_figure(found)), "Flown and simulated track from above", caption)
     page = rendered("replay.html", told=told, rows=rows_of(told), picture=picture)
     replace_text(found.folder / "report.html", page)

@@ -115,9 +115,8 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
         keys["area"]["origin"] = origin.model_dump(exclude={"altitude_m"})
     scenario = scenario_of(keys, overrides)
     if scenario.guidance.follow != "waypoints":
-        raise InputError(
-            "command line: guidance.follow: is path; must be waypoints, as the log's corners are flown to"
-        )
+        told = "is path; must be waypoints, as the log's corners are flown to"
+        raise InputError(f"command line: guidance.follow: {told}")
     return scenario
 
 
