@@ -68,10 +68,8 @@ def _kinds_of(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
     from harness.scenario.kinds import registered
 
     if isinstance(names, str) or not names or not all(isinstance(each, str) for each in names):
-        raise InputError(
-            f"wayproof: compare flies in processes of its own; give {argument} as a list of names, FILE.py:NAME for "
-            "your own"
-        )
+        told = f"give {argument} as a list of names, FILE.py:NAME for your own"
+        raise InputError(f"wayproof: compare flies in processes of its own; {told}")
     try:
         return [registered(each, part) for each in names]
     except ValueError as error:
@@ -128,9 +126,8 @@ def load_campaign(folder: str | Path) -> CampaignResult:
     """Reads the folder of a campaign, complete or not; an InputError says that it holds none, or is damaged."""
     path = Path(folder)
     if path.is_file():
-        raise InputError(
-            f"wayproof: {path} is a file; give the folder of a campaign, or fly the file with sweep"
-        )
+        told = "give the folder of a campaign, or fly the file with sweep"
+        raise InputError(f"wayproof: {path} is a file; {told}")
     result = CampaignResult(path)
     len(result.table)
     return result

@@ -119,10 +119,8 @@ class Scenario(ScenarioKeys):
 
     def __repr__(self) -> str:
         """A line for people; `dump_scenario` gives all of it."""
-        return (
-            f"Scenario({self.name}: {self.planner.kind}, {Path(self.aircraft.model).name}, seed {self.seed}, "
-            f"{counted(len(self.obstacles), 'obstacle')})"
-        )
+        model, obstacles = Path(self.aircraft.model).name, counted(len(self.obstacles), "obstacle")
+        return f"Scenario({self.name}: {self.planner.kind}, {model}, seed {self.seed}, {obstacles})"
 
     __str__ = __repr__
 
