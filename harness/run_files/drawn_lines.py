@@ -65,9 +65,7 @@ class PathAsRead(NamedTuple):
 
 def _notes_on_others(others: Mapping[str, int]) -> list[str]:
     """Returns notes on what else is in a file, by kind and count."""
-    return [
-        f"{counted(count, what)} beside the path passed over" for what, count in others.items() if count > 0
-    ]
+    return [f"{counted(n, what)} beside the path passed over" for what, n in others.items() if n > 0]
 
 
 def read_csv(text: str, source: str, any_altitude: bool = False) -> PathAsRead:
@@ -80,20 +78,14 @@ def read_csv(text: str, source: str, any_altitude: bool = False) -> PathAsRead:
     names = _columns(header, f"{source}:{line}", any_altitude)
     points: list[Point] = []
     for number, row in filled:
+        at = f"{source}:{number}"
         if len(row) != len(header):
-            raise InputError(f"{source}:{number}: has {len(row)} cells, the header {len(header)}")
+            raise InputError(f"{at}: has {len(row)} cells, the header {len(header)}")
         cells = dict(zip(header, row, strict=True))
-        first, second, *height = (
-            finite(cells[name], f"{source}:{number}: {name}", text=True) for name in names
-        )
+        first, second, *height = (finite(cells[name], f"{at}: {name}", text=True) for name in names)
         points.append((first, second, height[0] if height else None))
-    return PathAsRead(
-        source,
-        points,
-        _notes_on_columns(header, names),
-        names[2:] == [ABOVE_GROUND],
-        tuple(names[:2]) in LOCAL,
-    )
+    above_ground, local = names[2:] == [ABOVE_GROUND], tuple(names[:2]) in LOCAL
+    return PathAsRead(source, points, _notes_on_columns(header, names), above_ground, local)
 
 
 def _notes_on_columns(header: list[str], names: list[str]) -> list[str]:
@@ -186,10 +178,9 @@ def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
     """Reads the path of a KML file, its one LineString, with altitudes if their mode gives them a meaning."""
     found = kml.read_kml(data, source, most)
     if len(found.lines) != 1:
-        told = f" ({', '.join(line.name for line in found.lines[:4])})" if found.lines else ""
-        raise InputError(
-            f"{found.source}: has {len(found.lines)} lines{told}; must have exactly one, the path"
-        )
+        named = f" ({', '.join(line.name for line in found.lines[:4])})" if found.lines else ""
+        told = f"{len(found.lines)} lines{named}"
+        raise InputError(f"{found.source}: has {told}; must have exactly one, the path")
     (line,) = found.lines
     points, notes = list(line.rings[0]), _notes_on_others({**found.others, "Polygon": len(found.polygons)})
     if line.mode not in (ABSOLUTE, RELATIVE):

@@ -34,21 +34,17 @@ PX4, FIXED_WING = 12, 1
 
 
 class ExportedPath(NamedTuple):
-    """A path, "flown" or "planned": (n, 2) latitude and longitude (WGS84), (n,) altitudes above mean sea level.
-
-    Those that were to be held there are for missions.
-    """
+    """A path, "flown" or "planned": (n, 2) latitude and longitude (WGS84), (n,) altitudes above mean sea level."""
 
     what: str
     scenario: Scenario
     degrees: FloatArray
     altitude_m: FloatArray
-    held_m: FloatArray
 
 
 def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
     """Writes a run in one of `FORMATS`, its track or the plans in effect; returns it, with notes for its user."""
-    path = _path_of(run, what)
+    path = _path_of(run, what, held=form in MISSIONS)
     if len(path.degrees) < 2:
         raise RunFolderError(f"the run in {run.folder} has no {what} path: it is too short")
     origin, outcome, notes = path.scenario.area.origin, run.metrics["outcome"], []
@@ -56,15 +52,13 @@ def exported(run: Run, form: str, what: str) -> tuple[bytes, list[str]]:
         ended = f"{outcome.replace('_', ' ')}: {run.metrics['reason']}"
         notes.append(f"the run did not reach its goal, and its mission would not either ({ended})")
     if origin == Origin():  # nobody knows any more whether it was given
-        place = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
-        notes.append(
-            f"area.origin is {place}, also the default of scenarios without one: the file lies there"
-        )
+        at = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
+        notes.append(f"area.origin is {at}, also the default of scenarios without one: the file lies there")
     return FORMATS[form](path).encode(), notes
 
 
-def _path_of(run: Run, what: str) -> ExportedPath:
-    """Returns the path of a run with no more points than it needs."""
+def _path_of(run: Run, what: str, held: bool) -> ExportedPath:
+    """Returns the path of a run with no more points than it needs, at altitudes flown, or those to be `held` there."""
     scenario = parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"), as_flown=True)
     track, profile = run.track, (run.metrics.get("check") or {}).get("profile") or {}
     known = profile.get("arc_length_m", [0.0]), profile.get("altitude_m", [scenario.mission.altitude_m])
@@ -81,7 +75,7 @@ def _path_of(run: Run, what: str) -> ExportedPath:
         points, held_m, altitude_m = points[kept], held_m[kept], altitude_m[kept]
     plane = LocalPlane(scenario.area.origin.latitude_deg, scenario.area.origin.longitude_deg)
     degrees = np.array([plane.geodetic(*point) for point in points.tolist()]).reshape(-1, 2).round(DIGITS)
-    return ExportedPath(what, scenario, degrees, altitude_m.round(3), held_m.round(3))
+    return ExportedPath(what, scenario, degrees, (held_m if held else altitude_m).round(3))
 
 
 def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
@@ -105,8 +99,8 @@ def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
 
 
 def _places(path: ExportedPath) -> list[list[float]]:
-    """Returns latitude, longitude and altitude of a mission's waypoints."""
-    places: list[list[float]] = np.column_stack((path.degrees, path.held_m)).tolist()
+    """Returns latitude, longitude and altitude of each point."""
+    places: list[list[float]] = np.column_stack((path.degrees, path.altitude_m)).tolist()
     return places
 
 
@@ -164,13 +158,12 @@ def geojson_text(path: ExportedPath) -> str:
 
 def kml_text(path: ExportedPath) -> str:
     """Returns KML 2.2 with one line, its altitudes above mean sea level: https://www.ogc.org/standard/kml."""
-    rows = zip(path.degrees.tolist(), path.altitude_m.tolist(), strict=True)
     root = ElementTree.Element("kml", {"xmlns": "http://www.opengis.net/kml/2.2"})
     placemark = ElementTree.SubElement(ElementTree.SubElement(root, "Document"), "Placemark")
     ElementTree.SubElement(placemark, "name").text = f"{path.scenario.name}, {path.what}"
     line = ElementTree.SubElement(placemark, "LineString")
     ElementTree.SubElement(line, "altitudeMode").text = "absolute"
-    ElementTree.SubElement(line, "coordinates").text = " ".join(f"{b},{a},{up}" for (a, b), up in rows)
+    ElementTree.SubElement(line, "coordinates").text = " ".join(f"{b},{a},{up}" for a, b, up in _places(path))
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

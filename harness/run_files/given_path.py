@@ -241,14 +241,11 @@ def _off_given_m(places: NDArray[Any], apex: complex, legs: NDArray[Any], radius
     touch = apex - radius_m * np.tan(0.5 * abs(turn)) * legs[0]
     swept = np.exp(1j * turn * np.linspace(0.0, 1.0, ARC_POINTS))
     arc = touch + 1j * np.sign(turn) * radius_m * legs[0] * (1.0 - swept)
-    given = np.concatenate((places, 0.5 * (places[1:] + places[:-1])))
+    given = np.repeat(places, 2)[:-1]
+    given[1::2] = 0.5 * (places[1:] + places[:-1])
     way = np.concatenate((places[:1], arc, places[-1:]))
-    pairs = (arc, places), (given[1:], way)
-    off_m = 0.0
-    for spots, corners in pairs:
-        line = shapely.LineString(np.column_stack((corners.real, corners.imag)))
-        off_m = max(off_m, float(shapely.distance(line, shapely.points(spots.real, spots.imag)).max()))
-    return off_m
+    lines = (shapely.LineString(np.column_stack((each.real, each.imag))) for each in (given, way))
+    return float(shapely.hausdorff_distance(*lines))
 
 
 class _Shapes(NamedTuple):

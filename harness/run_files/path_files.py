@@ -103,9 +103,8 @@ def _of_line(found: PathAsRead, source: str, any_altitude: bool, origin_deg: Pla
         raise InputError(f"{source}: has {counted(count, 'point')}; a path has at least 2")
     heights = [altitude for *_, altitude in found.points if altitude is not None]
     if heights and len(heights) != count:
-        raise InputError(
-            f"{found.where}: has an altitude at {len(heights)} of {count} points; give all or none"
-        )
+        told = f"{len(heights)} of {count} points"
+        raise InputError(f"{found.where}: has an altitude at {told}; give all or none")
     positions = [(first, second) for first, second, _ in found.points]
     if found.local:
         origin, points = None, np.array(positions)
@@ -131,9 +130,8 @@ def _of_mission(flown: Program, source: str, origin_deg: Place | None) -> PathAs
     steps = tuple(replace(step, position=step.position and place(step.position)) for step in flown.steps)
     if flown.home is None and any(step.height_m is not None and step.above == HOME for step in flown.steps):
         notes = (*notes, "has no home: altitudes above home are counted from the sea")
-    return PathAsGiven(
-        source, points, origin, mission=replace(flown, steps=steps, fences=fences), notes=notes
-    )
+    mission = replace(flown, steps=steps, fences=fences)
+    return PathAsGiven(source, points, origin, mission=mission, notes=notes)
 
 
 def given_points(points: Any) -> PathAsGiven:

@@ -14,15 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from aircraft.interface import FloatArray
 from harness.flight.polylines import polylines
-from harness.flight.record import (
-    BELIEVED_FIELDS,
-    TRACK_COLUMNS,
-    TRACK_FIELDS,
-    AcceptedPlan,
-    FloatArray,
-    Track,
-)
+from harness.flight.record import BELIEVED_FIELDS, TRACK_COLUMNS, TRACK_FIELDS, AcceptedPlan, Track
 
 if TYPE_CHECKING:
     import pyarrow as pa
