@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from harness.cli.app import main
 from tests.faults.hostile import JSON_SNIPPETS, KEYS, as_json, spoilt, spoilt_bytes
 from tests.longer import longer
+from tests.refusals import refused
 
 FILES = ("track.parquet", "plans.parquet", "metrics.json", "manifest.json", "scenario.yaml")
 INDICES = {
@@ -114,30 +115,24 @@ def device(path: Path) -> None:
         *(("flight.rrd", make) for make in (pipe, loop, device, Path.mkdir)),
     ],
 )
-def test_something_else_in_place_of_a_file(
-    name: str, make: Any, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_something_else_in_place_of_a_file(name: str, make: Any, a_run: Path, tmp_path: Path) -> None:
     copy = tmp_path / "run"
     shutil.copytree(a_run, copy)
     (copy / name).unlink()
     make(copy / name)
     for arguments in (["report", str(copy)], ["view", str(copy), str(a_run)]):
         if (name == "flight.rrd") == (arguments[0] == "view"):
-            assert main(arguments) == 2
-            said = capsys.readouterr().err
+            said = refused(*arguments)
             assert str(copy) in said
             assert len(said.splitlines()) == 1
 
 
 @pytest.mark.parametrize("name", INDICES)
 @pytest.mark.parametrize("kind", ["too deep", "a pipe"])
-def test_a_folder_with_an_index_that_is_none_is_somebody_elses(
-    kind: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_with_an_index_that_is_none_is_somebody_elses(kind: str, name: str, tmp_path: Path) -> None:
     if kind == "a pipe":
         os.mkfifo(tmp_path / name)
     else:
         (tmp_path / name).write_text("[" * 100_000)
-    assert main([*INDICES[name], "--out", str(tmp_path)]) == 2
-    assert f"{tmp_path} is not empty and not a" in capsys.readouterr().err
+    assert f"{tmp_path} is not empty and not a" in refused(*INDICES[name], "--out", tmp_path)
     assert [each.name for each in tmp_path.iterdir()] == [name]

@@ -18,6 +18,7 @@ import pytest
 from harness.cli.app import main
 from harness.files.whole_file import PARTIAL
 from tests.faults.command import FOREST
+from tests.refusals import refused
 
 OUTPUTS = ("report.html", "report.csv", "path.svg", "path.png")
 
@@ -64,28 +65,22 @@ def test_a_flight_writes_through_no_link(sent: Path, tmp_path: Path) -> None:
     assert not (sent / "flight.rrd").is_symlink()
 
 
-def test_a_pipe_in_the_place_of_an_output_is_refused_at_once(
-    sent: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_pipe_in_the_place_of_an_output_is_refused_at_once(sent: Path, tmp_path: Path) -> None:
     (sent / "report.csv").unlink(missing_ok=True)
     os.mkfifo(sent / "report.csv")
-    assert main(["report", str(sent)]) == 2
-    assert "report.csv: is a pipe or a device, not a file" in capsys.readouterr().err
+    assert "report.csv: is a pipe or a device, not a file" in refused("report", sent)
     os.mkfifo(tmp_path / "pipe")
-    assert main(["export", str(sent), "--format", "kml", "--out", str(tmp_path / "pipe")]) == 2
-    assert "pipe: is a pipe or a device, not a file" in capsys.readouterr().err
+    said = refused("export", sent, "--format", "kml", "--out", tmp_path / "pipe")
+    assert "pipe: is a pipe or a device, not a file" in said
 
 
 @pytest.mark.parametrize("name", ["metrics.json", "scenario.yaml"])
-def test_an_edited_file_of_a_run_is_named_with_its_sha256(
-    name: str, sent: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_edited_file_of_a_run_is_named_with_its_sha256(name: str, sent: Path) -> None:
     text = (sent / name).read_text()
     (sent / name).write_text(text.replace("timeout", "reached").replace("radius_m: ", "radius_m: 1"))
     assert (sent / name).read_text() != text
     for command in (["report"], ["export", "--format", "kml"], ["view", "--web"]):
-        assert main([*command, str(sent)]) == 2
-        (line,) = capsys.readouterr().err.splitlines()
+        (line,) = refused(*command, sent).splitlines()
         assert f"{name} is not what was written: its sha256 is not that in manifest.json" in line
 
 

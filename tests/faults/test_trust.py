@@ -15,9 +15,9 @@ from aircraft.frames import LocalPlane
 from aircraft.jsbsim_loading import load, trim
 from aircraft.model_files import AircraftError, model_files
 from aircraft.start import StartConditions
-from harness.cli.app import main
 from tests.faults.command import FOREST
 from tests.pictures import served
+from tests.refusals import refused
 
 MODEL = Path(aircraft.__path__[0], "aerosonde")
 
@@ -102,12 +102,11 @@ SPOILT = {
 
 @pytest.mark.parametrize(("added", "sentence"), SPOILT.values(), ids=SPOILT)
 def test_a_model_that_reaches_too_far_is_refused_by_the_command(
-    added: str, sentence: str, model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    added: str, sentence: str, model: Path, tmp_path: Path
 ) -> None:
     model.write_text(model.read_text().replace("</fdm_config>", f"{added}</fdm_config>"))
     arguments = ["fly", str(FOREST), "--aircraft", str(model.parent), "--out", str(tmp_path / "run")]
-    assert main(arguments) == 2
-    said = capsys.readouterr().err
+    said = refused(*arguments)
     assert sentence in said
     assert str(model) in said
     assert not (tmp_path / "run").exists()
@@ -126,26 +125,22 @@ def test_a_huge_file_and_a_crowded_folder_are_refused(model: Path) -> None:
 
 
 @pytest.mark.parametrize("path", ["file/below", "x" * 300, "\udcff", "a\nb"])
-def test_where_a_run_cannot_be_written(path: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_where_a_run_cannot_be_written(path: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    assert main(["fly", str(FOREST), "--out", str(tmp_path / path)]) == 2
-    said = capsys.readouterr().err
+    said = refused("fly", FOREST, "--out", tmp_path / path)
     assert said.startswith("wayproof: cannot write the run folder ")
     assert len(said.splitlines()) == 1
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
 
 
 @pytest.mark.parametrize("out", ["/proc/run", "/sys/run"])
-def test_a_file_system_that_takes_nothing(out: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["fly", str(FOREST), "--out", out]) == 2
-    assert capsys.readouterr().err.startswith(f"wayproof: cannot write the run folder {out}: ")
+def test_a_file_system_that_takes_nothing(out: str) -> None:
+    assert refused("fly", FOREST, "--out", out).startswith(f"wayproof: cannot write the run folder {out}: ")
 
 
 @pytest.mark.parametrize("kind", ["pipe", "loop", "device", "folder", "long"])
 @pytest.mark.parametrize("command", ["fly", "validate", "check"])
-def test_what_is_no_file_is_refused_at_once(
-    command: str, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_file_is_refused_at_once(command: str, kind: str, tmp_path: Path) -> None:
     path = tmp_path / ("x" * 300 if kind == "long" else "given.csv")
     if kind == "pipe":
         os.mkfifo(path)
@@ -155,7 +150,6 @@ def test_what_is_no_file_is_refused_at_once(
         path.symlink_to(path if kind == "loop" else "/dev/zero")
     path = path.with_suffix(".csv")
     options = {"check": ["--aircraft", "aerosonde"]}.get(command, [])
-    assert main([command, str(path), *options]) == 2
-    said = capsys.readouterr().err
+    said = refused(command, path, *options)
     assert said.startswith(f"{path}: ")
     assert len(said.splitlines()) == 1

@@ -14,6 +14,7 @@ from harness.campaign.campaign_file import CampaignFile, campaign_schema, is_a, 
 from harness.campaign.runs import CampaignRuns
 from harness.cli.app import main
 from harness.scenario.shipped import shipped_campaigns, shipped_scenarios
+from tests.refusals import refused
 from wayproof import InputError, load_scenario
 
 ROOT = Path(__file__).parents[3]
@@ -398,19 +399,15 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
         ("schema: wayproof/campaign/1", "schema: wayproof/campaign/2", "schema: is the text"),
     ],
 )
-def test_a_mistake_is_told_with_file_line_and_key(
-    place: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
-) -> None:
+def test_a_mistake_is_told_with_file_line_and_key(place: Path, old: str, new: str, said: str) -> None:
     assert old in CAMPAIGN
     (place / "campaign.yaml").write_text(CAMPAIGN.replace(old, new))
     (place / "list.yaml").write_text("- schema: wayproof/scenario/1\n")
     out = place / "out"
-    assert main(["sweep", str(place / "campaign.yaml"), "--out", str(out)]) == 2
-    told = capsys.readouterr()
-    assert said in told.err
-    assert told.out == ""
-    assert str(place) in told.err
-    assert len(told.err.splitlines()) <= 5
+    told = refused("sweep", place / "campaign.yaml", "--out", out)
+    assert said in told
+    assert str(place) in told
+    assert len(told.splitlines()) <= 5
     assert not out.exists(), "nothing is written"
 
 

@@ -17,6 +17,7 @@ from harness.campaign.results import RESULTS
 from harness.campaign.runs import CampaignRuns
 from harness.cli.app import main
 from tests.faults.command import CAMPAIGN_FILES
+from tests.refusals import refused
 
 Lines = list[bytes]
 
@@ -123,15 +124,13 @@ def test_results_without_a_journal_are_results(
     assert content(place / "out") == before
 
 
-def test_results_that_cannot_be_read_count_and_are_made_anew_from_the_journal(
-    place: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_results_that_cannot_be_read_count_and_are_made_anew_from_the_journal(place: Path) -> None:
     whole = (place / "out" / RESULTS).read_bytes()
     shutil.copytree(place / "out", place / "lost")
     for folder in ("out", "lost"):
         (place / folder / RESULTS).write_bytes(b"spoilt")
     (place / "lost" / JOURNAL).unlink()
-    assert main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "lost")]) == 2
-    assert f"holds {RESULTS}: go on with --resume" in capsys.readouterr().err
+    said = refused("sweep", place / "campaign.yaml", "--out", place / "lost")
+    assert f"holds {RESULTS}: go on with --resume" in said
     assert sweep(place, "--resume") == 0
     assert (place / "out" / RESULTS).read_bytes() == whole

@@ -28,6 +28,7 @@ from harness.cli.sweep import print_summary
 from harness.files.wording import printable
 from tests.examples import examples
 from tests.page import shown
+from tests.refusals import refused
 from wayproof import InputError, load_campaign
 
 SCHEMA = pa.schema(
@@ -256,9 +257,7 @@ def entries_campaign(folder: Path) -> Path:
     return folder
 
 
-def test_entries_of_one_kind_are_told_apart_and_paired(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_entries_of_one_kind_are_told_apart_and_paired(tmp_path: Path) -> None:
     folder = entries_campaign(tmp_path / "c")
     summary = load_campaign(folder).summary
     names = ["rolling_window, clearance_m 40", "rolling_window, steps 8", "bug2"]
@@ -278,15 +277,14 @@ def test_a_table_that_says_nonsense_of_its_campaign_is_damaged(tmp_path: Path, a
 
 
 @pytest.mark.parametrize("name", ["results.parquet", "timings.parquet"])
-def test_an_edited_table_is_refused(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_edited_table_is_refused(name: str, tmp_path: Path) -> None:
     folder = campaign(tmp_path / "c", [row(0), row(1, "collision")], [(1.0, 4.0, 9.0)] * 2)
     whole = pq.read_table(folder / name)
     column = "outcome" if name == "results.parquet" else "compute_ms.max"
     other = pa.array(["reached"] * 2 if column == "outcome" else [1.0, 1.0])
     edited = whole.set_column(whole.column_names.index(column), column, other)
     pq.write_table(edited.replace_schema_metadata(whole.schema.metadata), folder / name)
-    assert main(["report", str(folder)]) == 2
-    assert f"{folder / name}: is not as it was written: its sha256 is another" in capsys.readouterr().err
+    assert f"{folder / name}: is not as it was written: its sha256 is another" in refused("report", folder)
     assert not (folder / PAGE).exists()
 
 
@@ -444,26 +442,19 @@ def test_the_command_makes_the_summary_again_by_other_keys(
         ("planner,world,aircraft", "must be one key, or two different ones"),
     ],
 )
-def test_a_wrong_key_is_bad_input(
-    by: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_key_is_bad_input(by: str, sentence: str, tmp_path: Path) -> None:
     folder = by_two(tmp_path / "c")
-    assert main(["report", str(folder), "--by", by]) == 2
-    assert sentence in capsys.readouterr().err
+    assert sentence in refused("report", folder, "--by", by)
     assert not (folder / PAGE).exists()
 
 
-def test_a_run_folder_has_no_keys_and_damage_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["report", str(tmp_path), "--by", "planner"]) == 2
-    assert "only a campaign has tables by keys" in capsys.readouterr().err
+def test_a_run_folder_has_no_keys_and_damage_is_told(tmp_path: Path) -> None:
+    assert "only a campaign has tables by keys" in refused("report", tmp_path, "--by", "planner")
     (tmp_path / "campaign.json").write_text("{}")
-    assert main(["report", str(tmp_path)]) == 2
-    assert "stopped before the tables were written; `wayproof sweep` with --resume" in capsys.readouterr().err
+    said = refused("report", tmp_path)
+    assert "stopped before the tables were written; `wayproof sweep` with --resume" in said
     (tmp_path / "results.parquet").write_bytes(b"PAR1 torn")
-    assert main(["report", str(tmp_path)]) == 2
-    assert "results.parquet: is not the results.parquet of a campaign" in capsys.readouterr().err
+    assert "results.parquet: is not the results.parquet of a campaign" in refused("report", tmp_path)
     with pytest.raises(InputError, match="not the folder of a campaign"):
         load_campaign(tmp_path / "none")
 

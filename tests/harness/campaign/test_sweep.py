@@ -27,6 +27,7 @@ from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import local_workers
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
+from tests.refusals import refused
 from wayproof import load_scenario
 
 ROOT = Path(__file__).parents[3]
@@ -221,13 +222,11 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
         (["--from", "run/track.parquet", "--run", "1"], "is not the results.parquet of a campaign"),
         (["--from", "nowhere", "--run", "1"], "nowhere: no such file"),
     ):
-        assert main(["fly", *arguments]) == 2
-        assert said in capsys.readouterr().err
+        assert said in refused("fly", *arguments)
     damaged = bytearray(results(unbroken))
     damaged[300:308] = b"XXXXXXXX"
     (elsewhere / "r.parquet").write_bytes(damaged)
-    assert main(["fly", "--from", "r.parquet", "--run", "1"]) == 2
-    said = capsys.readouterr().err
+    said = refused("fly", "--from", "r.parquet", "--run", "1")
     assert said.startswith("r.parquet: is damaged: ")
     assert len(said.splitlines()) == 1
 
@@ -240,8 +239,8 @@ def test_a_row_that_was_flown_otherwise_is_told(
     column = rows.column_names.index("digest")
     changed = rows.set_column(column, "digest", pa.array(["0" * 64] * len(rows)))
     pq.write_table(changed, place / "r.parquet")
-    assert main(["fly", "--from", str(place / "r.parquet"), "--run", "1"]) == 2
-    assert "is not as it was written: its sha256 is another" in capsys.readouterr().err
+    said = refused("fly", "--from", place / "r.parquet", "--run", "1")
+    assert "is not as it was written: its sha256 is another" in said
     pq.write_table(sealed(changed, about), place / "r.parquet")
     again = ["fly", "--from", str(place / "r.parquet"), "--run", "1", "--out", str(place / "run"), "--quiet"]
     assert main(again) == 1

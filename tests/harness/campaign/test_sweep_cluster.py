@@ -25,6 +25,7 @@ from tests.harness.campaign.test_sweep import (
     wait_for,
 )
 from tests.processes import python
+from tests.refusals import refused
 
 LOCAL = "127.0.0.1"
 
@@ -189,11 +190,11 @@ def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
 
 
 @pytest.mark.flights
-def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_scheduler_nothing_is_flown(place: Path) -> None:
     address = f"tcp://{LOCAL}:{free_port()}"
     out = place / "nowhere"
-    assert main(["sweep", str(place / "campaign.yaml"), "--scheduler", address, "--out", str(out)]) == 2
-    assert f"no Dask scheduler answers at {address}" in capsys.readouterr().err
+    said = refused("sweep", place / "campaign.yaml", "--scheduler", address, "--out", out)
+    assert f"no Dask scheduler answers at {address}" in said
     assert not out.exists()
     words = "sweep campaign.yaml --scheduler tcp://no-such-host:8786 --unencrypted --out nowhere"
     nobody = python("-m", "harness", *words.split(), folder=place)
@@ -204,5 +205,4 @@ def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.Captur
         (["--scheduler", "foo"], "--scheduler foo: is no address; give it as tcp://HOST:PORT"),
         (["--scheduler", "nonsense://x", "--unencrypted"], "no Dask scheduler answers at nonsense://x"),
     ):
-        assert main(["sweep", str(place / "campaign.yaml"), "--out", str(out), *options]) == 2
-        assert said in capsys.readouterr().err
+        assert said in refused("sweep", place / "campaign.yaml", "--out", out, *options)

@@ -21,6 +21,7 @@ from harness.scenario import scenario
 from harness.scenario.environment import Turbulence
 from tests.harness.cli.test_terminal import METRICS
 from tests.processes import ROOT, python
+from tests.refusals import refused
 
 CAMPAIGN = ROOT / "scenarios" / "campaigns" / "forest_planners.yaml"
 SCENARIO = ROOT / "scenarios" / "paper_circles.yaml"
@@ -131,18 +132,12 @@ print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
     ],
 )
 def test_bad_usage_is_one_line_and_writes_nothing(
-    words: str,
-    sentence: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    words: str, sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(words.split()) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert sentence in said.err
-    assert len(said.err.splitlines()) <= 2
+    said = refused(*words.split())
+    assert sentence in said
+    assert len(said.splitlines()) <= 2
     assert list(tmp_path.iterdir()) == []
 
 
@@ -164,11 +159,8 @@ def test_a_campaign_is_viewed_alone(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize("arguments", [["--debug", "fly", "nope"], ["fly", "nope", "--debug"]])
-def test_debug_shows_where_and_ends_as_without(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(arguments) == 2
-    said = capsys.readouterr().err
+def test_debug_shows_where_and_ends_as_without(arguments: list[str]) -> None:
+    said = refused(*arguments)
     assert said.startswith("Traceback (most recent call last):")
     assert said.splitlines()[-1].startswith("nope: ")
 

@@ -15,6 +15,7 @@ from rerun.chunk import RrdReader
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 from tests.harness.conftest import Checked
+from tests.refusals import refused
 from tests.scenarios import scenario_of
 from wayproof import InputError, check
 
@@ -108,14 +109,12 @@ def test_an_end_that_is_passed_far_off_is_not_reached(tmp_path: Path, checked: C
     ],
 )
 def test_bad_input_is_refused_before_anything_is_flown(
-    options: str, sentence: str, strip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    options: str, sentence: str, strip: Path, tmp_path: Path
 ) -> None:
     aircraft = [] if "--aircraft" in options else ["--aircraft", "aerosonde"]
-    assert main(["check", str(strip), *aircraft, *options.split(), "--out", str(tmp_path / "run")]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert len(said.err.splitlines()) <= 2
-    assert sentence in said.err
+    said = refused("check", strip, *aircraft, *options.split(), "--out", tmp_path / "run")
+    assert len(said.splitlines()) <= 2
+    assert sentence in said
     assert not (tmp_path / "run").exists()
 
 

@@ -10,6 +10,7 @@ import pytest
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 from tests.harness.conftest import Checked
+from tests.refusals import refused
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real"
 MISSIONS = sorted((REAL / "missions").glob("*")) if REAL.is_dir() else []
@@ -169,19 +170,16 @@ MUTILATED: dict[str, str] = {
 
 
 @pytest.mark.parametrize("spoilt", MUTILATED)
-def test_a_mutilated_mission_is_refused_in_a_line(
-    spoilt: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_mutilated_mission_is_refused_in_a_line(spoilt: str, tmp_path: Path) -> None:
     rows = row(1, 16, 0.0, up_m=100.0), row(2, 206, 25), row(3, 16, 0.0, north_m=1500, up_m=100.0)
     path = write(tmp_path / "m.waypoints", *rows)
     before, _, after = MUTILATED[spoilt].partition("->")
     text = path.read_text()
     assert before in text
     path.write_text(text.replace(before, after))
-    assert main(["check", str(path), "--aircraft", "aerosonde", "--out", str(tmp_path / "run")]) == 2
-    said = capsys.readouterr()
-    assert (said.out, len(said.err.splitlines())) == ("", 1)
-    assert said.err.startswith(str(path))
+    said = refused("check", path, "--aircraft", "aerosonde", "--out", tmp_path / "run")
+    assert len(said.splitlines()) == 1
+    assert said.startswith(str(path))
     assert not (tmp_path / "run").exists()
 
 

@@ -16,6 +16,7 @@ from harness.recording.file import end_of_whole
 from harness.run_files.run_folder import load_run
 from tests.faults.command import run as run_alone
 from tests.faults.command import start
+from tests.refusals import refused
 
 RRD_HEADER_BYTES = 12
 RECORDED_BYTES = 600_000
@@ -80,20 +81,15 @@ def test_killed_while_flying_leaves_a_readable_recording(tmp_path: Path) -> None
     assert not (out / "flight.rrd").exists()
 
 
-def test_a_folder_with_other_things_is_refused_and_left_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_with_other_things_is_refused_and_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    assert main(["fly", "aerosonde_forest", *SHORT, "--out", str(tmp_path), "--quiet"]) == 2
-    assert "not empty and not a run folder" in capsys.readouterr().err
+    said = refused("fly", "aerosonde_forest", *SHORT, "--out", tmp_path, "--quiet")
+    assert "not empty and not a run folder" in said
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
 
-def test_viewing_a_run_without_a_recording_is_bad_input(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_viewing_a_run_without_a_recording_is_bad_input(tmp_path: Path) -> None:
     out = tmp_path / "run"
     main(["fly", "aerosonde_forest", *SHORT, "--out", str(out), "--no-recording", "--quiet"])
-    assert main(["view", str(out)]) == 2
-    assert f"{out} has no flight.rrd" in capsys.readouterr().err
+    assert f"{out} has no flight.rrd" in refused("view", out)

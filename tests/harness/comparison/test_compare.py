@@ -30,6 +30,7 @@ from harness.world.obstacle import Circle, Obstacle
 from tests.harness.campaign.test_sweep import wait_for
 from tests.harness.conftest import CIRCLE_PLAN, circle_track
 from tests.page import shown
+from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]
 PLUGIN = '''
@@ -257,14 +258,12 @@ def test_the_overlay_of_an_earlier_comparison_is_not_offered(
     ],
 )
 def test_bad_input_ends_with_2_before_anything_is_flown(
-    place: Path, tmp_path: Path, arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+    place: Path, tmp_path: Path, arguments: list[str], sentence: str
 ) -> None:
     given = [argument.format(place=place) for argument in arguments]
-    assert main(["compare", *given, "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr()
-    assert sentence in said.err
-    assert said.err.count("\n") <= 2
-    assert said.out == ""
+    said = refused("compare", *given, "--out", tmp_path / "out")
+    assert sentence in said
+    assert said.count("\n") <= 2
     assert not (tmp_path / "out").exists()
 
 
@@ -425,5 +424,5 @@ def test_the_table_of_a_comparison_for_a_paper(flown: Path, capsys: pytest.Captu
     assert heads[:4] == ["scenario", "planner", "outcome", "km"]
     lengths_m = [row["flown_length_m"] for row in rows_of(flown)]
     assert [row[3] for row in rows] == [f"{m / 1e3:.3g}" if m else "\N{EN DASH}" for m in lengths_m]
-    assert main(["report", str(flown / "ring"), "--format", "csv"]) == 2
-    assert "is not the folder of a campaign or of a complete comparison" in capsys.readouterr().err
+    said = refused("report", flown / "ring", "--format", "csv")
+    assert "is not the folder of a campaign or of a complete comparison" in said

@@ -19,6 +19,7 @@ from harness.falsify.breaking_point import FALSIFIED, INDEX, number_text, scenar
 from harness.run.scenario_flight import fly_and_measure
 from tests.examples import examples
 from tests.harness.breaking import WAY_M, broken, stand_in
+from tests.refusals import refused
 from wayproof import AircraftError, InputError, Scenario, load_scenario
 
 
@@ -202,18 +203,12 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     ],
 )
 def test_bad_usage_is_one_line_and_writes_nothing(
-    arguments: list[str],
-    sentence: str,
-    to_break: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    arguments: list[str], sentence: str, to_break: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(to_break.parent)
-    assert main(["falsify", "straight.yaml", *arguments]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert sentence in said.err
-    assert len(said.err.splitlines()) <= 2
+    said = refused("falsify", "straight.yaml", *arguments)
+    assert sentence in said
+    assert len(said.splitlines()) <= 2
     assert [path.name for path in to_break.parent.iterdir()] == ["straight.yaml"]
 
 

@@ -16,7 +16,6 @@ from rerun.experimental import ViewerClient
 
 from harness.analysis.metrics import metrics
 from harness.campaign.results import recordings_of
-from harness.cli.app import main
 from harness.flight.record import Flight, Outcome
 from harness.recording.catalog import catalog
 from harness.recording.log import RerunLog
@@ -27,6 +26,7 @@ from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
 from tests.harness.recording.test_rerun_log import LIMITS, SCENE, column, read, seconds
 from tests.pictures import draw_settled
+from tests.refusals import refused
 from tests.scenarios import scenario_of
 
 SCENARIO = """\
@@ -121,24 +121,19 @@ def test_the_plots_of_a_thin_recording_have_the_peaks_that_its_figures_name(tmp_
     assert len(column(entities, "/series/clearance/flown", "scalars")) <= 1001 // 20 + 3
 
 
-def test_a_campaign_without_recordings_says_how_to_get_some(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_campaign_without_recordings_says_how_to_get_some(tmp_path: Path) -> None:
     """On a machine without a screen too, before it says what it would open."""
     (tmp_path / "campaign.json").write_text("{}")
     for arguments in ([str(tmp_path)], [str(tmp_path), "--web"]):
-        assert main(["view", *arguments]) == 2
-        said = capsys.readouterr().err
+        said = refused("view", *arguments)
         assert said.startswith(
             f"wayproof: {tmp_path} has no recordings: `recordings: thin` in the campaign's file "
         )
         assert len(said.splitlines()) == 1
     for run in ("7", "07"):
-        assert main(["view", str(tmp_path / "runs" / run)]) == 2
-        said = capsys.readouterr().err
+        said = refused("view", tmp_path / "runs" / run)
         assert f"`wayproof fly --from {tmp_path}/results.parquet --run 7` flies the run again" in said
-    assert main(["view", str(tmp_path / "runs" / "none")]) == 2
-    assert "no such folder; give a run folder" in capsys.readouterr().err
+    assert "no such folder; give a run folder" in refused("view", tmp_path / "runs" / "none")
 
 
 def test_a_campaign_is_one_table_worst_first(campaign: Path) -> None:

@@ -40,6 +40,7 @@ from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
 from tests.page import NoBrowserError, browser
 from tests.pictures import screenshot, served
+from tests.refusals import refused
 from wayproof import AircraftState, InputError, Mission, Plan, PlanPicture, PlanStatus
 from wayproof import Path as PlannedPath
 
@@ -462,8 +463,7 @@ def test_view_says_what_is_missing(
         monkeypatch.delenv(screen, raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
     (tmp_path / "flight.rrd").write_bytes(b"not a recording")
-    assert main(["view", str(tmp_path), str(tmp_path), "--web"]) == 2
-    assert "recording" in capsys.readouterr().err
+    assert "recording" in refused("view", tmp_path, tmp_path, "--web")
     assert main(["view", str(tmp_path)]) == 1
     assert "no screen" in (said := capsys.readouterr().err)
     assert "`wayproof view --web`" in said

@@ -17,6 +17,7 @@ import wayproof
 from aircraft.frames import LocalPlane
 from harness.cli.app import main
 from tests.harness.replays.test_logs import FORMATS, form
+from tests.refusals import refused
 
 FLOWN = Path(__file__).parents[4] / "shared" / "flown"
 needs_flown = pytest.mark.skipif(not (FLOWN / "thor75.json").is_file(), reason="shared/flown is not here")
@@ -246,37 +247,29 @@ def test_a_log_that_lacks_values_has_thors_own_laps_or_leaves_them_out(
         ({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": "45"}}, "bank_limit_deg: is '45'"),
     ],
 )
-def test_a_wrong_mission_is_told(
-    tmp_path: Path, change: dict[str, Any], told: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_mission_is_told(tmp_path: Path, change: dict[str, Any], told: str) -> None:
     log, mission = circles(tmp_path, (0.0, 1.0), laps=2)
     mission.write_text(json.dumps(change))
     out = tmp_path / "out"
     words = ["--aircraft", "aerosonde", "--mission", str(mission), "--out", str(out)]
-    assert main(["replay", str(log), *words]) == 2
-    assert told in capsys.readouterr().err
+    assert told in refused("replay", log, *words)
     assert not out.exists()
 
 
-def test_a_log_that_lacks_a_column_or_goes_straight_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_log_that_lacks_a_column_or_goes_straight_is_told(tmp_path: Path) -> None:
     log, mission = circles(tmp_path, (0.0, 1.0), laps=2)
     arguments = ["--aircraft", "aerosonde", "--mission", str(mission), "--out", str(tmp_path / "out")]
     table = pq.read_table(log)
     pq.write_table(table.drop_columns(["north_m"]), log)
-    assert main(["replay", str(log), *arguments]) == 2
-    assert "has no column north_m" in capsys.readouterr().err
+    assert "has no column north_m" in refused("replay", log, *arguments)
     (tmp_path / "a.csv").write_text("time_s,time_s,east_m,north_m\n0,0,0,0\n")
-    assert main(["replay", str(tmp_path / "a.csv"), *arguments]) == 2
-    assert "a.csv: time_s: stands 2 times; must stand once" in capsys.readouterr().err
+    said = refused("replay", tmp_path / "a.csv", *arguments)
+    assert "a.csv: time_s: stands 2 times; must stand once" in said
     straight = {name: table[name] for name in table.column_names} | {
         "ve_mps": pa.array(np.full(len(table), 9.0))
     }
     pq.write_table(pa.table({**straight, "vn_mps": pa.array(np.full(len(table), 9.0))}), log)
-    assert main(["replay", str(log), *arguments]) == 2
-    assert "the wind cannot be told" in capsys.readouterr().err
-    assert main(["replay", str(log), "--aircraft", "aerosonde"]) == 2
-    assert "give --mission FILE" in capsys.readouterr().err
-    assert main(["replay", str(mission), "--aircraft", "aerosonde"]) == 2
-    assert "is no flight log that is read; must end in .parquet, .csv" in capsys.readouterr().err
+    assert "the wind cannot be told" in refused("replay", log, *arguments)
+    assert "give --mission FILE" in refused("replay", log, "--aircraft", "aerosonde")
+    said = refused("replay", mission, "--aircraft", "aerosonde")
+    assert "is no flight log that is read; must end in .parquet, .csv" in said

@@ -25,6 +25,7 @@ from harness.run_files.exports import FORMATS, planned_points
 from harness.run_files.path_files import read_path
 from harness.run_files.run_folder import Run, load_run
 from harness.scenario.sections import Origin
+from tests.refusals import refused
 from tests.scenarios import scenario_of
 
 Export = Callable[..., str]
@@ -215,13 +216,10 @@ def test_what_its_user_should_know_is_said(
         assert failed not in said
 
 
-def test_a_folder_without_a_run_and_a_file_without_a_folder_are_refused(
-    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["export", str(tmp_path), "--format", "plan"]) == 2
-    assert "is not a run folder" in capsys.readouterr().err
-    assert main(["export", str(run.folder), "--format", "kml", "--out", str(tmp_path / "no" / "a.kml")]) == 2
-    assert "a.kml: cannot be written" in capsys.readouterr().err
+def test_a_folder_without_a_run_and_a_file_without_a_folder_are_refused(run: Run, tmp_path: Path) -> None:
+    assert "is not a run folder" in refused("export", tmp_path, "--format", "plan")
+    said = refused("export", run.folder, "--format", "kml", "--out", tmp_path / "no" / "a.kml")
+    assert "a.kml: cannot be written" in said
 
 
 @pytest.mark.parametrize("form", list(FORMATS))

@@ -15,7 +15,6 @@ import pytest
 from rerun.chunk import RrdReader
 
 from harness.analysis.metrics import metrics
-from harness.cli.app import main
 from harness.flight.closed_loop import fly
 from harness.flight.observer import Observer
 from harness.recording.log import RerunLog
@@ -27,6 +26,7 @@ from harness.watching.relay import Call, Opening, RelayProcess
 from harness.watching.watched_flight import Viewing, fly_watched
 from tests.closed_loop.small import small_world as world
 from tests.point_mass import PointMass
+from tests.refusals import refused
 from wayproof import AircraftState, GuidanceOutput
 
 SERVER = """
@@ -152,17 +152,12 @@ def test_what_is_handed_over_is_the_flight(tmp_path: Path, monkeypatch: pytest.M
     ],
 )
 def test_what_makes_no_sense_is_refused_before_the_flight(
-    arguments: list[str],
-    sentence: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    arguments: list[str], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "platform", "linux")
     for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(screen, raising=False)
-    assert main(["fly", "aerosonde_forest", *arguments, "--out", str(tmp_path / "run")]) == 2
-    said = capsys.readouterr().err
+    said = refused("fly", "aerosonde_forest", *arguments, "--out", tmp_path / "run")
     assert sentence in said
     assert len(said.splitlines()) <= 2
     assert list(tmp_path.iterdir()) == []
