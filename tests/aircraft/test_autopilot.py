@@ -17,26 +17,10 @@ from aircraft.jsbsim_loading import linearised, trimmed
 from aircraft.model_files import model_files
 
 AEROSONDE = Derivatives(
-    airspeed_fps=82.02,
-    alpha_rad=0.0497,
-    qbar_psf=8.28,
-    lp=-22.63,
-    lr=10.91,
-    lda=57.11,
-    ldr=-0.784,
-    np=-0.115,
-    nr=-1.228,
-    nb=19.58,
-    yb=-0.777,
-    nda=2.187,
-    ndr=-10.86,
-    za=-4.48,
-    ma=-99.96,
-    mq=-5.30,
-    mde=-15.76,
-    xa=8.76,
-    xdt=31.07,
-)
+    airspeed_fps=82.02, alpha_rad=0.0497, qbar_psf=8.28, lp=-22.63, lr=10.91, lda=57.11, ldr=-0.784,
+    np=-0.115, nr=-1.228, nb=19.58, yb=-0.777, nda=2.187, ndr=-10.86, za=-4.48, ma=-99.96, mq=-5.30,
+    mde=-15.76, xa=8.76, xdt=31.07,
+)  # fmt: skip
 
 
 def test_feed_forwards_cancel_the_moments_of_a_steady_turn() -> None:

@@ -35,14 +35,11 @@ def aerosonde_with(folder: Path, change: tuple[str, str] = ("", ""), without: st
         (("", ""), "unpowered_engine.xml", "JSBSim refuses the model: Could not open file: unpowered_engine"),
         (("", ""), "motor.xml", "JSBSim refuses the model: Could not open file: motor"),
         (("<input>fcs/aileron-cmd-norm<", "<input>fcs/nothing<"), "", "property fcs/nothing does not exist"),
-        (
-            ("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"),
-            "",
-            "its functions read the property fcs/nothing, which does not exist",
-        ),
+        (("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"), "",
+            "its functions read the property fcs/nothing, which does not exist"),
         (('KG">11.0<', 'KG">400.0<'), "", "cannot be trimmed .*: JSBSim finds no trim"),
     ],
-)
+)  # fmt: skip
 def test_what_a_model_lacks_is_told(tmp_path: Path, change: tuple[str, str], without: str, said: str) -> None:
     with pytest.raises(InputError, match=f"aircraft.model: .*{said}"):
         load_scenario("paper_circles").with_({"aircraft.model": aerosonde_with(tmp_path, change, without)})

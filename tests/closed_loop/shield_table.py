@@ -155,17 +155,10 @@ def flown(name: str, number: int, shield: str, limit_s: float = 130.0) -> dict[s
 def table(rows: pd.DataFrame) -> str:
     """A row a planner, in Markdown, and the bounds over all."""
     told = head(
-        "planner",
-        "flights",
-        "reached",
-        "of those without a wall",
-        "contacts, departures",
-        "bare: contacts",
-        "length over bare: median, p95 (n)",
-        "refused, share of calls",
-        "on the backup, s a flight",
+        "planner", "flights", "reached", "of those without a wall", "contacts, departures", "bare: contacts",
+        "length over bare: median, p95 (n)", "refused, share of calls", "on the backup, s a flight",
         "shield alone, p50, p99 of the median flight, ms",
-    )
+    )  # fmt: skip
     safe, bare = rows[rows.shield == "loiter"], rows[rows.shield == "none"]
     for name in PLANNERS:
         mine = safe[safe.planner == name]

@@ -47,12 +47,10 @@ def test_servos_are_flown_and_planning_knows_of_them() -> None:
         ("aircraft: {actuators: {lag_s: -1}}", "6: aircraft.actuators.lag_s: is -1; must be at least 0"),
         ("aircraft: {actuators: {rate: 3}}", "6: aircraft.actuators.rate"),
         ("aircraft: {actuators: {lag_s: 3}}", "6: aircraft.actuators.lag_s: is 3; must be another, or left"),
-        (
-            "aircraft: {model: T38, actuators: {rate_limit_degps: 60}}",
-            "its model does not show how far the aileron",
-        ),
+        ("aircraft: {model: T38, actuators: {rate_limit_degps: 60}}",
+            "its model does not show how far the aileron"),
     ],
-)
+)  # fmt: skip
 def test_servos_that_cannot_be_flown_are_refused(aircraft: str, said: str) -> None:
     with pytest.raises(InputError) as refused:
         scenario(aircraft + "\n")

@@ -107,15 +107,11 @@ SLOW_ROLL = {
         ("turn radius too tight", turn(50.0), turn(112.0), {}),
         # 66 m takes 44 of the 45 degrees: none are left to get back onto the path with.
         ("bank limit", turn(66.0), turn(112.0), {"trackability__cross_track_m": 1, **SLOW_ROLL}),
-        (
-            "roll rate",
-            weave(112.0, 0.7, 8),
-            weave(700.0, 0.7, 4),
-            {"trackability__cross_track_m": 0.5, **SLOW_ROLL},
-        ),
+        ("roll rate", weave(112.0, 0.7, 8), weave(700.0, 0.7, 4),
+            {"trackability__cross_track_m": 0.5, **SLOW_ROLL}),
         ("load factor", turn(90.0), turn(112.0), {"trackability__load_factor": 1.2}),
     ],
-)
+)  # fmt: skip
 def test_a_path_that_asks_too_much_and_one_that_does_not(
     cause: str, bad: FloatArray, good: FloatArray, keys: dict[str, float], check: Check
 ) -> None:

@@ -52,10 +52,8 @@ FINE = GuidanceOutput(0.0, 0.0, 0.0, False, False)
 @pytest.mark.parametrize(
     ("law", "said"),
     [
-        (
-            {"follows": False},
-            "the guidance law raised ZeroDivisionError: no route for me when it was given a plan",
-        ),
+        ({"follows": False},
+            "the guidance law raised ZeroDivisionError: no route for me when it was given a plan"),
         ({"then": FINE._replace(roll_command_rad=math.nan)}, "asked for a roll of nan rad"),
         ({"then": FINE._replace(roll_command_rad=math.inf)}, "asked for a roll of inf rad"),
         ({"then": FINE._replace(airspeed_mps=math.inf)}, "an airspeed of inf m/s"),
@@ -63,7 +61,7 @@ FINE = GuidanceOutput(0.0, 0.0, 0.0, False, False)
         ({"then": "left"}, "the guidance law raised AttributeError"),
         ({"then": None}, "the guidance law raised SystemExit: enough"),
     ],
-)
+)  # fmt: skip
 def test_ends_as_lost_control(law: dict[str, Any], after: int, said: str, tmp_path: Path) -> None:
     figures = fly_to_folder(
         scenario_of(TEXT),

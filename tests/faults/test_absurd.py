@@ -99,11 +99,8 @@ def test_a_huge_file_is_refused_soon(name: str, tmp_path: Path) -> None:
         ("sensor.rate_hz", "1e-9", "must be at least"),
         ("sensor.range_m", "1e-9", "too short"),
         ("planner.margin_m", "1e9", "at most 1000000"),
-        (
-            "aircraft.autopilot",
-            "{roll_rate_limit_degps: 0.5}",
-            "autopilot.roll_rate_limit_degps: is 0.5; must be another, or left out: aerosonde",
-        ),
+        ("aircraft.autopilot", "{roll_rate_limit_degps: 0.5}",
+            "autopilot.roll_rate_limit_degps: is 0.5; must be another, or left out: aerosonde"),
         ("aircraft.deviation", "{centre_of_gravity_m: 3}", "deviation: must be smaller: aerosonde cannot be"),
         ("aircraft.airspeed_mps", "1e-9", "cannot hold"),
         ("aircraft.model", "/", "must be the folder of one aircraft"),
@@ -111,7 +108,7 @@ def test_a_huge_file_is_refused_soon(name: str, tmp_path: Path) -> None:
         ("aircraft.model", "~nobody-of-this-name", "unknown aircraft"),
         ("planner.kind", "../x", "must be one of"),
     ],
-)
+)  # fmt: skip
 def test_a_value_beyond_reason_is_refused(key: str, value: str, sentence: str, tmp_path: Path) -> None:
     arguments = ["fly", str(FOREST), "--set", f"{key}={value}", "--out", str(tmp_path / "run")]
     said = refused(*arguments)

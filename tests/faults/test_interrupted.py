@@ -98,17 +98,13 @@ def test_a_flight_whose_planner_hangs_can_be_broken_off_and_leaves_what_was_flow
 @pytest.mark.parametrize(
     ("shell", "told"),
     [
-        (
-            "ulimit -n 14; exec {} sweep forest_planners --workers 2 --out out",
-            "raise the limit with `ulimit -n 1024`",
-        ),
-        (
-            "cd gone; rmdir ../gone; exec {} fly {forest}",
-            "the working directory has been deleted: change to another",
-        ),
+        ("ulimit -n 14; exec {} sweep forest_planners --workers 2 --out out",
+            "raise the limit with `ulimit -n 1024`"),
+        ("cd gone; rmdir ../gone; exec {} fly {forest}",
+            "the working directory has been deleted: change to another"),
         ("ulimit -v 1100000; exec {} list campaigns", "lift the limit with `ulimit -v unlimited`"),
     ],
-)
+)  # fmt: skip
 def test_what_the_process_may_not_have_is_told_with_its_remedy(shell: str, told: str, tmp_path: Path) -> None:
     (tmp_path / "gone").mkdir()
     done = in_shell(tmp_path, shell.format(f"{sys.executable} -m harness", forest=FOREST))

@@ -23,24 +23,11 @@ def track(rows: int, **columns: Any) -> Track:
     """A straight flight north at 25 m/s and 10 rows a second, with some columns replaced."""
     time_s = np.arange(rows) / 10.0
     level: dict[str, FloatArray | float] = {
-        "time_s": time_s,
-        "east_m": 0.0,
-        "north_m": 25.0 * time_s,
-        "up_m": 300.0,
-        "course_deg": 0.0,
-        "heading_deg": 0.0,
-        "roll_deg": 0.0,
-        "pitch_deg": 2.0,
-        "airspeed_mps": 25.0,
-        "groundspeed_mps": 25.0,
-        "load_factor": 1.0,
-        "roll_command_deg": 0.0,
-        "cross_track_m": 0.0,
-        "clearance_m": 1000.0,
-        "plan_index": 0,
-        "arc_length_m": 25.0 * time_s,
-        "throttle": 0.5,
-    }
+        "time_s": time_s, "east_m": 0.0, "north_m": 25.0 * time_s, "up_m": 300.0, "course_deg": 0.0,
+        "heading_deg": 0.0, "roll_deg": 0.0, "pitch_deg": 2.0, "airspeed_mps": 25.0, "groundspeed_mps": 25.0,
+        "load_factor": 1.0, "roll_command_deg": 0.0, "cross_track_m": 0.0, "clearance_m": 1000.0,
+        "plan_index": 0, "arc_length_m": 25.0 * time_s, "throttle": 0.5,
+    }  # fmt: skip
     filled = {name: np.broadcast_to(value, rows) for name, value in {**level, **columns}.items()}
     return Track(**filled)
 

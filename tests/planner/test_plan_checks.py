@@ -96,10 +96,8 @@ def test_a_kink_in_direction_is_allowed() -> None:
         (spoilt(found([EAST]), waypoints_m=np.array([(0, 0), (1, math.nan)])), "a waypoint 1 at (1, nan) m"),
         (spoilt(found([EAST]), waypoints_m=np.array([(1e300, 0)])), "a waypoint 0 at (1e+300, 0) m"),
         (Plan(PlanStatus.FOUND, "", path=Path(np.zeros((0, 6)))), "must have shape (n, 6), n > 0; got (0, 6)"),
-        (
-            spoilt(found([EAST]), path=Path(np.array([(0.0, 0.0, 0.9, 0.0, 0.0, 5.0)]))),
-            "segment 0 begins with a tangent of length 0.9; it must be a unit vector",
-        ),
+        (spoilt(found([EAST]), path=Path(np.array([(0.0, 0.0, 0.9, 0.0, 0.0, 5.0)]))),
+            "segment 0 begins with a tangent of length 0.9; it must be a unit vector"),
         (found([EAST], picture=lambda: None), "picture of its plan is None; it must be a PlanPicture"),
     ],
 )  # fmt: skip
@@ -244,14 +242,12 @@ def test_a_picture_is_made_once_when_the_plan_is_taken() -> None:
     [
         ({"guide_m": np.zeros((3, 2))}, "a guide vector of 2 points"),
         ({"sectors": np.zeros((3, 2))}, r"sectors of a picture has the shape \(3, 2\); .* of shape \(n, 4\)"),
-        (
-            {"candidates": (np.zeros((3, 2)), np.zeros(3))},
-            r"candidates\[1\] of a picture has the shape \(3,\)",
-        ),
+        ({"candidates": (np.zeros((3, 2)), np.zeros(3))},
+            r"candidates\[1\] of a picture has the shape \(3,\)"),
         ({"met_m": np.full((1, 2), math.nan)}, "met_m of a picture .* must be finite"),
         ({"window_m": math.inf}, "a finite window"),
     ],
-)
+)  # fmt: skip
 def test_a_picture_that_cannot_be_drawn_is_refused(keys: Any, told: str) -> None:
     with pytest.raises(ValueError, match=told):
         checked_plan(found([EAST], picture=lambda: picture(**keys)), (0.0, 0.0), MISSION)

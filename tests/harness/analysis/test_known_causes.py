@@ -22,18 +22,10 @@ G = 9.80665
 ROWS = 301
 OFF = np.where(np.abs(np.arange(ROWS) - 200) < 40, 6.0, 0.0)
 LIMITS = FlightLimits(
-    altitude_m=300.0,
-    clearance_m=50.0,
-    bank_limit_rad=math.radians(45.0),
-    turn_radius_m=110.0,
-    max_cross_track_m=5.0,
-    airspeed_mps=25.0,
-    roll_rate_radps=math.radians(60.0),
-    stall_angle_deg=16.0,
-    max_altitude_error_m=10.0,
-    max_airspeed_error_mps=2.5,
-    max_load_factor=2.5,
-)
+    altitude_m=300.0, clearance_m=50.0, bank_limit_rad=math.radians(45.0), turn_radius_m=110.0,
+    max_cross_track_m=5.0, airspeed_mps=25.0, roll_rate_radps=math.radians(60.0), stall_angle_deg=16.0,
+    max_altitude_error_m=10.0, max_airspeed_error_mps=2.5, max_load_factor=2.5,
+)  # fmt: skip
 Case = tuple[Track, AcceptedPlan, FlightLimits, AsGiven | None, str | None]
 
 

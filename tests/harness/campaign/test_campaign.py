@@ -342,11 +342,8 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
         ("{uniform: [0, 360]}", "{uniform: [0, 1], choice: [1]}", "from_deg: has uniform and choice"),
         ("{uniform: [0, 360]}", "{uniform: [1, 1]}", "least < most"),
         ("{uniform: [0, 360]}", "{choice: []}", "from_deg.choice: has 0 items; must have at least 1"),
-        (
-            "{uniform: [0, 360]}",
-            "{uniform: [a, 1]}",
-            "from_deg.uniform[0]: is the text 'a'; must be a number",
-        ),
+        ("{uniform: [0, 360]}", "{uniform: [a, 1]}",
+            "from_deg.uniform[0]: is the text 'a'; must be a number"),
         ("sigma: 0.05,", "sigma: 0,", "sensor.dropout.normal.sigma: is 0; must be greater than 0"),
         ("least: 0, most: 0.1", "least: 2, most: 1", "leaves nothing"),
         ("least: 0, most: 0.1", "least: 50", "leaves nothing"),
@@ -360,45 +357,27 @@ def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
         ("{kind: bug2,", "{kind: bug3,", "planners[1].kind: is 'bug3'; must be one of"),
         ("model: c172p,", "model: nosuch,", "aircraft[1].model: unknown aircraft 'nosuch'"),
         ("airspeed_mps: 50}", "airspeed_mps: 500}", "aircraft[1].airspeed_mps: "),
-        (
-            "draws: 3",
-            "worlds: [{circles: {}}]",
-            "worlds[0].circles: unknown key; known here: label, seed, forest",
-        ),
+        ("draws: 3", "worlds: [{circles: {}}]",
+            "worlds[0].circles: unknown key; known here: label, seed, forest"),
         ("draws: 3", "worlds: [{}]", "worlds[0].forest: is missing"),
         ("draws: 3", "worlds: [{forest: {}}, {forest: {}}]", "worlds[1]: is called forest as another"),
-        (
-            "draws: 3",
-            "worlds: [{forest: {density_1pkm2: 401}}]",
-            "asks for 30075 obstacles; must be at most 10000",
-        ),
-        (
-            "draws: 3",
-            "worlds: [{forest: {trunks: [1, 401]}}]",
-            "asks for 20050 obstacles; must be at most 10000",
-        ),
-        (
-            "draws: 3",
-            "worlds: [{forest: {trunks: [3, 1]}}]",
-            "worlds[0].forest.trunks: is [3, 1]; must be [least",
-        ),
+        ("draws: 3", "worlds: [{forest: {density_1pkm2: 401}}]",
+            "asks for 30075 obstacles; must be at most 10000"),
+        ("draws: 3", "worlds: [{forest: {trunks: [1, 401]}}]",
+            "asks for 20050 obstacles; must be at most 10000"),
+        ("draws: 3", "worlds: [{forest: {trunks: [3, 1]}}]",
+            "worlds[0].forest.trunks: is [3, 1]; must be [least"),
         ("draws: 3", "worlds: [{forest: {size_m: [900, 1700]}}]", "each side must be at least 4 x room_m"),
-        (
-            "draws: 3",
-            "worlds: [{forest: {room_m: 20, gap_m: 0, density_1pkm2: 90}}]",
-            "worlds[0].forest: mission",
-        ),
+        ("draws: 3", "worlds: [{forest: {room_m: 20, gap_m: 0, density_1pkm2: 90}}]",
+            "worlds[0].forest: mission"),
         ("draws: 3", "draws: 1000000", "18: draws: makes 16000000 runs with what is combined; must be"),
         ("{kind: bug2, clearance_m: 50}", "rolling_window", "planners[1]: is there already"),
         ("{kind: bug2, clearance_m: 50}", "rolling_window+shield", "planners[1]: is there already"),
-        (
-            "  sensor.rays: {choice",
-            "  planner.clearance_m: {choice",
-            "planners[1].clearance_m: is given under random.planner.clearance_m too",
-        ),
+        ("  sensor.rays: {choice", "  planner.clearance_m: {choice",
+            "planners[1].clearance_m: is given under random.planner.clearance_m too"),
         ("schema: wayproof/campaign/1", "schema: wayproof/campaign/2", "schema: is the text"),
     ],
-)
+)  # fmt: skip
 def test_a_mistake_is_told_with_file_line_and_key(place: Path, old: str, new: str, said: str) -> None:
     assert old in CAMPAIGN
     (place / "campaign.yaml").write_text(CAMPAIGN.replace(old, new))

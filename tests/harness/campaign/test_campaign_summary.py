@@ -52,28 +52,15 @@ def row(run: int, outcome: str = "reached", /, **other: Any) -> dict[str, Any]:
     """A run of 1.1 times an optimum of 1 km, 100 m from the nearest obstacle where 50 m were wanted."""
     flown = outcome != "error"
     return {
-        "run": run,
-        "case": run,
-        "seed": 1000 + run,
-        "scenario": "base",
-        "world": "forest",
-        "planner": "rolling_window",
-        "aircraft": "aerosonde",
-        "outcome": outcome,
-        "reason": f"reason of run {run}",
-        WIND: 5.0,
-        "sensor.rays": 720,
-        "error": None if flown else "Traceback: <b>boom</b>",
-        "flown_length_m": 1100.0 if flown else None,
-        "min_clearance_m": 100.0 if flown else None,
-        "clearance_violation_s": 0.0 if flown else None,
-        "cross_track_m.p95": 0.1 if flown else None,
-        "trackability.legs": 3 if flown else None,
-        "trackable": True if flown else None,
-        "optimum_m": 1000.0,
-        "length_ratio": 1.1 if outcome == "reached" else None,
-        "wanted_clearance_m": 50.0,
-    } | other
+        "run": run, "case": run, "seed": 1000 + run, "scenario": "base", "world": "forest",
+        "planner": "rolling_window", "aircraft": "aerosonde", "outcome": outcome,
+        "reason": f"reason of run {run}", WIND: 5.0, "sensor.rays": 720,
+        "error": None if flown else "Traceback: <b>boom</b>", "flown_length_m": 1100.0 if flown else None,
+        "min_clearance_m": 100.0 if flown else None, "clearance_violation_s": 0.0 if flown else None,
+        "cross_track_m.p95": 0.1 if flown else None, "trackability.legs": 3 if flown else None,
+        "trackable": True if flown else None, "optimum_m": 1000.0,
+        "length_ratio": 1.1 if outcome == "reached" else None, "wanted_clearance_m": 50.0,
+    } | other  # fmt: skip
 
 
 def campaign(

@@ -107,10 +107,8 @@ print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
             "fly paper_circles --wind 3,90 --set environment.wind.speed_mps=8",
             "speed_mps=8 beside an option that gives environment.wind.speed_mps as 3.0; leave one of them out",
         ),
-        (
-            "falsify paper_circles --vary seed=1:2 --planner bug2 --set planner={}",
-            'planner={} beside an option that gives planner.kind as "bug2"',
-        ),
+        ("falsify paper_circles --vary seed=1:2 --planner bug2 --set planner={}",
+            'planner={} beside an option that gives planner.kind as "bug2"'),
         ("fly paper_circles --view --no-recording", "nothing to view with --no-recording"),
         ("fly paper_circle", "no such file; give a scenario file or one of aerosonde_forest"),
         ("fly one two", "two"),
@@ -130,7 +128,7 @@ print(sorted({slow!r} & set(sys.modules)), file=sys.stderr)
         ("fly forest_planners", "this is a campaign: use `wayproof sweep forest_planners`"),
         (f"fly {CAMPAIGN}", f"this is a campaign: use `wayproof sweep {CAMPAIGN}`"),
     ],
-)
+)  # fmt: skip
 def test_bad_usage_is_one_line_and_writes_nothing(
     words: str, sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

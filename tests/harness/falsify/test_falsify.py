@@ -179,29 +179,23 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     [
         ([], "--vary"),
         (["--vary", "mission.time_limit_s"], "'mission.time_limit_s' is not KEY.PATH=LO:HI with two numbers"),
-        (
-            ["--vary", "mission[goal_m].0=0:1", "--set", "mission.goal_m[0]=5"],
-            "mission.goal_m[0] is given a value too, 5; give one of them",
-        ),
-        (
-            ["--vary", "mission.goal_m[0]=0:1", "--vary", "mission.goal_m.0=0:1"],
-            "--vary mission.goal_m[0]: is given twice",
-        ),
+        (["--vary", "mission[goal_m].0=0:1", "--set", "mission.goal_m[0]=5"],
+            "mission.goal_m[0] is given a value too, 5; give one of them"),
+        (["--vary", "mission.goal_m[0]=0:1", "--vary", "mission.goal_m.0=0:1"],
+            "--vary mission.goal_m[0]: is given twice"),
         (["--vary", "sensor..rays=0:1"], "--vary: 'sensor..rays' is not a key path"),
         (["--vary", "seed=1:5"], "a seed is no condition; --seed gives another"),
         (["--vary", "sensor.dropout=0:0"], "both ends are 0; give two, as sensor.dropout=0:1"),
         (["--vary", "sensor.dropout=0:2"], "command line: sensor.dropout: is 2; must be at most 1"),
-        (
-            ["--vary", "sensor.dropuot=0:1"],
-            "command line: sensor.dropuot: unknown key; did you mean dropout?",
-        ),
+        (["--vary", "sensor.dropuot=0:1"],
+            "command line: sensor.dropuot: unknown key; did you mean dropout?"),
         (["--vary", "sensor.rate_hz=4:1"], "which does not divide 120 Hz"),
         (["--vary", "planner.kind=0:1"], "planner.kind: is 0; must be text"),
         (["--vary", "sensor.dropout=0:1", "--tolerance", "0"], "is 0; must be between 0 and 1"),
         (["--vary", "sensor.dropout=0:1", "--runs", "1"], "--runs"),
         (["--vary", "sensor.dropout=0:1", "--claim", "later"], "--claim"),
     ],
-)
+)  # fmt: skip
 def test_bad_usage_is_one_line_and_writes_nothing(
     arguments: list[str], sentence: str, to_break: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

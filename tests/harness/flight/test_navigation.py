@@ -43,14 +43,10 @@ def test_the_same_seed_has_the_same_errors_and_is_not_used_up() -> None:
 @pytest.mark.parametrize("interval_s", [1.0, 7.0])
 def test_errors_have_the_sizes_and_the_memory_that_were_asked_for(interval_s: float) -> None:
     keys = {
-        "position_sigma_m": 4.0,
-        "position_correlation_s": 10.0,
-        "position_bias_m": [30.0, -20.0],
-        "velocity_sigma_mps": 0.2,
-        "heading_sigma_deg": 2.0,
-        "airspeed_sigma_mps": 0.5,
+        "position_sigma_m": 4.0, "position_correlation_s": 10.0, "position_bias_m": [30.0, -20.0],
+        "velocity_sigma_mps": 0.2, "heading_sigma_deg": 2.0, "airspeed_sigma_mps": 0.5,
         "altitude_sigma_m": 3.0,
-    }
+    }  # fmt: skip
     gnss, count = navigator(**keys), 20_000
     rows = []
     for index in range(count):
@@ -95,14 +91,9 @@ def test_dead_reckoning_knows_its_start_and_drifts_ever_after() -> None:
 
 def test_a_state_is_as_old_as_its_latency() -> None:
     navigation = Navigation(
-        kind="gnss",
-        latency_s=0.25,
-        position_sigma_m=0.0,
-        velocity_sigma_mps=0.0,
-        heading_sigma_deg=0.0,
-        airspeed_sigma_mps=0.0,
-        altitude_sigma_m=0.0,
-    )
+        kind="gnss", latency_s=0.25, position_sigma_m=0.0, velocity_sigma_mps=0.0, heading_sigma_deg=0.0,
+        airspeed_sigma_mps=0.0, altitude_sigma_m=0.0,
+    )  # fmt: skip
     navigator = Navigator(navigation, np.random.SeedSequence(1))
     # A circle flown at 20 m/s with a rate of 0.3 rad/s, as seen ten times a second.
     for step in range(60):
@@ -113,18 +104,9 @@ def test_a_state_is_as_old_as_its_latency() -> None:
 
         turn = 0.3 * time_s
         true = AircraftState(
-            time_s,
-            *place(time_s),
-            300.0 + time_s,
-            20 * math.sin(turn),
-            20 * math.cos(turn),
-            1.0,
-            turn % math.tau,
-            0.1,
-            0.0,
-            20.0,
-            1.0,
-        )
+            time_s, *place(time_s), 300.0 + time_s, 20 * math.sin(turn), 20 * math.cos(turn), 1.0,
+            turn % math.tau, 0.1, 0.0, 20.0, 1.0,
+        )  # fmt: skip
         seen = navigator.believed(true)
         assert (seen.time_s, seen.roll_rad) == pytest.approx((time_s, 0.1))
         assert (seen.east_m, seen.north_m) == pytest.approx(place(time_s - 0.25), abs=0.2)

@@ -18,19 +18,10 @@ from wayproof import AircraftState, Mission
 
 BOUNDS = (0.0, 0.0, 20_000.0, 20_000.0)
 MISSION = Mission(
-    goal_m=(19_000.0, 10_000.0),
-    goal_radius_m=100.0,
-    bounds_m=BOUNDS,
-    clearance_m=100.0,
-    turn_radius_m=100.0,
-    speed_mps=25.0,
-    roll_in_s=0.5,
-    tracking_error_m=1.0,
-    sensor_range_m=1000.0,
-    compute_latency_s=0.0,
-    sensor_latency_s=0.0,
-    wind_mps=0.0,
-)
+    goal_m=(19_000.0, 10_000.0), goal_radius_m=100.0, bounds_m=BOUNDS, clearance_m=100.0, turn_radius_m=100.0,
+    speed_mps=25.0, roll_in_s=0.5, tracking_error_m=1.0, sensor_range_m=1000.0, compute_latency_s=0.0,
+    sensor_latency_s=0.0, wind_mps=0.0,
+)  # fmt: skip
 
 
 def ridge() -> Ground:

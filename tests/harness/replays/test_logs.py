@@ -111,11 +111,8 @@ def mission_in(folder: Path) -> Path:
     [
         ("a.igc", b"", "is no flight log that is read; must end in .parquet, .csv, .ulg, .bin"),
         ("a.ulg", b"not a log", "cannot be read as .ulg"),
-        (
-            "a.csv",
-            b"a,b\n1,2\n",
-            "has no column time_s; must have time_s, and east_m, north_m or latitude_deg",
-        ),
+        ("a.csv", b"a,b\n1,2\n",
+            "has no column time_s; must have time_s, and east_m, north_m or latitude_deg"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1,two,3\n", "x_m: row 2: is 'two'; must be a finite number"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n", "time_s: must have at least 3 rows"),
         ("a.csv", b"time_s,x_m,y_m\n2,1,2\n1,1,2\n0,1,2\n", "each later than the one before"),
@@ -124,7 +121,7 @@ def mission_in(folder: Path) -> Path:
         ("a.parquet", b"PAR1", "cannot be read as .parquet"),
         ("a.bin", b"not a log", "is no DataFlash log: such a file begins with a3 95 80"),
     ],
-)
+)  # fmt: skip
 def test_a_file_that_is_no_log_is_told(name: str, content: bytes, sentence: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError) as raised:

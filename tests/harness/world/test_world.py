@@ -127,16 +127,10 @@ def test_a_contact_on_the_way_is_found_where_shapely_finds_one(seed: int, moves:
 @pytest.mark.parametrize(
     ("active_s", "met"),
     [
-        ((0.0, 1.0), True),
-        ((0.03, 1.0), True),
-        ((0.0, 0.07), True),
-        ((0.03, 0.07), True),
-        ((0.05, 0.06), True),
-        ((0.06, 1.0), False),
-        ((0.06, 0.07), False),
-        ((0.0, 0.04), False),
+        ((0.0, 1.0), True), ((0.03, 1.0), True), ((0.0, 0.07), True), ((0.03, 0.07), True),
+        ((0.05, 0.06), True), ((0.06, 1.0), False), ((0.06, 0.07), False), ((0.0, 0.04), False),
     ],
-)
+)  # fmt: skip
 def test_what_appears_or_goes_on_the_way_is_met_while_it_is_there(
     active_s: tuple[float, float], met: bool
 ) -> None:
