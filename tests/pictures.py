@@ -64,13 +64,8 @@ def make(out: Path, work: Path) -> Iterator[str]:
         work: an empty folder for the flights.
     """
     flights = [
-        "compare",
-        "paper_circles",
-        "--planners",
-        "bug2,improved_bug,rolling_window",
-        "--out",
-        str(work),
-    ]
+        "compare", "paper_circles", "--planners", "bug2,improved_bug,rolling_window", "--out", str(work),
+    ]  # fmt: skip
     if wayproof(flights) or wayproof(["report", str(work / "paper_circles" / "bug2")]):
         yield "a flight or a report failed"
     wayproof(["fly", "aerosonde_forest", "--out", str(work / "forest"), "--quiet"])

@@ -27,23 +27,17 @@ from tests.aircraft.check_cases import rows as check_case_rows
 HERE = Path(__file__).parents[1] / "aircraft"
 GRAVITY_MPS2 = 9.80665
 TRIED = {
-    "as above": (),
-    "state not old": (("navigation.latency_s", "0"),),
+    "as above": (), "state not old": (("navigation.latency_s", "0"),),
     "state 0.12 s old": (("navigation.latency_s", "0.12"),),
     "roll of 60 deg/s at most, in 0.25 s": (
-        ("aircraft.autopilot.roll_rate_limit_degps", "60"),
-        ("aircraft.autopilot.roll_time_constant_s", "0.25"),
-    ),
-    "airspeed 18.1 m/s": (("aircraft.airspeed_mps", "18.1"),),
-    "gain 1": (("guidance.gain", "1"),),
+        ("aircraft.autopilot.roll_rate_limit_degps", "60"), ("aircraft.autopilot.roll_time_constant_s", "0.25")),
+    "airspeed 18.1 m/s": (("aircraft.airspeed_mps", "18.1"),), "gain 1": (("guidance.gain", "1"),),
     "gain 3": (("guidance.gain", "3"),),
     "roll of 180 deg/s at most, in 0.1 s": (
-        ("aircraft.autopilot.roll_rate_limit_degps", "180"),
-        ("aircraft.autopilot.roll_time_constant_s", "0.1"),
-    ),
+        ("aircraft.autopilot.roll_rate_limit_degps", "180"), ("aircraft.autopilot.roll_time_constant_s", "0.1")),
     "height off by 2.1 m (1 sigma)": (("navigation.altitude_sigma_m", "2.1"),),
     "light turbulence": (("environment.turbulence", "{intensity: light}"),),
-}
+}  # fmt: skip
 """What the answer hangs on: name, and keys of the simulated flight."""
 
 

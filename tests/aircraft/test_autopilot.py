@@ -54,14 +54,9 @@ def test_propeller_speed_is_eliminated_as_settled() -> None:
     control = np.zeros((9, 4))
     control[4, 0] = 1000.0
     at = derivatives(
-        states,
-        ["ThtlCmd", "DaCmd", "DeCmd", "DrCmd"],
-        system,
-        control,
-        airspeed_fps=100.0,
-        alpha_rad=0.0,
+        states, ["ThtlCmd", "DaCmd", "DeCmd", "DrCmd"], system, control, airspeed_fps=100.0, alpha_rad=0.0,
         qbar_psf=10.0,
-    )
+    )  # fmt: skip
     assert at.xdt == pytest.approx(0.02 * 1000.0 / 5.0)
 
 

@@ -249,18 +249,14 @@ def reachable(start: Place, goal: Place, obstacles: Obstacles, radius_m: float) 
 
 
 def scenario_about(seed: int, family: str, start: Place, goal: Place, obstacles: Obstacles) -> Scenario:
+    ends = {"goal_radius_m": GOAL_RADIUS_M, "time_limit_s": TIME_LIMIT_S}
     plain = {
         "schema": "wayproof/scenario/1",
         "name": f"{family.replace('_', '-')}-{seed}",
         "seed": seed,
         "area": {"bounds_m": [0.0, 0.0, SIDE_M, SIDE_M]},
         "obstacles": obstacles,
-        "mission": {
-            "start_m": list(start),
-            "goal_m": list(goal),
-            "goal_radius_m": GOAL_RADIUS_M,
-            "time_limit_s": TIME_LIMIT_S,
-        },
+        "mission": {"start_m": list(start), "goal_m": list(goal)} | ends,
         "sensor": {"range_m": 1000.0, "rays": 360, "rate_hz": 1.0},
         "planner": {"kind": "rolling_window", "clearance_m": CLEARANCE_M},
     }

@@ -15,15 +15,11 @@ def flown(width_m: float, length_m: float, margin_m: float | None = None) -> Fli
         {"polygon": {"vertices_m": [[x0, south], [x1, south], [x1, north], [x0, north]]}}
         for south, north in ((0.0, 2000.0 - half), (2000.0 + half, 4000.0))
     ]
+    goal = {"goal_m": [x1 + 1600.0, 2000.0]}
     scenario = small_world(
         *blocks,
         area={"bounds_m": [0, 0, x1 + 2000.0, 4000]},
-        mission={
-            "start_m": [400.0, 2000.0],
-            "course_deg": 90.0,
-            "goal_m": [x1 + 1600.0, 2000.0],
-            "time_limit_s": 1500.0,
-        },
+        mission={"start_m": [400.0, 2000.0], "course_deg": 90.0, "time_limit_s": 1500.0} | goal,
         sensor={"range_m": 1200.0},
         planner={"clearance_m": 50.0, "margin_m": margin_m},
     )

@@ -117,29 +117,21 @@ class Told(Observer):
             self.of_fixes.append((round(time_s, 3), text.partition(":")[0], isinstance(text, Caution)))
 
 
+LOST, FOUND = ("no fix any more", True), ("a fix again", True)
+
+
 @pytest.mark.parametrize(
     ("navigation", "told"),
     [
         ({"kind": "gnss"}, []),
         (
             {"kind": "gnss", "outages_s": [[40.0, 60.0], [70.0, 80.0], [90.0, 1e4]]},
-            [
-                (40.0, "no fix any more", True),
-                (60.0, "a fix again", True),
-                (70.0, "no fix any more", True),
-                (80.0, "a fix again", True),
-                (90.0, "no fix any more", True),
-            ],
+            [(40.0, *LOST), (60.0, *FOUND), (70.0, *LOST), (80.0, *FOUND), (90.0, *LOST)],
         ),
         # From one outage into the next between two looks at the state: the fix in between is told of too.
         (
             {"kind": "gnss", "outages_s": [[40.0, 60.01], [60.02, 70.0]]},
-            [
-                (40.0, "no fix any more", True),
-                (60.1, "a fix again", True),
-                (60.1, "no fix any more", True),
-                (70.0, "a fix again", True),
-            ],
+            [(40.0, *LOST), (60.1, *FOUND), (60.1, *LOST), (70.0, *FOUND)],
         ),
         ({"kind": "dead_reckoning"}, [(0.0, "no fix at the start", False)]),
     ],

@@ -21,15 +21,11 @@ def test_a_vanished_wall_is_cut_short_within_25_seconds(wind: dict[str, Any] | N
         "polygon": {"vertices_m": [[2000, 500], [2100, 500], [2100, 7500], [2000, 7500]]},
         "active_s": [0.0, GONE_S],
     }
+    mission = {"start_m": [1000.0, 4000.0], "course_deg": 90.0, "goal_m": list(GOAL), "time_limit_s": 900.0}
     scenario = small_world(
         wall,
         area={"bounds_m": [0, 0, 10_000, 8000]},
-        mission={
-            "start_m": [1000.0, 4000.0],
-            "course_deg": 90.0,
-            "goal_m": list(GOAL),
-            "time_limit_s": 900.0,
-        },
+        mission=mission,
         sensor={"range_m": 3000.0},
         planner={"clearance_m": 50.0},
         environment={"wind": wind} if wind else {},

@@ -26,24 +26,14 @@ from wayproof import load_scenario
 
 SHARED: Final = Path(__file__).parents[3] / "shared"
 FAMILIES: Final[dict[str, tuple[str, ...]]] = {
-    "like the paper's": ("paper_like",),
-    "circles, few": ("circles_low",),
-    "circles, more": ("circles_mid",),
-    "circles, many": ("circles_high",),
-    "polygons": ("polygon_field",),
-    "U-shaped traps": ("u_trap",),
+    "like the paper's": ("paper_like",), "circles, few": ("circles_low",), "circles, more": ("circles_mid",),
+    "circles, many": ("circles_high",), "polygons": ("polygon_field",), "U-shaped traps": ("u_trap",),
     "mazes of 5 x 5 cells, corridors of 18.5 km": ("maze5",),
-    "mazes of 8 x 8 cells, corridors of 11 km": ("maze8",),
-    "spirals": ("spiral",),
-    "slots": ("slots",),
-    "dead ends": ("dead_ends",),
-    "forest": ("faster_forest",),
-    "CTU": ("ctu_dubins",),
-    "OMPL": ("ompl_circles",),
-    "others": ("mrpb", "pythonrobotics", "zhm_rrt2d"),
-    "without a way": ("enclosed_goal", "enclosed_start", "wall_across"),
-    "BARN": ("barn",),
-}
+    "mazes of 8 x 8 cells, corridors of 11 km": ("maze8",), "spirals": ("spiral",), "slots": ("slots",),
+    "dead ends": ("dead_ends",), "forest": ("faster_forest",), "CTU": ("ctu_dubins",),
+    "OMPL": ("ompl_circles",), "others": ("mrpb", "pythonrobotics", "zhm_rrt2d"),
+    "without a way": ("enclosed_goal", "enclosed_start", "wall_across"), "BARN": ("barn",),
+}  # fmt: skip
 ENDS: Final = {"reach": "reached", "unreachable": "unreachable"}
 
 

@@ -127,13 +127,9 @@ def test_nothing_that_a_planner_prints_gets_into_the_result(place: Path) -> None
     status, out, err = flown(place, "talks", "--json")
     assert (status, json.loads(out)["outcome"]) == (0, "reached"), err
     ways = (
-        "on being imported",
-        "on being made",
-        "from Python",
-        "past Python",
-        "from C",
+        "on being imported", "on being made", "from Python", "past Python", "from C",
         "from a process of its own",
-    )
+    )  # fmt: skip
     assert [way for way in (*ways, "on leaving") if f"{way}\n" not in err] == []
 
 

@@ -54,14 +54,10 @@ def circle_track(radius_m: float, seconds: float, speed_mps: float = 25.0) -> Tr
     time_s = np.arange(round(10 * seconds) + 1) / 10.0
     angle = speed_mps * time_s / radius_m
     return track(
-        len(time_s),
-        east_m=radius_m * np.cos(angle),
-        north_m=radius_m * np.sin(angle),
-        course_deg=np.degrees(-angle) % 360.0,
-        heading_deg=np.degrees(-angle) % 360.0,
-        groundspeed_mps=speed_mps,
-        arc_length_m=speed_mps * time_s,
-    )
+        len(time_s), east_m=radius_m * np.cos(angle), north_m=radius_m * np.sin(angle),
+        course_deg=np.degrees(-angle) % 360.0, heading_deg=np.degrees(-angle) % 360.0,
+        groundspeed_mps=speed_mps, arc_length_m=speed_mps * time_s,
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="session")

@@ -35,14 +35,10 @@ def flat(
     """A straight flight north at 25 m/s in which some columns are other than they should be."""
     flown = track(ROWS, **columns)
     asked: dict[str, Any] = {
-        "corners": (),
-        "deviation_m": np.zeros(ROWS),
-        "allowed_m": np.full(ROWS, 5.0),
-        "altitude_m": np.full(ROWS, 300.0),
-        "climb_mps": np.zeros(ROWS),
-        "fastest_mps": np.tile((8.0, 8.0), (ROWS, 1)),
-        "airspeed_mps": np.full(ROWS, 25.0),
-    }
+        "corners": (), "deviation_m": np.zeros(ROWS), "allowed_m": np.full(ROWS, 5.0),
+        "altitude_m": np.full(ROWS, 300.0), "climb_mps": np.zeros(ROWS),
+        "fastest_mps": np.tile((8.0, 8.0), (ROWS, 1)), "airspeed_mps": np.full(ROWS, 25.0),
+    }  # fmt: skip
     straight = plan([(0, 0, 0, 1, 0.0, 50000.0)])
     return flown, straight, replace(LIMITS, **limits), AsGiven(**asked | given) if given else None, lost
 

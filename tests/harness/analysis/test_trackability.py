@@ -114,14 +114,9 @@ def as_given(track: Track, corners: list[CutCorner], off_m: FloatArray, allowed_
     """A level path for an aircraft that climbs at 5 m/s and sinks at 8."""
     rows = len(track)
     return AsGiven(
-        corners,
-        off_m,
-        np.full(rows, allowed_m),
-        altitude_m=track.up_m,
-        climb_mps=np.zeros(rows),
-        fastest_mps=np.tile((5.0, 8.0), (rows, 1)),
-        airspeed_mps=np.full(rows, 25.0),
-    )
+        corners, off_m, np.full(rows, allowed_m), altitude_m=track.up_m, climb_mps=np.zeros(rows),
+        fastest_mps=np.tile((5.0, 8.0), (rows, 1)), airspeed_mps=np.full(rows, 25.0),
+    )  # fmt: skip
 
 
 def test_corners_end_legs_and_belong_to_the_leg_that_they_end() -> None:

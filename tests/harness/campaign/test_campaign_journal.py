@@ -15,8 +15,8 @@ from harness.campaign.flight import Answer
 from harness.campaign.folder import JOURNAL, CampaignFolder, sealed
 from harness.campaign.results import RESULTS
 from harness.campaign.runs import CampaignRuns
-from harness.cli.app import main
 from tests.faults.command import CAMPAIGN_FILES
+from tests.harness.campaign.test_sweep import refuses, sweep
 from tests.refusals import refused
 
 Lines = list[bytes]
@@ -34,10 +34,6 @@ def place(tmp_path: Path) -> Path:
             folder.append(Answer(number, {**runs.cells(number), **flown}, {"wall_s": 1.0}))
         folder.write_tables()
     return tmp_path
-
-
-def sweep(place: Path, *options: str) -> int:
-    return main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "out"), "--quiet", *options])
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -82,13 +78,12 @@ DAMAGE: dict[str, tuple[Callable[[Lines], Lines], str]] = {
 @pytest.mark.parametrize("options", [(), ("--resume",)], ids=["", "resume"])
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_line_is_named_and_nothing_touched(
-    damage: str, options: tuple[str, ...], place: Path, capsys: pytest.CaptureFixture[str]
+    damage: str, options: tuple[str, ...], place: Path
 ) -> None:
     edit, said = DAMAGE[damage]
     (place / "out" / JOURNAL).write_bytes(b"".join(edit(lines_of(place))))
     before = content(place / "out")
-    assert sweep(place, *options) == 2
-    told = capsys.readouterr().err
+    told = refuses(place, *options)
     assert len(told.splitlines()) == 1
     if options:
         assert told.startswith(f"wayproof: {place / 'out' / JOURNAL}{said}")
@@ -107,20 +102,16 @@ def test_a_run_told_twice_alike_is_one_and_a_torn_line_none(torn: bytes | None, 
 
 
 @pytest.mark.parametrize("left", [None, b"", b'{"run": 0, "ro'], ids=["deleted", "emptied", "torn"])
-def test_results_without_a_journal_are_results(
-    left: bytes | None, place: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_results_without_a_journal_are_results(left: bytes | None, place: Path) -> None:
     (place / "out" / JOURNAL).unlink()
     if left is not None:
         (place / "out" / JOURNAL).write_bytes(left)
     before = content(place / "out")
-    assert sweep(place) == 2
-    assert f"{place / 'out'} holds {RESULTS}: go on with --resume" in capsys.readouterr().err
+    assert f"{place / 'out'} holds {RESULTS}: go on with --resume" in refuses(place)
     text = (place / "campaign.yaml").read_text()
     (place / "campaign.yaml").write_text(text.replace("seed: ", "seed: 1"))
-    assert sweep(place) == 2
-    assert sweep(place, "--resume") == 2
-    assert "is of another campaign: campaign.seed was" in capsys.readouterr().err
+    assert refuses(place)
+    assert "is of another campaign: campaign.seed was" in refuses(place, "--resume")
     assert content(place / "out") == before
 
 

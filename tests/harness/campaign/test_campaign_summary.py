@@ -116,17 +116,10 @@ def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
         campaign(tmp_path, rows, [(1, 5, 9), (2, 6, 8), (3, 4, 7), (4, 4, 4), (9, 9, 9)])
     ).summary.total
     assert total == Cell(
-        runs=5,
-        reached=3,
-        success=wilson(3, 5),
-        length_median=1.1,
-        length_p95=float(np.percentile(ratios, 95)),
-        least_clearance_m=-1.0,
-        below_wanted=wilson(1, 4),
-        trackable=wilson(3, 4),
-        planner_p99_ms=9.0,
-        planner_max_ms=9.0,
-    )
+        runs=5, reached=3, success=wilson(3, 5), length_median=1.1,
+        length_p95=float(np.percentile(ratios, 95)), least_clearance_m=-1.0, below_wanted=wilson(1, 4),
+        trackable=wilson(3, 4), planner_p99_ms=9.0, planner_max_ms=9.0,
+    )  # fmt: skip
 
 
 def test_nearly_all_is_not_all_and_none_of_a_few_is_not_never() -> None:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import os
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -27,20 +25,12 @@ from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import local_workers
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
+from tests.faults import command
+from tests.faults.command import ROOT
 from tests.refusals import refused
 from wayproof import load_scenario
 
-ROOT = Path(__file__).parents[3]
-SCENARIO = """\
-schema: wayproof/scenario/1
-name: short
-area: {bounds_m: [0, 0, 2000, 2000]}
-obstacles:
-  - circle: {center_m: [1000, 1000], radius_m: 100}
-mission: {start_m: [500, 500], goal_m: [1500, 1500], goal_radius_m: 60}
-sensor: {range_m: 900, rays: 360}
-planner: {clearance_m: 40}
-"""
+SCENARIO = command.CAMPAIGN_FILES["short.yaml"]
 CAMPAIGN = """\
 schema: wayproof/campaign/1
 name: short
@@ -102,25 +92,31 @@ ENTRY_POINTS = "[wayproof.planners]\n" + "".join(
 )
 
 
+def written(place: Path, campaign: str = CAMPAIGN) -> Path:
+    (place / "short.yaml").write_text(SCENARIO)
+    (place / "campaign.yaml").write_text(campaign)
+    return place
+
+
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    (tmp_path / "short.yaml").write_text(SCENARIO)
-    (tmp_path / "campaign.yaml").write_text(CAMPAIGN)
-    return tmp_path
+    return written(tmp_path)
 
 
 @pytest.fixture(scope="module")
 def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The campaign's folder, flown by one process without a break."""
-    place = tmp_path_factory.mktemp("unbroken")
-    (place / "short.yaml").write_text(SCENARIO)
-    (place / "campaign.yaml").write_text(CAMPAIGN)
-    assert main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "out"), "--workers", "1"]) == 0
+    place = written(tmp_path_factory.mktemp("unbroken"))
+    assert sweep(place, "--workers", "1") == 0
     return place / "out"
 
 
 def sweep(place: Path, *options: str) -> int:
     return main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "out"), *options])
+
+
+def refuses(place: Path, *options: str) -> str:
+    return refused("sweep", place / "campaign.yaml", "--out", place / "out", *options)
 
 
 def rows_of(folder: Path, name: str = "results") -> list[dict[str, Any]]:
@@ -134,14 +130,7 @@ def results(folder: Path) -> bytes:
 
 def start(place: Path, *options: str) -> subprocess.Popen[str]:
     """The command in a process of its own."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "harness", "sweep", "campaign.yaml", "--out", "out", *options],
-        cwd=place,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    return command.start(place, "sweep", "campaign.yaml", "--out", "out", *options)
 
 
 def wait_for(what: Callable[[], bool], seconds: float = 90.0) -> None:
@@ -310,13 +299,10 @@ TORN = b'{"run": 99, "row": {"outc'
 
 
 @pytest.mark.flights
-def test_resume_flies_only_what_is_missing(
-    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_resume_flies_only_what_is_missing(place: Path, unbroken: Path) -> None:
     out = place / "out"
     whole = after_six_runs(place, unbroken, TORN)
-    assert sweep(place) == 2
-    assert "holds 6 runs: go on with --resume, or choose another folder" in capsys.readouterr().err
+    assert "holds 6 runs: go on with --resume, or choose another folder" in refuses(place)
     assert sweep(place, "--resume", "--workers", "1") == 0
     assert results(out) == results(unbroken)
     lines = (out / "journal.jsonl").read_bytes().splitlines(keepends=True)
@@ -335,7 +321,7 @@ def test_resume_flies_only_what_is_missing(
     ],
 )
 def test_resume_refuses_a_changed_campaign_and_says_what_changed(
-    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str], file: str, old: str, new: str, said: str
+    place: Path, unbroken: Path, file: str, old: str, new: str, said: str
 ) -> None:
     out = place / "out"
     out.mkdir()
@@ -344,8 +330,7 @@ def test_resume_refuses_a_changed_campaign_and_says_what_changed(
     changed = (place / file).read_text().replace(old, new)
     assert changed != (place / file).read_text()
     (place / file).write_text(changed)
-    assert sweep(place, "--resume") == 2
-    assert said in capsys.readouterr().err
+    assert said in refuses(place, "--resume")
     assert results(out) == results(unbroken), "nothing lost"
     (place / file).write_text(changed.replace(new, old) if new else SCENARIO)
     (place / file).write_text(f"# a comment is no change\n{(place / file).read_text()}")
@@ -354,9 +339,7 @@ def test_resume_refuses_a_changed_campaign_and_says_what_changed(
         assert folder.over.keys() == set(range(8))
 
 
-def test_resume_refuses_an_added_null_and_another_order_of_keys(
-    place: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_resume_refuses_an_added_null_and_another_order_of_keys(place: Path) -> None:
     """What a run flies follows from the order of grid and random keys; a null replaces what the scenario has."""
     grid = "  environment.wind.speed_mps: [0, 5]\n"
     rays, gusts = "  sensor.rays: [360, 720]\n", "environment.vertical_gusts"
@@ -371,12 +354,11 @@ def test_resume_refuses_an_added_null_and_another_order_of_keys(
         (two.replace(": 0}", f": 0, {gusts}: null}}"), f"campaign.set.{gusts} was not there, is null"),
     ):
         (place / "campaign.yaml").write_text(other)
-        assert sweep(place, "--resume") == 2
-        assert said in capsys.readouterr().err
+        assert said in refuses(place, "--resume")
 
 
 def test_resume_refuses_another_aircraft_planner_or_version(
-    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(ROOT / "aircraft" / "aerosonde", place / "mine")
     with_plugin(place, monkeypatch)
@@ -387,17 +369,14 @@ def test_resume_refuses_another_aircraft_planner_or_version(
         folder.append(Answer(0, {"outcome": "reached"}, {}))
     model = place / "mine" / "aerosonde.xml"
     model.write_text(model.read_text() + "<!-- other -->\n")
-    assert sweep(place, "--resume") == 2
-    assert "aircraft." in capsys.readouterr().err
+    assert "aircraft." in refuses(place, "--resume")
     model.write_text(model.read_text().removesuffix("<!-- other -->\n"))
     with_plugin(place, monkeypatch, "2.0")
-    assert sweep(place, "--resume") == 2
-    assert 'planners.leaves was "campaign_plugin 1.0", is "campaign_plugin 2.0"' in capsys.readouterr().err
+    assert 'planners.leaves was "campaign_plugin 1.0", is "campaign_plugin 2.0"' in refuses(place, "--resume")
     index = json.loads((place / "out" / "campaign.json").read_text())
     index["versions"]["jsbsim"] = "1.0.0"
     (place / "out" / "campaign.json").write_text(json.dumps(index))
-    assert sweep(place, "--resume") == 2
-    assert 'versions.jsbsim was "1.0.0", is' in capsys.readouterr().err
+    assert 'versions.jsbsim was "1.0.0", is' in refuses(place, "--resume")
 
 
 @pytest.mark.flights
@@ -419,17 +398,15 @@ def test_a_planner_that_cannot_be_made_is_a_row_whatever_it_raises(
     assert not (place / "run").exists()
 
 
-def test_a_folder_that_holds_other_things_is_refused(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_holds_other_things_is_refused(place: Path) -> None:
     (place / "out").mkdir()
     (place / "out" / "thesis.tex").write_text("years of work")
     (place / "out" / "campaign.json").write_text("[]")
-    assert sweep(place) == 2
-    assert "is not empty and not a campaign" in capsys.readouterr().err
+    assert "is not empty and not a campaign" in refuses(place)
     assert sorted(each.name for each in (place / "out").iterdir()) == ["campaign.json", "thesis.tex"]
     shutil.rmtree(place / "out")
     (place / "out").write_text("a file")
-    assert sweep(place) == 2
-    assert "is a file" in capsys.readouterr().err
+    assert "is a file" in refuses(place)
 
 
 @pytest.mark.flights

@@ -15,15 +15,8 @@ from pathlib import Path
 import pytest
 
 from harness.cli.app import main
-from tests.harness.campaign.test_sweep import (
-    CAMPAIGN,
-    ROOT,
-    SCENARIO,
-    journal_lines,
-    results,
-    start,
-    wait_for,
-)
+from tests.faults.command import ROOT
+from tests.harness.campaign.test_sweep import CAMPAIGN, journal_lines, results, start, wait_for, written
 from tests.processes import python
 from tests.refusals import refused
 
@@ -89,9 +82,7 @@ class Cluster:
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("cluster")
-    (folder / "short.yaml").write_text(SCENARIO)
-    (folder / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 4"))
-    return folder
+    return written(folder, CAMPAIGN.replace("draws: 2", "draws: 4"))
 
 
 @pytest.fixture(scope="module")

@@ -18,26 +18,17 @@ from tests.refusals import refused
 
 METRICS: dict[str, Any] = {
     "outcome": "collision",
-    "reason": "hit obstacle [3] at 812.3 s, "
-    + "and a reason that goes on for longer than a line of 80 columns",
-    "flown_length_m": 94321.5,
-    "planned_length_m": None,
-    "flight_time_s": 3772.9,
-    "min_clearance_m": -0.52,
-    "clearance_violation_s": 0.0,
-    "cross_track_m": {"rms": 0.04, "p95": 0.09, "max": 0.18},
-    "altitude_error_m": {"rms": None, "p95": None, "max": None},
-    "trackable": False,
+    "reason": "hit obstacle [3] at 812.3 s, and a reason that goes on for longer than a line of 80 columns",
+    "flown_length_m": 94321.5, "planned_length_m": None, "flight_time_s": 3772.9, "min_clearance_m": -0.52,
+    "clearance_violation_s": 0.0, "cross_track_m": {"rms": 0.04, "p95": 0.09, "max": 0.18},
+    "altitude_error_m": {"rms": None, "p95": None, "max": None}, "trackable": False,
     "trackability": [
-        {"trackable": True, "cause": None},
-        {"trackable": False, "cause": "wind drift"},
-        {"trackable": False, "cause": "bank limit"},
-        {"trackable": False, "cause": "wind drift"},
+        {"trackable": True, "cause": None}, {"trackable": False, "cause": "wind drift"},
+        {"trackable": False, "cause": "bank limit"}, {"trackable": False, "cause": "wind drift"},
     ],
-    "replans": 41,
-    "compute_ms": {"p50": 0.2, "p99": 3.25, "max": 7.75},
+    "replans": 41, "compute_ms": {"p50": 0.2, "p99": 3.25, "max": 7.75},
     "timing": {"sim_s": 3772.9, "wall_s": 6.12, "realtime_factor": 616.5},
-}
+}  # fmt: skip
 
 
 def test_the_table_of_a_flight_fits_80_columns_and_says_what_happened(

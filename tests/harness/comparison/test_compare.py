@@ -8,8 +8,6 @@ import json
 import math
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -27,12 +25,12 @@ from harness.report.page import Chapter, rendered
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.world.obstacle import Circle, Obstacle
+from tests.faults.command import start
 from tests.harness.campaign.test_sweep import wait_for
 from tests.harness.conftest import CIRCLE_PLAN, circle_track
 from tests.page import shown
 from tests.refusals import refused
 
-ROOT = Path(__file__).parents[3]
 PLUGIN = '''
 import os
 
@@ -293,14 +291,7 @@ def alive(group: int) -> bool:
 def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place: Path) -> None:
     out = place / "interrupted"
     arguments = ["compare", "paper_circles", "--planners", "rolling_window", "--no-recording", "--out"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "harness", *arguments, str(out)],
-        cwd=place,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    process = start(place, *arguments, str(out), start_new_session=True)
     wait_for((out / "paper_circles" / "rolling_window" / "scenario.yaml").exists)
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=30)

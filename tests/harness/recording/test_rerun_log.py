@@ -45,16 +45,9 @@ from wayproof import AircraftState, InputError, Mission, Plan, PlanPicture, Plan
 from wayproof import Path as PlannedPath
 
 MISSION = Mission(
-    goal_m=(0.0, 2500.0),
-    goal_radius_m=50.0,
-    bounds_m=(-2000.0, -1000.0, 2000.0, 3000.0),
-    clearance_m=100.0,
-    turn_radius_m=110.0,
-    speed_mps=25.0,
-    roll_in_s=0.6,
-    tracking_error_m=0.5,
-    sensor_range_m=800.0,
-)
+    goal_m=(0.0, 2500.0), goal_radius_m=50.0, bounds_m=(-2000.0, -1000.0, 2000.0, 3000.0), clearance_m=100.0,
+    turn_radius_m=110.0, speed_mps=25.0, roll_in_s=0.6, tracking_error_m=0.5, sensor_range_m=800.0,
+)  # fmt: skip
 OBSTACLES = (
     Obstacle(Circle((600.0, 1250.0), 300.0)),
     Obstacle(Polygon(((-1500.0, 500.0), (-500.0, 500.0), (-500.0, 1500.0), (-1000.0, 800.0)))),

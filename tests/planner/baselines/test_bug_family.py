@@ -29,12 +29,9 @@ from tests.longer import longer
 MakePoints = Callable[..., FloatArray]
 
 MISSION = replace(
-    contract.MISSION,
-    goal_m=(17_000.0, 5000.0),
-    goal_radius_m=100.0,
-    bounds_m=(0.0, 0.0, 20_000.0, 10_000.0),
+    contract.MISSION, goal_m=(17_000.0, 5000.0), goal_radius_m=100.0, bounds_m=(0.0, 0.0, 20_000.0, 10_000.0),
     sensor_range_m=3000.0,
-)
+)  # fmt: skip
 KEEP = MISSION.clearance_m + MarginConfig().margin(MISSION)
 START = (3000.0, 5000.0)
 SPACING = 50.0
