@@ -44,7 +44,6 @@ class PointMass:
         return self._step_rate_hz
 
     def state(self) -> AircraftState:
-        """The state now."""
         airspeed = self._airspeed
         return AircraftState(
             time_s=self._step / self._step_rate_hz,

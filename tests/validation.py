@@ -42,7 +42,6 @@ TRIED = {
 
 
 def main(flown: Path) -> None:
-    """Writes the page and its figure."""
     found = {name: _thor(flown, keys) for name, keys in TRIED.items()}
     told = found["as above"].told
     (HERE.parent / ".pictures" / "validation_thor.svg").write_bytes(svg(replay_figure(found["as above"])))

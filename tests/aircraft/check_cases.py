@@ -98,7 +98,6 @@ INTEGRATORS = {
 
 
 def model_xml(case: Case) -> str:
-    """The JSBSim model of a case's body."""
     area, span, chord, ixx, iyy, izz, slug = case.body
     here = "<x>0</x><y>0</y><z>0</z>"
     places = "".join(

@@ -22,8 +22,6 @@ def cached(title: str, digest: str, measure: Measurement) -> dict[str, Any]:
 
 
 class Measurement:
-    """Counts how often it is made."""
-
     def __init__(self) -> None:
         self.times = 0
 

@@ -41,8 +41,6 @@ class NoKeys:
 
 
 class Straight:
-    """Never turns."""
-
     def __init__(self, config: Any, limits: GuidanceLimits) -> None:
         pass
 

@@ -81,7 +81,6 @@ def obstacles(number: int) -> list[Polygon]:
 
 
 def flown(name: str, number: int, shield: str, limit_s: float = 130.0) -> dict[str, Any]:
-    """One flight, judged."""
     shapes = obstacles(number)
     course = 90.0 + float(np.random.default_rng(number + 10_000).uniform(-60.0, 60.0))
     base = wayproof.load_scenario("aerosonde_forest").with_(

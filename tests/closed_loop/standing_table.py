@@ -97,7 +97,6 @@ def pairs(rows: pd.DataFrame) -> list[str]:
 
 
 def tables(folders: Sequence[Path]) -> str:
-    """Both tables."""
     rows = load(folders)
     told = head(*HEAD)
     for name in rows.planner.unique():

@@ -11,7 +11,6 @@ MEASURED: Final = Path(__file__).parents[2] / "planner" / "MEASURED.md"
 
 
 def line(*cells: str) -> str:
-    """A row."""
     return f"| {' | '.join(cells)} |"
 
 

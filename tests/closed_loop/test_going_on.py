@@ -21,8 +21,6 @@ SCAN_S, STEP_S = 0.5, 0.1
 
 
 class Events(Observer):
-    """Keeps what is told."""
-
     def __init__(self) -> None:
         self.told: list[tuple[float, str]] = []
 

@@ -48,7 +48,6 @@ class Point(NamedTuple):
     wind_east_mps: float = 0.0
 
     def state(self, airspeed_mps: float = LIMITS.airspeed_mps) -> AircraftState:
-        """Its state at an airspeed."""
         east = airspeed_mps * math.sin(self.heading_rad) + self.wind_east_mps
         north, heading = airspeed_mps * math.cos(self.heading_rad), self.heading_rad % math.tau
         place = self.time_s, self.east_m, self.north_m, 300.0
@@ -102,7 +101,6 @@ class GuidanceContract:
     kind: ClassVar[GuidanceKind]
 
     def law(self, route: Route = LINE, arc_length_m: float = 0.0) -> GuidanceLaw:
-        """A law for one flight, on a route."""
         law = self.kind.law(LIMITS)
         law.follow(route, arc_length_m)
         return law

@@ -85,7 +85,6 @@ def run_here(folder: Path, *arguments: str) -> tuple[int, str, str]:
 
 
 def wait_until(true: Callable[[], bool], process: subprocess.Popen[str]) -> None:
-    """Waits for something that a process does."""
     until = time.monotonic() + TIMEOUT_S
     while not true():
         assert process.poll() is None, process.communicate()[1]

@@ -153,7 +153,6 @@ def _flow(value: Any) -> str:
 
 
 def as_json(value: Any) -> str:
-    """Nested dicts, lists and raw pieces as JSON."""
     if isinstance(value, Raw):
         return value.text
     if isinstance(value, dict):

@@ -34,7 +34,6 @@ def circles(number: int) -> str:
 
 
 def star(corners: int) -> str:
-    """One polygon."""
     rows = []
     for number in range(corners):
         angle = math.tau * number / corners

@@ -25,7 +25,6 @@ LONG = ("fly", "paper_circles", "--out", "run", "--quiet")
 
 
 def in_shell(folder: Path, script: str, *words: str) -> subprocess.CompletedProcess[str]:
-    """Runs a script in a folder, with words as its arguments."""
     env, words = {**os.environ, "PYTHONPATH": str(ROOT)}, ("bash", "-c", script, "bash", *words)
     return subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, timeout=120)
 

@@ -37,7 +37,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def unbroken(whole: Path) -> bytes:
-    """The results of a sweep without a break."""
     return results(whole.parent)
 
 

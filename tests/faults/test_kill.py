@@ -35,8 +35,6 @@ that nobody waits for it, which takes its time on a busy machine."""
 
 @dataclass(frozen=True)
 class Command:
-    """A command that is killed."""
-
     begin: tuple[str, ...]
     again: tuple[str, ...]
     """The arguments that finish what a killed one began."""
@@ -115,7 +113,6 @@ COMMANDS = {
 
 
 def made(folder: Path, command: Command) -> Path:
-    """A folder in which a command can be given."""
     folder.mkdir()
     for name, text in command.files.items():
         (folder / name).write_text(text)
@@ -123,12 +120,10 @@ def made(folder: Path, command: Command) -> Path:
 
 
 def names(folder: Path) -> set[str]:
-    """Of all files in a folder and below."""
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
 
 def alive(group: int) -> list[int]:
-    """Processes of a process group."""
     found = []
     for process in psutil.process_iter():
         try:

@@ -25,14 +25,12 @@ OUTPUTS = ("report.html", "report.csv", "path.svg", "path.png")
 
 @pytest.fixture
 def sent(a_run: Path, tmp_path: Path) -> Path:
-    """A run folder that somebody sent."""
     shutil.copytree(a_run, tmp_path / "run")
     return tmp_path / "run"
 
 
 @contextmanager
 def full_disk(size: int) -> Iterator[None]:
-    """No file can grow beyond a size."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:

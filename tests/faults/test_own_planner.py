@@ -97,7 +97,6 @@ planners: [gone, rolling_window]
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    """A folder with a scenario, a campaign and a distribution with planners."""
     info = tmp_path / "site" / "own_plugin-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: own_plugin\nVersion: 1.0\n")
@@ -110,7 +109,6 @@ def place(tmp_path: Path) -> Path:
 
 
 def own_path(place: Path) -> dict[str, str]:
-    """The environment in which the distribution is installed."""
     return {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{place / 'site'}"}
 
 

@@ -62,7 +62,6 @@ def circle_track(radius_m: float, seconds: float, speed_mps: float = 25.0) -> Tr
 
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
-    """A browser without a screen."""
     with ExitStack() as stack:
         try:
             opened = stack.enter_context(browser())
@@ -85,7 +84,6 @@ def checked(tmp_path: FilePath, capsys: pytest.CaptureFixture[str]) -> Checked:
 
 @pytest.fixture
 def to_break(tmp_path: FilePath) -> FilePath:
-    """A scenario to be broken."""
     path = tmp_path / "straight.yaml"
     path.write_text(SCENARIO)
     return path

@@ -32,7 +32,6 @@ class Batches(Seen):
         self._shown = [(1, keep)]
 
     def thin_out(self, rng: np.random.Generator) -> None:
-        """Takes back some points, one by one."""
         self.revision += 1
         self.last_removal_revision = self.revision
         self._shown = [(at, points[rng.random(len(points)) < 0.95]) for at, points in self._shown]

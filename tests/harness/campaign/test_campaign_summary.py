@@ -66,7 +66,6 @@ def row(run: int, outcome: str = "reached", /, **other: Any) -> dict[str, Any]:
 def campaign(
     folder: Path, rows: Sequence[Mapping[str, Any]], times: Sequence[tuple[float, float, float]] = ()
 ) -> Path:
-    """The folder of a campaign with these rows."""
     folder.mkdir(exist_ok=True)
     names = [name for name in SCHEMA.names if not rows or name in rows[0]]
     schema = pa.schema([SCHEMA.field(name) for name in names])

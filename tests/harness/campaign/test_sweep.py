@@ -129,7 +129,6 @@ def results(folder: Path) -> bytes:
 
 
 def start(place: Path, *options: str) -> subprocess.Popen[str]:
-    """The command in a process of its own."""
     return command.start(place, "sweep", "campaign.yaml", "--out", "out", *options)
 
 
@@ -242,7 +241,6 @@ def test_a_row_that_was_flown_otherwise_is_told(
 
 
 def with_plugin(place: Path, monkeypatch: pytest.MonkeyPatch, version: str = "1.0") -> None:
-    """Installs a distribution with planners."""
     site = place / f"site-{version}"
     info = site / f"campaign_plugin-{version}.dist-info"
     info.mkdir(parents=True)

@@ -74,7 +74,6 @@ class Cluster:
         return process
 
     def log(self, of: str) -> str:
-        """What was written so far."""
         path = self._folder / f"{of}.log"
         return path.read_text() if path.exists() else ""
 

@@ -31,7 +31,6 @@ COMMANDS += ["bench", "envelope", "world", "sweep", "certify", "replay"]
 
 
 def wayproof(*arguments: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs the command in a process of its own, in a folder."""
     return python("-m", "harness", *arguments, folder=folder, environment=environment)
 
 

@@ -279,7 +279,6 @@ def test_a_planner_in_a_file_may_lie_in_another_folder(
 
 
 def alive(group: int) -> bool:
-    """Whether any process of a group is there."""
     try:
         os.killpg(group, 0)
     except ProcessLookupError:

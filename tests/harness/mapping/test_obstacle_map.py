@@ -45,7 +45,6 @@ def fed(*sequences: list[RangeScan], doubtful: bool = True) -> ObstacleMap:
 
 
 def edited(scan: RangeScan, ray: int, range_m: float) -> RangeScan:
-    """A scan with one other return."""
     ranges = scan.ranges_m.copy()
     ranges[ray] = range_m
     return replace(scan, ranges_m=ranges)

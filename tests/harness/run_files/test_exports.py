@@ -72,7 +72,6 @@ def in_plane(run: Run, latitude_deg: list[float], longitude_deg: list[float]) ->
 
 
 def line_of(run: Run, what: str) -> shapely.LineString:
-    """What should have been exported."""
     flown = np.column_stack((run.track.east_m, run.track.north_m))
     return shapely.LineString(planned_points(run)[0] if what == "planned" else flown)
 

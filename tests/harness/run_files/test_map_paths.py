@@ -56,7 +56,6 @@ FLIGHT = [
 
 
 def kmz(files: dict[str, str | bytes]) -> bytes:
-    """An archive of files by their names."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():

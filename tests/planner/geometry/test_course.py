@@ -22,7 +22,6 @@ START = (0.0, 0.0)
 
 
 def course(nodes: tuple[Point, ...], known: int) -> Course:
-    """A course along straight lines."""
     rows = []
     for a, b in zip((START, *nodes), nodes, strict=False):
         length = math.dist(a, b)

@@ -20,7 +20,6 @@ def item(number: int, command: int, *params: float, frame: int = 3) -> Item:
 
 
 def at(number: int, command: int = 16, height: float = 100.0, first: float = 0.0, third: float = 0.0) -> Item:
-    """An item with a place of its own."""
     return item(number, command, first, 0.0, third, 0.0, 47.0 + 0.01 * number, 8.0, height)
 
 
