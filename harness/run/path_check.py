@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
+from operator import attrgetter
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -141,9 +142,8 @@ def prepare_check(
         east, north = plan.way.segments[0, 2:4].tolist()
         keys["mission", "course_deg"] = math.degrees(math.atan2(east, north)) % 360.0
         keys["mission", "altitude_m"] = float(plan.profile.altitude_m[0])
-        root = overridden(
-            _with_keys(base, {**_mission_keys(plan.way.given_m[:, :2], base), **keys}), settings
-        )
+        given_m = plan.way.given_m[:, :2]
+        root = overridden(_with_keys(base, {**_mission_keys(given_m, base), **keys}), settings)
         if not plan.profile.level:
             root, files = _without_files(root, folder, scenario)
         scenario = validly(root)
@@ -196,11 +196,10 @@ def _world_root(world: FilePath | None) -> Node:
 def _derived_keys(world: Scenario) -> tuple[Loc, ...]:
     """Returns the keys of limits in a run folder's complete scenario that say what they would be if left out."""
     for keys in (WORLD_KEYS[-2:], WORLD_KEYS[-1:]):
+        names = [key_path(key) for key in keys]
+        values = attrgetter(*names)
         with suppress(InputError):  # with another clearance start and goal may be too near to obstacles
-            other = world.with_({key_path(key): None for key in keys})
-            if all(
-                getattr(getattr(other, part), key) == getattr(getattr(world, part), key) for part, key in keys
-            ):
+            if values(world.with_(dict.fromkeys(names))) == values(world):
                 return keys
     return ()
 
@@ -239,22 +238,20 @@ def _without_files(
     root: Node, folder: FilePath | None, scenario: Scenario
 ) -> tuple[Node, tuple[FileSpec, ...]]:
     """Takes the files out of the obstacles, for a path of several altitudes; returns the keys left, and the files."""
+
+    def entries(section: str) -> tuple[Node, ...]:
+        listed = root.at((section,))
+        return listed.value if listed is not None and isinstance(listed.value, tuple) else ()
+
     if scenario.ground is not None:
         root = _with_keys(root, {("ground",): scenario.ground.model_dump()})
-    cut = root.at(("sources",))
-    if (
-        cut is not None
-        and isinstance(cut.value, tuple)
-        and any(each.at(("altitude_m",)) for each in cut.value)
-    ):
+    if any(each.at(("altitude_m",)) for each in entries("sources")):
         raise InputError(
             "command line: the obstacles are files cut at one altitude, as a run folder has them, and the path has "
             "several: give the scenario that names the files"
         )
-    listed = root.at(("obstacles",))
-    every = listed.value if listed is not None and isinstance(listed.value, tuple) else ()
-    files = [file for each in every if (file := each.at(("file",))) is not None]
-    kept = tuple(each for each in every if each.at(("file",)) is None)
+    files = [file for each in entries("obstacles") if (file := each.at(("file",))) is not None]
+    kept = tuple(each for each in entries("obstacles") if each.at(("file",)) is None)
     specs = tuple(spec_of(WorldFile.model_validate(file.plain()), folder) for file in files)
     if files:
         told = {"polygons": 0, "altitude_m": None, "in_layers": True}

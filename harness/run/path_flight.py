@@ -208,9 +208,8 @@ def _drawn_profile(
     if given.above_ground:
         remedy = "give --altitude-m"
         if ground is None:
-            raise InputError(
-                f"{given.source}: has altitudes above ground, and the ground is not known; {remedy}"
-            )
+            told = "has altitudes above ground, and the ground is not known"
+            raise InputError(f"{given.source}: {told}; {remedy}")
         altitudes = altitudes + ground(*given.points_m.T)
         unknown = np.flatnonzero(~np.isfinite(altitudes))
         if len(unknown):

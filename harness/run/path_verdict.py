@@ -137,17 +137,12 @@ def verdict(
     `sure`: it is a yes with `corner_m_that_would_do`.
     """
     bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
+    legs = [tallied(bad, "legs")] if bad else []
     touched, high_m = _breaches_told(seen), figures["altitude_error_m"]["max"]
     ended = [] if figures["outcome"] in ("reached", "collision") else [str(figures["reason"])]
     share = told["limit_used"]["altitude"]
     high = [f"{high_m:.3g} m off in altitude where {high_m / share:.3g} m are allowed"] if share > 1.0 else []
-    faults = [
-        *touched,
-        *([tallied(bad, "legs")] if bad else []),
-        *_deviation_told(told, sure),
-        *high,
-        *ended,
-    ]
+    faults = [*touched, *legs, *_deviation_told(told, sure), *high, *ended]
     if not faults and not figures["trackable"]:
         faults.append("no leg was flown")
     return (False, "no: " + "; ".join(faults)) if faults else (True, _flown_as_given_told(told, limits))
@@ -362,15 +357,14 @@ def layer_contacts(
         half_m = 0.5 * LAYER_M * (high + 1 - low)
         cut = [replace(each, vertical_clearance_m=each.vertical_clearance_m + half_m) for each in specs]
         sources = expanded(cut, place, scenario.area.bounds_m, low * LAYER_M + half_m, ground=known).sources
-        solids = [
-            (each.spec.path.name, shapely.union_all(each.polygons)) for each in sources if each.polygons
-        ]
-        margins = [np.where(rows, -inside_m(track, solid), np.inf) for _, solid in solids]
+        there = [each for each in sources if each.polygons]
+        solids = [shapely.union_all(each.polygons) for each in there]
+        margins = [np.where(rows, -inside_m(track, solid), np.inf) for solid in solids]
         nearest = min((float(each.min()) for each in margins), default=math.inf)
         if low == high:
             least = min(least, nearest)
-            for (name, solid), margin in zip(solids, margins, strict=True):
-                found += crossings(track, margin, solid, CONTACT, name)
+            for each, solid, margin in zip(there, solids, margins, strict=True):
+                found += crossings(track, margin, solid, CONTACT, each.spec.path.name)
         elif nearest < max(least, 0.0):
             middle = (low + high) // 2
             waiting += [(middle + 1, high), (low, middle)]
