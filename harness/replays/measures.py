@@ -150,9 +150,8 @@ def compared(flown: Side, simulated: Side) -> dict[str, Any]:
     """Returns laps and figures of both flights; InputError if they have no settled lap in common."""
     settled = [lap for lap, lack in flown.lacks.items() if lack == simulated.lacks.get(lap) == ""]
     if not settled:
-        missing, side = (
-            ("the simulated flight", simulated) if "" in flown.lacks.values() else ("the log", flown)
-        )
+        whole = "" in flown.lacks.values()
+        missing, side = ("the simulated flight", simulated) if whole else ("the log", flown)
         why = "".join(f"; lap {lap} {lack}" for lap, lack in list(side.lacks.items())[:3] if lack)
         raise InputError(f"{missing} has no whole lap after lap 1{why}; there is nothing to compare")
     rows: list[dict[str, Any]] = [

@@ -22,10 +22,8 @@ def replay_figure(found: Replay) -> Figure:
         axes.plot(*corners.T, color="0.7", lw=1.0, marker="s", ms=4, label="corners of the mission")
         axes.plot(found.flown["east_m"], found.flown["north_m"], color="0.2", lw=1.4, label="flown")
         simulated = found.simulated
-        line = axes.plot(
-            simulated["east_m"], simulated["north_m"], color=COLOURS[1], lw=1.2, label="simulated"
-        )
-        line[0].set_linestyle((0, (6, 1.5)))
+        places, dashes = (simulated["east_m"], simulated["north_m"]), (0, (6, 1.5))
+        axes.plot(*places, color=COLOURS[1], lw=1.2, ls=dashes, label="simulated")
         wind = found.told["wind"]
         towards = math.radians(wind["from_deg"]) + math.pi
         half = 0.08 * np.array((math.sin(towards), math.cos(towards)))
