@@ -150,9 +150,8 @@ def crossings(
 
     margin = margin_m.copy()
     steps_m = np.hypot(np.diff(track.east_m), np.diff(track.north_m))
-    near = np.flatnonzero(
-        (margin_m[:-1] >= 0.0) & (margin_m[1:] >= 0.0) & (margin_m[:-1] + margin_m[1:] <= steps_m)
-    )
+    before, after = margin_m[:-1], margin_m[1:]
+    near = np.flatnonzero((before >= 0.0) & (after >= 0.0) & (before + after <= steps_m))
     for row in near.tolist():
         way = shapely.LineString(np.column_stack((track.east_m[row : row + 2], track.north_m[row : row + 2])))
         wrong = way.difference(area) if stays_in else way.intersection(area)

@@ -148,9 +148,8 @@ def cause_of(claim: Claim, metrics: Mapping[str, Any]) -> str:
         return f"{CROSSED.get(each['kind'], 'touches')} {each['name']}"
     legs = sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]})
     corners = metrics.get("check", {}).get("corners", ())
-    return "; ".join(
-        legs or [f"corner {each['waypoint']} not kept" for each in corners if not each["kept"]][:1]
-    )
+    missed = [f"corner {each['waypoint']} not kept" for each in corners if not each["kept"]]
+    return "; ".join(legs or missed[:1])
 
 
 def margin(claim: Claim, metrics: Mapping[str, Any]) -> float | None:

@@ -211,9 +211,6 @@ def _max_rate(profile: Profile, window_m: float) -> float:
     middle = 0.5 * (edges[:-1] + edges[1:])[wide]
     if not len(middle):
         return 0.0
-    here = np.searchsorted(joint, middle, side="right") - 1
-    there = np.searchsorted(joint, middle + window_m, side="right") - 1
-    last = len(length) - 1
-    return float(
-        np.abs(curvature[np.minimum(there, last)] - curvature[np.minimum(here, last)]).max() / window_m
-    )
+    pieces = (np.searchsorted(joint, at, side="right") - 1 for at in (middle, middle + window_m))
+    here, there = (curvature[np.minimum(piece, len(length) - 1)] for piece in pieces)
+    return float(np.abs(there - here).max() / window_m)
