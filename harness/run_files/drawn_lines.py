@@ -145,14 +145,14 @@ def read_geojson(text: str, source: str) -> PathAsRead:
             raise InputError(f"{at}: must be [longitude, latitude] or [longitude, latitude, altitude]")
         longitude, latitude, *altitude = (finite(value, at) for value in point)
         points.append((latitude, longitude, altitude[0] if altitude else None))
-    others = Counter(kind for _, kind, _ in shapes if kind != "LineString")
-    if (crs := crs_named(content)) != WGS84:
-        y, x = np.array([point[:2] for point in points]).T
+    if points and (crs := crs_named(content)) != WGS84:
+        y, x, altitudes = zip(*points, strict=True)
         try:
-            places = np.column_stack(geodetic(crs, x, y)).tolist()
+            north, east = geodetic(crs, np.array(x), np.array(y))
         except InputError as error:
             raise InputError(f"{source}: {error}") from error
-        points = [(*place, altitude) for place, (*_, altitude) in zip(places, points, strict=True)]
+        points = list(zip(north.tolist(), east.tolist(), altitudes, strict=True))
+    others = Counter(kind for _, kind, _ in shapes) - Counter(("LineString",))
     return PathAsRead(where, points, _notes_on_others(others))
 
 

@@ -165,6 +165,7 @@ BROKEN = {
     "column twice": ("a.csv", "x_m,x_m,y_m\n0,0,0\n1,1,1\n", ":1: x_m: stands 2 times"),
     "short row": ("a.csv", "x_m,y_m\n0,0\n1\n", ":3: has 1 cells, the header 2"),
     "one point": ("a.csv", "x_m,y_m\n0,0\n", ": has 1 point; a path has at least 2"),
+    "no point": ("a.json", '{"type": "LineString", "coordinates": [], "crs": "EPSG:21781"}', ": has 0 points; a path"),
     "one place": ("a.csv", "x_m,y_m\n5,5\n5,5\n", ": all its points are in one place"),
     "far beyond": ("a.csv", "x_m,y_m\n1e308,0\n-1e308,1\n", "must stay within 500 km of its origin"),
     "too far": ("a.csv", "x_m,y_m\n0,0\n9e5,0\n", ": reaches 900 km; must stay within 500 km"),
