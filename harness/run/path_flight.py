@@ -141,8 +141,10 @@ def planned(
         profile = replace(profile, altitude_m=np.full_like(profile.altitude_m, altitude_m))
     else:
         profile = _in_the_air(profile, given.source, scenario.trackability.altitude_m, notes)
-    if altitude_m is None and ground is None:
-        notes += _above_home(given.mission.above_ground)
+    items = given.mission.above_ground if altitude_m is None and ground is None else ()
+    if items:
+        told = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
+        notes.append(f"items {told}: above ground, which is taken to be as high as home everywhere")
     if by_waypoints and any(step.loiter is not None for step in given.mission.steps):
         heads, joins = "heads for its centre and then joins it", "joins it along a tangent"
         how = heads if flying.heads_for_centres else joins
@@ -166,13 +168,6 @@ def _in_the_air(
         notes.append(f"altitudes below {lowest:g} m or above {highest:g} m above the sea: flown at these")
         return replace(profile, altitude_m=held_m)
     return profile
-
-
-def _above_home(items: Sequence[int]) -> list[str]:
-    """Returns a note on items whose altitudes are above a ground that is not known."""
-    told = ", ".join(map(str, items[:6])) + (" and others" if len(items) > 6 else "")
-    said = f"items {told}: above ground, which is taken to be as high as home everywhere"
-    return [said] if items else []
 
 
 def _planned_line(

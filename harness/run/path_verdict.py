@@ -357,14 +357,13 @@ def layer_contacts(
         half_m = 0.5 * LAYER_M * (high + 1 - low)
         cut = [replace(each, vertical_clearance_m=each.vertical_clearance_m + half_m) for each in specs]
         sources = expanded(cut, place, scenario.area.bounds_m, low * LAYER_M + half_m, ground=known).sources
-        there = [each for each in sources if each.polygons]
-        solids = [shapely.union_all(each.polygons) for each in there]
-        margins = [np.where(rows, -inside_m(track, solid), np.inf) for solid in solids]
+        solid = [(each.spec.path.name, shapely.union_all(each.polygons)) for each in sources if each.polygons]
+        margins = [np.where(rows, -inside_m(track, shape), np.inf) for _, shape in solid]
         nearest = min((float(each.min()) for each in margins), default=math.inf)
         if low == high:
             least = min(least, nearest)
-            for each, solid, margin in zip(there, solids, margins, strict=True):
-                found += crossings(track, margin, solid, CONTACT, each.spec.path.name)
+            for (name, shape), margin in zip(solid, margins, strict=True):
+                found += crossings(track, margin, shape, CONTACT, name)
         elif nearest < max(least, 0.0):
             middle = (low + high) // 2
             waiting += [(middle + 1, high), (low, middle)]

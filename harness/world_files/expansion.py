@@ -16,7 +16,7 @@ from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.height_field import HeightField, cell_sides, height_field, window_of
-from harness.world_files.parts import NO_BOTTOM, NO_TOP, Box, Contents, FileSpec
+from harness.world_files.parts import Box, Contents, FileSpec
 from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.solids import Layer, Solid, clipped, occupied, placed_cells, simplified, sliced_parts
 
@@ -184,18 +184,18 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
         layer = layer._replace(flat_m=0.0)
         notes.append("no terrain: the ground is taken as flat at 0 m (ground_m)")
     solids = sliced_parts(contents.parts, mapping, layer, box)
-    tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
+    finest_m = 0.1
     if (raster := contents.raster) is not None:
         near = raster.window(*window_of(raster, mapping, box))
+        of_map, of_terrain = (spec.unknown, "unknown", HEIGHTS_M), (spec.nodata, "nodata", (layer.low_m,) * 2)
+        taken, key, heights_m = of_map if raster.occupancy else of_terrain
         if missing := int(np.isnan(raster.values).sum()):
-            taken, key = (spec.unknown, "unknown") if raster.occupancy else (spec.nodata, "nodata")
             notes.append(f"{counted(missing, 'cell')} without a value taken as {taken} ({key})")
-        heights_m = HEIGHTS_M if raster.occupancy else (layer.low_m, layer.low_m)
         shapes = placed_cells(near, occupied(near, spec, layer.low_m), mapping)
         solids += [Solid(shape, *heights_m) for shape in shapes]
-        if spec.tolerance_m is None:
-            rows, columns = raster.values.shape
-            tolerance_m = max(cell_sides(raster, mapping, columns / 2, rows / 2) or (tolerance_m,))
+        rows, columns = raster.values.shape
+        finest_m = max(cell_sides(raster, mapping, columns / 2, rows / 2) or (finest_m,))
+    tolerance_m = finest_m if spec.tolerance_m is None else spec.tolerance_m
     solids = clipped(solids, box)
     polygons = _outlines([each.shape for each in solids], tolerance_m)
     if polygons:
@@ -203,8 +203,7 @@ def _cut(spec: FileSpec, contents: Contents, mapping: Mapping, layer: Layer, box
     else:
         notes.append(f"nothing of it is solid in the area between {layer.low_m:g} and {layer.high_m:g} m")
     heights = tuple(_heights(polygons, solids))
-    limited = any((part.bottom, part.top) != (NO_BOTTOM, NO_TOP) for part in contents.parts)
-    by_altitude = limited or contents.terrain is not None
+    by_altitude = contents.terrain is not None or any(part.is_limited for part in contents.parts)
     return Source(spec, contents.kind, contents.sha256, tuple(polygons), heights, tuple(notes), by_altitude)
 
 

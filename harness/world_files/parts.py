@@ -61,6 +61,11 @@ class Part:
     keep_in: bool = False
     rigid: bool = False
 
+    @property
+    def is_limited(self) -> bool:
+        """Whether it has a bottom or a top."""
+        return (self.bottom, self.top) != (NO_BOTTOM, NO_TOP)
+
 
 @dataclass(frozen=True, eq=False)
 class Raster:

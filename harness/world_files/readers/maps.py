@@ -12,7 +12,7 @@ from harness.files.input_file import InputError, listed, numbers, shown
 from harness.files.kml import Shape, read_kml
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, json_of, read_bytes
-from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Datum, FileSpec, Limit, Part
+from harness.world_files.parts import WGS84, Contents, Datum, FileSpec, Limit, Part
 from harness.world_files.readers import limits
 
 WITHOUT_AREA: Final = ("Point", "MultiPoint", "LineString", "MultiLineString")
@@ -109,7 +109,7 @@ def read_kml_polygons(spec: FileSpec) -> Contents:
     found = read_kml(read_bytes(spec.path, MAX_TREE_BYTES), "", MAX_TREE_BYTES)
     notes: list[str] = []
     parts = tuple(_kml_part(each, notes) for each in found.polygons)
-    if flat := sum((part.bottom, part.top) == (NO_BOTTOM, NO_TOP) for part in parts):
+    if flat := sum(not part.is_limited for part in parts):
         notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
     if any(DATUMS[each.mode] and not limits.has_limits(each.data) for each in found.polygons):
         notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
