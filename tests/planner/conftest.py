@@ -77,11 +77,6 @@ def wall_fixture() -> MakePoints:
     return wall
 
 
-@pytest.fixture(scope="session", name="integrated")
-def integrated_fixture() -> Callable[..., FloatArray]:
-    return integrated
-
-
 @pytest.fixture(scope="session", name="assert_flyable")
 def assert_flyable_fixture() -> Callable[[Path, float], None]:
     return assert_flyable

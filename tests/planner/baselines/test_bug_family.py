@@ -25,8 +25,7 @@ from planner.keys import MarginConfig
 from planner.plan_checks import checked_plan
 from planner.world_stability import SETTLED_S
 from tests.longer import longer
-
-MakePoints = Callable[..., FloatArray]
+from tests.planner.conftest import ring, wall
 
 MISSION = replace(
     contract.MISSION, goal_m=(17_000.0, 5000.0), goal_radius_m=100.0, bounds_m=(0.0, 0.0, 20_000.0, 10_000.0),
@@ -153,7 +152,7 @@ def around_a_circle(kind: str, radius: float, to_center: float, straight: float)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_way_round_a_circle_has_the_length_that_geometry_gives(kind: str, ring: MakePoints) -> None:
+def test_the_way_round_a_circle_has_the_length_that_geometry_gives(kind: str) -> None:
     points = ring(10_000.0, 5000.0, 1500.0, SPACING)
     # Seen from the start, so that TangentBug takes the tangent at once.
     mission = replace(MISSION, sensor_range_m=10_000.0)
@@ -169,7 +168,7 @@ def test_the_way_round_a_circle_has_the_length_that_geometry_gives(kind: str, ri
 
 
 @pytest.mark.parametrize("range_m", [4000.0, 6000.0, 7000.0])
-def test_tangent_bug_takes_no_way_round_for_a_way_across_a_dent(range_m: float, ring: MakePoints) -> None:
+def test_tangent_bug_takes_no_way_round_for_a_way_across_a_dent(range_m: float) -> None:
     """Nearly a whole round ahead along the boundary is in sight: right behind."""
     points = np.concatenate([ring(*circle, SPACING) for circle in contract.CIRCLES])
     mission = replace(contract.MISSION, sensor_range_m=range_m)
@@ -180,7 +179,7 @@ def test_tangent_bug_takes_no_way_round_for_a_way_across_a_dent(range_m: float, 
 
 @pytest.mark.parametrize("goal_north_m", [2000.3, 8123.9])
 @pytest.mark.parametrize("kind", OF_CONTACT)
-def test_a_line_that_leads_aslant_is_found_again(kind: str, goal_north_m: float, ring: MakePoints) -> None:
+def test_a_line_that_leads_aslant_is_found_again(kind: str, goal_north_m: float) -> None:
     mission = replace(MISSION, goal_m=(17_000.0, goal_north_m))
     flight = walk(kind, ring(10_000.0, 0.5 * (5000.0 + goal_north_m), 700.0, SPACING), mission=mission)
     assert flight.reason == "reached"
@@ -189,7 +188,7 @@ def test_a_line_that_leads_aslant_is_found_again(kind: str, goal_north_m: float,
 
 
 @pytest.mark.parametrize("aside", [-800.0, 800.0])
-def test_bug1_returns_to_the_nearest_point_by_the_shorter_way(aside: float, ring: MakePoints) -> None:
+def test_bug1_returns_to_the_nearest_point_by_the_shorter_way(aside: float) -> None:
     radius = 1500.0 + KEEP
     flight = walk("bug1", ring(10_000.0, 5000.0 + aside, 1500.0, SPACING))
     back = math.sqrt(radius**2 - aside**2)
@@ -203,7 +202,7 @@ def test_bug1_returns_to_the_nearest_point_by_the_shorter_way(aside: float, ring
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_trap_open_to_the_start_is_left(kind: str, wall: MakePoints) -> None:
+def test_a_trap_open_to_the_start_is_left(kind: str) -> None:
     corners = [(9000.0, 3000.0), (12_000.0, 3000.0), (12_000.0, 7000.0), (9000.0, 7000.0)]
     points = np.concatenate([wall(a, b, SPACING) for a, b in pairwise(corners)])
     flight = walk(kind, points)
@@ -217,7 +216,7 @@ def test_a_trap_open_to_the_start_is_left(kind: str, wall: MakePoints) -> None:
 @pytest.mark.parametrize("kind", [*OF_CONTACT, *longer(["tangent_bug"])])
 @pytest.mark.parametrize("enclosed", ["goal", "start"])
 def test_an_enclosure_is_proved_by_going_round_it_but_not_soon_after_something_appeared(
-    kind: str, enclosed: str, ring: MakePoints
+    kind: str, enclosed: str
 ) -> None:
     """It is gone round again meanwhile: what closes the way may go again."""
     closed = ring(*(MISSION.goal_m if enclosed == "goal" else START), 2000.0, SPACING)
@@ -233,7 +232,7 @@ def test_an_enclosure_is_proved_by_going_round_it_but_not_soon_after_something_a
 
 @pytest.mark.parametrize("kind", [*OF_CONTACT, *longer(["tangent_bug"])])
 @pytest.mark.parametrize("share", [0.8, 0.95, 1.0])
-def test_a_way_that_was_taken_to_be_closed_is_tried_again(kind: str, share: float, ring: MakePoints) -> None:
+def test_a_way_that_was_taken_to_be_closed_is_tried_again(kind: str, share: float) -> None:
     """At the end of the round as well as where it has been passed by."""
     closed = ring(*MISSION.goal_m, 2000.0, SPACING)
     flight = walk(kind, closed)
@@ -246,7 +245,7 @@ def test_a_way_that_was_taken_to_be_closed_is_tried_again(kind: str, share: floa
 
 @pytest.mark.flights
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_wall_across_the_area_is_proved_along_the_bounds(kind: str, wall: MakePoints) -> None:
+def test_a_wall_across_the_area_is_proved_along_the_bounds(kind: str) -> None:
     flight = walk(kind, wall((10_000.0, 0.0), (10_000.0, 10_000.0), SPACING))
     assert flight.status is PlanStatus.UNREACHABLE
     x, y = flight.track_m.T
@@ -262,9 +261,7 @@ def test_a_wall_across_the_area_is_proved_along_the_bounds(kind: str, wall: Make
         *longer([("tangent_bug", 1.8 * KEEP, PlanStatus.UNREACHABLE)]),
     ],
 )
-def test_a_gap_is_taken_where_it_is_wide_enough(
-    kind: str, gap_m: float, status: PlanStatus, wall: MakePoints
-) -> None:
+def test_a_gap_is_taken_where_it_is_wide_enough(kind: str, gap_m: float, status: PlanStatus) -> None:
     walls = [
         wall((10_000.0, 0.0), (10_000.0, 3000.0), SPACING),
         wall((10_000.0, 3000.0 + gap_m), (10_000.0, 10_000.0), SPACING),
@@ -274,9 +271,7 @@ def test_a_gap_is_taken_where_it_is_wide_enough(
 
 @pytest.mark.parametrize("depth_m", [0.5, 2.0, 6.0, 12.0, 20.0, 30.0, 100.0])
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_obstacle_that_the_line_grazes_encloses_nothing(
-    kind: str, depth_m: float, ring: MakePoints
-) -> None:
+def test_an_obstacle_that_the_line_grazes_encloses_nothing(kind: str, depth_m: float) -> None:
     """The line leaves the boundary at so small an angle that the next points of it still lie ahead."""
     (start_x, y), (goal_x, _) = START, MISSION.goal_m
     middle = 0.5 * (start_x + goal_x)
@@ -292,20 +287,16 @@ circles = st.lists(
 
 @pytest.mark.parametrize("cases", [*longer([3]), pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_goal_is_reached_where_there_is_a_way_and_only_there(
-    kind: str, cases: int, ring: MakePoints
-) -> None:
+def test_the_goal_is_reached_where_there_is_a_way_and_only_there(kind: str, cases: int) -> None:
     @settings(max_examples=cases, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(world=circles)
     def each(world: list[tuple[float, float, float]]) -> None:
-        assert_reached_where_there_is_a_way(kind, ring, world)
+        assert_reached_where_there_is_a_way(kind, world)
 
     each()
 
 
-def assert_reached_where_there_is_a_way(
-    kind: str, ring: MakePoints, world: list[tuple[float, float, float]]
-) -> None:
+def assert_reached_where_there_is_a_way(kind: str, world: list[tuple[float, float, float]]) -> None:
     points = np.concatenate([ring(x, y, radius, SPACING) for x, y, radius in world])
     ends = shapely.MultiPoint([START, MISSION.goal_m])
     assume(float(shapely.distance(ends, shapely.MultiPoint(points))) > 1.1 * KEEP)
@@ -333,7 +324,7 @@ def test_legs_are_joined_by_straight_lines_from_where_the_vehicle_is() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_plans_begin_where_the_loop_allows_it_beside_the_path_too(kind: str, ring: MakePoints) -> None:
+def test_plans_begin_where_the_loop_allows_it_beside_the_path_too(kind: str) -> None:
     """An aircraft that cuts corners flies 41 m beside its path: no plan begins further from it than is taken."""
     mission = replace(MISSION, speed_mps=15.0)
     planner, seen = MAKE[kind](mission), Range(ring(8000.0, 5000.0, 1200.0, SPACING), mission.sensor_range_m)

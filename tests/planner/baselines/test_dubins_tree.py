@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +12,7 @@ from planner.baselines.dubins_tree import HOLD_REGROW_S, DubinsTree, DubinsTreeC
 from planner.contract import MISSION, GivenMap
 from planner.geometry.curves import sample
 from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
-
-MakePoints = Callable[..., FloatArray]
+from tests.planner.conftest import ring, wall
 
 START = (2000.0, 5000.0)
 EAST = replace(MISSION, goal_m=(15_000.0, 5000.0))
@@ -32,7 +30,7 @@ def keeps_m(path: Path | None, points: FloatArray) -> float:
     return float(np.hypot(*(places[:, None] - points).transpose(2, 0, 1)).min())
 
 
-def test_a_tree_finds_a_way_round_twice_the_same(ring: MakePoints) -> None:
+def test_a_tree_finds_a_way_round_twice_the_same() -> None:
     points = ring(5000.0, 5200.0, 1200.0, 50.0)
     plan, again = first(points), first(points)
     assert plan.path is not None
@@ -44,17 +42,17 @@ def test_a_tree_finds_a_way_round_twice_the_same(ring: MakePoints) -> None:
 
 
 @pytest.mark.parametrize("north_m", [4000.0, 4600.0, 5000.0, 5400.0])
-def test_it_keeps_away_from_what_is_known_beyond_the_sensing_range(ring: MakePoints, north_m: float) -> None:
+def test_it_keeps_away_from_what_is_known_beyond_the_sensing_range(north_m: float) -> None:
     points = np.concatenate((ring(5000.0, 5200.0, 1200.0, 50.0), ring(11_500.0, north_m, 1500.0, 50.0)))
     assert keeps_m(first(points).path, points) > EAST.clearance_m
 
 
-def test_the_area_may_be_as_large_as_a_continent(ring: MakePoints) -> None:
+def test_the_area_may_be_as_large_as_a_continent() -> None:
     wide = replace(EAST, bounds_m=(-3e6, -3e6, 3e6, 3e6), clearance_m=20.0)
     assert first(ring(5000.0, 5200.0, 1200.0, 50.0), wide).status is PlanStatus.FOUND
 
 
-def test_from_a_turn_to_hold_in_another_way_is_looked_for(ring: MakePoints) -> None:
+def test_from_a_turn_to_hold_in_another_way_is_looked_for() -> None:
     planner, around = DubinsTree(DubinsTreeConfig(), EAST), ring(*START, 1500.0, 50.0)
     hold = planner.plan(PlanRequest(0.0, START, (1.0, 0.0), GivenMap(around)))
     assert hold.path is not None
@@ -71,7 +69,7 @@ def test_from_a_turn_to_hold_in_another_way_is_looked_for(ring: MakePoints) -> N
     assert asked(2.0 * HOLD_REGROW_S, gone) is PlanStatus.FOUND
 
 
-def test_in_a_turn_that_a_shield_holds_a_tree_is_grown_as_seldom(ring: MakePoints) -> None:
+def test_in_a_turn_that_a_shield_holds_a_tree_is_grown_as_seldom() -> None:
     planner, points = DubinsTree(DubinsTreeConfig(), EAST), ring(5000.0, 5200.0, 1200.0, 50.0)
     held = Path(np.array([(*START, 1.0, 0.0, 1.0 / EAST.turn_radius_m, math.tau * EAST.turn_radius_m)]))
 
@@ -83,7 +81,7 @@ def test_in_a_turn_that_a_shield_holds_a_tree_is_grown_as_seldom(ring: MakePoint
     assert asked(HOLD_REGROW_S) is PlanStatus.FOUND
 
 
-def test_a_path_stays_inside_the_area_where_the_way_round_leads_along_its_border(wall: MakePoints) -> None:
+def test_a_path_stays_inside_the_area_where_the_way_round_leads_along_its_border() -> None:
     points = wall((8000.0, 1500.0), (8000.0, 13_500.0), 50.0)
     path = first(points).path
     assert keeps_m(path, points) > EAST.clearance_m

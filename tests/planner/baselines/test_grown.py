@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -15,12 +14,12 @@ from planner.baselines.grown import GrownObstacles
 from planner.baselines.polyline import length_of
 from planner.contract import GivenMap
 from planner.interface import FloatArray, Mission
+from tests.planner.conftest import wall
 
 MISSION = Mission(
     (9000.0, 9000.0), 50.0, (0.0, 0.0, 10_000.0, 10_000.0), 200.0, 100.0, 25.0, 1.0, 3.0, 3000.0
 )
 KEEP, SIMPLER_M = 220.0, 4.0
-MakePoints = Callable[..., FloatArray]
 
 
 def grown(points: FloatArray) -> GrownObstacles:
@@ -57,7 +56,7 @@ def test_a_boundary_goes_once_round_the_union_of_discs(
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_straight_wall_is_followed_on_a_straight_line(side: float, wall: MakePoints) -> None:
+def test_a_straight_wall_is_followed_on_a_straight_line(side: float) -> None:
     known = grown(wall((3000.0, 5000.0), (7000.0, 5000.0), 50.0))
     way = known.boundary((4500.0, 5000.0 - side * KEEP), side, 1200.0)
     np.testing.assert_allclose(np.abs(way[:, 1] - 5000.0), KEEP, atol=SIMPLER_M)
@@ -131,7 +130,7 @@ def test_a_line_past_one_disc_and_onto_another_of_the_same_obstacle_touches_a_de
     assert dent.place[1] > 5000.0
 
 
-def test_two_walls_that_the_border_joins_are_as_near_to_the_goal_as_each_is(wall: MakePoints) -> None:
+def test_two_walls_that_the_border_joins_are_as_near_to_the_goal_as_each_is() -> None:
     """A planner that takes them for one leaves neither, and calls a goal unreachable that is not."""
     far = wall((0.0, 3000.0), (3000.0, 3000.0), 50.0)
     near = wall((10_000.0, 8000.0), (8000.0, 8000.0), 50.0)

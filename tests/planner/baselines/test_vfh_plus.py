@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +12,7 @@ from planner.contract import GivenMap
 from planner.geometry.curves import pose_at
 from planner.interface import FloatArray, Plan, PlanRequest, PlanStatus
 from planner.keys import MarginConfig
-
-MakePoints = Callable[..., FloatArray]
+from tests.planner.conftest import ring
 
 MISSION = replace(contract.MISSION, goal_m=(15_000.0, 5000.0), bounds_m=(0.0, 0.0, 20_000.0, 10_000.0))
 START = (2000.0, 5000.0)
@@ -62,7 +60,7 @@ def test_nothing_near_steers_to_the_goal() -> None:
     assert len(plans) < 20
 
 
-def test_obstacles_apart_are_passed_at_the_clearance(ring: MakePoints) -> None:
+def test_obstacles_apart_are_passed_at_the_clearance() -> None:
     points = np.concatenate(
         [
             ring(5000.0, 5300.0, 700.0, 50.0),
@@ -79,7 +77,7 @@ def test_obstacles_apart_are_passed_at_the_clearance(ring: MakePoints) -> None:
     assert len(track) * 25.0 < 1.15 * 13_000.0
 
 
-def test_the_nearer_side_of_an_obstacle_is_taken(ring: MakePoints) -> None:
+def test_the_nearer_side_of_an_obstacle_is_taken() -> None:
     assert steered(first(ring(4000.0, 5200.0, 600.0, 50.0))) < -0.1
     assert steered(first(ring(4000.0, 4800.0, 600.0, 50.0))) > 0.1
 
@@ -117,7 +115,7 @@ def test_a_sector_between_the_thresholds_stays_as_it_was() -> None:
     assert swerves([near, middle])
 
 
-def test_a_dead_end_ends_in_a_holding_turn(ring: MakePoints) -> None:
+def test_a_dead_end_ends_in_a_holding_turn() -> None:
     points = ring(*START, 900.0, 50.0)
     plan = first(points)
     assert plan.status is PlanStatus.FOUND
@@ -126,7 +124,7 @@ def test_a_dead_end_ends_in_a_holding_turn(ring: MakePoints) -> None:
     assert "holding" in plan.reason
 
 
-def test_near_the_border_a_path_ends_inside_and_none_is_held_back_far_from_it(ring: MakePoints) -> None:
+def test_near_the_border_a_path_ends_inside_and_none_is_held_back_far_from_it() -> None:
     """Three times from one place, each time in the direction that was chosen before."""
     xmin, ymin, xmax, ymax = MISSION.bounds_m
     for seed in range(100):
@@ -135,7 +133,7 @@ def test_near_the_border_a_path_ends_inside_and_none_is_held_back_far_from_it(ri
         discs = rng.uniform((13_000.0, 3500.0, 300.0), (19_800.0, 11_000.0, 900.0), (6, 3)).tolist()
         if min(math.dist(place, (x, y)) - radius for x, y, radius in discs) < 400.0:
             continue
-        seen = GivenMap(np.concatenate([ring(*disc, 50.0) for disc in discs]))
+        seen = GivenMap(np.concatenate([ring(x, y, radius, 50.0) for x, y, radius in discs]))
         heading = float(rng.uniform(0.0, math.tau))
         direction = (math.cos(heading), math.sin(heading))
         far = min(place[0] - xmin, xmax - place[0], place[1] - ymin, ymax - place[1]) > 2000.0

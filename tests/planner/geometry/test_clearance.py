@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,10 +13,10 @@ from hypothesis import strategies as st
 from planner.geometry.clearance import behind, distances, first_breach, first_exit_m, inside_bounds
 from planner.geometry.curves import Pose, along, full_turn, pose_at
 from planner.geometry.terrain import Terrain
-from planner.interface import FloatArray, Path
+from planner.interface import Path
 from tests.examples import examples
+from tests.planner.conftest import integrated
 
-Integrated = Callable[..., FloatArray]
 SEEDS = st.integers(0, 2**32 - 1)
 PIECES = st.lists(
     st.tuples(st.sampled_from([0.0, 1 / 900.0, -1 / 500.0, 1 / 200.0, -1 / 150.0]), st.floats(1.0, 900.0)),
@@ -37,20 +36,18 @@ def path_of(pose: Pose, pieces: list[tuple[float, float]]) -> Path:
     return Path(np.array(rows))
 
 
-def dense_line(path: Path, integrated: Integrated) -> shapely.LineString:
+def dense_line(path: Path) -> shapely.LineString:
     segments = [tuple(row) for row in path.segments.tolist()]
     return shapely.LineString(integrated(path.segments[0, :4].tolist(), segments, 0.5)[:, :2])
 
 
 @settings(max_examples=examples(30))
 @given(pieces=PIECES, seed=SEEDS)
-def test_distances_and_their_stations(
-    pieces: list[tuple[float, float]], seed: int, integrated: Integrated
-) -> None:
+def test_distances_and_their_stations(pieces: list[tuple[float, float]], seed: int) -> None:
     path = path_of(ASLANT, pieces)
     points = np.random.default_rng(seed).uniform(-1500.0, 1500.0, (40, 2))
     distance, arc_length_m = distances(path, points)
-    line = dense_line(path, integrated)
+    line = dense_line(path)
     np.testing.assert_allclose(distance, shapely.distance(line, shapely.points(points)), atol=2e-3)
     assert (arc_length_m >= 0.0).all()
     assert (arc_length_m <= path.length_m + 1e-6).all()
@@ -61,11 +58,11 @@ def test_distances_and_their_stations(
 @settings(max_examples=examples(30))
 @given(pieces=PIECES, seed=SEEDS, radius=st.floats(1.0, 500.0))
 def test_a_breach_is_told_where_and_only_where_there_is_one(
-    pieces: list[tuple[float, float]], seed: int, radius: float, integrated: Integrated
+    pieces: list[tuple[float, float]], seed: int, radius: float
 ) -> None:
     path = path_of(ASLANT, pieces)
     points = np.random.default_rng(seed).uniform(-1500.0, 1500.0, (6, 2))
-    nearest = shapely.distance(dense_line(path, integrated), shapely.points(points))
+    nearest = shapely.distance(dense_line(path), shapely.points(points))
     assume(np.abs(nearest - radius).min() > 0.01)
     arc_length_m = first_breach(path, points, radius)
     assert math.isfinite(arc_length_m) == (nearest < radius).any()
@@ -102,14 +99,12 @@ def test_a_second_pass_is_a_breach_where_the_first_does_not_count() -> None:
 
 @settings(max_examples=examples(50))
 @given(pieces=PIECES, seed=SEEDS, full=st.booleans())
-def test_inside_bounds(
-    pieces: list[tuple[float, float]], seed: int, full: bool, integrated: Integrated
-) -> None:
+def test_inside_bounds(pieces: list[tuple[float, float]], seed: int, full: bool) -> None:
     path = path_of(ASLANT, pieces)
     if full:
         end = along(path.segments[-1], float(path.segments[-1, 5]))
         path = Path(np.array([*path.segments.tolist(), full_turn(end, 300.0, 1.0)]))
-    xmin, ymin, xmax, ymax = dense_line(path, integrated).bounds
+    xmin, ymin, xmax, ymax = dense_line(path).bounds
     # Bounds about the path, some of them a little too narrow.
     slack = np.random.default_rng(seed).choice([0.05, 0.5, 500.0, 500.0, -0.05, -5.0], 4)
     bounds = (xmin - slack[0], ymin - slack[1], xmax + slack[2], ymax + slack[3])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -34,11 +33,9 @@ from planner.geometry.curves import (
     turn_centres,
     turn_onto,
 )
-from planner.interface import FloatArray, Path
+from planner.interface import Path
 from tests.examples import examples
-
-Integrated = Callable[..., FloatArray]
-AssertFlyable = Callable[[Path, float], None]
+from tests.planner.conftest import assert_flyable, integrated
 
 EAST = Pose(0.0, 0.0, 1.0, 0.0)
 ANGLES = st.floats(-math.pi, math.pi)
@@ -79,7 +76,7 @@ def corners(start: Pose, walk: list[tuple[float, float]]) -> list[Point]:
 
 @given(start=POSES, pieces=PIECES, share=st.floats(0.0, 1.0), more=st.floats(0.0, 1.0))
 def test_pose_sample_and_stretch_agree(
-    start: Pose, pieces: list[tuple[float, float]], share: float, more: float, integrated: Integrated
+    start: Pose, pieces: list[tuple[float, float]], share: float, more: float
 ) -> None:
     path = Path(np.array(joined(start, pieces)))
     begin = share * path.length_m
@@ -101,7 +98,7 @@ def test_pose_sample_and_stretch_agree(
 
 @given(start=POSES, pieces=PIECES, deviation=st.floats(0.01, 5.0))
 def test_sample_keeps_chords_near_their_arcs(
-    start: Pose, pieces: list[tuple[float, float]], deviation: float, integrated: Integrated
+    start: Pose, pieces: list[tuple[float, float]], deviation: float
 ) -> None:
     segments = joined(start, pieces)
     line = shapely.LineString(sample(Path(np.array(segments)), math.inf, deviation))
@@ -177,12 +174,7 @@ def assert_room_to_roll(path: Path, roll_m: float, before: float) -> None:
     before=st.sampled_from([-1.0, 0.0, 1.0]),
 )
 def test_a_fillet_is_smooth_and_passes_its_corners_as_near_as_asked(
-    start: Pose,
-    walk: list[tuple[float, float]],
-    limits: Limits,
-    cut: float,
-    before: float,
-    assert_flyable: AssertFlyable,
+    start: Pose, walk: list[tuple[float, float]], limits: Limits, cut: float, before: float
 ) -> None:
     nodes = corners(start, walk)
     path = fillet(start, nodes, limits, cut, before / limits.radius_m)
@@ -230,7 +222,7 @@ def test_what_cannot_be_rounded_has_no_fillet(nodes: list[Point], radius: float)
 @settings(max_examples=examples(30))
 @given(start=POSES, pieces=PIECES, shares=st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=20))
 def test_poses_at_many_stations_are_those_of_integration(
-    start: Pose, pieces: list[tuple[float, float]], shares: list[float], integrated: Integrated
+    start: Pose, pieces: list[tuple[float, float]], shares: list[float]
 ) -> None:
     path = Path(np.array(joined(start, pieces)))
     arc_lengths_m = np.array(shares) * path.length_m
@@ -278,12 +270,7 @@ def test_turns_off_a_path_begin_after_a_straight_where_it_turns_the_other_way(
     further=st.floats(1.0, 4000.0),
 )
 def test_onward_goes_round_the_loiter_as_integration_does(
-    start: Pose,
-    pieces: list[tuple[float, float]],
-    side: float,
-    share: float,
-    further: float,
-    integrated: Integrated,
+    start: Pose, pieces: list[tuple[float, float]], side: float, share: float, further: float
 ) -> None:
     before = joined(start, pieces)
     turn = full_turn(along(before[-1], before[-1][5]), 150.0, side)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,9 +12,7 @@ from planner.geometry.curves import Limits, end_of, pose_at, sample
 from planner.geometry.joining import divert_to_loiter
 from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, Path
-
-MakePoints = Callable[..., FloatArray]
-AssertFlyable = Callable[[Path, float], None]
+from tests.planner.conftest import assert_flyable, wall
 
 LIMITS = Limits(100.0, 30.0)
 EAST = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 2000.0)]))
@@ -26,7 +23,7 @@ def terrain(points: FloatArray, bounds: tuple[float, float, float, float] = WIDE
     return Terrain(points, np.full(len(points), 50.0), bounds)
 
 
-def test_in_the_open_the_path_is_flown_as_far_as_it_can_be(assert_flyable: AssertFlyable) -> None:
+def test_in_the_open_the_path_is_flown_as_far_as_it_can_be() -> None:
     turn = divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, terrain(np.zeros((0, 2))))
     assert turn is not None
     assert turn.loiter
@@ -36,9 +33,7 @@ def test_in_the_open_the_path_is_flown_as_far_as_it_can_be(assert_flyable: Asser
     assert 1000.0 - 25.0 <= end_of(turn).east_m <= 1000.0
 
 
-def test_before_a_wall_the_turn_is_begun_where_there_is_room(
-    wall: MakePoints, assert_flyable: AssertFlyable
-) -> None:
+def test_before_a_wall_the_turn_is_begun_where_there_is_room() -> None:
     points = wall((1000.0, -800.0), (1000.0, 800.0), 12.0)
     turn = divert_to_loiter(EAST, 300.0, 950.0, LIMITS, terrain(points))
     assert turn is not None
@@ -49,9 +44,7 @@ def test_before_a_wall_the_turn_is_begun_where_there_is_room(
 
 
 @pytest.mark.parametrize("curvature", [1 / 400.0, -1 / 400.0])
-def test_a_turn_against_the_one_being_flown_begins_after_the_room_to_roll(
-    curvature: float, assert_flyable: AssertFlyable
-) -> None:
+def test_a_turn_against_the_one_being_flown_begins_after_the_room_to_roll(curvature: float) -> None:
     bent = Path(np.array([(0.0, 0.0, 1.0, 0.0, curvature, 600.0)]))
     free = divert_to_loiter(bent, 0.0, 500.0, LIMITS, terrain(np.zeros((0, 2))))
     assert free is not None
@@ -67,7 +60,7 @@ def test_a_turn_against_the_one_being_flown_begins_after_the_room_to_roll(
     np.testing.assert_allclose(turn.segments[-2, 4:], (0.0, 30.0))
 
 
-def test_without_room_there_is_none(wall: MakePoints) -> None:
+def test_without_room_there_is_none() -> None:
     points = np.concatenate([wall((-900.0, y), (3000.0, y), 12.0) for y in (-120.0, 120.0)])
     assert divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, terrain(points)) is None
     narrow = terrain(np.zeros((0, 2)), (-10.0, -190.0, 2e3, 190.0))
