@@ -29,6 +29,7 @@ aircraft: {{model: aerosonde, airspeed_mps: 25}}
 sensor: {{range_m: 2500}}
 planner: {{kind: rolling_window, clearance_m: 40}}
 """
+SMALL = "schema: wayproof/campaign/1\nname: small\nseed: 5\n"
 CAMPAIGN = """\
 schema: wayproof/campaign/1
 name: small
@@ -82,14 +83,9 @@ def test_every_combination_is_drawn_and_flown_by_every_pair(place: Path) -> None
     assert {run["world"] for run in every} == {"ring.yaml"}
     assert {run["scenario"] for run in every} == {"ring"}
     assert runs.varied == [
-        "environment.wind.speed_mps",
-        "environment.turbulence",
-        "environment.wind.from_deg",
-        "sensor.rays",
-        "sensor.dropout",
-        "planner.clearance_m",
-        "aircraft.airspeed_mps",
-    ]
+        "environment.wind.speed_mps", "environment.turbulence", "environment.wind.from_deg", "sensor.rays",
+        "sensor.dropout", "planner.clearance_m", "aircraft.airspeed_mps",
+    ]  # fmt: skip
 
 
 def test_a_list_of_one_entry_is_text_and_nothing_in_the_others(place: Path) -> None:
@@ -162,9 +158,7 @@ def test_a_scenario_has_what_its_run_says(place: Path) -> None:
 
 
 def test_the_scenario_of_a_run_without_changes_is_the_file_but_for_its_seed(place: Path) -> None:
-    runs = runs_of(
-        place, "schema: wayproof/campaign/1\nname: small\nseed: 5\nscenarios: [ring.yaml]\ndraws: 2\n"
-    )
+    runs = runs_of(place, SMALL + "scenarios: [ring.yaml]\ndraws: 2\n")
     assert runs.scenario(1) == load_scenario(place / "ring.yaml", [("seed", str(runs.cells(1)["seed"]))])
     assert runs.cells(0)["seed"] != runs.cells(1)["seed"]
 
@@ -185,19 +179,8 @@ def test_more_draws_leave_the_runs_there_were_as_they_are(
 
 
 def test_worlds_take_the_place_of_the_scenarios_own(place: Path) -> None:
-    text = """\
-schema: wayproof/campaign/1
-name: small
-seed: 5
-scenarios: [ring.yaml]
-worlds:
-  - forest: {size_m: [3000, 3000]}
-  - label: few
-    seed: 1
-    forest: {density_1pkm2: 0.5}
-draws: 2
-"""
-    runs = runs_of(place, text)
+    worlds = "[{forest: {size_m: [3000, 3000]}}, {label: few, seed: 1, forest: {density_1pkm2: 0.5}}]"
+    runs = runs_of(place, f"{SMALL}scenarios: [ring.yaml]\nworlds: {worlds}\ndraws: 2\n")
     assert [run["world"] for run in all_of(runs)] == ["forest", "few", "forest", "few"]
     scenarios = [runs.scenario(number) for number in range(4)]
     assert [each.name for each in scenarios] == ["ring"] * 4
@@ -209,7 +192,7 @@ draws: 2
 
 
 def test_worlds_need_no_scenario(place: Path) -> None:
-    text = "schema: wayproof/campaign/1\nname: small\nseed: 5\nworlds: [{forest: {}}]\n"
+    text = SMALL + "worlds: [{forest: {}}]\n"
     runs = runs_of(place, text)
     (place / "other.yaml").write_text(text)
     assert load_campaign(place / "other.yaml").plain() == runs.file.plain(), "whatever its file is called"
@@ -248,7 +231,7 @@ def test_scenarios_are_files_folders_and_shipped_names(place: Path) -> None:
     (place / "more" / "._a.yaml").write_bytes(b"\x00\x05\x16\x07")
     (place / "more" / ".#b.yaml").symlink_to("somebody@somewhere.1234")
     (place / "more" / "c.yml").write_text(SCENARIO.format(name="c"))
-    text = "schema: wayproof/campaign/1\nname: small\nseed: 5\nscenarios: [ring.yaml, more, paper_circles]\n"
+    text = SMALL + "scenarios: [ring.yaml, more, paper_circles]\n"
     every = all_of(runs_of(place, text))
     assert [run["scenario"] for run in every] == ["ring", "a", "b", "c", "paper_circles"]
     assert [run["world"] for run in every] == ["ring.yaml", "a.yaml", "b.yaml", "c.yml", "paper_circles.yaml"]
@@ -395,7 +378,7 @@ def test_a_fault_of_the_scenario_itself_names_its_own_line_and_the_run(place: Pa
     with pytest.raises(InputError, match=r"ring.yaml:8: sensor.range_m: is 0; .* \(run 0 of .*campaign.yaml"):
         runs_of(place).check()
     with pytest.raises(InputError, match="has neither scenarios nor worlds"):
-        runs_of(place, "schema: wayproof/campaign/1\nname: small\nseed: 5\n")
+        runs_of(place, SMALL)
 
 
 def test_validate_and_schema_know_campaigns(place: Path, capsys: pytest.CaptureFixture[str]) -> None:

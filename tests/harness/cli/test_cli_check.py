@@ -15,6 +15,7 @@ from rerun.chunk import RrdReader
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 from tests.harness.conftest import Checked
+from tests.harness.run.given import written
 from tests.refusals import refused
 from tests.scenarios import scenario_of
 from wayproof import InputError, check
@@ -26,9 +27,7 @@ CIRCUIT = "x_m,y_m\n0,0\n0,2000\n1500,2000\n1500,0\n0,0\n"
 
 @pytest.fixture
 def strip(tmp_path: Path) -> Path:
-    path = tmp_path / "Strip 1.csv"
-    path.write_text(STRIP)
-    return path
+    return written(tmp_path / "Strip 1.csv", STRIP)
 
 
 def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
@@ -67,8 +66,7 @@ def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
 
 
 def test_a_circuit_is_flown_to_its_end_and_is_trackable(tmp_path: Path, checked: Checked) -> None:
-    path = tmp_path / "circuit.csv"
-    path.write_text(CIRCUIT)
+    path = written(tmp_path / "circuit.csv", CIRCUIT)
     options = ["--corner-m", "120", "--wind", "6,200", "--turbulence", "light"]
     status, said = checked(path, *options)
     assert status == 0
@@ -81,8 +79,7 @@ def test_a_circuit_is_flown_to_its_end_and_is_trackable(tmp_path: Path, checked:
 
 
 def test_an_end_that_is_passed_far_off_is_not_reached(tmp_path: Path, checked: Checked) -> None:
-    path = tmp_path / "path.csv"
-    path.write_text("x_m,y_m\n0,0\n2400,0\n1900,500\n3000,700\n7000,0\n")
+    path = written(tmp_path / "path.csv", "x_m,y_m\n0,0\n2400,0\n1900,500\n3000,700\n7000,0\n")
     status, said = checked(path, "--aircraft", "T38")
     track = load_run(tmp_path / "run").track
     assert math.dist((track.east_m[-1], track.north_m[-1]), (7000.0, 0.0)) > 1000.0
@@ -120,9 +117,7 @@ def test_bad_input_is_refused_before_anything_is_flown(
 
 @pytest.fixture
 def straight(tmp_path: Path) -> Path:
-    path = tmp_path / "straight.csv"
-    path.write_text("x_m,y_m\n0,0\n0,1500\n")
-    return path
+    return written(tmp_path / "straight.csv", "x_m,y_m\n0,0\n0,1500\n")
 
 
 CIRCLE = "obstacles=[{circle: {center_m: [100, 800], radius_m: 150}}]"
@@ -222,8 +217,7 @@ AROUND: dict[str, Any] = {"inclusion": True, "circle": {"center": [47.006, 8.008
 def test_the_fences_of_a_mission_are_kept(
     fences: list[dict[str, Any]], told: list[str], tmp_path: Path, checked: Checked
 ) -> None:
-    path = tmp_path / "mission.plan"
-    path.write_text(mission(*fences))
+    path = written(tmp_path / "mission.plan", mission(*fences))
     status, metrics = checked(path)
     assert (status, [each["name"] for each in metrics["breaches"]]) == (1 if told else 0, told)
     assert metrics["check"]["ok"] is not bool(told)
@@ -242,8 +236,7 @@ def test_a_mission_may_cut_corners_by_its_acceptance_radius(
     tmp_path: Path,
     checked: Checked,
 ) -> None:
-    path = tmp_path / "mission.plan"
-    path.write_text(mission(acceptance_m=acceptance_m))
+    path = written(tmp_path / "mission.plan", mission(acceptance_m=acceptance_m))
     ended, metrics = checked(path, *options)
     (corner,) = metrics["check"]["corners"]
     assert (ended, corner["allowed_cut_m"], corner["kept"]) == (status, allowed_m, status == 0)
@@ -284,8 +277,7 @@ def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:
 @pytest.mark.flights
 def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
     """Three of three: with confidence 0.95 at least the cube root of 0.05 (Clopper and Pearson)."""
-    path = tmp_path / "line.csv"
-    path.write_text("x_m,y_m\n0,0\n1500,0\n")
+    path = written(tmp_path / "line.csv", "x_m,y_m\n0,0\n1500,0\n")
     run = ["check", str(path), "--aircraft", "aerosonde", "--conditions", "typical", "--quiet"]
     assert main([*run, "--days", "3", "--out", str(tmp_path / "run")]) == 0
     certificate = json.loads((tmp_path / "run" / "days" / "certificate.json").read_text())

@@ -10,6 +10,7 @@ import pytest
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 from tests.harness.conftest import Checked
+from tests.harness.run.given import written
 from tests.refusals import refused
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real"
@@ -31,8 +32,7 @@ def row(
 
 def write(path: Path, *rows: str) -> Path:
     home = "\t".join(map(str, (0, 1, 0, 16, 0, 0, 0, 0, 47.0, 8.0, 400.0, 1)))
-    path.write_text("\n".join(("QGC WPL 110", home, *rows)) + "\n")
-    return path
+    return written(path, "\n".join(("QGC WPL 110", home, *rows)) + "\n")
 
 
 @pytest.mark.flights
@@ -120,8 +120,7 @@ def asc(path: Path) -> Path:
 
 def test_a_path_that_meets_terrain_is_told_where(tmp_path: Path, checked: Checked) -> None:
     terrain = f"obstacles=[{{file: {{path: {asc(tmp_path / 'ridge.asc')}}}}}]"
-    path = tmp_path / "low.csv"
-    path.write_text("x_m,y_m,altitude_m\n0,0,400\n0,1000,440\n0,3500,440\n")
+    path = written(tmp_path / "low.csv", "x_m,y_m,altitude_m\n0,0,400\n0,1000,440\n0,3500,440\n")
     status, metrics = checked(path, "--set", terrain)
     (contact,) = metrics["contacts"]
     assert (status, contact["kind"], metrics["outcome"]) == (1, "terrain", "collision")
@@ -146,8 +145,7 @@ def test_a_building_is_touched_only_below_its_roof(tmp_path: Path, checked: Chec
     for low_m, later, contacts in ((60.0, [], 1), (150.0, [], 0), (141.0, [[8, 47.12, 1000]], 0)):
         places = [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5], *later]
         line = {"type": "LineString", "coordinates": places}
-        path = tmp_path / "line.geojson"
-        path.write_text(json.dumps(line))
+        path = written(tmp_path / "line.geojson", json.dumps(line))
         _, metrics = checked(path, "--set", solid)
         assert [each["name"] for each in metrics["contacts"]] == ["town.geojson"] * contacts
 

@@ -141,16 +141,14 @@ def seconds(entities: dict[str, Columns], entity: str) -> list[float]:
 def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
     path, flight = recording
     entities = read(path)
-    for entity, values in {
-        "cross_track/flown": flight.track.cross_track_m,
-        "bank/pitch": flight.track.pitch_deg,
-        "bank/commanded": flight.track.roll_command_deg,
-        "bank/flown": flight.track.roll_deg,
-        "speed/ground": flight.track.groundspeed_mps,
-        "speed/flown": flight.track.airspeed_mps,
-        "altitude_error/flown": flight.track.up_m - 300.0,
+    track = flight.track
+    shown = {
+        "cross_track/flown": track.cross_track_m, "bank/pitch": track.pitch_deg, "bank/flown": track.roll_deg,
+        "bank/commanded": track.roll_command_deg, "speed/ground": track.groundspeed_mps,
+        "speed/flown": track.airspeed_mps, "altitude_error/flown": track.up_m - 300.0,
         "throttle/flown": np.full(1001, 50.0),
-    }.items():
+    }  # fmt: skip
+    for entity, values in shown.items():
         np.testing.assert_array_equal(numbers(entities, f"/series/{entity}").ravel()[-1001:], values)
     limit_deg = math.degrees(0.78)
     for entity, value in {"clearance/wanted": [100.0], "bank/limit": [-limit_deg, limit_deg]}.items():

@@ -36,15 +36,18 @@ def item(
     return "\t".join(map(str, cells))
 
 
+def written(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
 def waypoints_file(
     folder: Path, places: Sequence[tuple[float, float]], acceptance_m: float = 0.0, more: Sequence[str] = ()
 ) -> Path:
     """A mission of waypoints 100 m above home at places east and north of it; `more` lines follow."""
     home = f"0\t1\t0\t16\t0\t0\t0\t0\t{LATITUDE_DEG}\t{LONGITUDE_DEG}\t{HOME_M}\t1"
     lines = [item(n, *place, params=(0.0, acceptance_m)) for n, place in enumerate(places, start=1)]
-    path = folder / "mission.waypoints"
-    path.write_text("\n".join(["QGC WPL 110", home, *lines, *more]) + "\n")
-    return path
+    return written(folder / "mission.waypoints", "\n".join(["QGC WPL 110", home, *lines, *more]) + "\n")
 
 
 def off_polyline_m(points: Array, line: Sequence[tuple[float, float]]) -> Array:

@@ -14,6 +14,7 @@ from pyproj import Geod
 from harness.run_files.mission.program import MissionStep
 from harness.run_files.mission.vertices import altitude_m
 from harness.run_files.path_files import read_path
+from tests.harness.run.given import written
 from wayproof import InputError, check
 
 WGS84 = Geod(ellps="WGS84")
@@ -61,8 +62,7 @@ def wpl_items(frame: int = 3, command: int = 16, hold: float = 0.0, altitude: fl
 
 
 def test_other_columns_are_named(tmp_path: Path) -> None:
-    path = tmp_path / "path.csv"
-    path.write_text("x_m,y_m,a,b,,d\n0,0,1,1,1,1\n9,9,1,1,1,1\n")
+    path = written(tmp_path / "path.csv", "x_m,y_m,a,b,,d\n0,0,1,1,1,1\n9,9,1,1,1,1\n")
     assert read_path(path).notes == ("columns passed over: a, b, one without a name, d",)
 
 
@@ -134,16 +134,14 @@ def test_csv_in_metres(columns: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("column", ["altitude_m", "z_m", "up_m"])
 @pytest.mark.parametrize("names", ["x_m,y_m", "latitude_deg,longitude_deg"])
 def test_csv_with_altitudes(names: str, column: str, tmp_path: Path) -> None:
-    path = tmp_path / "path.csv"
-    path.write_text(f"{names},{column}\n1,2,300\n2,3,300.5\n")
+    path = written(tmp_path / "path.csv", f"{names},{column}\n1,2,300\n2,3,300.5\n")
     assert read_path(path).altitudes_m.tolist() == [300.0, 300.5]
     assert read_path(path, any_altitude=True).altitudes_m.tolist() == []
 
 
 @pytest.mark.parametrize("altitude", [2.0, 30_000.0])
 def test_an_altitude_that_cannot_be_flown_is_told_of_the_file(altitude: float, tmp_path: Path) -> None:
-    path = tmp_path / "path.csv"
-    path.write_text(f"x_m,y_m,z_m\n1,2,{altitude}\n2,3,{altitude}\n")
+    path = written(tmp_path / "path.csv", f"x_m,y_m,z_m\n1,2,{altitude}\n2,3,{altitude}\n")
     told = (
         f"path.csv: point 0 is at {altitude:g} m above the sea; must be between 5 and 20000 m, or give "
         "--altitude-m"
@@ -248,8 +246,7 @@ def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_pa
     content = json.loads(plan(*(old(k, *place) for k, place in enumerate(POINTS, 1))))
     content["geoFence"] = {"polygon": [[46.9, 7.9], [47.2, 7.9], [47.2, 8.5], [46.9, 8.5]], "version": 1}
     content["mission"]["cruiseSpeed"] = 15
-    path = tmp_path / "old.plan"
-    path.write_text(json.dumps(content))
+    path = written(tmp_path / "old.plan", json.dumps(content))
     found = read_path(path)
     assert found.mission is not None
     assert [step.position for step in found.mission.steps] == list(map(tuple, found.points_m.tolist()))
@@ -296,8 +293,7 @@ def test_no_altitude_is_not_an_altitude_of_zero(
     with pytest.raises(InputError, match=f":3: field 11 is nan; a {name} must have an altitude"):
         check(path)
     here = item(0, 0, doJumpId=2, command=19, params=[9, 0, 0, None, None, None, None])
-    path = tmp_path / "b.plan"
-    path.write_text(plan(first, here, last))
+    path = written(tmp_path / "b.plan", plan(first, here, last))
     assert [step.height_m for step in steps_of(path)] == [120.0, None, 120.0]
 
 

@@ -114,9 +114,7 @@ def test_former_run_is_removed_and_nothing_else(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("last", [TRACK, PLANS, METRICS, "manifest.json"])
 def test_process_killed_while_finishing_leaves_no_complete_run(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    last: str,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, last: str
 ) -> None:
     """Dies instead of putting each file in its place, one after the other."""
     replace = os.replace

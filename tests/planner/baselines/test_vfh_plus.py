@@ -61,13 +61,8 @@ def test_nothing_near_steers_to_the_goal() -> None:
 
 
 def test_obstacles_apart_are_passed_at_the_clearance() -> None:
-    points = np.concatenate(
-        [
-            ring(5000.0, 5300.0, 700.0, 50.0),
-            ring(8500.0, 4600.0, 900.0, 50.0),
-            ring(12_000.0, 5200.0, 500.0, 50.0),
-        ]
-    )
+    discs = ((5000.0, 5300.0, 700.0), (8500.0, 4600.0, 900.0), (12_000.0, 5200.0, 500.0))
+    points = np.concatenate([ring(*disc, 50.0) for disc in discs])
     track, plans, reached = flown(points)
     assert reached
     assert shapely.distance(shapely.LineString(track), shapely.MultiPoint(points)) > MISSION.clearance_m

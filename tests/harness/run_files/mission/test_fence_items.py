@@ -11,6 +11,7 @@ from harness.run_files.mission.mission_files import read_waypoints
 from harness.run_files.path_files import read_path
 from harness.world_files.kinds import read as read_world
 from harness.world_files.parts import FileSpec
+from tests.harness.run.given import written
 from tests.harness.run_files.test_paths_io import refused
 from wayproof import InputError, check
 
@@ -46,8 +47,7 @@ def test_fences_of_a_mission_are_fences_and_rally_points_are_named() -> None:
 def test_a_fence_about_home(tmp_path: Path) -> None:
     (circle,) = read_waypoints(wpl(*WAYPOINTS, (5005, 50.0, 0.0, 0.0)), "m.txt").fences.every
     assert (circle.inclusion, circle.center, circle.radius_m) == (True, (47.0, 8.0), 50.0)
-    path = tmp_path / "fence.txt"
-    path.write_text("QGC WPL 110\n0 0 0 5005 50 0 0 0 0 0 0 0\n")
+    path = written(tmp_path / "fence.txt", "QGC WPL 110\n0 0 0 5005 50 0 0 0 0 0 0 0\n")
     with pytest.raises(InputError, match="no items to fly to, but 1 fence item and 0 rally points"):
         check(path)
     with pytest.raises(InputError, match="is a fence about home, which has no position"):
@@ -73,8 +73,7 @@ def test_check_and_world_agree_on_several_inclusion_fences(
         "mission": {"items": places, **({} if firmware is None else {"firmwareType": firmware})},
         "geoFence": {"polygons": [{"inclusion": True, "polygon": ring} for ring in rings]},
     }
-    path = tmp_path / "m.plan"
-    path.write_text(json.dumps(plan))
+    path = written(tmp_path / "m.plan", json.dumps(plan))
     assert read_path(path).fences.inside_all is every
     assert len(read_world(FileSpec(path)).parts) == 1 + every
 
@@ -90,8 +89,7 @@ def test_a_home_whose_altitude_is_not_above_the_sea_is_told() -> None:
 
 def test_a_first_item_that_is_no_waypoint_is_no_home(tmp_path: Path) -> None:
     lines = wpl((22, 15.0, 47.0, 8.0), *WAYPOINTS).splitlines()
-    path = tmp_path / "m.waypoints"
-    path.write_text("\n".join((lines[0], *lines[2:])))
+    path = written(tmp_path / "m.waypoints", "\n".join((lines[0], *lines[2:])))
     found = read_path(path)
     assert found.mission is not None
     assert [step.item for step in found.mission.steps] == [1, 2, 3]
@@ -127,6 +125,5 @@ def test_items_are_counted_by_lines_where_their_numbers_leave_it_open() -> None:
     ],
 )
 def test_what_is_no_mission_is_told(text: str, said: str, tmp_path: Path) -> None:
-    path = tmp_path / "m.txt"
-    path.write_text(text)
+    path = written(tmp_path / "m.txt", text)
     assert said in refused(path)
