@@ -185,7 +185,7 @@ def _deviation(
     values = {}
     for name, each in zip(names, _clipped(rng, len(names)), strict=True):
         most = MOST_SHIFT_M if name == "centre_of_gravity_m" else MOST_SHARE
-        values[name] = min(max(round((getattr(uncertainty, name) or 0.0) * each, 6), -most), most)
+        values[name] = min(max(round(getattr(uncertainty, name) * each, 6), -most), most)
     return (given or DeviationSpec()).filled(**values)
 
 

@@ -148,18 +148,18 @@ def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
 def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     """Returns how the law tracks with the aircraft, flown once to learn it; None: as the aircraft's survey says."""
     from aircraft.airframes import AircraftError
+    from aircraft.guidance.waypoints import by_passing
     from aircraft.law_cards import law_card
 
     kind, config = _kind_and_config(spec)
     waypoints = spec.follow == "waypoints"
-    if waypoints and not getattr(config, "switch_by_passing", True):
+    if waypoints and not by_passing(config):
         return None  # it flies to points: where it is beside the legs says nothing of how it tracks
     at = ("guidance", "kind")
     with _code_of_others(lambda said: KeyFault(at, f"{spec.kind}: it cannot be flown: {said}")):
         try:
-            how: dict[str, Any] = {"waypoints": waypoints, "acceptance_radius_m": spec.acceptance_radius_m}
             frame, speed_mps = airframe_of(aircraft), aircraft.airspeed_mps
-            return law_card(frame, kind, config, speed_mps, before_flying=seal, **how)
+            return law_card(frame, kind, config, speed_mps, waypoints, spec.acceptance_radius_m, seal)
         except AircraftError as error:
             raise KeyFault(at, str(error)) from error
 
