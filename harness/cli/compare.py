@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from harness.analysis.rows import Row
 
 LEGEND: Final = (
-    "ratio: length over the optimum; clear: least clearance; κ·R: tightest planned turn, above 1 too tight; "
-    "tracks: all legs trackable; tse: total system error, m; p99: planner time"
+    "ratio: length over the optimum; clear: least clearance; κ·R: tightest planned curvature times the turn "
+    "radius in this air, above 1 with less bank in reserve; tracks: all legs trackable; tse: total system error, m; "
+    "p99: planner time"
 )
 
 
