@@ -181,10 +181,8 @@ def _world_root(world: FilePath | None) -> Node:
     assert isinstance(root.value, dict)
     layered = [each.path for each in whole.sources or () if each.in_layers]
     if layered:
-        raise InputError(
-            f"{world}: sources: the obstacles of {layered[0]} were looked at in layers along a path, and none "
-            "stand here; give the scenario that names the file"
-        )
+        told = f"the obstacles of {layered[0]} were looked at in layers along a path, and none stand here"
+        raise InputError(f"{world}: sources: {told}; give the scenario that names the file")
     base = Node({key: node for key, node in root.value.items() if key in WORLD_SECTIONS}, root.line)
     derived = _derived_keys(whole) if (world.parent / MANIFEST).is_file() else ()
     for loc in WORLD_KEYS:
@@ -246,10 +244,8 @@ def _without_files(
     if scenario.ground is not None:
         root = _with_keys(root, {("ground",): scenario.ground.model_dump()})
     if any(each.at(("altitude_m",)) for each in entries("sources")):
-        raise InputError(
-            "command line: the obstacles are files cut at one altitude, as a run folder has them, and the path has "
-            "several: give the scenario that names the files"
-        )
+        held = "files cut at one altitude, as a run folder has them, and the path has several"
+        raise InputError(f"command line: the obstacles are {held}: give the scenario that names the files")
     files = [file for each in entries("obstacles") if (file := each.at(("file",))) is not None]
     kept = tuple(each for each in entries("obstacles") if each.at(("file",)) is None)
     specs = tuple(spec_of(WorldFile.model_validate(file.plain()), folder) for file in files)

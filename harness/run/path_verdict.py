@@ -211,15 +211,13 @@ def _tried(
     limit_m: float | None, flown_at: Callable[[float], Mapping[str, Any]] | None
 ) -> tuple[float | None, bool]:
     """Flies with a corner limit, and with a wider one as long as that does not hold; returns it, and if it is a yes."""
-    if limit_m is None or flown_at is None:
-        return limit_m, False
     for _ in range(MOST_FLIGHTS):
+        if limit_m is None or flown_at is None:
+            return limit_m, False
         found = flown_at(limit_m)["check"]
         if _is_kept(found):
             return limit_m, found["ok"]
         limit_m = found["corner_m_that_would_do"]
-        if limit_m is None:
-            break
     return None, False
 
 
@@ -263,8 +261,7 @@ def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:
     asked = np.maximum(np.searchsorted(profile.speed_from_m, along, side="right") - 1, 0)
     fastest = np.full((len(track), 2), np.inf)
     if not profile.level:
-        rates = {speed: plan.climb_mps(speed) for speed in set(profile.airspeed_mps.tolist())}
-        fastest = np.array([rates[speed] for speed in profile.airspeeds(along).tolist()]).reshape(-1, 2)
+        fastest = np.array(list(map(plan.climb_mps, profile.airspeeds(along).tolist()))).reshape(-1, 2)
     return AsGiven(
         _leg_ends(plan, corners),
         passing.off_m,

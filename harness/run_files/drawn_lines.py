@@ -278,10 +278,8 @@ def _fixes(text: str, source: str) -> tuple[FloatArray, int]:
         raise InputError(f"{source}: is not IGC ({type(error).__name__}: {error})") from error
     broken, fixes = read["fix_records"]
     if len(broken) > MOST_BROKEN_SHARE * len(fixes):
-        raise InputError(
-            f"{source}: has {len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}; must be at "
-            f"most {MOST_BROKEN_SHARE:.0%}"
-        )
+        told = f"{len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}"
+        raise InputError(f"{source}: has {told}; must be at most {MOST_BROKEN_SHARE:.0%}")
     rows: list[tuple[float, ...]] = []
     for fix in fixes:
         height = 0.0 if fix.get("validity") == "V" else fix["gps_alt"] or 0.0

@@ -164,10 +164,9 @@ def _plane(
 def _check_degrees(names: Sequence[str], places: Sequence[Place], source: str) -> None:
     for name, (latitude, longitude) in zip(names, places, strict=True):
         if not (abs(latitude) <= ON_EARTH_DEG[0] and abs(longitude) <= ON_EARTH_DEG[1]):
-            raise InputError(
-                f"{source}: {name} is at latitude {latitude:g}, longitude {longitude:g}; must be degrees within 85 "
-                "and 360 (local metres can be given as CSV with the columns x_m,y_m)"
-            )
+            wanted = "degrees within 85 and 360 (local metres can be given as CSV with the columns x_m,y_m)"
+            told = f"{name} is at latitude {latitude:g}, longitude {longitude:g}"
+            raise InputError(f"{source}: {told}; must be {wanted}")
 
 
 def _check_points(points: FloatArray, altitudes_m: Sequence[float], source: str) -> None:
@@ -178,10 +177,9 @@ def _check_points(points: FloatArray, altitudes_m: Sequence[float], source: str)
     lowest, highest = ALTITUDES_M
     for number, altitude in enumerate(altitudes_m):
         if not lowest <= altitude <= highest:
-            raise InputError(
-                f"{source}: point {number} is at {altitude:g} m above the sea; must be between {lowest:g} and "
-                f"{highest:g} m, or give --altitude-m"
-            )
+            told = f"point {number} is at {altitude:g} m above the sea"
+            wanted = f"between {lowest:g} and {highest:g} m, or give --altitude-m"
+            raise InputError(f"{source}: {told}; must be {wanted}")
 
 
 def _check_span(points: FloatArray, source: str) -> None:

@@ -129,10 +129,9 @@ def _check_corner_count(sources: Sequence[Source]) -> None:
     every = [each for source in sources for each in source.polygons]
     corners = int(shapely.get_num_coordinates(np.array(every, dtype=object)).sum())
     if corners > MAX_CORNERS:
-        raise InputError(
-            f"has {counted(len(sources[-1].polygons), 'polygon')}, {corners:,} corners in the area with those of the "
-            f"files before; at most {MAX_CORNERS:,} corners can be kept: make area.bounds_m smaller"
-        )
+        own = counted(len(sources[-1].polygons), "polygon")
+        told = f"has {own}, {corners:,} corners in the area with those of the files before"
+        raise InputError(f"{told}; at most {MAX_CORNERS:,} corners can be kept: make area.bounds_m smaller")
 
 
 def loaded_file(spec: FileSpec) -> Contents:

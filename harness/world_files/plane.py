@@ -76,9 +76,8 @@ def check_metres(crs: str, unit: str = "") -> tuple[str, ...]:
     axes = _pyproj_crs(crs).axis_info
     unit = unit or next((axis.unit_name for axis in axes if axis.direction == "up"), axes[0].unit_name)
     if unit.strip().lower() not in METRES:
-        raise InputError(
-            f"has heights in {unit[:20]}; make them metres, or give a crs with heights in metres, as EPSG:2263+5703"
-        )
+        remedy = "make them metres, or give a crs with heights in metres, as EPSG:2263+5703"
+        raise InputError(f"has heights in {unit[:20]}; {remedy}")
     told = "has heights above the ellipsoid, up to 110 m beside those above mean sea level: taken as they are"
     return (told,) * any("ellipsoid" in axis.name.lower() for axis in axes)
 

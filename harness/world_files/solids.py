@@ -68,10 +68,9 @@ def sliced_parts(parts: Sequence[Part], mapping: Mapping, layer: Layer, box: Box
         solid += found or ()
         unknown += [part.name or "one without a name"] * (found is None)
     if unknown:
-        raise InputError(
-            f"has {counted(len(unknown), 'part')} with limits above ground ({', '.join(dict.fromkeys(unknown))[:60]}), "
-            "and the ground there is not known; give a terrain file too, or ground_m (--ground-m)"
-        )
+        count, named = counted(len(unknown), "part"), ", ".join(dict.fromkeys(unknown))[:60]
+        told = f"has {count} with limits above ground ({named}), and the ground there is not known"
+        raise InputError(f"{told}; give a terrain file too, or ground_m (--ground-m)")
     return solid
 
 

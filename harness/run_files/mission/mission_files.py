@@ -100,10 +100,8 @@ def read_plan(text: str, source: str) -> Program:
     """Reads the mission of a .plan, with its fences."""
     plan = parsed_json(text, source)
     if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
-        raise InputError(
-            f'{source}: is not a plan of QGroundControl; must have "fileType": "Plan" (of Mission Planner, save '
-            "the mission as .waypoints)"
-        )
+        wanted = '"fileType": "Plan" (of Mission Planner, save the mission as .waypoints)'
+        raise InputError(f"{source}: is not a plan of QGroundControl; must have {wanted}")
     mission = plan.get("mission")
     if not isinstance(mission, dict) or not isinstance(mission.get("items"), list):
         raise InputError(f"{source}: mission.items: is missing; it is required")

@@ -159,11 +159,8 @@ class _Run:
         """Returns the place in the items after a jump: its target while it is to be taken, else the next item."""
         wanted, repeats = item.params[0], int(item.params[1])
         if wanted not in self.index:
-            first, last = min(self.index), max(self.index)
-            raise _fault(
-                item,
-                f"jumps to item {wanted:g}, which does not exist; must be one from {first} to {last}: {NOT_LOADED}",
-            )
+            among = f"must be one from {min(self.index)} to {max(self.index)}: {NOT_LOADED}"
+            raise _fault(item, f"jumps to item {wanted:g}, which does not exist; {among}")
         target, to = self.index[int(wanted)], f"to item {wanted:g}"
         if repeats == 0:
             self._tell(item, PASSED_OVER, "is never taken")

@@ -95,10 +95,9 @@ class _RouteBuilder:
         low, high = self._flying.airspeed_range_mps
         self._asked_mps, self._mps = asked_mps, min(max(asked_mps, low), high)
         if self._mps != asked_mps:
-            self._notes.append(
-                f"{asked_mps:g} m/s asked for before item {step.item}: flown at {self._mps:g} m/s; the aircraft holds "
-                f"speed and altitude in turns from {low:g} to {high:g} m/s"
-            )
+            flown = f"{asked_mps:g} m/s asked for before item {step.item}: flown at {self._mps:g} m/s"
+            held = f"the aircraft holds speed and altitude in turns from {low:g} to {high:g} m/s"
+            self._notes.append(f"{flown}; {held}")
 
     def _here(self) -> complex | None:
         if self._run:

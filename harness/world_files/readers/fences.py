@@ -64,10 +64,8 @@ def _contents(fences: Sequence[Fence], inside_all: bool, rally: int, told: tuple
     points = counted(rally, "rally point")
     if not fences:
         held = f", but {points}, which are no obstacles" if rally else ""
-        raise InputError(
-            f"has an empty fence{held}; must have at least one polygon or circle (a mission is flown by `wayproof "
-            "check`)"
-        )
+        wanted = "at least one polygon or circle (a mission is flown by `wayproof check`)"
+        raise InputError(f"has an empty fence{held}; must have {wanted}")
     inside = [_fence_shape(each) for each in fences if each.inclusion]
     inside = inside if inside_all or not inside else [shapely.union_all(inside)]
     parts = [Part(shape, name="inclusion fence", keep_in=True) for shape in inside]

@@ -89,9 +89,8 @@ def _driver(path: Path) -> str:
     if path.suffix.lower() != ".hgt" and begin != b"PK":
         return "AAIGrid"
     if not re.fullmatch(r"[NS]\d{2}[EW]\d{3}(\.SRTMGL\d)?\.hgt(\.zip)?", path.name, re.IGNORECASE):
-        raise InputError(
-            "is an SRTM tile; its name must say where it lies, as N46E009.hgt, or N46E009.hgt.zip"
-        )
+        wanted = "where it lies, as N46E009.hgt, or N46E009.hgt.zip"
+        raise InputError(f"is an SRTM tile; its name must say {wanted}")
     return "SRTMHGT"
 
 
@@ -130,9 +129,8 @@ def read_numpy(spec: FileSpec) -> Contents:
         raise InputError("must have numbers `elevation`, `xmin`, `xmax`, `ymin`, `ymax`") from error
     south, north = min(south, north), max(south, north)
     if values.ndim != 2 or not values.size or not (-180 <= west < east <= 180 and -90 <= south < north <= 90):
-        raise InputError(
-            "must have up to 500 MB of elevation in rows and columns, and edges in degrees around it"
-        )
+        wanted = "up to 500 MB of elevation in rows and columns, and edges in degrees around it"
+        raise InputError(f"must have {wanted}")
     rows, columns = values.shape
     affine: Any = ((east - west) / columns, 0.0, west, 0.0, -(north - south) / rows, north)
     return Contents(spec.crs or WGS84, raster=Raster(values, affine))
