@@ -23,7 +23,7 @@ from harness.flight.closed_loop import Loop, fly
 from harness.flight.observer import Observer, Progress
 from harness.flight.record import Flight, Outcome
 from harness.flight.termination import Ending
-from harness.run_files.given_path import FlyBy, Tightest, fly_by
+from harness.run_files.given_path import FlyBy, Tightest, fly_by, needed
 from harness.run_files.mission.route import CLIMB_SHARE, mission_route
 from harness.run_files.mission.vertices import Flying, Ground, corner_limit_m, without_steps
 from harness.run_files.path_files import PathAsGiven
@@ -221,14 +221,10 @@ def _drawn_profile(
 
 def _bends(profile: VerticalProfile, tolerance_m: float) -> tuple[tuple[int, float], ...]:
     """Returns the points between which altitudes are straight to a tolerance, both ends left out."""
-    import shapely
-
     if profile.level:
         return ()
-    points = np.column_stack((profile.arc_length_m, profile.altitude_m, np.arange(len(profile.arc_length_m))))
-    simple = shapely.simplify(shapely.LineString(points), tolerance_m, preserve_topology=False)
-    kept = shapely.get_coordinates(simple, include_z=True)[1:-1]
-    return tuple((int(number), along) for along, _, number in kept.tolist())
+    kept = needed(np.column_stack((profile.arc_length_m, profile.altitude_m)), tolerance_m)[1:-1]
+    return tuple(zip(kept.tolist(), profile.arc_length_m[kept].tolist(), strict=True))
 
 
 def _slowest_turning_mps(frame: Airframe) -> float:
