@@ -77,7 +77,8 @@ def test_a_scenario_keeps_its_holes() -> None:
         ("[[[200, 200], [1800, 200], [800, 800]]]", "has holes_m that lie outside of it, cross or touch"),
         ("[[[2000, 200], [2800, 200], [2800, 800]]]", "has holes_m that lie outside of it, cross or touch"),
         ("[[[200, 200], [800, 800], [800, 200], [200, 800]]]", r"holes_m\[0\]: crosses or touches itself"),
-        ("[[[200, 200], [800, 800]]]", r"holes_m\[0\]: has 2 distinct vertices"),
+        ("[[[200, 200], [800, 800]]]", r"holes_m\[0\]: has 2 items; must have at least 3"),
+        ("[[[200, 200], [200, 200], [800, 800]]]", r"holes_m\[0\]: has 2 distinct vertices"),
     ],
 )
 def test_holes_that_are_none_are_refused(holes: str, sentence: str) -> None:
