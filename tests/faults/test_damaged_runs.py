@@ -45,7 +45,7 @@ def damage(draw: st.DrawFn, whole: Path, name: str) -> bytes:
     )
 
 
-NOTES = ("the run did not reach its goal", "area.origin is 47, 8, as where")
+NOTES = ("the run did not reach its goal", "area.origin is 47, 8, also the default")
 """How what is said of a file that was written begins."""
 
 
