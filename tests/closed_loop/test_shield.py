@@ -32,7 +32,7 @@ def flown(inner: type[Straight]) -> wayproof.Run:
     return wayproof.fly(scenario, planner=inner)
 
 
-@pytest.mark.parametrize("inner", [*HOSTILE, hostile.Dense])
+@pytest.mark.parametrize("inner", [*HOSTILE, pytest.param(hostile.Dense, marks=pytest.mark.flights)])
 def test_whatever_a_planner_answers_nothing_is_hit_and_the_area_not_left(inner: type[Straight]) -> None:
     run = flown(inner)
     assert run.outcome in ("reached", "timeout"), run.reason

@@ -173,6 +173,7 @@ def test_the_days_of_a_path_have_the_limits_of_its_check(tmp_path: Path) -> None
     assert [day["check.ok"] for day in days] == [max(each) <= 10.0 for each in off_m]
 
 
+@pytest.mark.flights
 def test_days_that_touch_the_same_obstacle_fail_alike_whenever_and_however_deep(tmp_path: Path) -> None:
     """The obstacle reaches 10 m over the line; with a tolerance of 1 mm the turn before it is not tracked either."""
     (tmp_path / "world.yaml").write_text(
