@@ -303,7 +303,7 @@ def test_a_failing_day_is_flown_again_by_the_command_of_its_manifest(command: st
     path.write_text("x_m,y_m\n0,0\n1500,0\n")
     law.write_text("from aircraft.guidance.registry import BUILT_IN\nLAW = BUILT_IN[-1]\n")
     run = [command, str(path), "--aircraft", "aerosonde", "--conditions", "typical", "--quiet", "--seed", "9"]
-    run += ["--guidance", f"{law}:LAW", "--set", "trackability.cross_track_m=0.01"]
+    run += ["--guidance", f"{law}:LAW", "--set", "trackability.cross_track_m=0.1"]
     run += ["--set", "aircraft.autopilot.bank_limit_deg=40", "--out", str(tmp_path / "run")]
     own = ["--altitude-m", "700", "--days", "1"] if command == "check" else ["--runs", "1"]
     assert main([*run, *own]) == 1
