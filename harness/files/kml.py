@@ -21,8 +21,7 @@ REFUSED_ELEMENTS: Final = ("altitudeOffset", "Track", "MultiTrack")  # of Google
 COMMA: Final = re.compile(r"\s*,\s*")  # blanks about it are dropped
 
 Element = ElementTree.Element
-Point = tuple[float, float, float | None]
-"""Latitude, longitude, altitude."""
+Point = tuple[float, float, float | None]  # latitude, longitude, altitude
 
 
 class Shape(NamedTuple):

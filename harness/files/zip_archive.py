@@ -13,10 +13,9 @@ from typing import Final
 from harness.files.input_file import InputError
 from harness.files.wording import counted, printable
 
-DAMAGES: Final = (
+DAMAGES: Final = (  # errors that Python's unpacking raises for damaged archives
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, ValueError, IndexError
 )  # fmt: skip
-"""Errors that Python's unpacking raises for damaged archives."""
 
 
 def unpacked(data: bytes, ending: str, most: int) -> tuple[str, bytes]:

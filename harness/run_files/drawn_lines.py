@@ -22,15 +22,13 @@ from harness.files.wording import counted
 from planner.interface import BoolArray, FloatArray
 
 LOCAL: Final = (("x_m", "y_m"), ("east_m", "north_m"))  # CSV columns of a place in the local plane
-DEGREES: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), ("lat", "lon"))
-"""Pairs of columns that hold a place in degrees."""
+DEGREES: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), ("lat", "lon"))  # of a place
 ALTITUDES: Final[tuple[str, ...]] = ("altitude_m", "up_m", "z_m")  # above mean sea level
 ABOVE_GROUND: Final = "altitude_agl_m"  # column that holds an altitude above ground
-ALTITUDE_WORD: Final = re.compile(
+ALTITUDE_WORD: Final = re.compile(  # ends the name of a column of altitudes, as `alt_ft`, read or not
     r"(^(up|z|fl)|(?<![a-z])((rel_?)?alt|altitudes?|elev?|elevation|height|hgt|hae|agl|a?msl))"
     r"([ _(\[]+(m|ft|feet|met(er|re)s?|rel|agl|a?msl)[)\]]?)*$"
 )
-"""Ends the name of a column that holds an altitude, as `alt_ft`, whether or not it is read."""
 SPEED_WORD: Final = re.compile(r"^(?!.*wind).*(speed|velocity|(?<![a-z])[tice]as(?![a-z]))")  # of a column
 SPEED_NOT_FLOWN: Final = "not flown: the airspeed is --airspeed-mps, else the aircraft's cruise"
 SINGLE_TYPE: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon", "MultiPoint": "Point"}
@@ -38,8 +36,7 @@ SINGLE_TYPE: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon"
 ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
 """Values of KML's altitudeMode, the last the default; at any other value, and at that, the altitude means nothing."""
 
-FLYING_MPS: Final = 12.0
-"""A recorded flight goes from the first to the last fix at this ground speed or more; elsewhere the aircraft rolls."""
+FLYING_MPS: Final = 12.0  # a flight lasts from the first to the last fix this fast; else the aircraft rolls
 FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
 """No glider is faster than these over the ground, and up or down: a fix that would need it from both its neighbours is
 an error of the receiver."""

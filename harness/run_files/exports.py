@@ -18,18 +18,13 @@ from harness.run_files.run_folder import Run
 from harness.scenario.scenario import Scenario, parse_scenario
 from harness.scenario.sections import Origin
 
-FORWARD_M: Final = 0.5
-"""A planned point less than this ahead of the one before is left out, as where a new plan takes effect."""
-TOLERANCE_M: Final = 0.25
-"""A point is left out only if it is nearer than this to the remaining path, seen from above."""
+FORWARD_M: Final = 0.5  # a planned point less ahead of the one before is left out, as where a new plan begins
+TOLERANCE_M: Final = 0.25  # a point is left out only if it is nearer to the path that remains, from above
 CLIMB_M: Final = 1.0  # nor if its altitude is further than this from that of the remaining path
-DIGITS: Final = 9
-"""Degrees in files have this many decimal places, a tenth of a millimetre."""
+DIGITS: Final = 9  # decimal places of degrees in files: a tenth of a millimetre
 MISSIONS: Final = ("plan", "waypoints")  # formats that an autopilot flies
-ABOVE_SEA: Final = 0
-"""MAV_FRAME_GLOBAL: latitude and longitude, altitude above mean sea level."""
-ABSOLUTE: Final = 2
-"""QGroundControl's AltitudeMode above mean sea level."""
+ABOVE_SEA: Final = 0  # MAV_FRAME_GLOBAL: latitude and longitude, altitude above mean sea level
+ABSOLUTE: Final = 2  # QGroundControl's AltitudeMode above mean sea level
 PX4, FIXED_WING = 12, 1
 
 
@@ -168,10 +163,9 @@ def kml_text(path: ExportedPath) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-FORMATS: Final[dict[str, Callable[[ExportedPath], str]]] = {
+FORMATS: Final[dict[str, Callable[[ExportedPath], str]]] = {  # writers by the name of the format
     "plan": plan_text,
     "waypoints": waypoints_text,
     "geojson": geojson_text,
     "kml": kml_text,
 }
-"""Functions that write a path, by the name of the format."""

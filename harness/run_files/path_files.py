@@ -28,21 +28,19 @@ from harness.scenario.sections import ALTITUDES_M
 MAX_BYTES: Final = 64_000_000  # a larger path file is refused
 MAX_SPAN_M: Final = 500e3  # a path that reaches further is refused
 ON_EARTH_DEG: Final = (85.0, 360.0)  # a latitude or longitude further from 0, either way, is refused
-LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
+LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {  # by the ending of a file's name
     ".csv": read_csv,
     ".geojson": read_geojson,
     ".json": read_geojson,
     ".gpx": read_gpx,
     ".igc": read_igc,
 }
-"""Functions that read drawn lines and recorded tracks, by the ending of a file's name."""
 KML_ENDINGS: Final = (".kml", ".kmz")
-MISSIONS: Final[dict[str, Callable[[str, str], Program]]] = {
+MISSIONS: Final[dict[str, Callable[[str, str], Program]]] = {  # by the ending of a file's name
     ".plan": read_plan,
     ".waypoints": read_waypoints,
     ".txt": read_waypoints,
 }
-"""Functions that read missions, by the ending of a file's name."""
 
 
 @dataclass(frozen=True, eq=False)

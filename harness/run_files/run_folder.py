@@ -39,15 +39,13 @@ PLANS = "plans.parquet"
 METRICS = "metrics.json"
 EVENTS = "events.csv"
 RECORDING = "flight.rrd"
-OVERLAY: Final = "overlay.rrd"
-"""File that a comparison writes for each of its scenarios: the recordings of its runs in one."""
+OVERLAY: Final = "overlay.rrd"  # in a comparison, for each scenario: the recordings of its runs in one
 REPORT = "report.html"
 REPORT_FILES = ("report.html", "report.csv", "path.svg", "path.png", "profiles.svg", "profiles.png")
 """Files that `wayproof report` adds to a run folder."""
 MAX_BYTES = 64_000_000  # a larger scenario file in the folder is refused
 
-HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)
-"""Files whose SHA-256 stands in the manifest of a complete run."""
+HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)  # SHA-256 in the manifest
 
 SCHEMA = "wayproof/run/1"
 VERSIONED_DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")  # whose versions the manifest has

@@ -29,10 +29,8 @@ if TYPE_CHECKING:
 
 CONDITIONS_STREAM, DEVIATION_STREAM = 4, 5
 """Numbers of the random streams, derived from the scenario's seed, that draw a day and the aircraft's deviations."""
-MOST_SIGMAS: Final = 3.0
-"""Numbers drawn from a normal distribution are clipped to this many standard deviations from its mean."""
-WIND_FROM_M: Final = 10.0
-"""The wind of a day has its speed at this height over ground, the WMO's for measuring wind."""
+MOST_SIGMAS: Final = 3.0  # normal numbers are clipped to this many standard deviations from the mean
+WIND_FROM_M: Final = 10.0  # height over ground of a day's wind speed, the WMO's for measuring wind
 CHANGE_EVERY_S, CHANGES = 300.0, 24
 """The wind of a day changes its speed and direction this often, and this many times; then it stays."""
 GUST_LENGTH_M: Final = 100.0

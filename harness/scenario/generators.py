@@ -17,8 +17,7 @@ from harness.files.strict_yaml import Loc
 from harness.scenario.sections import MAX_COORDINATE_M, Length, Section, in_order
 
 MAX_OBSTACLES: Final = 10_000  # a forest that is asked for more trunks is refused
-TRIES, TRIES_AT_ONCE = 100, 10
-"""A copse is tried at this many places before it is left out, and at this many of them at once."""
+TRIES, TRIES_AT_ONCE = 100, 10  # places that a copse is tried at before it is left out, and at once
 Place = tuple[float, float]
 Count = Annotated[int, Field(ge=1, le=1000)]
 

@@ -20,10 +20,8 @@ if TYPE_CHECKING:
     from aircraft.model_files import ModelFiles
     from planner.interface import Mission
 
-LEAST_CLEARANCE_RADII: Final = 0.02
-"""Planners keep at least this share of the turn radius from obstacles, also where less is wanted."""
-MAX_WIND_FRACTION: Final = 0.9
-"""Wind from this fraction of the airspeed on is refused: against it an aircraft makes hardly any way."""
+LEAST_CLEARANCE_RADII: Final = 0.02  # planners keep this share of the turn radius, also where less is wanted
+MAX_WIND_FRACTION: Final = 0.9  # of the airspeed: in more wind an aircraft makes hardly any way; refused
 
 
 def performance_of(scenario: ScenarioKeys) -> Performance:
@@ -100,8 +98,7 @@ def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: f
     )
 
 
-INSIDE_M: Final = 1e-3
-"""A flight from the boundary begins this far inside: the flight model keeps its place in degrees, to some 1e-9 m."""
+INSIDE_M: Final = 1e-3  # a flight begins so far inside: the model keeps its place in degrees, to some 1e-9 m
 SURVEY_ALTITUDE_M: Final = 300.0  # above the sea; there an aircraft's range of airspeeds is measured
 PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # between which the survey proves level flight
 PROVEN_FACTOR: Final = 1.05

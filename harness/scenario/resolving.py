@@ -162,8 +162,7 @@ def _rounded_up(value: float, step: int) -> float:
 
 PLANE_REACH_M: Final = 400_000.0
 """Up to this distance from any origin within 85 degrees of the equator the local plane is right to 0.9 m (`pyproj`)."""
-COURSE_STEP_DEG: Final = 5
-"""Step in which courses, and places on an arc, are tested for a start that leads out of the area."""
+COURSE_STEP_DEG: Final = 5  # step of courses, and of places on an arc, tested for a start that leads out
 ROUNDING_M: Final = 1e-3  # a place outside of the area by at most this counts as inside
 
 

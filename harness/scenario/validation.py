@@ -13,14 +13,12 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
     from pydantic_core import ErrorDetails
 
-MAX_FAULTS: Final = 2
-"""An error on a file has at most this many lines, the last of which counts what is left out."""
-MOST_WHOLE: Final = 2**53
-"""A whole number of this size or more, either way, is refused: below it a float has each of them."""
+MAX_FAULTS: Final = 2  # lines of an error on a file at the most; the last counts what is left out
+MOST_WHOLE: Final = 2**53  # larger whole numbers, either way, are refused: a float has all below
 NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"  # of a name that a folder may have
 
 _PATTERNS: Final = {NAME_PATTERN: "have only a-z, 0-9, '.', '_' and '-', and not only dots"}
-_SENTENCES: Final = {
+_SENTENCES: Final = {  # by the type of pydantic's error, with what it tells of it
     "missing": "is missing; it is required",
     "literal_error": "is {shown}; must be {expected}",
     "too_long": "has {actual_length} items; must have {max_length}",
@@ -38,7 +36,6 @@ _SENTENCES: Final = {
     "less_than": "is {shown}; must be less than {lt:.12g}",
     "less_than_equal": "is {shown}; must be at most {le:.12g}",
 }
-"""What is wrong, and what would be right, by the type of pydantic's error and with what it tells of it."""
 
 
 class KeyFaults(ValueError):

@@ -20,15 +20,12 @@ from harness.world_files.parts import Box, Contents, FileSpec
 from harness.world_files.plane import Mapping, Place, geodetic
 from harness.world_files.solids import Layer, Solid, clipped, occupied, placed_cells, simplified, sliced_parts
 
-MARGIN: Final = 0.02
-"""Parts of a file that lie outside the area by more than this share of its longer side are left out."""
-DECIMALS: Final = 3
-"""Decimals of a corner in metres: corners are rounded to a millimetre."""
+MARGIN: Final = 0.02  # parts further outside the area than this share of its longer side are left out
+DECIMALS: Final = 3  # of a corner in metres: corners are rounded to a millimetre
 MAX_CORNERS: Final = 900_000  # more in all files are refused: such a scenario could not be read again
-HEIGHTS_M: Final = (-1000.0, 30_000.0)
-"""A polygon without a known bottom or top gets these, in metres above mean sea level."""
+HEIGHTS_M: Final = (-1000.0, 30_000.0)  # of a polygon without a bottom or a top, above mean sea level
 
-USED_BY: Final = {
+USED_BY: Final = {  # keys of a file that not every kind uses, and the kinds that do
     "metres_per_cell": ("ascii_grid", *kinds.GROUPS["occupancy"]),
     "crs": (*kinds.GROUPS["terrain"], "cityjson", "geojson", "kml"),
     "nodata": (*kinds.GROUPS["terrain"],),
@@ -36,7 +33,6 @@ USED_BY: Final = {
     "default_height_m": (*kinds.GROUPS["buildings"],),
     "ground_m": (*kinds.GROUPS["buildings"], *kinds.GROUPS["airspace"]),
 }
-"""Keys of a file that not every kind uses, and the kinds that do."""
 
 
 def unused_keys(spec: FileSpec, contents: Contents) -> dict[str, str]:

@@ -43,7 +43,7 @@ KINDS: Final[dict[str, Reader]] = {kind: read for group in GROUPS.values() for k
 IMAGE: Final = "an image; give the YAML file of its ROS map"
 GAZEBO: Final = "a Gazebo world; give its footprints as GeoJSON, or its cells as a MovingAI .map"
 FLIGHT: Final = "a flight, not a world; `wayproof check` takes flown paths"
-REFUSED: Final = {
+REFUSED: Final = {  # what a file that is not read is, by its ending or kind, and what to give instead
     **{".pgm": IMAGE, ".png": IMAGE, ".world": GAZEBO, ".sdf": GAZEBO, ".igc": FLIGHT, ".gpx": FLIGHT},
     **dict.fromkeys((".gpkg", ".shp", ".fgb"), "a vector file; make GeoJSON of it (ogr2ogr a.geojson FILE)"),
     ".scen": "a list of MovingAI problems; give the .map file that it names",
@@ -53,15 +53,13 @@ REFUSED: Final = {
     "cityjsonseq": "a sequence of CityJSON features; make CityJSON of it (cjseq collect)",
     "overpass": "JSON of Overpass; ask it for XML ([out:xml]) and give that",
 }
-"""What a file that is not read is, by its ending or kind, and what to give instead."""
 FAMILIES: Final = "; ".join(f"{group} ({', '.join(kinds)})" for group, kinds in GROUPS.items())
 HEAD_BYTES: Final = 65_536  # the kind of a file that is not JSON is told from this many bytes at its begin
 _BINARY_BEGINS: Final = (
     ("geotiff", re.compile(rb"II[*+]\0|MM\0[*+]")),
     ("osm_pbf", re.compile(rb"(?s).{0,53}OSMHeader")),
 )
-_KIND_IN_ZIP: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}
-"""The kind of a ZIP archive by the ending of a file in it."""
+_KIND_IN_ZIP: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}  # by ending
 _PLACE_LINE: Final = r"[ \t]*[-+]?\d+\.\d+[ \t,]+[-+]?\d+\.\d+[ \t]*\n"  # latitude and longitude in a line
 _TEXTS: Final = (
     ("rally", r"\Arally\b"),
@@ -74,7 +72,7 @@ _TEXTS: Final = (
     ("ardupilot_fence", rf"\A(?:QGC WPL.*\n.|(?:{_PLACE_LINE}){{3}})"),
 )
 """Kind of a text without comments by a pattern in it; an airspace begins with its class, or its name and a shape."""
-_JSON_PATTERNS: Final = (
+_JSON_PATTERNS: Final = (  # kind of a JSON file by a key that it has anywhere; the first that is found counts
     ("overpass", r'"generator"\s*:\s*"Overpass'),
     ("cityjsonseq", r'"CityJSONFeature"'),
     ("cityjson", r'"CityObjects"\s*:'),
@@ -83,7 +81,6 @@ _JSON_PATTERNS: Final = (
     ("ed318", r'"(?:layer|extent)"\s*:\s*\{'),
     ("geojson", r'"type"\s*:\s*"(?:Feature(?:Collection)?|(?:Multi)?Polygon|GeometryCollection)"'),
 )
-"""The kind of a JSON file by a key that it has somewhere; the first that is found counts."""
 
 
 def read(spec: FileSpec) -> Contents:

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 Affine = tuple[float, float, float, float, float, float]
-Box = tuple[float, float, float, float]
-"""xmin, ymin, xmax, ymax."""
+Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax
 
 WGS84: Final = "EPSG:4326"  # latitude and longitude
 FOOT_M: Final = 0.3048

@@ -21,8 +21,7 @@ from harness.world_files.plane import CIRCLE_DEG, Mapping, Place, geodetic, shor
 from harness.world_files.solids import placed_cells
 
 ANY_PLACE: Final = Place(47.0, 8.0)  # origin of the plane for files that name no place on earth
-LARGEST_RADII, LARGEST_M = 400.0, 400_000.0
-"""Longest side of an area in turn radii, and in metres; of a larger file a part is taken."""
+LARGEST_RADII, LARGEST_M = 400.0, 400_000.0  # longest side of an area in turn radii, and in metres
 PAD_RADII: Final = 12.0
 """The area reaches this many turn radii beyond buildings and zones; at least as many beyond a start and goal given."""
 

@@ -24,7 +24,7 @@ TAKEOFFS: Final = {
 LANDINGS: Final = (LAND, VTOL_LAND)
 AT_AN_ALTITUDE: Final = (WAYPOINT, SPLINE_WAYPOINT, *TAKEOFFS)  # they have an altitude of their own
 FLOWN: Final = (*AT_AN_ALTITUDE, *LOITERS, RETURN_TO_LAUNCH, *LANDINGS)  # flown to, or about
-NAMES: Final = {
+NAMES: Final = {  # plain words for the commands of ordinary missions; any other is named by its number
     WAYPOINT: "waypoint", LOITER_UNLIMITED: "loiter without limit", LOITER_TURNS: "loiter turns",
     LOITER_TIME: "loiter time", RETURN_TO_LAUNCH: "return to launch", LAND: "land", TAKEOFF: "takeoff",
     30: "continue and change altitude", LOITER_TO_ALTITUDE: "loiter to altitude", SPLINE_WAYPOINT: "spline waypoint",
@@ -36,18 +36,15 @@ NAMES: Final = {
     206: "camera trigger distance", 207: "enable fence", 208: "parachute", 210: "inverted flight", 211: "gripper",
     214: "camera trigger interval", 2000: "take pictures", 2001: "stop taking pictures", 3000: "VTOL transition",
 }  # fmt: skip
-"""Plain words for the commands of ordinary missions; any other is named by its number."""
-WITHOUT_EFFECT: Final = frozenset((
+WITHOUT_EFFECT: Final = frozenset((  # cameras, servos, marks and the like do not change an aeroplane's path
     80, 115, 181, 182, 183, 184, 187, 188, 190, 195, 196, 197, 198, 200, 201, 202, 203, 204, 205, 206, 207, 211, 212,
     214, 215, 216, 220, 223, 530, 531, 532, 534, 600, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 42600, LAND_START,
 ))  # fmt: skip
-"""Commands for cameras, servos, marks and the like, which do not change the path of an aeroplane."""
-WHY_NOT: Final = {
+WHY_NOT: Final = {  # reasons why commands are not flown, where there is one to tell
     42702: "a script of the aircraft flies it",
     36: "an arc of a multicopter: ArduPlane goes on to the next item",
     **dict.fromkeys((112, 114, 116), "what follows it up to the next leg is not held back"),
 }
-"""Reasons why commands are not flown, where there is one to tell."""
 
 RETURN_POINT: Final = 5000  # of a fence
 CORNERS: Final = {5001: True, 5002: False}
@@ -57,9 +54,7 @@ CIRCLES: Final = {5003: True, 5004: False, HOME_CIRCLE: True}
 """Commands for a circular fence: True to stay inside of, False outside; the first parameter is the radius."""
 RALLY_POINT: Final = 5100  # no item to fly to
 NO_MISSION_COMMANDS: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
-"""Commands of items that are no part of a mission."""
-PX4: Final = 12
-"""`firmwareType` of a plan with which the aircraft has to be inside of one inclusion fence; else inside of all."""
+PX4: Final = 12  # `firmwareType` of a plan that keeps inside one inclusion fence; others keep inside all
 
 
 def name_of(command: int) -> str:

@@ -29,14 +29,11 @@ from harness.run_files.mission.program import Program, program
 LANDING_PATTERNS: Final = {"fwLandingPattern": commands.LAND, "vtolLandingPattern": commands.VTOL_LAND}
 """Command to land at for complex items that are written as a place to descend at and a place to land."""
 TRANSECTS: Final = "TransectStyleComplexItem"  # key of the mapping in which a survey has its items
-RELATIVE, ABSOLUTE = 3, 0
-"""MAV_FRAME of altitudes above home and above the sea."""
-PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')
-"""Matches every plan of QGroundControl, whatever the name of its file."""
+RELATIVE, ABSOLUTE = 3, 0  # MAV_FRAME of altitudes above home and above the sea
+PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')  # in every plan of QGroundControl, whatever its name
 PLACE_FORM: Final = "[latitude, longitude, altitude]"
 PLAN_SPEEDS: Final = ("cruiseSpeed", "hoverSpeed")  # m/s, where no item says another
-Home = tuple[Place | None, float]
-"""Latitude and longitude of home, None where the file does not say, and its altitude."""
+Home = tuple[Place | None, float]  # latitude and longitude, None where the file does not say; altitude
 
 
 def _mission(

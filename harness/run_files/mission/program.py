@@ -21,13 +21,10 @@ FLOWN, PASSED_OVER, NOT_FLOWN, NOT_REACHED = "flown", "passed over", "not flown"
 MOST_STEPS: Final = 20_000  # a mission that its jumps make longer than this many legs is refused
 MOST_TURNS, MOST_LOITER_S, MOST_RADIUS_M, MOST_HEIGHT_M = 1000, 86_400.0, 50_000.0, 50_000.0
 """An item with a larger figure than these is taken for a mistake."""
-SIDE_ALONE_M: Final = 1.0
-"""A radius of at most this gives the side only: ArduPlane hands back 1 or -1 where it has none."""
+SIDE_ALONE_M: Final = 1.0  # a smaller radius gives the side only: ArduPlane has 1 or -1 where it has none
 NOT_LOADED: Final = "ArduPilot and QGroundControl load no mission with it"
-BACK_MPS: Final = -2.0
-"""A change to this speed, MAVLink says, goes back to that of the vehicle; to -1 changes nothing."""
-AIRSPEED, GROUND_SPEED = 0, 1
-"""Kinds of speed in a change of speed, its first parameter."""
+BACK_MPS: Final = -2.0  # a change to this goes back to the vehicle's speed, says MAVLink; -1 changes nothing
+AIRSPEED, GROUND_SPEED = 0, 1  # kinds of speed in a change of speed, its first parameter
 
 
 @dataclass(frozen=True)
@@ -113,8 +110,7 @@ def program(
     return Program(tuple(run.steps), every, home_altitude_m, home)
 
 
-Flown = tuple[MissionStep | None, str]
-"""The step that an item makes, with a remark; or None, with the reason why it is not flown."""
+Flown = tuple[MissionStep | None, str]  # the step that an item makes, and a remark, or why it is not flown
 
 
 class _Run:

@@ -34,14 +34,12 @@ from harness.run_files.mission.vertices import (
     without_steps,
 )
 
-LANDING_HEIGHT_M: Final = 15.0
-"""A landing is flown down to this height above its place; flare and touchdown are not."""
+LANDING_HEIGHT_M: Final = 15.0  # a landing is flown down to this height; flare and touchdown are not
 CLIMB_SHARE: Final = 0.8  # a loiter to an altitude takes as long as a climb at this share of the fastest rate
 ARC_RAD: Final = math.pi / 2  # a segment on a circle spans at most this angle
 SAMPLE_M: Final = 5.0  # points along circles are this close together, for comparison with a track
 SAME_DIRECTION: Final = 1e-5  # directions that differ by less than this (rad) make no corner
-PAST_RADII: Final = 3.0
-"""A turn of more than `PAST_RAD` goes past the next leg and is back on it within this many radii."""
+PAST_RADII: Final = 3.0  # a turn of more than `PAST_RAD` is back on the next leg within this many radii
 
 
 def mission_route(mission: Program, flying: Flying, source: str) -> MissionRoute:

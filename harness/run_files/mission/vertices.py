@@ -20,8 +20,7 @@ from harness.run_files.mission.program import MissionStep
 Ground = Callable[[FloatArray, FloatArray], FloatArray]
 """Maps east and north to the height of the ground above mean sea level, NaN where it is not known."""
 
-CORNER_M: Final = 90.0
-"""A waypoint without an acceptance radius may be passed this far off: ArduPilot Plane's default WP_RADIUS."""
+CORNER_M: Final = 90.0  # the limit of a waypoint without an acceptance radius: ArduPilot Plane's WP_RADIUS
 FOLLOWED_M: Final = 50.0  # along a leg above ground, the ground is looked up at this spacing
 
 

@@ -16,13 +16,10 @@ from harness.world_files.parts import Contents, FileSpec, FloatArray, Limit, Par
 from harness.world_files.plane import check_metres
 from harness.world_files.readers import limits
 
-SOLID_TYPES: Final = ("Building", "Bridge", "OtherConstruction")
-"""CityJSON objects whose type begins with one of these are taken as solid."""
-INSTANCE: Final = "GeometryInstance"
-"""The type of a geometry that places a template of the file; such geometries are passed over and counted."""
+SOLID_TYPES: Final = ("Building", "Bridge", "OtherConstruction")  # begins of types that are solid
+INSTANCE: Final = "GeometryInstance"  # type of a geometry that places a template; passed over and counted
 LOW_M: Final = 0.1  # an object lower than this is a footprint whose height its attributes may give
-WALL_SHARE: Final = 1e-9
-"""A surface is a wall if its area seen from above is less than this share of its length squared."""
+WALL_SHARE: Final = 1e-9  # a surface is a wall if its area from above is less of its length squared
 
 
 def read(spec: FileSpec) -> Contents:

@@ -16,13 +16,11 @@ from harness.files.wording import counted
 from harness.world_files.parts import Contents, FloatArray
 from harness.world_files.plane import CIRCLE_DEG, in_degrees
 
-CIRCLE_POINTS: Final = 96
-"""A circle becomes a polygon round it with this many corners, whose area is 0.04 % larger."""
+CIRCLE_POINTS: Final = 96  # corners of the polygon round a circle, whose area is 0.04 % larger
 LARGEST_M: Final = 2_000_000.0  # a circle with a larger radius is refused
 
 GEOD: Final = Geod(ellps="WGS84")
-Place = tuple[float, float]
-"""Longitude and latitude, degrees."""
+Place = tuple[float, float]  # longitude and latitude, degrees
 
 
 def finished(contents: Contents) -> Contents:

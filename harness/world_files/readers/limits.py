@@ -22,12 +22,11 @@ _LIMIT_WORD: Final = re.compile("|".join(sorted((*_UNIT_M, *_DATUMS, "ABOVE"), k
 _WORDS_BESIDE: Final = rf"((?:{_LIMIT_WORD.pattern}|[\s()'./+\N{{DEGREE SIGN}}])*)"
 _LIMIT: Final = re.compile(rf"{_WORDS_BESIDE}(-?\s*(?:\d+(?:\.\d*)?|\.\d+)){_WORDS_BESIDE}")
 """A number among words that a limit may consist of. Nothing is guessed of a limit with others, as `ASK 123.5`."""
-_WORDED_LIMITS: Final = (
+_WORDED_LIMITS: Final = (  # written without a number
     (re.compile(r"SFC|GND|SURFACE|GROUND|0+(\.0*)?\s*(FT|M)?\s*(AGL|GND|ASFC|SFC)?"), NO_BOTTOM),
     (re.compile(r"(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b.*"), NO_TOP),
     (re.compile("MSL|AMSL|SEA LEVEL"), Limit(0.0)),
 )
-"""Limits that are written without a number."""
 _LOWEST_M: Final = {Datum.SEA: -2700.0, Datum.GROUND: 0.0}
 """A lower number means a limit that is not known (-9998 ft in files of the FAA), or is two limits (SFC-2500)."""
 _SIDE_PREFIXES: Final = (("lower", "floor", "bottom", "min"), ("upper", "ceiling", "top", "max"))
@@ -37,23 +36,20 @@ _LIMIT_KEY: Final = re.compile(
     "((?:ft|feet|m|metres|agl|amsl|msl|gnd)*)"
 )
 """Matches the name of an attribute with a limit, without underscores; unit and datum may follow (`floor_ft_agl`)."""
-_OWN_UNIT_KEY: Final = re.compile("uom|unit|ref|code|datum|type")
-"""Occurs in the name of an attribute with the unit or the datum of one limit."""
-_SHARED_UNIT_KEY: Final = re.compile(
+_OWN_UNIT_KEY: Final = re.compile("uom|unit|ref|code|datum|type")  # of one limit: occurs in names
+_SHARED_UNIT_KEY: Final = re.compile(  # matches an attribute with the unit or the datum of both limits
     r"uom|units?|uomdimensions|altitudeunit|(altitude|vertical|height)?reference|(vertical)?datum"
 )
-"""Matches the name of an attribute with the unit or the datum of both limits."""
 
 _LENGTH_AND_UNIT: Final = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*([a-z]*)\.?")
 _FEET_AND_INCHES: Final = re.compile(r"(\d+(?:\.\d+)?)\s*(?:'|ft)\s*(?:(\d+(?:\.\d+)?)\s*(?:''|\"|in)?)?")
 _THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")
 """Matches numbers such as `1,200`, which mean 1200 to some and 1.2 to others, and are not read."""
-_LENGTHS_M: Final = {
+_LENGTHS_M: Final = {  # of OpenStreetMap's units: https://wiki.openstreetmap.org/wiki/Map_features/Units
     **{name.lower(): metres for name, metres in (*_FEET.items(), *_METRES.items()) if name != "F"},
     **dict.fromkeys(("in", "inch", "inches"), FOOT_M / 12.0),
     **{"": 1.0, "cm": 0.01, "km": 1000.0},
 }
-"""Metres of the units that OpenStreetMap has: https://wiki.openstreetmap.org/wiki/Map_features/Units."""
 _HEIGHTS: Final = (  # attributes with the height of a building
     "height", "building:height", "building_height", "measuredheight", "render_height", "est_height"
 )  # fmt: skip

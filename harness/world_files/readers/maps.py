@@ -16,11 +16,10 @@ from harness.world_files.parts import WGS84, Contents, Datum, FileSpec, Limit, P
 from harness.world_files.readers import limits
 
 WITHOUT_AREA: Final = ("Point", "MultiPoint", "LineString", "MultiLineString")
-DATUMS: Final = {
+DATUMS: Final = {  # of a KML altitude by its altitudeMode; "" is the first of those without one
     **{"absolute": Datum.SEA, "relativeToGround": Datum.GROUND},
     **dict.fromkeys(("clampToGround", "clampToSeaFloor", "relativeToSeaFloor", "")),
 }
-"""Datum of a KML altitude by its altitudeMode, of which "" is the first without one."""
 
 
 def read_geojson(spec: FileSpec) -> Contents:

@@ -32,10 +32,9 @@ TALL: Final = {
     "generator:source": ("wind",),
 }
 """Values of tags for what stands up, or hangs between what does, and has no area; every aerialway is such, too."""
-NODE: Final = re.compile(
+NODE: Final = re.compile(  # matches a node of an XML file by its id, latitude and longitude, in any order
     rb"<node\s" + b"".join(rb"(?=[^>]*\b%s=['\"](-?\d+\.?\d*)['\"])" % key for key in (b"id", b"lat", b"lon"))
 )
-"""Matches a node of an XML file by its id, latitude and longitude, in any order."""
 KINDS: Final = {"n": "point", "w": "way"}
 NOT_THERE: Final = 2**31 - 1  # coordinate that osmium gives a node which a way names and the file has not
 

@@ -14,15 +14,13 @@ from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import circle
 from harness.world_files.readers.maps import features_of, polygon_of, simple
 
-UNITS: Final = {"": "m", "m": "m", "ft": "ft", "feet": "ft", "fl": "fl"}
-"""The unit of a limit by the name that a file uses."""
-NOTES: Final = (
+UNITS: Final = {"": "m", "m": "m", "ft": "ft", "feet": "ft", "fl": "fl"}  # of a limit, by the file's name
+NOTES: Final = (  # on zones passed over or simplified, by the key under which they are counted
     ("empty", "zone", "without a geometry passed over"),
     ("flat", "geometry", "without an area passed over"),
     ("free", "zone", "without restriction passed over"),
     ("at times", "zone", "that apply at times only taken as always there"),
 )
-"""Notes on zones that are passed over or simplified, by the key under which they are counted."""
 
 
 class _Zones:
