@@ -83,22 +83,8 @@ def envelope(
     return 0
 
 
-_TURN_COLUMNS: Final = {
-    "bank_deg": "bank deg",
-    "radius_m": "radius m",
-    "load_factor": "load factor",
-    "altitude_lost_m": "altitude lost m",
-    "airspeed_lost_mps": "speed lost m/s",
-}
-_PATH_COLUMNS: Final = {
-    "wind_mps": "wind m/s",
-    "tightest_radius_m": "tightest radius tracked m",
-    "planned_radius_m": "planned radius m",
-}
-
-
 def _print_card(card: Mapping[str, Any]) -> None:
-    """Prints the tables of `envelope`."""
+    """Prints the tables of `envelope`; figures that a page lists are headed by their names."""
     low, high = card["airspeed_range_mps"]
     facts = {
         "mass": f"{card['mass_kg']:g} kg",
@@ -115,9 +101,6 @@ def _print_card(card: Mapping[str, Any]) -> None:
         kept = f"speed and altitude kept up to {page['level_bank_deg']:g} deg"
         climbs = f"climbs at up to {page['climb_mps']:.3g} m/s, sinks at up to {page['descent_mps']:.3g}"
         turns = f"turns {at}; 90 % of 30 deg in {page['roll_in_s']:g} s; {kept}; {climbs}"
-        for title, key, columns in (
-            (turns, "turns", _TURN_COLUMNS),
-            (f"paths {at}", "tracked", _PATH_COLUMNS),
-        ):
-            rows = [[legible(entry[name]) for name in columns] for entry in page[key]]
-            print_table(title, rows, tuple(columns.values()))
+        for title, entries in ((turns, page["turns"]), (f"paths {at} that are tracked", page["tracked"])):
+            heads = [name.replace("_", " ").replace("mps", "m/s") for name in entries[0]]
+            print_table(title, [[legible(figure) for figure in each.values()] for each in entries], heads)

@@ -30,7 +30,6 @@ from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import make_loop
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, load_scenario
-from harness.scenario.shipped import scenario_path
 from planner.interface import Mission
 
 Observation = dict[str, NDArray[Any]]
@@ -81,23 +80,21 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         beams: int | None = None,
         render_mode: None = None,  # asked for by gymnasium's makers of several environments
     ) -> None:
-        own = scenario if isinstance(scenario, Scenario) else load_scenario(scenario_path(str(scenario)))
+        own = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
         self._own = self._flown = own
         self._updates = round(step_s * UPDATE_RATE_HZ) if math.isfinite(step_s) else 0
         if self._updates < 1 or abs(self._updates - step_s * UPDATE_RATE_HZ) > 1e-9:
             raise ValueError(f"step_s is {step_s:g}; must be a multiple of {1.0 / UPDATE_RATE_HZ:g} s")
-        rays = self._own.sensor.rays
+        rays, scan_s = own.sensor.rays, 1.0 / own.sensor.rate_hz
         self._beams = min(rays, DEFAULT_BEAMS) if beams is None else beams
         if not 1 <= self._beams <= rays:
             raise ValueError(f"beams is {beams}; must be from 1 to the {rays} rays of the scenario's sensor")
-        self._mission = replace(mission_of(self._own), bounds_m=self._own.area.bounds_m)
-        limits = airframe(self._own.aircraft.model).guidance_limits(self._own.aircraft.airspeed_mps)
+        self._mission = replace(mission_of(own), bounds_m=own.area.bounds_m)
+        limits = airframe(own.aircraft.model).guidance_limits(own.aircraft.airspeed_mps)
         self._bank_limit_rad = limits.bank_limit_rad
-        if self._updates * self._own.sensor.rate_hz < UPDATE_RATE_HZ:
-            raise ValueError(
-                f"step_s is shorter than the {1.0 / self._own.sensor.rate_hz:g} s from scan to scan: "
-                "actions would be passed over"
-            )
+        if self._updates * own.sensor.rate_hz < UPDATE_RATE_HZ:
+            told = f"step_s is shorter than the {scan_s:g} s from scan to scan"
+            raise ValueError(f"{told}: actions would be passed over")
         self._pilot = WaypointPilot(self._mission)
         self._scans = ScanKeeper()
         self._loop: SteppedLoop | None = None
@@ -130,7 +127,13 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         given = np.asarray(action, dtype=np.float64)
         if given.shape != (2,) or not (np.abs(given) <= 1.0).all():
             raise ValueError(f"action is {action!r}; must be 2 numbers from -1 to 1")
-        self._act(given, before.believed)
+        right_m, ahead_m = (self._mission.sensor_range_m * given).tolist()
+        believed = before.believed
+        sine, cosine = math.sin(believed.course_rad), math.cos(believed.course_rad)
+        self._pilot.target_m = (
+            believed.east_m + ahead_m * sine + right_m * cosine,
+            believed.north_m + ahead_m * cosine - right_m * sine,
+        )
         status = self._advanced(before)
         whole_m = math.dist(self._own.mission.start_m, self._own.mission.goal_m)
         reward = (self._to_go_m - status.to_go_m) / whole_m
@@ -149,15 +152,6 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         """The parts of a flight with the agent's pilot as the planner."""
         self._pilot = WaypointPilot(loop.mission)
         return replace(loop, planner=self._pilot)
-
-    def _act(self, action: NDArray[np.float64], believed: AircraftState) -> None:
-        """Tells the pilot where to fly."""
-        right_m, ahead_m = (self._mission.sensor_range_m * action).tolist()
-        sine, cosine = math.sin(believed.course_rad), math.cos(believed.course_rad)
-        self._pilot.target_m = (
-            believed.east_m + ahead_m * sine + right_m * cosine,
-            believed.north_m + ahead_m * cosine - right_m * sine,
-        )
 
     def _advanced(self, status: Status) -> Status:
         assert self._loop is not None

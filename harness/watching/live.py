@@ -45,21 +45,22 @@ class LiveLog(Observer):
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Keeps a scan until it is handed over."""
-        self._keep_call("on_scan", scan, state, moving=self._moving())
+        self._calls.append(Call("on_scan", (scan, state), self._moving()))
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
         """Keeps a plan, its picture drawn at once, until it is handed over."""
         picture = accepted.plan.picture
-        drawn = None if picture is None else partial(_identity, picture())
-        self._keep_call("on_plan", replace(accepted, plan=replace(accepted.plan, picture=drawn)), state)
+        drawn = None if picture is None else partial(replace, picture())
+        shown = replace(accepted, plan=replace(accepted.plan, picture=drawn))
+        self._calls.append(Call("on_plan", (shown, state)))
 
     def on_event(self, time_s: float, text: str) -> None:
         """Keeps an event until it is handed over."""
-        self._keep_call("on_event", time_s, text)
+        self._calls.append(Call("on_event", (time_s, text)))
 
     def on_rows(self, rows: Track) -> None:
         """Keeps the rows of the track since the last hand-over; the flight's own blocks come too seldom."""
-        self._keep_call("on_block", rows)
+        self._calls.append(Call("on_block", (rows,)))
 
     def on_row(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
         """Adds a row of the track, and hands over what is kept when it is time."""
@@ -73,20 +74,12 @@ class LiveLog(Observer):
     def close(self, metrics: Mapping[str, Any], run: Mapping[str, Any]) -> None:
         """Shows the content of `metrics.json` and the typed figures of the run."""
         self._hand_over()
-        self._keep_call("close", dict(metrics), dict(run))
+        self._calls.append(Call("close", (dict(metrics), dict(run))))
         self._hand_over()
-
-    def _keep_call(self, method: str, *arguments: Any, moving: tuple[Any, ...] = ()) -> None:
-        if not self._relay.given_up:
-            self._calls.append(Call(method, arguments, moving))
 
     def _hand_over(self) -> None:
         if self._track is not None:
             self._track.hand_on()
         if self._calls:
-            calls, self._calls = self._calls, []
-            self._relay.hand_over(calls)
-
-
-def _identity(value: Any) -> Any:
-    return value
+            self._relay.hand_over(self._calls)
+            self._calls = []

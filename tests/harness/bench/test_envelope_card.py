@@ -89,7 +89,7 @@ def test_the_table_fits_and_names_the_figures(cache: Path, capsys: pytest.Captur
     assert main(["envelope", "aerosonde", "--airspeed-mps", "20", "--wind", "0"]) == 0
     shown = capsys.readouterr().out
     assert max(map(len, shown.splitlines())) <= 80
-    for text in ("11 kg", "turns at 20 m/s", "tightest radius tracked m"):
+    for text in ("11 kg", "turns at 20 m/s", "airspeed lost m/s", "tightest radius m"):
         assert text in shown
     (level,) = re.findall(r"level flight +([\d.]+) to ([\d.]+) m/s", shown)
     # 17.3 to 32.4 m/s by an independent trim of the same published figures.
