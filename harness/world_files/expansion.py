@@ -28,9 +28,8 @@ HEIGHTS_M: Final = (-1000.0, 30_000.0)  # of a polygon without a bottom or a top
 USED_BY: Final = {  # keys of a file that not every kind uses, and the kinds that do
     "metres_per_cell": ("ascii_grid", *kinds.GROUPS["occupancy"]),
     "crs": (*kinds.GROUPS["terrain"], "cityjson", "geojson", "kml"),
-    "nodata": (*kinds.GROUPS["terrain"],),
-    "unknown": (*kinds.GROUPS["occupancy"],),
-    "default_height_m": (*kinds.GROUPS["buildings"],),
+    **{"nodata": kinds.GROUPS["terrain"], "unknown": kinds.GROUPS["occupancy"]},
+    "default_height_m": kinds.GROUPS["buildings"],
     "ground_m": (*kinds.GROUPS["buildings"], *kinds.GROUPS["airspace"]),
 }
 
@@ -101,12 +100,18 @@ def expanded(
         field, notes = height_field(terrain, box)
     field = field or ground
     sources: list[Source] = []
+    corners = 0
     for index, (spec, (contents, mapping)) in enumerate(zip(specs, loaded, strict=True)):
         with blaming(index):
             reach_m = spec.vertical_clearance_m
             layer = Layer(altitude_m - reach_m, altitude_m + reach_m, field, spec.ground_m, bounds_m)
             sources.append(_cut(spec, contents, mapping, layer, box))
-            _check_corner_count(sources)
+            own = sources[-1].polygons
+            corners += int(shapely.get_num_coordinates(np.array(own, dtype=object)).sum())
+            if corners > MAX_CORNERS:
+                told = f"has {counted(len(own), 'polygon')}, {corners:,} corners in the area"
+                told += f" with those of the files before; at most {MAX_CORNERS:,} corners can be kept"
+                raise InputError(f"{told}: make area.bounds_m smaller")
     return Expanded(tuple(sources), field, tuple(notes))
 
 
@@ -119,15 +124,6 @@ def blaming(index: int) -> Iterator[None]:
         raise
     except InputError as error:
         raise FileFault(index, str(error)) from error
-
-
-def _check_corner_count(sources: Sequence[Source]) -> None:
-    every = [each for source in sources for each in source.polygons]
-    corners = int(shapely.get_num_coordinates(np.array(every, dtype=object)).sum())
-    if corners > MAX_CORNERS:
-        own = counted(len(sources[-1].polygons), "polygon")
-        told = f"has {own}, {corners:,} corners in the area with those of the files before"
-        raise InputError(f"{told}; at most {MAX_CORNERS:,} corners can be kept: make area.bounds_m smaller")
 
 
 def loaded_file(spec: FileSpec) -> Contents:

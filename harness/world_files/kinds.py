@@ -151,6 +151,4 @@ def _text_kind(path: Path, first: bytes) -> str | None:
         return found
     lines = [line.strip() for line in text.splitlines()]
     text = "\n".join(line for line in lines if line and line[0] not in "*#") + "\n"
-    return next(
-        (kind for kind, pattern in _TEXTS if re.search(pattern, text, re.MULTILINE | re.IGNORECASE)), None
-    )
+    return next((kind for kind, pattern in _TEXTS if re.search(f"(?im){pattern}", text)), None)

@@ -233,10 +233,10 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
         return chosen, []
     cell = f"--metres-per-cell {cell_m:g}" if (cell_m := _cell_that_fits(files, craft, room)) else ""
     if (chosen := ends(room, turn_m, clearance_m, turning=False)) is not None:
-        told = (
-            f"every way from start to goal is somewhere narrower than {2.0 * (clearance_m + turn_m):,.0f} m, where "
-            f"{craft.name} cannot turn round: the goal may be proved unreachable"
+        narrow = (
+            f"every way from start to goal is somewhere narrower than {2.0 * (clearance_m + turn_m):,.0f} m"
         )
+        told = f"{narrow}, where {craft.name} cannot turn round: the goal may be proved unreachable"
         return chosen, [told + (f"; with {cell} it can" if cell else "")]
     would = cell or "--start and --goal, another altitude, a smaller clearance or aircraft, or a larger file"
     raise InputError(

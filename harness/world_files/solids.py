@@ -52,11 +52,9 @@ class Layer(NamedTuple):
 
 def sliced_parts(parts: Sequence[Part], mapping: Mapping, layer: Layer, box: Box) -> list[Solid]:
     """Returns the solids of one file's parts in a layer, in the plane and near a box."""
-    if not parts:
-        return []
     shapes = mapping.geometries(np.array([part.footprint for part in parts], dtype=object))
     window = shapely.box(*box)
-    near = np.array([part.keep_in for part in parts]) | shapely.intersects(shapes, window)
+    near = np.array([part.keep_in for part in parts], dtype=np.bool_) | shapely.intersects(shapes, window)
     near &= np.isfinite(shapely.bounds(shapes)).all(axis=1)
     solid: list[Solid] = []
     unknown: list[str] = []

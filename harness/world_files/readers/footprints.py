@@ -32,7 +32,10 @@ def finished(contents: Contents) -> Contents:
     shapes = np.array([part.footprint for part in contents.parts], dtype=object)
     bounds = shapely.bounds(shapes)
     if in_degrees(contents.crs):
-        _check_degrees(bounds)
+        off = (np.abs(bounds) > (CIRCLE_DEG, 90.0, CIRCLE_DEG, 90.0)).any(axis=1)
+        if off.any():
+            x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
+            raise InputError(f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs")
         wide = bounds[:, 2] - bounds[:, 0] > CIRCLE_DEG / 2
         turned = shapely.transform(shapes[wide], lambda p: np.column_stack((p[:, 0] % CIRCLE_DEG, p[:, 1])))
         west, _, east, _ = shapely.bounds(turned).T
@@ -53,13 +56,6 @@ def finished(contents: Contents) -> Contents:
     flat = len(area) - len(parts)
     passed = (f"{counted(flat, 'polygon')} without an area passed over",) if flat else ()
     return replace(contents, parts=parts, notes=(*contents.notes, *passed))
-
-
-def _check_degrees(bounds: FloatArray) -> None:
-    off = (np.abs(bounds) > (CIRCLE_DEG, 90.0, CIRCLE_DEG, 90.0)).any(axis=1)
-    if off.any():
-        x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
-        raise InputError(f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs")
 
 
 def circle(center: Place, radius_m: float) -> Any:
@@ -85,12 +81,6 @@ def arc(
     sweep = (to_deg - from_deg) % CIRCLE_DEG if clockwise else -((from_deg - to_deg) % CIRCLE_DEG)
     count = max(int(abs(sweep)), 1) + 1
     return _around(center, from_deg + np.linspace(0.0, sweep, count), np.linspace(*distance_m, count))
-
-
-def polar(center: Place, place: Place) -> tuple[float, float]:
-    """Returns the azimuth (deg) and the distance (m) of a place from a centre."""
-    azimuth, _, distance = GEOD.inv(*center, *place)
-    return float(azimuth), float(distance)
 
 
 def corridor(line: Sequence[Place], width_m: float) -> Any:

@@ -14,7 +14,7 @@ from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, text_of
 from harness.world_files.parts import WGS84, Contents, FileSpec, Limit, Part
 from harness.world_files.readers import limits
-from harness.world_files.readers.footprints import Place, arc, circle, corridor, on_earth, polar
+from harness.world_files.readers.footprints import GEOD, Place, arc, circle, corridor, on_earth
 
 MILE_M: Final = 1852.0  # nautical
 COMMANDS: Final = ("AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")  # with a value after a blank
@@ -59,7 +59,7 @@ class _Airspace:
             raise InputError("has an arc or circle before its centre `V X=`")
         if command == "DB":
             first, last = _places(rest, 2)
-            (begin, near), (end, far) = (polar(self.center, place) for place in (first, last))
+            (begin, _, near), (end, _, far) = (GEOD.inv(*self.center, *place) for place in (first, last))
             is_whole = first == last and not self.ring  # else a small arc whose ends were rounded
         else:
             radius, begin, end = _numbers(rest, 3) if command == "DA" else (*_numbers(rest, 1), 0.0, 360.0)
