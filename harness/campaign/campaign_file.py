@@ -190,7 +190,7 @@ def load_campaign(path: Path, planners: Sequence[str] = (), settings: Settings =
     if planners:
         root = strict_yaml.replaced(root, ("planners",), node_of(tuple(planners), COMMAND_LINE))
     for name, text in settings:
-        value = strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE)
+        value = node_of(strict_yaml.parse(text, f"command line: {name}").plain(), COMMAND_LINE)
         root = strict_yaml.replaced(root, ("seed",) if name == "seed" else ("set", name), value)
     root = absolute_paths(root, path.parent)
     campaign = validated(root, source)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
@@ -106,14 +106,14 @@ def name_of(element: Element) -> str:
     return str(element.tag).rpartition("}")[2]
 
 
-def named(element: Element, name: str) -> Iterator[Element]:
-    """Yields all elements of a name, itself among them."""
-    return (each for each in element.iter() if name_of(each) == name)
+def named(element: Element, name: str) -> list[Element]:
+    """Returns all elements of a name within an element, whatever their namespace."""
+    return element.findall(f".//{{*}}{name}")
 
 
 def text_of(element: Element, name: str) -> str:
     """Returns the text of the first element of a name; empty where there is none."""
-    return next(((each.text or "").strip() for each in named(element, name)), "")
+    return element.findtext(f".//{{*}}{name}", "").strip()
 
 
 def _points(element: Element, where: str, what: str) -> tuple[Point, ...]:

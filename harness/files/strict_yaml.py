@@ -58,10 +58,6 @@ class Node:
             return tuple(node.plain() for node in self.value)
         return self.value
 
-    def moved(self, line: int) -> Node:
-        """Returns the same value with every part of it at `line`."""
-        return node_of(self.plain(), line)
-
     def at(self, loc: Loc) -> Node | None:
         """Returns the node at `loc`; None where there is none."""
         node: Node | None = self
@@ -236,7 +232,6 @@ def _line(event: yaml.Event) -> int:
 
 
 def _is_key(text: str) -> bool:
-    """Tells whether a key can be shown in a line."""
     return len(text) <= MAX_KEY_LENGTH and text.isprintable()
 
 
@@ -293,7 +288,5 @@ _Dumper.add_representer(tuple, _Dumper.represent_list)
 
 def dump(value: Any) -> str:
     """Writes plain values as YAML text that `parse` reads back to the same values, floats to the last bit."""
-    text = yaml.dump(
-        value, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=110, allow_unicode=True
-    )
-    return str(text)
+    how: Any = {"sort_keys": False, "default_flow_style": None, "width": 110, "allow_unicode": True}
+    return str(yaml.dump(value, Dumper=_Dumper, **how))

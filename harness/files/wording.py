@@ -6,10 +6,9 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
-_UNPRINTABLE: Final = re.compile(
+_UNPRINTABLE: Final = re.compile(  # controls but tab and line end, marks of direction, halves of characters
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )
-"""Matches control characters except tab and end of line, marks of writing direction, and halves of characters."""
 
 
 def counted(number: int, noun: str) -> str:

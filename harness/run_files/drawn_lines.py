@@ -38,8 +38,7 @@ ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
 
 FLYING_MPS: Final = 12.0  # a flight lasts from the first to the last fix this fast; else the aircraft rolls
 FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
-"""No glider is faster than these over the ground, and up or down: a fix that would need it from both its neighbours is
-an error of the receiver."""
+"""No glider is faster over the ground, or up and down: a fix that needs more from both neighbours is an error."""
 MOST_BROKEN_SHARE: Final = 0.05  # a file in which more than this share of the fixes cannot be read is refused
 DATE_RECORD: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)  # begins an IGC file's line with the date
 EARTH_RADIUS_M: Final = 6_371_000.0
@@ -190,7 +189,7 @@ def read_kml(data: bytes, source: str, most: int) -> PathAsRead:
 def read_gpx(text: str, source: str) -> PathAsRead:
     """Reads the path of a GPX file, its one track, else its one route, without waypoints."""
     root = kml.parsed_xml(text.encode(), source, "gpx")
-    tracks, routes = list(kml.named(root, "trk")), list(kml.named(root, "rte"))
+    tracks, routes = kml.named(root, "trk"), kml.named(root, "rte")
     lines, kind, tag = (tracks, "track", "trkpt") if tracks else (routes, "route", "rtept")
     if len(lines) != 1:
         raise InputError(f"{source}: has {counted(len(lines), kind)}; must have exactly one, the path")
@@ -200,10 +199,10 @@ def read_gpx(text: str, source: str) -> PathAsRead:
         latitude, longitude = (finite(each.get(key), f"{where}: {key}", text=True) for key in ("lat", "lon"))
         height = kml.text_of(each, "ele")
         points.append((latitude, longitude, finite(height, f"{where}: ele", text=True) if height else None))
-    segments = sum(1 for _ in kml.named(lines[0], "trkseg"))
+    segments = len(kml.named(lines[0], "trkseg"))
     notes = [f"{segments} segments of the track joined by straight lines"] if segments > 1 else []
-    waypoints = sum(1 for _ in kml.named(root, "wpt"))
-    notes += _notes_on_others({"route": len(routes) if tracks else 0, "waypoint": waypoints})
+    others = {"route": len(routes) if tracks else 0, "waypoint": len(kml.named(root, "wpt"))}
+    notes += _notes_on_others(others)
     return PathAsRead(f"{source}: {shown(kml.text_of(lines[0], 'name') or tag)}", points, notes)
 
 

@@ -22,8 +22,7 @@ BATCH: Final = 10_000  # so many segments are simplified at a time: GEOS recurse
 PAST_RAD: Final = np.radians(140.0)
 """A sharper corner is flown past and back, which keeps nearer to both legs from there on (flown: at 140 degrees 118 m
 off against 125 m, at 150 degrees 178 m against 128 m)."""
-LEAST_CUT: Final = 1e-12
-"""A corner's distance from its arc counts as at least this many radii, so that a straight one divides by no zero."""
+LEAST_CUT: Final = 1e-12  # least distance from a corner to its arc, in radii, so that nothing is over zero
 LIMIT_SHARE: Final = 0.9  # a corner is cut by at most this share of its limit, if the aircraft turns so
 CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
 """Only this share of a corner's limit is used if the arc then has at least this many least radii, which leaves the rest

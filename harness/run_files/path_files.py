@@ -30,16 +30,14 @@ MAX_SPAN_M: Final = 500e3  # a path that reaches further is refused
 ON_EARTH_DEG: Final = (85.0, 360.0)  # a latitude or longitude further from 0, either way, is refused
 LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {  # by the ending of a file's name
     ".csv": read_csv,
-    ".geojson": read_geojson,
-    ".json": read_geojson,
+    **dict.fromkeys((".geojson", ".json"), read_geojson),
     ".gpx": read_gpx,
     ".igc": read_igc,
 }
 KML_ENDINGS: Final = (".kml", ".kmz")
 MISSIONS: Final[dict[str, Callable[[str, str], Program]]] = {  # by the ending of a file's name
     ".plan": read_plan,
-    ".waypoints": read_waypoints,
-    ".txt": read_waypoints,
+    **dict.fromkeys((".waypoints", ".txt"), read_waypoints),
 }
 
 
@@ -153,10 +151,9 @@ def _plane(
     """Returns latitude and longitude of the origin, and a function that puts a position into the plane."""
     _check_degrees(names, positions, source)
     latitude, longitude = origin or positions[0]
-    if abs(longitude) > 180.0:
-        longitude = math.remainder(longitude, 360.0)
-    plane = LocalPlane(latitude, longitude)
-    return (latitude, longitude), lambda place: plane.plane(*place)
+    at = latitude, math.remainder(longitude, 360.0)
+    plane = LocalPlane(*at)
+    return at, lambda place: plane.plane(*place)
 
 
 def _check_degrees(names: Sequence[str], places: Sequence[Place], source: str) -> None:

@@ -50,8 +50,7 @@ HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, EVENTS, RECORDING)  # SHA-256 
 SCHEMA = "wayproof/run/1"
 VERSIONED_DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")  # whose versions the manifest has
 COMPRESSION = "lz4"  # of Parquet files
-UNSPLIT_COLUMN = "plan_index"
-"""The one column that is not written byte plane by byte plane, which halves size and time of all others."""
+UNSPLIT_COLUMN = "plan_index"  # not written byte plane by byte plane, which halves the others' size and time
 
 
 @dataclass(frozen=True, eq=False)

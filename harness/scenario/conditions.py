@@ -31,32 +31,25 @@ CONDITIONS_STREAM, DEVIATION_STREAM = 4, 5
 """Numbers of the random streams, derived from the scenario's seed, that draw a day and the aircraft's deviations."""
 MOST_SIGMAS: Final = 3.0  # normal numbers are clipped to this many standard deviations from the mean
 WIND_FROM_M: Final = 10.0  # height over ground of a day's wind speed, the WMO's for measuring wind
-CHANGE_EVERY_S, CHANGES = 300.0, 24
-"""The wind of a day changes its speed and direction this often, and this many times; then it stays."""
-GUST_LENGTH_M: Final = 100.0
-"""Length of a discrete vertical gust: twice a gradient distance of 50 m, amid the 9 to 107 m of CS 25.341."""
+CHANGE_EVERY_S, CHANGES = 300.0, 24  # how often a day's wind changes, and how many times; then it stays
+GUST_LENGTH_M: Final = 100.0  # twice a gradient distance of 50 m, amid the 9 to 107 m of CS 25.341
 
 
 class Day(NamedTuple):
     """The figures of one kind of day."""
 
-    wind_mps: float | tuple[float, float]
-    """Wind speed 10 m over ground: the mean of its Rayleigh distribution, or the ends of its uniform one."""
-    most_wind: float
-    """The wind at the mission's altitude is at most this share of the airspeed."""
-    speed_change: float
-    """Standard deviation of the wind's later speeds, as a share of its first."""
-    direction_change_deg: float
-    """Standard deviation of the wind's later directions from its first."""
+    wind_mps: (
+        float | tuple[float, float]
+    )  # 10 m over ground: mean of a Rayleigh, or ends of a uniform distribution
+    most_wind: float  # at the mission's altitude, as a share of the airspeed
+    speed_change: float  # standard deviation of the wind's later speeds, as a share of its first
+    direction_change_deg: float  # standard deviation of the wind's later directions from its first
     turbulence: Literal["light", "moderate"]
     vertical_gust_mps: float
     vertical_gust_every_s: float
-    navigation: dict[str, Any]
-    """Keys of `navigation`, for a satellite receiver with a barometer."""
-    servos: dict[str, float]
-    """Keys of `aircraft.actuators`, for every surface and the throttle."""
-    uncertainty: dict[str, float]
-    """Keys of `uncertainty`; the centre of gravity's is over the cube root of the mass (m/kg^1/3)."""
+    navigation: dict[str, Any]  # keys of `navigation`, for a satellite receiver with a barometer
+    servos: dict[str, float]  # keys of `aircraft.actuators`, for every surface and the throttle
+    uncertainty: dict[str, float]  # its keys; the centre of gravity's is over mass^1/3 (m/kg^1/3)
 
 
 # fmt: off

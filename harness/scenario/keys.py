@@ -25,8 +25,7 @@ from harness.scenario.sections import (
 )
 from harness.scenario.validation import NAME_PATTERN, KeyFault
 
-NORMALS: Final = (51, 8)
-"""Counts of the standard normal numbers from which a day's air and the deviations of its aircraft are drawn."""
+NORMALS: Final = (51, 8)  # standard normal numbers that draw a day's air, and the deviations of its aircraft
 
 
 class TrackabilitySpec(Section):
@@ -43,8 +42,7 @@ class TrackabilitySpec(Section):
 
 
 DEFAULT_RATES_HZ: Final = (STEP_RATE_HZ, 120)  # the first that the sensor's rate divides is the default
-LEAST_RATE_HZ: Final = 30
-"""A lower rate is refused: at this one the Aerosonde's track on 14 turns is 0.07 m from that at 480 steps a second."""
+LEAST_RATE_HZ: Final = 30  # at this one the Aerosonde's track on 14 turns is 0.07 m from that at 480
 
 
 class Simulation(Section):

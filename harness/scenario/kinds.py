@@ -94,16 +94,8 @@ LAW_METHODS = ("update(state)", "follow(route, arc_length_m)")  # a law must hav
 GUIDANCE = LoopPart("guidance law", GuidanceKind, LAWS, "wayproof.guidance", LAW_METHODS, "limits")
 
 
-def planner_kinds() -> dict[str, PlannerKind]:
-    """All planners by name."""
-    return PLANNER.known()
-
-
-def guidance_kinds() -> dict[str, GuidanceKind]:
-    """All guidance laws by name."""
-    return GUIDANCE.known()
-
-
+planner_kinds: Callable[[], dict[str, PlannerKind]] = PLANNER.known
+guidance_kinds: Callable[[], dict[str, GuidanceKind]] = GUIDANCE.known
 Kind = PlannerKind | GuidanceKind
 
 
@@ -167,8 +159,7 @@ def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
     return kind
 
 
-_same_kind_of = lru_cache(maxsize=64)(kind_of)
-"""Does as `kind_of`, but returns the same kind for the same object: what was measured of it stays known."""
+_same_kind_of = lru_cache(maxsize=64)(kind_of)  # one kind for one object, with what was measured of it
 
 
 def _has_methods(given: object, part: LoopPart) -> bool:

@@ -15,8 +15,7 @@ MAX_ERROR_M: Final = 10_000.0  # of a sigma of position or altitude, and of a po
 Error = Annotated[float, Field(ge=0, le=MAX_ERROR_M)]
 Offset = Annotated[float, Field(ge=-MAX_ERROR_M, le=MAX_ERROR_M)]
 
-MARGIN_SIGMAS: Final = 3.0
-"""The planner's margin covers this many sigma of the position error: 1 - exp(-9 / 2) of all errors in the plane."""
+MARGIN_SIGMAS: Final = 3.0  # of the position error in the planner's margin: 1 - exp(-9 / 2) of all errors
 
 _ERROR_KEYS: Final = (  # zero where navigation is perfect
     "position_sigma_m", "velocity_sigma_mps", "heading_sigma_deg", "airspeed_sigma_mps", "altitude_sigma_m",

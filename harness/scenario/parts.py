@@ -36,8 +36,7 @@ if TYPE_CHECKING:
     from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
     from planner.interface import Mission, Planner
 
-SURVEY_BYTES: Final = 11_000
-"""Surveying an aircraft takes about as long as compiling this many bytes of byte code, the law's included."""
+SURVEY_BYTES: Final = 11_000  # of byte code that compile in the time of a survey, the law's included
 
 
 @cache

@@ -101,10 +101,8 @@ def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: f
 INSIDE_M: Final = 1e-3  # a flight begins so far inside: the model keeps its place in degrees, to some 1e-9 m
 SURVEY_ALTITUDE_M: Final = 300.0  # above the sea; there an aircraft's range of airspeeds is measured
 PROVEN_ALTITUDES_M: Final = (50.0, 1000.0)  # between which the survey proves level flight
-PROVEN_FACTOR: Final = 1.05
-"""The survey proves level flight at airspeeds this factor within its range: there the air's density differs by 7 %."""
-PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01
-"""It does so for deviations up to these: shares, and the shift over the cube root of the mass (m/kg^1/3)."""
+PROVEN_FACTOR: Final = 1.05  # so far within the range of airspeeds, since the air's density differs by 7 %
+PROVEN_SHARE, PROVEN_SHIFT = 0.25, 0.01  # and with deviations up to these; the shift over mass^1/3 (m/kg^1/3)
 ALTITUDE_STEP_M: Final = 50.0  # a limit of the altitude of level flight is told as a multiple of this
 
 

@@ -160,8 +160,7 @@ def _rounded_up(value: float, step: int) -> float:
     return float(math.ceil(value / step) * step)
 
 
-PLANE_REACH_M: Final = 400_000.0
-"""Up to this distance from any origin within 85 degrees of the equator the local plane is right to 0.9 m (`pyproj`)."""
+PLANE_REACH_M: Final = 400_000.0  # the plane is right to 0.9 m so far from any origin within 85 degrees
 COURSE_STEP_DEG: Final = 5  # step of courses, and of places on an arc, tested for a start that leads out
 ROUNDING_M: Final = 1e-3  # a place outside of the area by at most this counts as inside
 
@@ -241,10 +240,8 @@ def _stays_inside(area: Area, start: Point, course_deg: float, radius_m: float) 
         ahead = np.exp(1j * (math.radians(90.0 - course_deg) - side * turned))  # east and north
         places = complex(*start) - side * 1j * radius_m * (ahead[0] - ahead)
         both = np.stack((places, places + 2.0 * radius_m * ahead))
-        east, north = both.real, both.imag
-        inside = (np.abs(2.0 * east - xmin - xmax) <= xmax - xmin + 2.0 * ROUNDING_M) & (
-            np.abs(2.0 * north - ymin - ymax) <= ymax - ymin + 2.0 * ROUNDING_M
-        )
+        beside = both.real - xmin, xmax - both.real, both.imag - ymin, ymax - both.imag
+        inside = np.min(beside, axis=0) >= -ROUNDING_M
         inside[1, -1] = True  # a whole circle
         if (np.logical_and.accumulate(inside[0]) & inside[1]).any():
             return True

@@ -36,7 +36,8 @@ def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
         loc = loc_of(name, "command line")
         if not text.strip():
             raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
-        root = with_key(root, loc, strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE))
+        new = strict_yaml.parse(text, f"command line: {name}").plain()
+        root = with_key(root, loc, node_of(new, COMMAND_LINE))
     return root
 
 
@@ -145,8 +146,8 @@ def parse_scenario(
 
 def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
     """A scenario from plain keys that a command has put together; their faults name the command line."""
-    root = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
-    return validated(overridden(root, overrides), "command line")
+    plain = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").plain()
+    return validated(overridden(node_of(plain, COMMAND_LINE), overrides), "command line")
 
 
 def dump_scenario(scenario: Scenario) -> str:

@@ -15,8 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field
 
 from harness.scenario.validation import KeyFault
 
-MAX_COORDINATE_M, ALTITUDES_M = 1e6, (5, 20_000)
-"""Largest coordinate or length in a scenario, and the range of altitudes of a mission."""
+MAX_COORDINATE_M, ALTITUDES_M = 1e6, (5, 20_000)  # largest coordinate or length; altitudes of a mission
 SHIELDED: Final = "+shield"  # ending of the name of a planner that is flown with the shield
 DERIVED: Final[Any] = None  # default of a key that follows from others: `resolving.resolve` fills it in
 

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from harness.world_files.plane import Mapping
 
 NO_HEIGHT: Final = 65_535  # this number stands for a height that is not known
-MAX_NODES: Final = 4_000_000
-"""A text with more heights is refused; a field that would have more has fewer than its file, and a note says so."""
+MAX_NODES: Final = 4_000_000  # a text with more is refused; a larger field is thinned out, with a note
 MAX_CELLS: Final = 60_000_000  # cells of all files together in an area; with more it is refused
 LARGEST_DEGREE: Final = 8  # of the polynomials that say where the cells of a file lie
 PLACE_ERROR_CELLS: Final = 1e-3  # polynomials of the least degree with at most this error are taken

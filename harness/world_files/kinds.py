@@ -16,7 +16,7 @@ from harness.world_files.readers import city_json, fences, maps, occupancy, open
 from harness.world_files.readers.footprints import finished
 
 Reader = Callable[[FileSpec], Contents]
-GROUPS: Final[dict[str, dict[str, Reader]]] = {
+GROUPS: Final[dict[str, dict[str, Reader]]] = {  # readers by kind; a group stands for any of its kinds
     "terrain": {
         **dict.fromkeys(("geotiff", "ascii_grid", "srtm"), raster.read),
         "numpy_dem": raster.read_numpy,
@@ -37,7 +37,6 @@ GROUPS: Final[dict[str, dict[str, Reader]]] = {
     "fences": {"plan_fence": fences.read_plan, "ardupilot_fence": fences.read_ardupilot},
     "occupancy": {"ros_map": occupancy.read_ros, "moving_ai": occupancy.read_moving_ai},
 }
-"""The reader of each kind of file, by what files of the kind hold. A group's name may stand for any of its kinds."""
 KINDS: Final[dict[str, Reader]] = {kind: read for group in GROUPS.values() for kind, read in group.items()}
 
 IMAGE: Final = "an image; give the YAML file of its ROS map"
@@ -61,7 +60,7 @@ _BINARY_BEGINS: Final = (
 )
 _KIND_IN_ZIP: Final = {".hgt": "srtm", "elevation.npy": "numpy_dem", ".kml": "kml"}  # by ending
 _PLACE_LINE: Final = r"[ \t]*[-+]?\d+\.\d+[ \t,]+[-+]?\d+\.\d+[ \t]*\n"  # latitude and longitude in a line
-_TEXTS: Final = (
+_TEXTS: Final = (  # kinds of texts without comments; an airspace has a class, or a name and a shape
     ("rally", r"\Arally\b"),
     ("osm", r"\A<(?:[?!][^<]*<)*osm[\s>/]"),
     ("kml", r"\A<(?:[?!][^<]*<)*(?:[a-z_][\w.-]*:)?kml[\s>/]"),
@@ -71,7 +70,6 @@ _TEXTS: Final = (
     ("openair", r"^(AC\s|AN\s(.*\n)+?(DP|DC|DA|DB|DY)\s)"),
     ("ardupilot_fence", rf"\A(?:QGC WPL.*\n.|(?:{_PLACE_LINE}){{3}})"),
 )
-"""Kind of a text without comments by a pattern in it; an airspace begins with its class, or its name and a shape."""
 _JSON_PATTERNS: Final = (  # kind of a JSON file by a key that it has anywhere; the first that is found counts
     ("overpass", r'"generator"\s*:\s*"Overpass'),
     ("cityjsonseq", r'"CityJSONFeature"'),

@@ -22,8 +22,7 @@ from harness.world_files.solids import placed_cells
 
 ANY_PLACE: Final = Place(47.0, 8.0)  # origin of the plane for files that name no place on earth
 LARGEST_RADII, LARGEST_M = 400.0, 400_000.0  # longest side of an area in turn radii, and in metres
-PAD_RADII: Final = 12.0
-"""The area reaches this many turn radii beyond buildings and zones; at least as many beyond a start and goal given."""
+PAD_RADII: Final = 12.0  # the area reaches so far beyond buildings and zones, or beyond start and goal
 
 
 @dataclass(frozen=True)

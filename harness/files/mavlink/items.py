@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
 SEA, HOME, GROUND = "sea", "home", "ground"
-MISSION: Final = 2
-"""MAV_FRAME of commands without a place. ArduPilot takes an altitude in it as above the sea; PX4 refuses it."""
+MISSION: Final = 2  # MAV_FRAME without a place: ArduPilot takes altitudes as above the sea, PX4 refuses them
 FRAMES: Final = {0: SEA, 5: SEA, MISSION: SEA, 3: HOME, 6: HOME, 10: GROUND, 11: GROUND}
 """The datum of the altitude for each MAV_FRAME. Autopilots load no item to fly to in any other global frame."""
 NOWHERE_DEG: Final = 1e-7  # no position has less in both; ArduPilot writes zeros where none is meant

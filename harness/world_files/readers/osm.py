@@ -20,18 +20,16 @@ from harness.world_files.parts import WGS84, Contents, FileSpec, Part
 from harness.world_files.readers import limits
 from harness.world_files.readers.footprints import on_earth
 
-TALL_MAN_MADE: Final = frozenset(
+TALL_MAN_MADE: Final = frozenset(  # `man_made` that stands up like a building: no piers, pipelines, ...
     ("chimney", "communications_tower", "cooling_tower", "gasometer", "mast", "silo", "storage_tank", "tower",
      "water_tower")
 )  # fmt: skip
-"""Values of `man_made` for what stands up like a building, which piers, pipelines and the like do not."""
 
-TALL: Final = {
+TALL: Final = {  # tags of what stands up, or hangs, and has no area; every aerialway is such, too
     "power": ("tower", "pole", "portal", "catenary_mast", "line", "minor_line"),
     "man_made": ("crane", "antenna", "flagpole"),
     "generator:source": ("wind",),
 }
-"""Values of tags for what stands up, or hangs between what does, and has no area; every aerialway is such, too."""
 NODE: Final = re.compile(  # matches a node of an XML file by its id, latitude and longitude, in any order
     rb"<node\s" + b"".join(rb"(?=[^>]*\b%s=['\"](-?\d+\.?\d*)['\"])" % key for key in (b"id", b"lat", b"lon"))
 )
