@@ -39,6 +39,7 @@ class Breach:
     time_s: float
     east_m: float
     north_m: float
+    up_m: float
     depth_m: float
 
 
@@ -169,5 +170,6 @@ def _stretches(track: Track, margin_m: FloatArray, kind: str, name: str) -> list
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         row = first + int(margin_m[first:stop].argmin())
         ends_s = float(track.time_s[first]), float(track.time_s[min(stop, len(track) - 1)])
-        found.append(Breach(kind, name, *ends_s, **_where(track, row), depth_m=float(-margin_m[row])))
+        place = {**_where(track, row), "up_m": float(track.up_m[row]), "depth_m": float(-margin_m[row])}
+        found.append(Breach(kind, name, *ends_s, **place))
     return found

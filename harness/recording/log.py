@@ -26,7 +26,7 @@ from harness.recording.layout import WHOLE_ONLY_SERIES, blueprint
 from harness.recording.moving import Changing, Tracked
 from harness.recording.plans import send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
-from harness.recording.scene import lines_2d, log_end, log_scene, log_styles, log_summary, quaternions
+from harness.recording.scene import lines_2d, log_scene, log_styles, log_summary, log_wrong, quaternions
 from harness.recording.series import curves, send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_3d
 from harness.recording.states import (
@@ -59,6 +59,8 @@ MARKER_STEP_ROWS, THIN_STEP_ROWS = 5, 20
 """Every this many rows of the track one is drawn: of the marker in the plan view, and of a thin recording."""
 THIN_CHORD_ERROR_SHARE = 1e-2
 """A plan in a thin recording is off the true one by up to this share of the turn radius: less than a pixel."""
+FOUND_LATER_S = 1e-6
+"""What is found after the flight has a time of its own beside events of the same moment: a table keeps one each."""
 
 
 class RerunLog:
@@ -216,11 +218,17 @@ class RerunLog:
         varied: Mapping[str, Value] | None = None,
     ) -> None:
         """Draws the whole track, writes summary and verdicts where there are metrics, and ends the file."""
-        self._events += [
-            (each["time_s"], Caution(f"{each['kind']}: {each['text']}"), look.WARNED)
+        self._send_happened()
+        breaches = [each for kind in ("contacts", "breaches") for each in (metrics or {}).get(kind) or ()]
+        found = [
+            (each["time_s"], f"{each['kind']}: {each['text']}")
             for each in (metrics or {}).get("findings", ())
         ]
-        self._send_happened()
+        found += [
+            (each["start_s"], f"{each['kind']}: {each['depth_m']:.3g} m into {each['name']}")
+            for each in breaches
+        ]
+        send_events(self._rec, [(at_s + FOUND_LATER_S, Caution(text), look.WARNED) for at_s, text in found])
         if self._whole:
             whole, colour = np.concatenate(self._whole), look.TRACK if self._thin else look.WHOLE_TRACK
             track = lines_2d([whole], colour, 1.5, 15)
@@ -230,8 +238,14 @@ class RerunLog:
         if metrics is not None:
             shown = replace(self._scene, scenario_yaml="") if self._thin else self._scene
             log_summary(self._rec, shown, metrics)
-            if self._last is not None and metrics["outcome"] not in ("reached", "unreachable"):
-                log_end(self._rec, self._last, metrics["outcome"])
+            places = [(each["east_m"], each["north_m"], each["up_m"]) for each in breaches]
+            labels = [each["name"] for each in breaches]
+            told = ("reached", "unreachable", *(("collision", "out_of_bounds") if places else ()))
+            if self._last is not None and metrics["outcome"] not in told:
+                places += [(self._last.east_m[-1], self._last.north_m[-1], self._last.up_m[-1])]
+                labels += [metrics["outcome"].replace("_", " ")]
+            if places:
+                log_wrong(self._rec, np.array(places), labels)
             if not self._thin:
                 self._log_verdicts(metrics)
         send_properties(self._rec, RUN, run or {})

@@ -13,7 +13,7 @@ import numpy as np
 import rerun as rr
 
 from harness.analysis.metric import round_length_m
-from harness.flight.record import FloatArray, Track
+from harness.flight.record import FloatArray
 from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
 from harness.recording.series import log_series_styles
@@ -109,16 +109,15 @@ def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
     log_solids(rec, f"{look.WORLD}/moving/{index}", scene, [obstacle], look.MOVING, static=False)
 
 
-def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
-    """Marks the last row of a flight that did not reach its goal, with how it ended."""
-    last = np.array([[track.east_m[-1], track.north_m[-1], track.up_m[-1]]])
+def log_wrong(rec: rr.RecordingStream, places_m: FloatArray, labels: Sequence[str]) -> None:
+    """Marks the places (n, 3) where a flight went wrong, each with a label."""
     mark: dict[str, Any] = {"colors": [look.HIT], "radii": rr.Radius.ui_points(7.0)}
-    told: dict[str, Any] = {"labels": [outcome.replace("_", " ")], "show_labels": True}
+    told: dict[str, Any] = {"labels": list(labels), "show_labels": True}
     told |= {"colors": [look.END_LABEL_COLOUR], "radii": rr.Radius.ui_points(0.0)}
     for below, style, order in (("", mark, 70), ("/label", told, 71)):
         plan, world = f"{look.PLAN}/{look.END}{below}", f"{look.WORLD}/{look.END}{below}"
-        rec.log(plan, rr.Points2D(last[:, :2], draw_order=order, **style), static=True)
-        rec.log(world, rr.Points3D(last, **style), static=True)
+        rec.log(plan, rr.Points2D(places_m[:, :2], draw_order=order, **style), static=True)
+        rec.log(world, rr.Points3D(places_m, **style), static=True)
 
 
 def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any] | None) -> None:

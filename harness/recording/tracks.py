@@ -35,7 +35,7 @@ def write_tracks(
     ]
     layout = Layout(
         rrb.Horizontal(rrb.Spatial3DView(origin=look.WORLD, name="tracks"), rrb.Vertical(*views)),
-        rrb.TimePanel(timeline=look.TIMELINE),
+        rrb.TimePanel(timeline=look.TIMELINE, state="collapsed"),
         collapse_panels=True,
     )
     with recording_stream(name) as rec:

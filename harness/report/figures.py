@@ -222,11 +222,16 @@ def draw_flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes
     return line
 
 
+def changing_marks(scene: FigureScene) -> list[Any]:
+    """Returns the legend's entry for obstacles that move or stand for a time, if there are any."""
+    if all(obstacle.stands_for_ever for obstacle in scene.obstacles):
+        return []
+    return [patches.Patch(**CHANGING_STYLE, label="moves, or stands for a time; drawn at its first place")]
+
+
 def legend_marks(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
     """Returns the legend's entries for marks that only some flights have."""
-    marks: list[Any] = []
-    if not all(obstacle.stands_for_ever for obstacle in scene.obstacles):
-        marks.append(patches.Patch(**CHANGING_STYLE, label="moves, or stands for a time"))
+    marks: list[Any] = changing_marks(scene)
     if any(run.outcome != "reached" for run in runs):
         marks.append(
             Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")

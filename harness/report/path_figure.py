@@ -12,7 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from harness.report.figure_style import colour, styled
-from harness.report.figures import LEGEND_ROW_IN, DrawnRun, FigureScene, draw_map, map_height_in
+from harness.report.figures import (
+    LEGEND_ROW_IN,
+    DrawnRun,
+    FigureScene,
+    changing_marks,
+    draw_map,
+    map_height_in,
+)
 from harness.report.planner_figure import NEAR_MISS_HEIGHT_IN, close_up
 
 if TYPE_CHECKING:
@@ -55,7 +62,8 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     }
     marks = {name: entry for name, entry in every.items() if entry[1]}
     kinds = list(dict.fromkeys(fence["kind"] for fence in check["fences"]))
-    lines = math.ceil((2 + len(marks) + len(kinds)) / 2)
+    changing = changing_marks(scene)
+    lines = math.ceil((2 + len(marks) + len(kinds) + len(changing)) / 2)
     scene = _framed(scene, np.concatenate((given_m, flown)))
     heights_in = [map_height_in(scene), NEAR_MISS_HEIGHT_IN]
     with styled(sum(heights_in) + LEGEND_ROW_IN * (lines + 1)) as figure:
@@ -71,6 +79,7 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
         for name, (style, places) in marks.items():
             axes.plot(*np.array(places).T / 1e3, ls="", **style)
             legend.append(Line2D([], [], ls="", label=name, **{**style, "zorder": 1}))
+        legend += changing
         axes.set_title(f"{scene.name}: {'as given' if check['ok'] else 'not as given'}")
         figure.legend(handles=legend, loc="outside lower center", ncols=2, frameon=False)
     return figure

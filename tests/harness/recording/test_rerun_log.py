@@ -20,6 +20,7 @@ import rerun as rr
 from hypothesis import given
 from hypothesis import strategies as st
 
+from harness.analysis.breaches import compared
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.cli.app import main
@@ -34,7 +35,9 @@ from harness.recording.overlay import runs_in, write_overlay
 from harness.recording.scene import quaternions
 from harness.recording.summary import summary
 from harness.recording.viewer import NO_DRIVER, ViewerError, _executable, open_viewer, run_names
+from harness.run_files.fences import Fences
 from harness.world.obstacle import Circle, Obstacle, Polygon
+from harness.world.world import World
 from planner.interface import FloatArray, MovingEdges
 from tests.harness.conftest import plan as make_plan
 from tests.harness.conftest import track as make_track
@@ -359,6 +362,26 @@ def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Pat
     page = summary(SCENE, figures)
     assert page.index("**Flown as given: no: turn radius too tight (2 legs)**") < page.index("**reached**")
     assert "as given" not in summary(SCENE, metrics(recording[1], LIMITS))
+
+
+def test_a_contact_is_marked_and_told_where_it_was(tmp_path: Path, recording: tuple[Path, Flight]) -> None:
+    """At 25 m/s north the centre of the circle, 30 m aside, is passed after 50 s, 10 m inside its radius of 40 m."""
+    circle = World([Obstacle(Circle((30.0, 1250.0), 40.0))], MISSION.bounds_m)
+    clear_m = np.hypot(30.0, recording[1].track.north_m - 1250.0) - 40.0
+    track = make_track(1001, clearance_m=clear_m, plan_index=-1)
+    (contact,) = compared(track, circle, Fences(), True).contacts
+    figures = {**metrics(recording[1], LIMITS), "outcome": "collision", "contacts": [vars(contact)]}
+    log = RerunLog(tmp_path / "a.rrd", SCENE, recording_id="a")
+    log.on_block(track)
+    log.on_event(99.9, "the end")
+    log.close(figures)
+    entities = read(tmp_path / "a.rrd")
+    ((place,),) = column(entities, "/world/end", "positions")
+    assert place == [0.0, 1250.0, 300.0]
+    assert column(entities, "/plan/end/label", ":labels") == [["obstacles[0]"]]
+    told = dict(zip(texts(entities, "/events"), seconds(entities, "/events"), strict=True))
+    enters_s = 50.0 - math.sqrt(40.0**2 - 30.0**2) / 25.0
+    assert told["t = 49 s: obstacle: 10 m into obstacles[0]"] == pytest.approx(enters_s, abs=0.11)
 
 
 def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) -> None:
