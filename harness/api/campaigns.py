@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,7 +50,7 @@ def compare(
             [each.with_(keys) for each in loaded for keys in parts],
             Path(out),
             recording=recording,
-            workers=workers or os.cpu_count() or 1,
+            workers=workers,
             command=in_python(command),
             sources=(tuple(filter(is_source, planners)), tuple(filter(is_source, guidance or ()))),
         )
@@ -108,10 +107,9 @@ def sweep(
     runs = CampaignRuns(read_campaign(campaign_path(str(campaign))))
     runs.check()
     folder = Path(out) if out is not None else Path("runs") / runs.campaign.name
-    at_a_time = min(workers or os.cpu_count() or 1, len(runs))
     with (
         as_input_errors(),
-        dask_workers(scheduler) if scheduler else local_workers(at_a_time) as flyers,
+        dask_workers(scheduler) if scheduler else local_workers(workers, len(runs)) as flyers,
         CampaignFolder(folder, runs, resume=resume) as claimed,
     ):
         left = fly_missing(runs, claimed, flyers, progress)

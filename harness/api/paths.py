@@ -106,7 +106,7 @@ def replay(
         return flown_anew(
             Path(log),
             aircraft,
-            None if out is None else Path(out),
+            Path(out or Path("runs/replay") / Path(log).stem),
             None if mission is None else Path(mission),
             list((settings or {}).items()),
             recording=recording,

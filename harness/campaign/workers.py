@@ -174,12 +174,12 @@ def _died(future: Future[Answer | None]) -> bool:
 
 
 @contextmanager
-def local_workers(number: int) -> Iterator[LocalWorkers]:
-    """Starts processes of this machine at once, which end with the context, in mid-flight if need be."""
+def local_workers(number: int | None, jobs: int) -> Iterator[LocalWorkers]:
+    """Starts processes of this machine, None: one a processor, no more than jobs; they end with the context."""
     open_standard_files()
     kept = {name: os.environ[name] for name in ONE_THREAD_ENVIRONMENT if name in os.environ}
     os.environ.update(ONE_THREAD_ENVIRONMENT)
-    workers = LocalWorkers(number)
+    workers = LocalWorkers(min(number or os.cpu_count() or 1, jobs))
     try:
         workers.begin()
         yield workers

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from harness.analysis.metric import Claim
-from harness.cli.command_line import FAILED, at_a_time, print_json, resumable, told_apart
+from harness.cli.command_line import FAILED, print_json, resumable, told_apart
 from harness.cli.options import Count, Json, Number, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say, say_view, step_bar
@@ -127,8 +127,7 @@ def _fly(
     from harness.campaign.workers import local_workers
     from harness.certification.certification import certify as fly_days
 
-    number = at_a_time(workers, len(days))
-    with resumable(folder, INDEX), local_workers(number) as flyers, step_bar(silent) as bar:
+    with resumable(folder, INDEX), local_workers(workers, len(days)) as flyers, step_bar(silent) as bar:
         days.check()
 
         def report(tally: Tally) -> None:

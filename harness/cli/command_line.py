@@ -8,6 +8,7 @@ import os
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -72,11 +73,6 @@ def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = FOLDE
     return f"-{sha256(json.dumps(others).encode()).hexdigest()[:8]}" if others else ""
 
 
-def at_a_time(workers: int | None, flights: int) -> int:
-    """Returns the number of flights at a time: as many as were asked for, or one a processor."""
-    return min(workers or os.cpu_count() or 1, flights)
-
-
 def with_remedy(error: OSError) -> str:
     """Returns the text of a system's error, and a remedy where one is known."""
     if error.errno in (errno.EMFILE, errno.ENFILE):
@@ -103,21 +99,16 @@ def flying_into(folder: Path, length_m: float, silent: bool) -> Iterator[FlightR
     """Shows progress of a flight of about `length_m` into a run folder; after Ctrl-C says what became of the folder."""
     from harness.run_files.run_folder import MANIFEST, SCHEMA
 
-    left = marked_incomplete("run", folder, MANIFEST, SCHEMA)
+    left = partial(left_in, folder, "run", MANIFEST, SCHEMA)
     with interruptible(left), progress_bar(length_m, silent) as report:
         yield report
 
 
-def marked_incomplete(what: str, folder: Path, index: str, schema: str) -> Callable[[], str]:
-    """Returns a function that says what became of a folder that was being written, for `interruptible`."""
-
-    def left() -> str:
-        begun = read_index(folder / index, schema)
-        if begun is not None and begun.get("complete") is False:
-            return f"the {what} in {folder} is marked incomplete"
-        return "nothing was written"
-
-    return left
+def left_in(folder: Path, what: str, index: str, schema: str) -> str:
+    """Says what became of a folder that was being written."""
+    begun = read_index(folder / index, schema)
+    incomplete = begun is not None and begun.get("complete") is False
+    return f"the {what} in {folder} is marked incomplete" if incomplete else "nothing was written"
 
 
 @contextmanager

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from harness.cli.command_line import FAILED, at_a_time, interruptible, load, marked_incomplete, print_json
+from harness.cli.command_line import FAILED, interruptible, left_in, load, print_json
 from harness.cli.options import Json, NoRecording, Out, Text, Workers, argument, option
 from harness.cli.replacing import NOTHING, Given, given_by, replacing, sources
 from harness.cli.terminal import coloured, plain, print_line, print_table, say, say_view, step_bar
@@ -51,12 +52,12 @@ def compare(
     loaded = [load(scenario, each) for scenario in scenarios for each in variants]
     folder, over = out or Path("runs/comparison"), itertools.count(1)
     try:
-        with interruptible(marked_incomplete("comparison", folder, INDEX, SCHEMA)), step_bar() as bar:
+        with interruptible(partial(left_in, folder, "comparison", INDEX, SCHEMA)), step_bar() as bar:
             comparison = fly_and_compare(
                 loaded,
                 folder,
                 recording=not no_recording,
-                workers=at_a_time(workers, len(loaded)),
+                workers=workers,
                 sources=(sources(*kinds), sources(*laws)),
                 progress=lambda told: bar(next(over), len(loaded), told),
             )

@@ -175,10 +175,9 @@ def replay(
     For example: wayproof replay thor75.parquet --aircraft ultrastick25e --mission thor75.json
     """
     from harness.replays.measures import rows_of
-    from harness.replays.replay import default_folder
     from harness.replays.replay import replay as flown_anew
 
-    folder = out or default_folder(log)
+    folder = out or Path("runs/replay") / log.stem
     try:
         with interruptible(lambda: f"what was written is in {folder}"):
             found = flown_anew(log, aircraft, folder, mission, given.keys, recording=not no_recording)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from harness.cli.command_line import FAILED, at_a_time, print_json, resumable
+from harness.cli.command_line import FAILED, print_json, resumable
 from harness.cli.options import Json, Out, Quiet, Resume, Text, Workers, argument, flag, option
 from harness.cli.replacing import NOTHING, Given, kind_of, replacing, sources
 from harness.cli.terminal import coloured, plain, print_line, print_table, say, step_bar
@@ -68,12 +67,12 @@ def sweep(
     named = [each.strip() for each in planners.split(",")] if planners else []
     runs = checked(campaign_path(campaign), named, given.keys, given.sources[1])
     folder = out or Path("runs") / runs.campaign.name
-    local = partial(local_workers, at_a_time(workers, len(runs)))
 
     def warn(told: str) -> None:
         say(f"wayproof: {told}", err=True)
 
-    flyers = dask_workers(scheduler, unencrypted, warn) if scheduler else local()
+    local = local_workers(workers, len(runs))
+    flyers = dask_workers(scheduler, unencrypted, warn) if scheduler else local
     told, whole = _fly(runs, folder, flyers, resume=resume, silent=quiet)
     summary = summarise(folder)
     page = write_summary(summary, folder)

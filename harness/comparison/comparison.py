@@ -75,7 +75,7 @@ def fly_and_compare(
     out: Path,
     *,
     recording: bool = True,
-    workers: int = 1,
+    workers: int | None = 1,
     command: str | None = None,
     sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
     progress: Callable[[str], None] | None = None,
@@ -123,7 +123,9 @@ def _flights(scenarios: Sequence[Scenario], how: Job) -> list[_Flight]:
     return [*flights.values()]
 
 
-def _fly(flights: Sequence[_Flight], workers: int, progress: Callable[[str], None] | None) -> dict[int, str]:
+def _fly(
+    flights: Sequence[_Flight], workers: int | None, progress: Callable[[str], None] | None
+) -> dict[int, str]:
     """Flies all flights; returns why a flight did not come to an end, by its number."""
     crashes: dict[int, str] = {}
 
@@ -136,7 +138,7 @@ def _fly(flights: Sequence[_Flight], workers: int, progress: Callable[[str], Non
         if progress is not None:
             progress(f"{flights[number].scenario.name}, {flights[number].planner}: {outcome}")
 
-    with local_workers(min(workers, len(flights))) as flyers:
+    with local_workers(workers, len(flights)) as flyers:
         fly_jobs((each.job for each in flights), flyers, over)
     return crashes
 

@@ -25,15 +25,10 @@ SIMULATED: Final = "simulated"
 """The run folder of the simulated flight, in the folder of a replay."""
 
 
-def default_folder(log: Path) -> Path:
-    """Returns `runs/replay/NAME` for the log NAME.parquet."""
-    return Path("runs") / "replay" / log.stem
-
-
 def replay(
     log: Path,
     aircraft: str,
-    out: Path | None = None,
+    out: Path,
     mission: Path | None = None,
     overrides: Sequence[tuple[str, str]] = (),
     recording: bool = True,
@@ -41,14 +36,13 @@ def replay(
     """Flies the mission of a log with the simulated aircraft in the wind that the log shows, as it changes.
 
     `log` is as `read_flown` takes it, `mission` as `read_mission`, None for that of the log or of its `target_index`;
-    `overrides` replace keys of the simulated flight's scenario. `out` is `default_folder` where it is None.
+    `overrides` replace keys of the simulated flight's scenario, and `out` is the folder of the replay.
 
     Raises:
         InputError: log, mission or aircraft cannot be used; nothing was flown.
         RunFolderError: the folder holds something else or cannot be written.
         AircraftError: the aircraft cannot be loaded or trimmed.
     """
-    out = default_folder(log) if out is None else out
     if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / INDEX).exists())):
         raise RunFolderError(f"{out} holds other things; give a new folder")
     flown_mission, flight, notes = _read(log, mission)

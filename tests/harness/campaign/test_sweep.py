@@ -463,7 +463,7 @@ def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
     runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
     job = Job(0, runs.packed(0), place / "run", "none", optimum=False)
     rows = []
-    with local_workers(1) as workers:
+    with local_workers(1, 1) as workers:
         for begun in (1, 2):
             for _ in range(begun):
                 workers.start(job)
@@ -506,7 +506,7 @@ def test_a_worker_does_not_grow(place: Path) -> None:
 
     (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 128"))
     runs, used_mib, threads = CampaignRuns(load_campaign(place / "campaign.yaml")), [], []
-    with local_workers(1) as workers:
+    with local_workers(1, 1) as workers:
         for number in range(len(runs)):
             workers.start(Job(number, runs.packed(number), place / "run", "none", optimum=True))
             while not (over := workers.over(0.1)):
