@@ -84,7 +84,8 @@ def certify(
     if as_json:
         print_json(found.plain())
     elif not quiet:
-        _print(found, f"{found.subject}: {found.planner}, {found.aircraft}", folder)
+        print_table(f"{found.subject}: {found.planner}, {found.aircraft}", certificate_rows(found))
+        say(f"certificate: {folder / 'certificate.json'}")
         say_view(map((folder / "runs").joinpath, map(str, found.failing_runs)))
     return 0 if found.verdict == "shown" else FAILED
 
@@ -111,7 +112,8 @@ def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
     resume = (folder / "days" / "campaign.json").exists()
     found = _fly(days, folder / "days", None, Terms(), resume=resume, silent=silent)
     if not silent:
-        _print(found, f"{found.subject}: {found.runs} days", folder / "days")
+        print_table(f"{found.subject}: {found.runs} days", certificate_rows(found))
+        say(f"certificate: {folder / 'days' / 'certificate.json'}")
     band = read_band(folder / "days")
     if band is not None and (folder / RECORDING).is_file():
         from harness.recording.overlay import add_band
@@ -134,11 +136,6 @@ def _fly(
             bar(tally.runs, len(days), f"held on {tally.held} of {tally.runs} days")
 
         return fly_days(days, folder, flyers, terms, resume=resume, progress=report)
-
-
-def _print(found: Certificate, title: str, folder: Path) -> None:
-    print_table(title, certificate_rows(found))
-    say(f"certificate: {folder / 'certificate.json'}")
 
 
 def certificate_rows(certificate: Certificate) -> dict[str, str]:

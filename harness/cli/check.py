@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
 
@@ -13,10 +13,6 @@ from harness.cli.flight_rows import verdict_rows
 from harness.cli.options import AircraftName, Count, Json, NoRecording, Number, Out, Quiet, argument, option
 from harness.cli.replacing import NOTHING, Given, replacing
 from harness.cli.terminal import plain, print_table, say
-
-if TYPE_CHECKING:
-    from harness.run.path_flight import PathCheck
-
 
 PATH: Final = "A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints)."
 WORLD_HELP: Final = "A scenario that gives obstacles, bounds, environment, seed, altitude."
@@ -58,7 +54,10 @@ def check(
     1 flown, but not as given
     2 bad input or usage, nothing flown
     """
-    from harness.run.path_check import CheckedFile
+    import numpy as np
+
+    from harness.run.path_check import CheckedFile, fly_check
+    from harness.scenario.conditions import told as told_conditions
     from harness.scenario.shipped import scenario_path
 
     if corner_m is not None and not 0.0 <= corner_m < math.inf:
@@ -77,11 +76,17 @@ def check(
     differs = [(name, str(value)) for name, value in beside.items() if value is not None]
     apart = told_apart([*differs, *replaced], named=("aircraft.model",))
     folder = out or Path("runs") / "check" / f"{check.scenario.name}-{Path(aircraft).name}{apart}"
-    metrics = _fly(check, folder, recording=not no_recording, silent=quiet)
+    length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
+    with flying_into(folder, length_m, quiet) as report:
+        metrics = fly_check(check, folder, not no_recording, report)
     if as_json:
         print_json(metrics)
     elif not quiet:
-        _print_verdict(f"{path.name}: {aircraft}", check, metrics, folder)
+        verdict, *rows = verdict_rows(metrics).items()
+        conditions = ("conditions", plain(told_conditions(check.scenario)))
+        title = f"{path.name}: {aircraft}, {check.scenario.aircraft.airspeed_mps:g} m/s"
+        print_table(title, dict([verdict, conditions, *rows]))
+        say(f"run folder: {folder}")
     if days is not None:
         from harness.certification.days import PathDays
         from harness.cli.certify import fly_path_days
@@ -89,25 +94,3 @@ def check(
         drawn = PathDays(told, {}, claim="as-given", most=days, purpose="band")
         fly_path_days(drawn, folder, silent=quiet or as_json)
     return 0 if metrics["check"]["ok"] else FAILED
-
-
-def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:
-    """Flies into a folder, with progress on standard error."""
-    import numpy as np
-
-    from harness.run.path_check import fly_check
-
-    length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
-    with flying_into(folder, length_m, silent) as report:
-        return fly_check(check, folder, recording, report)
-
-
-def _print_verdict(title: str, check: PathCheck, metrics: dict[str, Any], folder: Path) -> None:
-    """Prints the table of a checked path, its verdict and its conditions first."""
-    from harness.scenario.conditions import told
-
-    scenario = check.scenario
-    verdict, *rows = verdict_rows(metrics).items()
-    conditions = ("conditions", plain(told(scenario)))
-    print_table(f"{title}, {scenario.aircraft.airspeed_mps:g} m/s", dict([verdict, conditions, *rows]))
-    say(f"run folder: {folder}")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
@@ -21,8 +22,9 @@ from harness.files.input_file import InputError
 
 if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
-    from harness.watching.watched_flight import Viewing
 
+FlyInto: TypeAlias = Callable[..., dict[str, Any]]
+"""Flies a scenario into a folder, with or without a recording, and tells its progress; returns the figures."""
 FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
 """Exit status of `fly` by outcome; FAILED for any other."""
 FROM_HELP: Final = "A campaign's results.parquet, instead of SCENARIO."
@@ -57,9 +59,13 @@ def fly(
     _check_usage(view and no_recording, live, speed, web)
     loaded, digest = _asked(scenario, results, run, given.keys)
     origin = [] if results is None else [("from", str(results.resolve())), ("run", str(run))]
-    folder = out or _default_folder(loaded, told_apart([*given.keys, *origin]))
-    with _viewer(web, speed) if live else nullcontext((None, lambda: None)) as (viewing, wait):
-        metrics = _fly(loaded, folder, viewing, recording=not no_recording, silent=quiet)
+    model, planner = Path(loaded.aircraft.model).name, loaded.planner.label.replace(":", "-")
+    named = f"{planner}-{model}-{loaded.seed}{told_apart([*given.keys, *origin])}"
+    folder = out or Path("runs") / loaded.name / named
+    straight_m = math.dist(loaded.mission.start_m, loaded.mission.goal_m)
+    with _viewer(live, web, speed) as (fly_into, wait):
+        with flying_into(folder, straight_m, quiet) as report:
+            metrics = fly_into(loaded, folder, not no_recording, report)
         otherwise = bool(digest) and metrics["digest"] != digest
         if otherwise:
             say(
@@ -103,26 +109,6 @@ def _asked(
     return flown_run(results, run, given)
 
 
-def _default_folder(scenario: Scenario, apart: str) -> Path:
-    model, planner = Path(scenario.aircraft.model).name, scenario.planner.label.replace(":", "-")
-    return Path("runs") / scenario.name / f"{planner}-{model}-{scenario.seed}{apart}"
-
-
-def _fly(
-    scenario: Scenario, folder: Path, viewing: Viewing | None, *, recording: bool, silent: bool
-) -> dict[str, Any]:
-    """Flies into a folder, with progress on standard error."""
-    from harness.run.scenario_flight import fly_to_folder
-
-    straight_m = math.dist(scenario.mission.start_m, scenario.mission.goal_m)
-    with flying_into(folder, straight_m, silent) as report:
-        if viewing is None:
-            return fly_to_folder(scenario, folder, recording, report)
-        from harness.watching.watched_flight import fly_watched
-
-        return fly_watched(scenario, folder, recording, report, viewing)
-
-
 def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
     """Prints the table of a flight, and where its files are."""
     from harness.scenario.conditions import told
@@ -144,13 +130,18 @@ def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_
 
 
 @contextmanager
-def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Viewing, Callable[[], None]]]:
-    """Opens a viewer for the length of the block; yields a `Viewing`, and a function that waits for its end.
+def _viewer(live: bool, web: bool, speed: float | None) -> Iterator[tuple[FlyInto, Callable[[], None]]]:
+    """Opens a viewer, if `live`; yields a function that flies, watched by it, and one that waits for its end.
 
     An InputError says that there is no screen for it.
     """
+    from harness.run.scenario_flight import fly_to_folder
+
+    if not live:
+        yield fly_to_folder, lambda: None
+        return
     from harness.recording.viewer import ViewerError, empty_viewer
-    from harness.watching.watched_flight import Viewing
+    from harness.watching.watched_flight import Viewing, fly_watched
 
     gone = "wayproof: the viewer has gone; the flight goes on"
     try:
@@ -162,6 +153,7 @@ def _viewer(web: bool, speed: float | None) -> Iterator[tuple[Viewing, Callable[
                 with suppress(KeyboardInterrupt):
                     process.wait()
 
-            yield Viewing(url, speed, lambda: say(gone, err=True)), wait
+            viewing = Viewing(url, speed, lambda: say(gone, err=True))
+            yield partial(fly_watched, viewing=viewing), wait
     except ViewerError as error:
         raise InputError(f"wayproof: {error}") from error

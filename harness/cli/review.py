@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
@@ -68,9 +69,7 @@ def open_viewer(runs: Sequence[Path], web: bool = False, campaign: Path | None =
     """Shows recordings, a campaign's as a table, until the viewer is closed; says why and returns False if it can't."""
     from harness.recording.viewer import ViewerError, open_viewer
 
-    def tell(told: str) -> None:
-        say(told, err=True)
-
+    tell = partial(say, err=True)
     try:
         if campaign is None:
             open_viewer(runs, web, tell)
