@@ -75,7 +75,7 @@ def compared(
     """Compares a track with obstacles, fences and, if `bounded`, the area; `others`: breaches, margin found before."""
     import shapely
 
-    heights, found = track.altitude_above_ground_m, [*_contacts(track, world), *others[0]]
+    found = [*_contacts(track, world), *others[0]]
     margins = [float(np.min(track.clearance_m, initial=np.inf)), others[1]]
     for fence in (each for each in fences.every if not each.inclusion):
         margin = -inside_m(track, fence.area)
@@ -89,17 +89,18 @@ def compared(
         name = names if len(fences.inclusions) == 1 else f"all of {names}"
         found += crossings(track, margin, allowed, "inclusion", name, stays_in=True)
     margins += [-each.depth_m for each in found]
-    if heights is not None:
-        found += _stretches(track, np.nan_to_num(heights, nan=np.inf), TERRAIN, "the ground")
+    heights_m = np.nan_to_num(track.altitude_above_ground_m, nan=np.inf)
+    found += _stretches(track, heights_m, TERRAIN, "the ground")
     if bounded:
         area = shapely.box(*world.bounds_m)
         found += crossings(track, inside_m(track, area), area, "area", "area.bounds_m", stays_in=True)
-    return Kept(tuple(sorted(found, key=lambda each: each.start_s)), min(margins), _heights(track, heights))
+    return Kept(tuple(sorted(found, key=lambda each: each.start_s)), min(margins), _heights(track))
 
 
-def _heights(track: Track, heights_m: FloatArray | None) -> dict[str, float] | None:
+def _heights(track: Track) -> dict[str, float] | None:
     """Returns least and mean height of a track above ground, and where the least was; None if not known."""
-    if heights_m is None or not np.isfinite(heights_m).any():
+    heights_m = track.altitude_above_ground_m
+    if not np.isfinite(heights_m).any():
         return None
     row = int(np.nanargmin(heights_m))
     return {"min": float(heights_m[row]), "mean": float(np.nanmean(heights_m)), **_where(track, row)}
@@ -138,9 +139,8 @@ def inside_m(track: Track, area: Geometry) -> FloatArray:
     shapely.prepare(area)
     edge = area.boundary
     shapely.prepare(edge)
-    away = shapely.distance(edge, shapely.points(track.east_m, track.north_m))
-    inside: FloatArray = np.where(shapely.intersects_xy(area, track.east_m, track.north_m), away, -away)
-    return inside
+    away: FloatArray = shapely.distance(edge, shapely.points(track.east_m, track.north_m))
+    return np.where(shapely.intersects_xy(area, track.east_m, track.north_m), away, -away)
 
 
 def crossings(

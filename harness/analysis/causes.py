@@ -235,7 +235,6 @@ def _vertical_limit(lead: Track, limits: FlightLimits) -> str | None:
 
 def _stalled(lead: Track, limits: FlightLimits) -> bool:
     """Tells whether the angle of attack was beyond that of the stall; False where it is not known."""
-    assert lead.angle_of_attack_deg is not None
     return bool((np.abs(lead.angle_of_attack_deg) > limits.stall_angle_deg).any())
 
 
@@ -252,10 +251,8 @@ def saturated(track: Track, bank_limit_rad: float) -> NDArray[np.bool_]:
 
 def _servo_share(lead: Track, lateral: bool) -> float:
     """Summed shares of the time for which servos, of aileron and rudder or of the others, were at their rate limits."""
-    limited_s, every_s = lead.vertical_actuator_limited_s, lead.actuator_limited_s
-    assert limited_s is not None
-    assert every_s is not None
-    limited_s = every_s - limited_s if lateral else limited_s
+    limited_s = lead.vertical_actuator_limited_s
+    limited_s = lead.actuator_limited_s - limited_s if lateral else limited_s
     return float(limited_s[-1] - limited_s[0]) / max(float(lead.time_s[-1] - lead.time_s[0]), 1e-9)
 
 

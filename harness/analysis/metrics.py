@@ -72,19 +72,14 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "shield": flight.shield and dataclasses.asdict(flight.shield),
         "plan_delay_s": percentiles(list(filter(math.isfinite, (plan.delay_s for plan in flight.plans)))),
         "compute_ms": percentiles(flight.compute_ms),
-        "timing": _timing(flight),
+        "timing": {
+            "sim_s": flight.sim_s,
+            "wall_s": flight.wall_s,
+            "realtime_factor": flight.sim_s / flight.wall_s if flight.wall_s > 0 else None,
+            "planner_wall_ms": percentiles(flight.compute_wall_ms),
+        },
         "digest": digest(track),
         "error": flight.error,
-    }
-
-
-def _timing(flight: Flight) -> dict[str, Any]:
-    """Returns how much simulated and computing time the flight took."""
-    return {
-        "sim_s": flight.sim_s,
-        "wall_s": flight.wall_s,
-        "realtime_factor": flight.sim_s / flight.wall_s if flight.wall_s > 0 else None,
-        "planner_wall_ms": percentiles(flight.compute_wall_ms),
     }
 
 
@@ -92,7 +87,6 @@ def _off_path(track: Track) -> dict[str, Any]:
     """Returns the figures of how far the true and the believed positions were off the path, while a plan was flown."""
     under_plan = track.plan_index >= 0
     believed_m = track.believed_cross_track_m if track.has_beliefs else track.cross_track_m
-    assert believed_m is not None
     total = error_figures(track.cross_track_m[under_plan])
     technical = error_figures(believed_m[under_plan])
     return {"cross_track_m": total, "total_system_error_m": {**total}, "flight_technical_error_m": technical}
@@ -102,12 +96,10 @@ def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:
     """Returns how far off the believed position was, and the margin for it; nothing if navigation is perfect."""
     if not track.has_beliefs:
         return {}
-    off_m = track.believed_m[:, :2] - np.column_stack((track.east_m, track.north_m))
-    jumps_m = np.hypot(*np.diff(off_m, axis=0).T)
-    known_m = jumps_m[np.isfinite(jumps_m)]
+    east_m, north_m = track.believed_east_m - track.east_m, track.believed_north_m - track.north_m
     return {
         "navigation_error_m": error_figures(track.navigation_error_m),
-        "navigation_jump_m": float(known_m.max(initial=0.0)),
+        "navigation_jump_m": float(np.nanmax(np.hypot(np.diff(east_m), np.diff(north_m)), initial=0.0)),
         "navigation_margin_m": limits.navigation_margin_m,
     }
 
@@ -142,7 +134,7 @@ def _planned_length_m(flight: Flight) -> float:
     return flown_m
 
 
-def _least(values: FloatArray | None) -> float | None:
+def _least(values: FloatArray) -> float | None:
     """Returns the least of those values that are known; None without any."""
-    known = np.zeros(0) if values is None else values[np.isfinite(values)]
+    known = values[np.isfinite(values)]
     return float(known.min()) if len(known) else None

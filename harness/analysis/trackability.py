@@ -162,8 +162,8 @@ class _Flown:
 
     def _altitude_cause(self, leg: Track, high_m: FloatArray, first: int) -> str:
         """Names the cause for which a leg is off its altitude by this, at the row where it is most."""
-        believed = None if leg.believed_up_m is None else leg.believed_up_m - (leg.up_m - high_m)
         row = int(np.abs(high_m).argmax())
+        believed = leg.believed_up_m - (leg.up_m - high_m)
         if _is_misled(believed, high_m, self.limits.max_altitude_error_m, row):
             return NAVIGATION_ERROR
         return altitude_cause(self.track, first + row, self.limits, self.given)
@@ -233,11 +233,9 @@ class _Flown:
         return cross_track_cause(track, worst, self.plans, self.limits, self.force, wide)
 
 
-def _is_misled(believed: FloatArray | None, true: FloatArray, most: float, row: int) -> bool:
+def _is_misled(believed: FloatArray, true: FloatArray, most: float, row: int) -> bool:
     """Whether the larger part of the largest true error, or all of it beyond the limit, is navigation's.
 
-    It is not where the belief is unknown. At other rows the aircraft may have believed to be off.
+    It is not where the belief is unknown (NaN). At other rows the aircraft may have believed to be off.
     """
-    if believed is None or not np.isfinite(believed[row]):
-        return False
     return bool(abs(believed[row]) <= max(most, abs(true[row] - believed[row])))

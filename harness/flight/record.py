@@ -51,10 +51,6 @@ class Column(NamedTuple):
     """Whether it holds a believed quantity, which a track of perfect navigation does without."""
 
 
-Floats = FloatArray | None
-"""A column that may be left out when a track is made, which then fills it in."""
-
-
 def _column(doc: str, *, digested: bool = True, **kind: Any) -> Any:
     """Declares a column of the track, as a field of `Track`."""
     column = Column(doc, in_digest=digested, **kind)
@@ -63,6 +59,7 @@ def _column(doc: str, *, digested: bool = True, **kind: Any) -> Any:
 
 
 def _optional(doc: str, left_out: float = math.nan, *, believed: bool = False) -> Any:
+    """Declares a column that may be left out when a track is made, which then fills it in."""
     return _column(doc, digested=False, left_out=left_out, believed=believed)
 
 
@@ -99,27 +96,33 @@ class Track:
     throttle: FloatArray = _column(
         "throttle command, 0 to 1; NaN for a flight model without an engine", digested=False
     )
-    altitude_above_ground_m: Floats = _optional(
+    altitude_above_ground_m: FloatArray = _optional(
         "height above the true ground; NaN where that is not known, the default"
     )
-    actuator_limited_s: Floats = _optional(
+    actuator_limited_s: FloatArray = _optional(
         "time since the start in which a servo was at its rate limit, each counted; 0 without such servos",
         0.0,
     )
-    vertical_actuator_limited_s: Floats = _optional("that of the servos of elevator and throttle alone", 0.0)
-    elevator: Floats = _optional(
+    vertical_actuator_limited_s: FloatArray = _optional(
+        "that of the servos of elevator and throttle alone", 0.0
+    )
+    elevator: FloatArray = _optional(
         "commanded deflection of the elevator with its trim, -1 to 1, where it is at its stop; NaN where not known"
     )
-    aileron: Floats = _optional("that of the ailerons, -1 to 1, where it is at its stop; NaN where not known")
-    rudder: Floats = _optional("that of the rudder, -1 to 1, where it is at its stop; NaN where not known")
-    angle_of_attack_deg: Floats = _optional("angle of attack; NaN where not known")
-    believed_east_m: Floats = _optional("where the aircraft believed to be", believed=True)
-    believed_north_m: Floats = _optional("where the aircraft believed to be", believed=True)
-    believed_up_m: Floats = _optional("altitude that it believed to have", believed=True)
-    believed_course_deg: Floats = _optional(
+    aileron: FloatArray = _optional(
+        "that of the ailerons, -1 to 1, where it is at its stop; NaN where not known"
+    )
+    rudder: FloatArray = _optional(
+        "that of the rudder, -1 to 1, where it is at its stop; NaN where not known"
+    )
+    angle_of_attack_deg: FloatArray = _optional("angle of attack; NaN where not known")
+    believed_east_m: FloatArray = _optional("where the aircraft believed to be", believed=True)
+    believed_north_m: FloatArray = _optional("where the aircraft believed to be", believed=True)
+    believed_up_m: FloatArray = _optional("altitude that it believed to have", believed=True)
+    believed_course_deg: FloatArray = _optional(
         "direction of the ground velocity that it believed to have", believed=True
     )
-    believed_cross_track_m: Floats = _optional(
+    believed_cross_track_m: FloatArray = _optional(
         "distance from the plan being flown that guidance saw", believed=True
     )
 
@@ -141,20 +144,17 @@ class Track:
     @property
     def has_beliefs(self) -> bool:
         """Whether the track knows a believed state other than the true one."""
-        return self.believed_east_m is not None and bool(np.isfinite(self.believed_east_m).any())
+        return bool(np.isfinite(self.believed_east_m).any())
 
     @property
     def believed_m(self) -> FloatArray:
         """(n, 3) where the aircraft believed to be: east, north, up; NaN where that is not known."""
-        columns = (self.believed_east_m, self.believed_north_m, self.believed_up_m)
-        return np.column_stack([column for column in columns if column is not None])
+        return np.column_stack((self.believed_east_m, self.believed_north_m, self.believed_up_m))
 
     @property
     def navigation_error_m(self) -> FloatArray:
         """(n,) distance in the plane from the true position to the believed one; NaN where that is not known."""
-        believed = self.believed_m
-        off: FloatArray = np.hypot(believed[:, 0] - self.east_m, believed[:, 1] - self.north_m)
-        return off
+        return np.hypot(self.believed_east_m - self.east_m, self.believed_north_m - self.north_m)
 
     def part(self, first: int, stop: int) -> Track:
         """Returns the rows from `first` up to `stop`."""

@@ -184,7 +184,6 @@ class RerunLog:
 
     def _send_believed(self, block: Track) -> None:
         """Shows the believed positions and their errors."""
-        assert block.believed_cross_track_m is not None
         shade = np.array(look.CHOSEN, dtype=np.uint8)
         self._trails[1].send(
             self._rec, block.time_s, block.believed_m, lambda starts: np.tile(shade, (len(starts), 1))

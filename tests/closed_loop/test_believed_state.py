@@ -77,7 +77,6 @@ def test_guidance_follows_the_plan_where_it_believes_to_be(flown: Flown) -> None
     flight = flown[0]
     assert flight.outcome is Outcome.REACHED, flight.reason
     track, plan = flight.track, flight.plans[-1]
-    assert track.believed_cross_track_m is not None
     assert np.nanpercentile(np.abs(track.believed_cross_track_m), 95) < 1.0
     progress = RouteProgress(Route(plan.segments, plan.loiter))
     rows = np.flatnonzero(track.plan_index == plan.plan_index)[:-1]

@@ -65,7 +65,6 @@ def test_truth_and_belief_are_in_the_track(flight: Flight) -> None:
     track = flight.track
     assert flight.outcome is Outcome.REACHED, flight.reason
     assert track.has_beliefs
-    assert track.believed_cross_track_m is not None
     off = track.navigation_error_m
     assert 0.0 < off[0] < 30.0
     in_outage = (track.time_s >= 40.0) & (track.time_s < 100.0)

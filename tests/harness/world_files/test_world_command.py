@@ -51,7 +51,7 @@ def test_a_hill_is_flown_round_and_the_expanded_scenario_flies_alone(
     assert figures["outcome"] == "reached"
     assert figures["min_altitude_above_ground_m"] > 10.0
     run = load_run(folder)
-    assert np.isfinite(run.track.altitude_above_ground_m).all()  # type: ignore[arg-type]
+    assert np.isfinite(run.track.altitude_above_ground_m).all()
     (source,) = run.manifest["sources"]
     assert source["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
     assert "file:" not in run.scenario_yaml
