@@ -17,8 +17,7 @@ MAX_INDEX_BYTES: Final = 10**9  # largest index of a folder that is read
 class FolderLock:
     """Locks a folder for this process (flock(2) on the folder itself) until it is released; a RunFolderError if locked.
 
-    With a name, a file of that name in it is held in its place, made where missing: on a network file system (NFS) only
-    what is open for writing can be held.
+    With a name, that file in it is held instead, made where missing: on NFS only what is open for writing can be held.
     """
 
     def __init__(self, path: Path, name: str | None = None) -> None:

@@ -1,7 +1,4 @@
-"""Shapes of KML files (OGC 12-007r2), plain or packed as KMZ.
-
-Elements are told by their names, whatever the namespace: these files carry several.
-"""
+"""Shapes of KML files (OGC 12-007r2), plain or packed as KMZ; elements are told by their names, in any namespace."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Files that are replaced whole: whoever reads one finds the old content or all of the new.
 
-Every output is written to a fresh file in its folder, which then takes its name. A link is replaced, never followed; a
-pipe or a device is refused at once.
+Every output is a fresh file that takes its name when whole. A link is replaced, never followed; a pipe is refused.
 """
 
 from __future__ import annotations

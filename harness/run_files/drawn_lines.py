@@ -1,7 +1,6 @@
 """Drawn lines and recorded tracks: CSV, GeoJSON (RFC 7946), KML, GPX 1.1, and IGC of gliders' loggers.
 
-Each file has exactly one line, the path; what else is there is counted in notes. IGC: FAI, Technical Specification for
-GNSS Flight Recorders.
+Each file has one line, the path; the rest is counted in notes. IGC: FAI, Specification for GNSS Flight Recorders.
 """
 
 from __future__ import annotations
@@ -48,8 +47,7 @@ NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]
 class PathAsRead(NamedTuple):
     """A line as its file has it: its place `where`, for faults, and notes on what else is in the file.
 
-    Points are latitude, longitude (deg; where `local` east, north in metres), and altitude (m) or None, above the sea
-    or `above_ground`.
+    Points are latitude, longitude (deg; `local`: east, north in m), altitude (m) or None, above sea or `above_ground`.
     """
 
     where: str
@@ -65,10 +63,7 @@ def _notes_on_others(others: Mapping[str, int]) -> list[str]:
 
 
 def read_csv(text: str, source: str, any_altitude: bool = False) -> PathAsRead:
-    """Reads the path of a CSV file: a header, and a point a row, without blank lines and comments after #.
-
-    With `any_altitude` a column of altitudes that are not read, as of feet, is passed over.
-    """
+    """Reads a CSV file: a header, and a point a row; with `any_altitude` altitudes not read are passed over."""
     (line, header), *filled = _filled_rows(text, source) or [(1, [])]
     header = [name.strip().lower() for name in header]
     names = _columns(header, f"{source}:{line}", any_altitude)
@@ -256,10 +251,7 @@ def _leaps(before: FloatArray, after: FloatArray) -> BoolArray:
 
 
 def _fixes(text: str, source: str) -> tuple[FloatArray, int]:
-    """Returns (n, 5) fixes, and the number of records that cannot be read.
-
-    A row is latitude, longitude (deg), GNSS altitude (m), 0 without a 3-D fix, pressure altitude or 0, and time (s).
-    """
+    """(n, 5) latitude, longitude (deg), GNSS altitude (m; 0: no 3-D fix), barometric one, time (s); unread records."""
     try:
         from aerofiles.igc import Reader
     except ImportError as error:

@@ -94,7 +94,7 @@ def planned_points(run: Run) -> tuple[FloatArray, IntArray]:
 
 
 def _places(path: ExportedPath) -> list[list[float]]:
-    """Returns latitude, longitude and altitude of each point."""
+    """(n, 3) latitude, longitude, altitude."""
     places: list[list[float]] = np.column_stack((path.degrees, path.altitude_m)).tolist()
     return places
 

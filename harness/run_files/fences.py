@@ -49,7 +49,6 @@ def in_plane(fences: Fences, plane: Callable[[Place], Place], source: str) -> Fe
 
 
 def _check_area(fence: Fence, source: str) -> None:
-    """Raises InputError if a fence encloses no valid area."""
     import shapely
 
     if fence.center is None and any(len(set(ring)) < 3 for ring in fence.rings or ((),)):

@@ -36,8 +36,7 @@ WIND_SAMPLES: Final = 9  # the ground speed is computed in this many directions 
 class Tightest:
     """The limits of how tightly corners are rounded, one value each or (m,) point by point.
 
-    The least radius is that of calm air, the limit how far off a corner may be passed. The wind is over the airspeed,
-    east + i north where it blows to.
+    Least radius in calm air; how far off a corner may be passed; wind over airspeed, east + i north where it blows to.
     """
 
     radius_m: float | FloatArray
@@ -299,11 +298,7 @@ def _tightened(
 
 
 def least_m(ahead: NDArray[Any], turn: FloatArray, tightest: Tightest) -> FloatArray:
-    """(k,) least radii in the wind.
-
-    A steady turn at one bank has the radius of calm air times the square of ground speed over airspeed, where that is
-    largest along the turn.
-    """
+    """(k,) least radii: that of calm air times the largest square of ground speed over airspeed along the turn."""
     along = np.linspace(0.0, 1.0, WIND_SAMPLES)
     course = ahead[:-1, None] * np.exp(1j * turn[:, None] * along)
     seen = np.conj(course) * np.asarray(tightest.wind)[..., None]

@@ -1,7 +1,4 @@
-"""Reads a path that somebody gives: a drawn line, a recorded track, or a mission.
-
-The path is put into the local plane; positions in degrees lie in a plane about the first.
-"""
+"""Reads a path that somebody gives, a drawn line, a track or a mission, into a plane about its first position."""
 
 from __future__ import annotations
 

@@ -110,7 +110,6 @@ def _numbers(values: ArrayLike, dtype: DTypeLike = np.float64) -> pa.Array:
 
 
 def _texts(values: Sequence[str]) -> pa.Array:
-    """Returns a column of texts."""
     import pyarrow as pa
 
     coded = [value.encode() for value in values]

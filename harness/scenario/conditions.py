@@ -146,10 +146,7 @@ def _air(keys: ScenarioKeys, day: Day, rng: _Draws) -> Environment:
 
 
 def _navigation(given: Navigation, day: Day | None) -> Navigation:
-    """Fills in the day's navigation where the file names no kind, else its latency alone; `perfect` stays as it is.
-
-    Raises a KeyFault if then `perfect` has errors.
-    """
+    """Fills in the day's navigation where the file names no kind, else its latency; KeyFault: `perfect` has errors."""
     named = _written(given)
     if day is not None and "kind" not in named:
         return Navigation(**day.navigation | named)

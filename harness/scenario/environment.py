@@ -6,6 +6,7 @@ import itertools
 import math
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 from pydantic import Field, Strict, model_validator
 
 from harness.scenario.sections import MAX_COORDINATE_M, Point, Section, Time
@@ -48,8 +49,6 @@ class GroundSpec(Section):
 
     def field(self) -> HeightField:
         """Unpacks the heights; raises a ValueError if the text does not hold them, or the lattice is none."""
-        import numpy as np
-
         from harness.world_files.height_field import HeightField, unpacked
 
         heights_m = unpacked(self.heights, self.rows, self.columns, self.lowest_m, self.step_m)
@@ -63,8 +62,6 @@ class GroundSpec(Section):
     @classmethod
     def of(cls, field: HeightField) -> GroundSpec:
         """The section that holds a height field, to a tenth of a metre, or to 1 / 60,000 of what its heights span."""
-        import numpy as np
-
         from harness.world_files.height_field import packed
 
         keys = {name: getattr(field, name) for name in ("corner_m", "spacing_m", "scale_m")}

@@ -82,10 +82,7 @@ def mission_of(scenario: ScenarioKeys, performance: Performance | None = None) -
 
 
 def _inset(scenario: ScenarioKeys, margin_m: float, tracking_m: float, near_m: float) -> Bounds:
-    """Moves the area's bounds in by a margin, but not past start and goal, and by the tracking error.
-
-    The latter is not kept from sides to which start or goal is nearer than `near_m`.
-    """
+    """Moves bounds in by a margin, not past the ends, and by the tracking error if no end is nearer than `near_m`."""
     xmin, ymin, xmax, ymax = scenario.area.bounds_m
     east, north = zip(scenario.mission.start_m, scenario.mission.goal_m, strict=True)
     xmin, xmax = min(xmin + margin_m, *east), max(xmax - margin_m, *east)

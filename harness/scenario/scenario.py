@@ -1,7 +1,6 @@
 """Scenario files: a complete scenario, reading and writing it, and the same with some keys replaced.
 
-The text becomes `ScenarioKeys`, which says what the file says; `resolve` then fills in defaults and refuses keys that
-contradict each other.
+The text becomes `ScenarioKeys`, as the file says; `resolve` fills in defaults and refuses keys that contradict.
 """
 
 from __future__ import annotations
@@ -58,10 +57,7 @@ class Given(NamedTuple):
 
 
 def changed(given: Given, keys: Mapping[str, Any]) -> Node:
-    """Returns the keys that a scenario was given, without defaults, with some changed.
-
-    None takes a key away; items of lists that it takes away are counted as they were before.
-    """
+    """Returns the keys that a scenario was given with some changed; None takes one away, items counted as before."""
     if not isinstance(keys, Mapping) or not all(isinstance(name, str) for name in keys):
         raise InputError('with_: must be given a mapping of key paths, such as {"planner.clearance_m": 60}')
     plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}

@@ -1,7 +1,4 @@
-"""The sections of a scenario file as frozen types: attribute = key.
-
-Positions are metres in the local ENU plane, x = east, y = north; directions are degrees clockwise from north.
-"""
+"""Sections of a scenario file, attribute = key: metres in the local ENU plane, degrees clockwise from north."""
 
 from __future__ import annotations
 

@@ -73,10 +73,7 @@ class HeightField:
 
 
 def bilinear(values: FloatArray, column: FloatArray, row: FloatArray) -> FloatArray:
-    """(k,) values between the four nodes round places in columns and rows; NaN outside, and next to a NaN.
-
-    On a node, and on the line between two, the others do not count.
-    """
+    """(k,) bilinear values at columns and rows; NaN outside, and where a node that counts there is NaN."""
     rows, columns = values.shape
     inside = (column >= 0) & (column <= columns - 1) & (row >= 0) & (row <= rows - 1)
     left = np.clip(np.where(inside, column, 0.0).astype(np.int64), 0, max(columns - 2, 0))
@@ -214,10 +211,7 @@ def _reach(field: HeightField, raster: Raster, mapping: Mapping, box: Box) -> tu
 
 
 def _taken(raster: Raster, places: FloatArray, beyond: int, cells: int) -> tuple[FloatArray, bool]:
-    """Returns heights of a file at columns and rows (2, k) counted from middles, and whether those are its cells.
-
-    If not, none is lower than the file is within so many of its cells.
-    """
+    """(k,) heights at columns and rows (2, k) from middles, and whether those are cells; else the highest near by."""
     sizes = np.array(raster.values.shape[::-1])[:, None]
     clipped = np.clip(places, 0.0, sizes - 1.0)
     inside = (np.abs(places - clipped) <= beyond + ALIGNED_CELLS).all(axis=0)

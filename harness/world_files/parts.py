@@ -1,7 +1,6 @@
 """What a world file holds, whatever its format: solid parts with a height band, terrain, occupied cells.
 
-Heights are metres. Horizontal coordinates are those of the file: x, y in its coordinate reference system (longitude
-before latitude), or metres in a plane of its own.
+Heights are metres; places x, y in the file's coordinate reference system (longitude first), or metres of its own.
 """
 
 from __future__ import annotations

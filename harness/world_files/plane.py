@@ -1,7 +1,6 @@
 """From the coordinates of a file to the local ENU plane of a scenario, and back, by pyproj.
 
-Axis order is always x, y (longitude, latitude). The plane is the azimuthal equidistant one of `aircraft.frames`. A
-coordinate reference system that pyproj does not know raises InputError.
+Axis order is x, y (longitude, latitude); the plane is that of `aircraft.frames`. InputError: an unknown crs.
 """
 
 from __future__ import annotations
@@ -69,10 +68,7 @@ class Mapping:
 
 
 def check_metres(crs: str, unit: str = "") -> tuple[str, ...]:
-    """Raises InputError unless heights are in metres: by `unit` if given, else the upward axis, else the plane's.
-
-    Returns notes: that they are heights above the ellipsoid, if so.
-    """
+    """Returns notes; InputError: heights are no metres, by `unit` if given, else the upward axis, else the plane's."""
     axes = _pyproj_crs(crs).axis_info
     unit = unit or next((axis.unit_name for axis in axes if axis.direction == "up"), axes[0].unit_name)
     if unit.strip().lower() not in METRES:

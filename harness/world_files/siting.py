@@ -1,7 +1,4 @@
-"""From files alone to an area with start and goal: what `wayproof world` writes.
-
-Files without a place on earth keep their own metres, moved so that the area's south-western corner is (0, 0).
-"""
+"""From files alone to an area with start and goal; own metres are moved so that its south-west corner is (0, 0)."""
 
 from __future__ import annotations
 

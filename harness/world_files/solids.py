@@ -1,7 +1,6 @@
 """Polygons of what is solid at one altitude: parts and cells of files, placed in the plane; and simpler outlines.
 
-A part is solid where it reaches into the band from altitude less to altitude plus the vertical clearance. Outlines only
-grow: notches are filled, nothing solid is ever cut away.
+Solid is what reaches into the band from altitude less to altitude plus vertical clearance. Outlines only grow.
 """
 
 from __future__ import annotations
@@ -39,8 +38,7 @@ class Solid(NamedTuple):
 class Layer(NamedTuple):
     """The altitudes (m, above mean sea level) that the aircraft may have, and what is known of the ground below.
 
-    `field` is the files' terrain, and `flat_m` the height where it has none. Zones with limits above ground are cut to
-    the area `known_in` where there is terrain.
+    `field` is the files' terrain, `flat_m` the height without; where it is, zones above ground are cut to `known_in`.
     """
 
     low_m: float
@@ -124,8 +122,7 @@ def _is_out(part: Part, layer: Layer) -> bool:
 def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, FloatArray]:
     """Returns the lowest and highest ground below a part, (2, ...), NaN where not known, and its first column and row.
 
-    Of what is rigid it is that at its corners, of which some may lie outside of the terrain; else that in the quarters
-    of the cells (the node in the middle) that cover it.
+    Of what is rigid it is that at its corners, as far as they lie on it; else in the quarters of cells that cover it.
     """
     heights, first = np.full((2, 1, 1), math.nan), np.zeros(2)
     if ground.field is not None and part.rigid:
@@ -143,10 +140,7 @@ def _ground_below(part: Part, shape: Any, ground: Layer) -> tuple[FloatArray, Fl
 
 
 def quarters(heights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Returns the lowest and the highest ground in each quarter of a cell, (2 rows, 2 columns), NaN where not known.
-
-    The ground is bilinear between the middles of cells, so that a quarter's corners have both.
-    """
+    """(2 rows, 2 columns) lowest and highest ground, bilinear between middles, in quarters of cells; NaN: not known."""
     fine = _with_edges(_with_edges(heights).T).T
     corners = fine[:-1, :-1], fine[1:, :-1], fine[:-1, 1:], fine[1:, 1:]
     return reduce(np.fmin, corners), reduce(np.fmax, corners)
@@ -160,10 +154,7 @@ def _with_edges(middles: FloatArray) -> FloatArray:
 
 
 def outlines(mask: BoolArray) -> list[Any]:
-    """Returns polygons (with holes) round the cells that are set.
-
-    The cell in column i and row j of a (rows, columns) mask covers i to i + 1 and j to j + 1.
-    """
+    """Returns polygons, with holes, round the cells that are set; column i and row j cover i to i + 1, j to j + 1."""
     change = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     rows, begins = np.nonzero(change == 1)
     ends = np.nonzero(change == -1)[1]

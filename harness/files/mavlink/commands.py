@@ -1,7 +1,6 @@
 """Commands of MAVLink missions, fences and rally points, and how an aeroplane flies them.
 
-Numbers and parameters: https://mavlink.io/en/messages/common.html#mav_commands, and ardupilotmega.xml for those of
-ArduPilot alone.
+Parameters: https://mavlink.io/en/messages/common.html#mav_commands; of ArduPilot alone: ardupilotmega.xml.
 """
 
 from __future__ import annotations

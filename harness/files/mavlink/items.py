@@ -159,10 +159,7 @@ class Fence:
 
 
 def plan_fences(plan: Keys, source: str) -> tuple[tuple[Fence, ...], bool, int]:
-    """Returns the fences of a plan, in degrees, whether to stay inside all inclusion fences, and its rally points.
-
-    `source`, as `path: ` or nothing, begins an InputError.
-    """
+    """Returns fences of a plan (degrees), whether all inclusions hold, and its rally points; `source` begins faults."""
     inner = {key: plan.get(key) for key in ("geoFence", "mission", "rallyPoints")}
     for key in (key for key, value in inner.items() if not isinstance(value, dict | None)):
         raise InputError(f"{source}{key}: must be a mapping")

@@ -76,8 +76,7 @@ class ItemFate:
 class Program:
     """A mission as an aeroplane flies it: its steps, and the treatment of every item, in the order of the file.
 
-    The altitude of home is above mean sea level; its latitude and longitude are None where the file does not say.
-    Fences come with it, and notes on what else does.
+    Home is latitude and longitude, None where the file does not say; its altitude is above mean sea level.
     """
 
     steps: tuple[MissionStep, ...]

@@ -204,10 +204,9 @@ class Buildings:
             told = f"taken as {self._default_m:g} m high (default_height_m)"
             notes.append(f"{counted(self._guessed, 'building')} without height and levels {told}")
         if self._odd:
-            notes.append(
-                f"{counted(self._odd.total(), 'height')} of buildings no plain length, {next(iter(self._odd))} the "
-                "first: the largest number in it is taken, in metres; of a bottom the ground; nothing below 0"
-            )
+            told = f"{counted(self._odd.total(), 'height')} of buildings no plain length, {next(iter(self._odd))}"
+            told += " the first: the largest number in it is taken, in metres"
+            notes.append(f"{told}; of a bottom the ground; nothing below 0")
         return notes
 
 

@@ -76,13 +76,11 @@ def read_ed269(spec: FileSpec) -> Contents:
 
 
 def _is_at_times(applicability: Any) -> bool:
-    """Whether a zone of ED-269 applies at times only."""
     times = [applicability] if isinstance(applicability, dict) else applicability
     return any(isinstance(t, dict) and (t.get("permanent") == "NO" or "schedule" in t) for t in times)
 
 
 def _add_volume(found: _Zones, volume: Any, name: str) -> None:
-    """Adds a volume of a zone of ED-269."""
     projection = volume.get("horizontalProjection") if isinstance(volume, dict) else None
     if not isinstance(projection, dict):
         raise InputError(f"has zone {name!r} without a horizontalProjection")
