@@ -8,7 +8,7 @@ import os
 import re
 import stat
 from pathlib import Path
-from typing import Any, BinaryIO, Final, NoReturn
+from typing import Any, Final, NoReturn
 
 MAX_JSON_BYTES: Final = 16_000_000  # a larger JSON file is refused
 _JSON_TOKEN: Final = re.compile(r'("(?:[^"\\]|\\.)*")\s*:|"(?:[^"\\]|\\.)*"|[{}]|NaN|-?Infinity')
@@ -26,13 +26,18 @@ def read_text(path: Path, max_bytes: int, what: str) -> str:
 def read_data(path: Path, max_bytes: int, what: str, first: int | None = None) -> bytes:
     """Reads the bytes of a regular file, or only its first ones; arguments and faults are those of `read_text`."""
     try:
-        with open_regular(path) as file:
+        # Opened so, a pipe is not waited for.
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise InputError(f"{path}: is a pipe or a device, not a file; give the path of a file")
             too_large = path.stat().st_size > max_bytes
             data: bytes = b"" if too_large else file.read(max_bytes if first is None else first)
     except InputError:
         raise
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such file; give the path of a file") from error
+    except IsADirectoryError as error:
+        raise InputError(f"{path}: is a folder, not a file; give the path of a file") from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"{path}: cannot be read ({reason}); give the path of a file") from error
@@ -52,17 +57,6 @@ def decoded(data: bytes, source: str, what: str) -> str:
         line = data.count(b"\n", 0, error.start) + 1
         told = f"{source}:{line}: byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
         raise InputError(told) from error
-
-
-def open_regular(path: Path) -> BinaryIO:
-    """Opens a regular file for reading, without waiting on a pipe; an InputError says that it is no such file."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    mode = os.fstat(descriptor).st_mode
-    if not stat.S_ISREG(mode):
-        os.close(descriptor)
-        what = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
-        raise InputError(f"{path}: is {what}, not a file; give the path of a file")
-    return os.fdopen(descriptor, "rb")
 
 
 def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any] | None:

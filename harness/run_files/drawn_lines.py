@@ -100,10 +100,8 @@ def _columns(header: list[str], where: str, any_altitude: bool) -> list[str]:
     """Returns the columns of the place, and that of the altitude where there is one."""
     pair = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
     if pair is None:
-        raise InputError(
-            f"{where}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
-            "latitude_deg,longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas"
-        )
+        told = f"{where}: has the columns {shown(', '.join(header)) or 'none'}; must have x_m,y_m or latitude_deg,"
+        raise InputError(f"{told}longitude_deg, and may have altitude_m or altitude_agl_m, parted by commas")
     names = [*pair, *[name for name in (*ALTITUDES, ABOVE_GROUND) if name in header][:1]]
     unread = next(filter(ALTITUDE_WORD.search, header), None)
     if unread is not None and len(names) == 2 and not any_altitude:

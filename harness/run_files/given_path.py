@@ -167,9 +167,8 @@ def fly_by(
     cut = np.where(joint, np.abs(away - radius), radius * shape.cut)
     _, onto, sharpest = _legs(spots)
     course = np.degrees(np.angle(1j * onto[sharp - 1].conj())) % 360.0
-    told = np.column_stack(
-        (points[sharp], np.degrees(sharpest[sharp - 1]), radius, cut, passed, half, 0.0 * half, course)
-    )
+    asked = np.degrees(sharpest[sharp - 1])
+    told = np.column_stack((points[sharp], asked, radius, cut, passed, half, 0.0 * half, course))
     corners = tuple(
         CutCorner(int(of[i + 1]), *told[i].tolist())
         for i in np.flatnonzero(every | (wanted * shape.cut > free * (1.0 + 1e-9)) | joint).tolist()

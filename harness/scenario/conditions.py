@@ -10,19 +10,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
+from pydantic import BaseModel
 
 from aircraft.start import profile_share
 from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
 from harness.scenario.keys import NORMALS, ScenarioKeys
 from harness.scenario.navigation import Navigation
-from harness.scenario.sections import (
-    MOST_SHARE,
-    MOST_SHIFT_M,
-    ActuatorsSpec,
-    DeviationSpec,
-    Section,
-    UncertaintySpec,
-)
+from harness.scenario.sections import MOST_SHARE, MOST_SHIFT_M, ActuatorsSpec, DeviationSpec, UncertaintySpec
 
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe
@@ -84,7 +78,7 @@ DAYS: Final = {  # sources: `aircraft/README.md`
 # fmt: on
 
 
-def _written(section: Section | None) -> dict[str, Any]:
+def _written(section: BaseModel | None) -> dict[str, Any]:
     """Returns those keys of a section that the file gives a value."""
     return {} if section is None else section.model_dump(exclude_unset=True, exclude_none=True)
 

@@ -229,10 +229,9 @@ def _ends(files: _Files, craft: Craft, bounds: Box, found: Expanded) -> tuple[Fl
         return chosen, []
     cell = f"--metres-per-cell {cell_m:g}" if (cell_m := _cell_that_fits(files, craft, room)) else ""
     if (chosen := ends(room, turn_m, clearance_m, turning=False)) is not None:
-        narrow = (
-            f"every way from start to goal is somewhere narrower than {2.0 * (clearance_m + turn_m):,.0f} m"
-        )
-        told = f"{narrow}, where {craft.name} cannot turn round: the goal may be proved unreachable"
+        width_m = 2.0 * (clearance_m + turn_m)
+        told = f"every way from start to goal is somewhere narrower than {width_m:,.0f} m, where {craft.name}"
+        told += " cannot turn round: the goal may be proved unreachable"
         return chosen, [told + (f"; with {cell} it can" if cell else "")]
     would = cell or "--start and --goal, another altitude, a smaller clearance or aircraft, or a larger file"
     raise InputError(

@@ -11,11 +11,9 @@ from harness.files.input_file import InputError, finite, listed, numbers, parsed
 from harness.files.mavlink import commands
 from harness.files.mavlink.items import (
     FRAMES,
-    HOME,
     MISSION,
     SEA,
     Item,
-    Place,
     filled,
     item_fences,
     plan_fences,
@@ -33,7 +31,7 @@ RELATIVE, ABSOLUTE = 3, 0  # MAV_FRAME of altitudes above home and above the sea
 PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')  # in every plan of QGroundControl, whatever its name
 PLACE_FORM: Final = "[latitude, longitude, altitude]"
 PLAN_SPEEDS: Final = ("cruiseSpeed", "hoverSpeed")  # m/s, where no item says another
-Home = tuple[Place | None, float]  # latitude and longitude, None where the file does not say; altitude
+Home = tuple[tuple[float, float] | None, float]  # latitude and longitude, None if not said; altitude
 
 
 def _mission(
@@ -71,11 +69,13 @@ def read_waypoints(text: str, source: str) -> Program:
 
 def _home_item(items: list[Item], notes: list[str]) -> Home:
     """Takes the first item out of the items if it is home, and returns home; else no place, and altitude 0."""
-    above = FRAMES.get(items[0].frame, SEA) if items else HOME
-    if not items or items[0].command != commands.WAYPOINT or (items[0].number != 0 and above != SEA):
+    if not items or items[0].command != commands.WAYPOINT:
         return None, 0.0
-    first = items.pop(0)
-    if above != SEA and first.params[6]:
+    first, is_at_sea = items[0], FRAMES.get(items[0].frame, SEA) == SEA
+    if first.number != 0 and not is_at_sea:
+        return None, 0.0
+    del items[0]
+    if not is_at_sea and first.params[6]:
         told = f"its altitude, {first.params[6]:g} m, is taken as above the sea"
         notes.append(f"its first item is home, though of frame {first.frame}: {told}")
     return first.position, first.params[6]
@@ -138,9 +138,12 @@ def _every_item(given: Sequence[Any], where: str, notes: list[str]) -> list[Item
 def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
     """Returns the simple items that an item of a plan stands for, or none, with a note."""
     keys = item if isinstance(item, dict) else {}
-    if keys.get("type", "SimpleItem") in ("SimpleItem", None) and not keys.get("complexItemType"):
-        return [_simple(item, where, number)]
-    kind = _complex_kind(item, where)
+    named, kind = keys.get("type"), shown(str(keys.get("complexItemType") or keys.get("type")))
+    if not keys.get("complexItemType"):
+        if named in ("SimpleItem", None):
+            return [_simple(item, where, number)]
+        if named not in ("ComplexItem", *LANDING_PATTERNS):
+            raise InputError(f"{where}.type: is {kind!r}; must be 'SimpleItem' or 'ComplexItem'")
     if kind in LANDING_PATTERNS:
         return _landing(item, where, number, LANDING_PATTERNS[kind])
     inner, where = (item[TRANSECTS], f"{where}.{TRANSECTS}") if TRANSECTS in item else (item, where)
@@ -149,14 +152,6 @@ def _items(item: Any, where: str, number: int, notes: list[str]) -> list[Item]:
         notes.append(f"item {number}, complex ({kind}): not flown, it has no items of its own")
         return []
     return [_simple(each, f"{where}.Items[{place}]", number + place) for place, each in enumerate(held)]
-
-
-def _complex_kind(item: dict[str, Any], where: str) -> str:
-    """Returns what a complex item is; an InputError says that it is none."""
-    kind, named = item.get("complexItemType"), item.get("type")
-    if not kind and named not in ("ComplexItem", *LANDING_PATTERNS):
-        raise InputError(f"{where}.type: is {shown(str(named))!r}; must be 'SimpleItem' or 'ComplexItem'")
-    return shown(str(kind or named))
 
 
 def _simple(item: Any, where: str, number: int) -> Item:

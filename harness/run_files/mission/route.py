@@ -22,17 +22,9 @@ from aircraft.route import SegmentRow
 from harness.files.input_file import InputError
 from harness.files.mavlink.items import GROUND
 from harness.run_files.given_path import PAST_RAD, SAME_PLACE_M, CutCorner, FlyBy
+from harness.run_files.mission import vertices
 from harness.run_files.mission.program import Loiter, MissionStep, Program
-from harness.run_files.mission.vertices import (
-    Flying,
-    MissionRoute,
-    Vertex,
-    above_ground,
-    altitude_m,
-    legs_of,
-    rounded,
-    without_steps,
-)
+from harness.run_files.mission.vertices import Flying, MissionRoute, Vertex
 
 LANDING_HEIGHT_M: Final = 15.0  # a landing is flown down to this height; flare and touchdown are not
 CLIMB_SHARE: Final = 0.8  # a loiter to an altitude takes as long as a climb at this share of the fastest rate
@@ -80,7 +72,7 @@ class _RouteBuilder:
             self._change_speed(step, step.airspeed_mps or self._flying.airspeed_mps)
         at = step.place if step.place is not None else self._here()
         assert at is not None  # the first step has a place
-        altitude = altitude_m(step, self._home_m, self._ground_m(at), self._altitude_m)
+        altitude = vertices.altitude_m(step, self._home_m, self._ground_m(at), self._altitude_m)
         if step.loiter is not None:
             self._loiter(number, step.loiter, at, altitude)
         elif step.landing:
@@ -249,26 +241,24 @@ class _RouteBuilder:
         points = np.array([(vertex.place.real, vertex.place.imag) for vertex in run])
         stations = np.full(len(run), begins_m)
         if np.hypot(*(points - points[0]).T).max() > SAME_PLACE_M:
-            way = rounded(run, self._flying)
+            way = vertices.rounded(run, self._flying)
             stations = begins_m + way.stations_of(points)
             self._given.append(np.add(way.given_m, (0.0, 0.0, begins_m)))
-            self._corners += [
-                replace(
-                    each, waypoint=run[each.waypoint].item or 0, arc_length_m=each.arc_length_m + begins_m
-                )
-                for each in way.corners
-            ]
+            for each in way.corners:
+                item, along_m = run[each.waypoint].item or 0, each.arc_length_m + begins_m
+                self._corners.append(replace(each, waypoint=item, arc_length_m=along_m))
             self.rows += [(*row,) for row in way.segments.tolist()]
             self._pose = end_of(self.rows[-1])
             self._length_m += float(way.segments[:, 5].sum())
-            self._legs += legs_of(run, stations)
+            self._legs += vertices.legs_of(run, stations)
         elif self._pose is None:  # nothing was flown to it yet
             self._run = run[-1:]
         for place, (vertex, station) in enumerate(zip(run, stations.tolist(), strict=True)):
             before = float(stations[max(place - 1, 0)])
             self._speeds.append((before, vertex.asked_mps, vertex.airspeed_mps))
             if place and vertex.agl_m is not None:
-                self._altitudes += above_ground((run[place - 1], vertex), (before, station), self._ground_m)
+                ends = run[place - 1], vertex
+                self._altitudes += vertices.above_ground(ends, (before, station), self._ground_m)
             self._altitudes.append((station, vertex.altitude_m))
             if vertex.item is not None:
                 self._passed.append((vertex.item, vertex.place, station))
@@ -280,15 +270,11 @@ class _RouteBuilder:
         kept = [b for a, b in pairwise([(math.inf, 0.0), *places]) if abs(b[0] - a[0]) > SAME_PLACE_M]
         every = sorted(self._altitudes, key=lambda each: each[0])
         slope = CLIMB_SHARE * min(self._flying.climb_mps(self._mps)) / self._mps
-        along, altitude = np.array(without_steps(every, lambda: slope)).T
+        along, altitude = np.array(vertices.without_steps(every, lambda: slope)).T
         since, asked, flown = np.array(self._speeds).T
-        way = FlyBy(
-            np.array([(place.real, place.imag) for place, _ in kept]),
-            np.array(self.rows),
-            tuple(self._corners),
-            np.arange(len(kept)),
-            np.array([station for _, station in kept]),
-            np.concatenate(self._given),
-        )
+        points = np.array([(place.real, place.imag) for place, _ in kept])
+        stations = np.array([station for _, station in kept])
+        rows, given, corners = np.array(self.rows), np.concatenate(self._given), tuple(self._corners)
+        way = FlyBy(points, rows, corners, np.arange(len(kept)), stations, given)
         profile = VerticalProfile(along, altitude, np.maximum.accumulate(since), flown)
         return MissionRoute(way, profile, asked, marks, tuple(self._notes), tuple(self._legs))

@@ -45,15 +45,11 @@ def finished(contents: Contents) -> Contents:
         raise InputError("has a position that is not finite")
     bad = ~shapely.is_valid(shapes)
     shapes[bad] = shapely.make_valid(shapes[bad], method="structure", keep_collapsed=False)
-    area = shapely.area(shapes)
-    parts = tuple(
-        replace(part, footprint=shape)
-        for part, shape, size in zip(contents.parts, shapes, area.tolist(), strict=True)
-        if size > 0.0
-    )
+    kept = np.flatnonzero(shapely.area(shapes) > 0.0).tolist()
+    parts = tuple(replace(contents.parts[index], footprint=shapes[index]) for index in kept)
     if not parts:
         raise InputError("has no polygon with an area; must have some")
-    flat = len(area) - len(parts)
+    flat = len(shapes) - len(parts)
     passed = (f"{counted(flat, 'polygon')} without an area passed over",) if flat else ()
     return replace(contents, parts=parts, notes=(*contents.notes, *passed))
 

@@ -25,11 +25,9 @@ DATUMS: Final = {  # of a KML altitude by its altitudeMode; "" is the first of t
 def read_geojson(spec: FileSpec) -> Contents:
     """Reads the polygons of a GeoJSON file; points and lines are passed over and counted."""
     content = json_of(spec.path)
-    shapes = [
-        (tags, polygon_of(*each))
-        for tags, geometry, key in features_of(content)
-        for each in simple(geometry, key)
-    ]
+    shapes = []
+    for tags, geometry, key in features_of(content):
+        shapes += [(tags, polygon_of(*each)) for each in simple(geometry, key)]
     notes: list[str] = []
     parts = limits.parts_of([each for each in shapes if each[1] is not None], spec, notes)
     if passed := sum(shape is None for _, shape in shapes):

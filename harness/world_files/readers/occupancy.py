@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -61,8 +61,10 @@ def read_ros(spec: FileSpec) -> Contents:
     origin = keys.get("origin", (0.0, 0.0, 0.0))
     over, under = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
     negate = keys.get("negate", 0)
-    _one_of("mode", mode, MODES)
-    _one_of("negate", negate, (0, 1))
+    for name, value, known in (("mode", mode, MODES), ("negate", negate, (0, 1))):
+        if value not in known:
+            told = f"has the {name} {str(value)[:20]!r}; must be one of {', '.join(map(str, known))}"
+            raise InputError(told)
     if not _are_numbers((size, over, under), least=0.0) or size == 0 or max(over, under) > 1:
         told = f"the resolution {size} and the thresholds {over}, {under}"
         raise InputError(f"has {told}; must be metres above 0, and shares between 0 and 1")
@@ -78,11 +80,6 @@ def read_ros(spec: FileSpec) -> Contents:
     cos, sin = cell * math.cos(yaw), cell * math.sin(yaw)
     place = (cos, sin, west - rows * sin, sin, -cos, south + rows * cos)
     return Contents(None, raster=Raster(solid, place, True))
-
-
-def _one_of(name: str, value: Any, known: Collection[Any]) -> None:
-    if value not in known:
-        raise InputError(f"has the {name} {str(value)[:20]!r}; must be one of {', '.join(map(str, known))}")
 
 
 def _greys(path: Path) -> FloatArray:
