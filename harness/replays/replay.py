@@ -50,15 +50,17 @@ def replay(
     winds = fit_windows(flight, wind)
     task = _task_of(flight, flown_mission, winds or [wind], wind)
     scenario = scenario_for(task, aircraft, overrides)
-    flown, laps = _flown(task)
+    flown, numbers = _flown(task)
     out.mkdir(parents=True, exist_ok=True)
     replace_text(out / INDEX, json.dumps({"schema": SCHEMA, "complete": False}) + "\n")
-    columns = fly_anew(scenario, task, laps, out / SIMULATED)
+    columns = fly_anew(scenario, task, len(numbers), out / SIMULATED)
     corners_m, legs = flown_mission.corners_m, columns["leg"]
-    ended = bool(legs[-1] >= laps * len(corners_m))
-    left_out = [f"lap {lap} is left out: it {lack}" for lap, lack in flown.lacks.items() if lack]
-    numbers = flown.laps[0] + _laps(legs, task)
-    simulated = Side(columns, corners_m, legs, numbers, scenario.mission.altitude_m, flown.begun, ended)
+    ended = bool(legs[-1] >= len(numbers) * len(corners_m))
+    laps = np.append(numbers, 0.0)[np.minimum(_laps(legs, task), len(numbers)).astype(np.int64)]
+    simulated = Side(columns, corners_m, legs, laps, scenario.mission.altitude_m, flown.begun, ended)
+    comparison = compared(flown, simulated)
+    lacks = {lap: lack or "is not flown to its end in the simulation" for lap, lack in flown.lacks.items()}
+    left_out = sorted(lacks.keys() - comparison["settled_laps"])
     told = {
         "schema": SCHEMA,
         "complete": True,
@@ -69,8 +71,8 @@ def replay(
         "wind_windows": [{"time_s": each.time_s, **each.told()} for each in winds],
         "airspeed_mps": task.airspeed_mps,
         "latency_s": scenario.navigation.latency_s,
-        **compared(flown, simulated),
-        "notes": [*notes, *flight.notes, *left_out],
+        **comparison,
+        "notes": [*notes, *flight.notes, *(f"lap {lap} is left out: it {lacks[lap]}" for lap in left_out)],
     }
     found = Replay(told, flown.columns, columns, corners_m, out)
     _write(found, {"flown": flown, "simulated": simulated}, recording)
@@ -100,7 +102,7 @@ def _read(log: Path, mission: Path | None) -> tuple[FlownMission, FlownFlight, l
 def _from_where_laps_begin(mission: FlownMission, flight: FlownFlight, notes: list[str]) -> FlownMission:
     """Returns the mission with its corners from that at which the column `lap` changes; notes it."""
     laps = flight.columns.get("lap", np.zeros(0))
-    begins = np.flatnonzero((np.diff(laps) > 0.0) & (laps[:-1] >= 1.0)) + 1
+    begins = np.flatnonzero((np.diff(laps) != 0.0) & (np.minimum(laps[:-1], laps[1:]) >= 1.0)) + 1
     first, away_m = mission.corner_at(flight, begins, 0) if begins.size else (0, 0.0)
     if first:
         where = f"{away_m:.0f} m from where lap changes"
@@ -134,24 +136,32 @@ def _first_corner(flight: FlownFlight, mission: FlownMission) -> int:
     return (int(away.argmin()) + 1) % corners
 
 
-def _flown(task: Task) -> tuple[Side, int]:
-    """Returns the flown flight ready to be measured, and its number of laps."""
+def _flown(task: Task) -> tuple[Side, FloatArray]:
+    """Returns the flown flight ready to be measured, and (k,) the numbers of the laps to simulate, as `_numbers`."""
     flight, mission = task.flight, task.mission
     columns = dict(flight.columns)
     legs = legs_of(columns, mission.corners_m, task.first, mission.acceptance_m)
-    laps = columns["lap"] if "lap" in columns else 1.0 + _laps(legs, task)
+    by_corners = _laps(legs, task)
+    laps = columns.get("lap", 1.0 + by_corners)
     # The log begins or ends where a lap does: as near to corner 0, in two rows, as counts as reached or as laps ended.
     ends = [0, -1]
     steps_m = np.hypot(flight["ve_mps"], flight["vn_mps"])[ends] * np.diff(flight["time_s"])[ends]
     away_m = np.hypot(*(mission.corners_m[:1] - np.column_stack((flight["east_m"], flight["north_m"]))).T)
-    turned_m = away_m[1:][(np.diff(laps) > 0) & (laps[:-1] >= 1)]
+    turned_m = away_m[1:][(np.diff(laps) != 0) & (np.minimum(laps[:-1], laps[1:]) >= 1)]
     near_m = mission.acceptance_m if mission.acceptance_m is not None else turned_m.max(initial=0.0)
     begun, ended = (away_m[ends] <= near_m + 2.0 * steps_m).tolist()
     columns["time_s"] = columns["time_s"] - columns["time_s"][0]
     if flight.airspeed_mps is not None:
         columns["airspeed_mps"] = flight.airspeed_mps
     side = Side(columns, mission.corners_m, legs, laps, task.height_m, begun, ended)
-    return side, int(laps[-1] - laps[0]) + 1
+    return side, _numbers(laps, by_corners)
+
+
+def _numbers(laps: FloatArray, by_corners: FloatArray) -> FloatArray:
+    """(k,) the log's number of each lap that `_laps` counts, in the order flown; 0 for one before its first."""
+    begins = np.flatnonzero((np.diff(laps, prepend=0.0) != 0.0) & (laps >= 1.0))
+    before = float(np.median(by_corners[laps == laps[begins[0]]])) if begins.size else 1.0
+    return np.append(np.zeros(int(before)), laps[begins])
 
 
 def _laps(legs: FloatArray, task: Task) -> FloatArray:

@@ -36,7 +36,7 @@ AREA_MARGIN_M: Final = 1000.0  # the area reaches this far beyond the flown trac
 LEAST_ALTITUDE_M: Final = 50.0  # lower heights of a log are not above the sea
 UNKNOWN_ALTITUDE_M: Final = 300.0
 """A log with heights below `LEAST_ALTITUDE_M`, which are not above the sea, is flown at this altitude."""
-TIME_LIMIT_FACTOR: Final = 1.25
+TIME_LIMIT_FACTOR: Final = 3.0
 """The simulated flight may take this many times the flown time, and a minute more."""
 SIMULATED_COLUMNS: Final = ("time_s", "east_m", "north_m", "up_m", "roll_deg", "airspeed_mps")
 

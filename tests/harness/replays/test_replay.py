@@ -87,6 +87,23 @@ def test_a_last_lap_is_whole_where_it_ends_as_near_to_its_corner_as_those_before
     assert found.told["settled_laps"] == settled
 
 
+def test_laps_are_those_of_the_column_lap_in_the_order_flown(tmp_path: Path) -> None:
+    """Whatever their numbers, and with 5 s of lap 0 before them, each is beside what was simulated at its time."""
+    log, mission = circles(tmp_path, (4.0, -3.0))
+    mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": 45.0}}))
+    table, found = pq.read_table(log).drop_columns(["lap"]), []
+    table = table.append_column("autonomous", pa.array(np.ones(len(table), dtype=bool)))
+    for first in ([1, 2, 3, 4], [5, 9, 7, 0], [0, 9, 7, 0]):
+        lap = np.repeat([*first[:1], first[0] or 1, *first[1:]], [50, 350, 400, 400, 400])
+        pq.write_table(table.append_column("lap", pa.array(lap)), log)
+        settings = {"aircraft.airspeed_mps": "18"}
+        told = wayproof.replay(log, "aerosonde", mission, out=tmp_path / "out", settings=settings).told
+        found.append({row["lap"]: row["simulated"]["outside_max_m"] for row in told["laps"]})
+    assert [list(each) for each in found] == [[2, 3, 4], [5, 7, 9], [7, 9]]
+    for each in found[1:]:
+        assert (each[9], each[7]) == pytest.approx((found[0][2], found[0][3]), abs=1e-6)
+
+
 @needs_flown
 def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
