@@ -54,6 +54,8 @@ FLIGHT = [
     "B1200165049613N00611520EA0014000205",  # stands
 ]
 
+GLIDE = [f"B1200{n:02}46{49000 + 27 * n // 5}N00611520EA00000{300 - n:05}" for n in range(0, 40, 10)]  # 10 m/s, a paraglider
+
 
 def kmz(files: dict[str, str | bytes]) -> bytes:
     packed = io.BytesIO()
@@ -124,6 +126,7 @@ JOINED = "2 segments of the track joined by straight lines"
         ("a.gpx", gpx(ROUTE.replace("<ele>500</ele>", "")), [], ()),
         ("a.igc", igc(*FLIGHT), [195.0, 200.0, 205.0], (GNSS, GROUND)),
         ("a.igc", igc(*FLIGHT) + "LXXXpilot M\u00fcller\n", [195.0, 200.0, 205.0], (GNSS, GROUND)),
+        ("a.igc", igc(*GLIDE), [300.0, 290.0, 280.0, 270.0], (GNSS,)),
         ("a.igc", igc(*(f"B11{n:02}00{FLIGHT[0][7:]}" for n in range(30)), *FLIGHT, "B12"), None, (TORN,)),
         ("a.igc", igc(*(fix[:-5] + "00000" for fix in FLIGHT)), [130.0, 135.0, 140.0], (PRESSURE, GROUND)),
     ],
