@@ -33,7 +33,7 @@ def digest_of(folder: Path, scenario: str, *options: str, hash_seed: int = 0, st
 @pytest.mark.parametrize(
     ("scenario", "seconds"),
     [
-        *longer([("aerosonde_forest", 30), ("aerosonde_forest", None), ("one_of_everything", 150)]),
+        *longer([("aerosonde_forest", None), ("one_of_everything", 150)]),
         pytest.param("one_of_everything", None, marks=pytest.mark.slow),
     ],
 )

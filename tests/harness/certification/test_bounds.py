@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
 
+from harness.certification import certification
 from harness.certification.bounds import clopper_pearson, sequential_bounds, verdict
 from harness.certification.certification import Tally, Terms
 
@@ -65,16 +67,20 @@ def test_a_claim_that_is_just_true_is_rarely_decided_at_any_look(rate: float) ->
     rng = np.random.default_rng(round(1 / rate))
     looks = np.unique(np.geomspace(1, 20_000, 300).astype(int))
     wrong = {"shown": 0, "refuted": 0}
+    judged = cache(verdict)
     for _ in range(REPETITIONS):
         failed = np.cumsum(rng.random(looks[-1]) < rate)[looks - 1]
-        said = {verdict(int(n - k), int(n), 1 - rate, CONFIDENCE) for n, k in zip(looks, failed, strict=True)}
+        said = {judged(int(n - k), int(n), 1 - rate, CONFIDENCE) for n, k in zip(looks, failed, strict=True)}
         for each in said & wrong.keys():
             wrong[each] += 1
     assert max(wrong.values()) <= MOST_MISSED * REPETITIONS
 
 
 @pytest.mark.parametrize("rate", [1e-1, 1e-2, pytest.param(1e-3, marks=pytest.mark.slow)])
-def test_bounds_at_the_day_that_decides_cover_the_rate(rate: float) -> None:
+def test_bounds_at_the_day_that_decides_cover_the_rate(
+    rate: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certification, "verdict", cache(verdict))
     rng = np.random.default_rng(round(7 / rate))
     missed = np.zeros(2, dtype=int)
     terms = Terms(probability=1 - 2 * rate, confidence=CONFIDENCE)
