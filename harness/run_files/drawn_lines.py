@@ -35,7 +35,7 @@ SINGLE_TYPE: Final = {"MultiLineString": "LineString", "MultiPolygon": "Polygon"
 ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
 """Values of KML's altitudeMode, the last the default; at any other value, and at that, the altitude means nothing."""
 
-FLYING_MPS: Final = 15.0 / 3.6  # a flight lasts from the first to the last fix this fast; else it stands or is carried
+FLYING_MPS: Final = 15.0 / 3.6  # a flight lasts from the first to the last fix this fast; else it stands
 FASTEST_MPS, STEEPEST_MPS = 150.0, 80.0
 """No glider is faster over the ground, or up and down: a fix that needs more from both neighbours is an error."""
 MOST_BROKEN_SHARE: Final = 0.05  # a file in which more than this share of the fixes cannot be read is refused

@@ -54,7 +54,8 @@ FLIGHT = [
     "B1200165049613N00611520EA0014000205",  # stands
 ]
 
-GLIDE = [f"B1200{n:02}46{49000 + 27 * n // 5}N00611520EA00000{300 - n:05}" for n in range(0, 40, 10)]  # 10 m/s, a paraglider
+# A paraglider at 10 m/s.
+GLIDE = [f"B1200{n:02}46{49000 + 27 * n // 5}N00611520EA00000{300 - n:05}" for n in range(0, 40, 10)]
 
 
 def kmz(files: dict[str, str | bytes]) -> bytes:
