@@ -77,9 +77,9 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
     if "up_m" not in columns:
         notes.append("altitude: the table has none; taken to be 0 m")
         columns["up_m"] = np.zeros_like(columns["time_s"])
-    if "airspeed_tas_mps" not in columns:
-        none = f"the log has none ({', '.join(AIRSPEED_COLUMNS)}); taken to be constant where wind is fitted"
-        notes.append(f"airspeed: {'indicated; taken as true' if 'airspeed_ias_mps' in columns else none}")
+    if not set(AIRSPEED_COLUMNS) & set(columns):
+        told = f"the log has none ({', '.join(AIRSPEED_COLUMNS)}); taken to be constant where wind is fitted"
+        notes.append(f"airspeed: {told}")
     targets = columns.get("target_index", np.zeros_like(columns["time_s"]))
     by_autopilot = columns.get("autonomous", columns.get("lap", 1.0 - (targets < 0.0))) > 0.0
     if not by_autopilot.any():

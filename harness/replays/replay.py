@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -14,11 +15,11 @@ from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
-from harness.replays.flown import TABLES, FlownFlight, check_kind, read_flown
+from harness.replays.flown import AIRSPEED_COLUMNS, TABLES, FlownFlight, check_kind, read_flown
 from harness.replays.measures import Replay, Side, compared, legs_of, rows_of
 from harness.replays.mission import FlownMission, mission_of_log, mission_of_targets, placed, read_mission
-from harness.replays.simulated import Task, fly_anew, scenario_for
-from harness.replays.wind import FittedWind, fit_wind, fit_windows
+from harness.replays.simulated import Task, altitude_flown_m, fly_anew, scenario_for
+from harness.replays.wind import FittedWind, fit_wind, fit_windows, true_over_indicated
 
 INDEX, RECORDING, SCHEMA = "replay.json", "flight.rrd", "wayproof/replay/1"
 SIMULATED: Final = "simulated"
@@ -46,9 +47,11 @@ def replay(
     if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / INDEX).exists())):
         raise RunFolderError(f"{out} holds other things; give a new folder")
     flown_mission, flight, notes = _read(log, mission)
+    height_m = _height_m(flight, flown_mission)
+    flight = _with_both_airspeeds(flight, flown_mission, altitude_flown_m(flight, flown_mission, height_m))
     wind = fit_wind(flight)
     winds = fit_windows(flight, wind)
-    task = _task_of(flight, flown_mission, winds or [wind], wind)
+    task = _task_of(flight, flown_mission, winds or [wind], wind, height_m)
     scenario = scenario_for(task, aircraft, overrides)
     flown, numbers = _flown(task)
     out.mkdir(parents=True, exist_ok=True)
@@ -110,19 +113,36 @@ def _from_where_laps_begin(mission: FlownMission, flight: FlownFlight, notes: li
     return mission.model_copy(update={"corners_m": np.roll(mission.corners_m, -first, axis=0)})
 
 
-def _task_of(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Task:
-    """Finds where the simulated flight begins, and its airspeed and height."""
+def _height_m(flight: FlownFlight, mission: FlownMission) -> float:
+    """The height that was commanded, as `up_m` has it."""
+    if mission.height_m is not None and "baro_height_m" in flight:
+        return mission.height_m + float(np.nanmedian(flight["up_m"] - flight["baro_height_m"]))
+    return float(np.nanmedian(flight["up_m"]))
+
+
+def _with_both_airspeeds(flight: FlownFlight, mission: FlownMission, altitude_m: float) -> FlownFlight:
+    """Fills in true or indicated airspeed, of which a log has one alone, if it is wanted; with a note."""
+    true, indicated = AIRSPEED_COLUMNS
+    known, other = (true, indicated) if true in flight else (indicated, true)
+    if known not in flight or other in flight or (known == true and mission.airspeed_mps is None):
+        return flight
+    ratio = true_over_indicated(altitude_m)
+    columns = {**flight.columns, other: flight[known] * (ratio if other == true else 1.0 / ratio)}
+    note = f"airspeed: {other} from {known} by the standard atmosphere at {altitude_m:.0f} m"
+    return replace(flight, columns=columns, notes=(*flight.notes, note))
+
+
+def _task_of(
+    flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind, height_m: float
+) -> Task:
+    """Finds where the simulated flight begins, and its airspeed."""
     airspeed, commanded = flight.airspeed_mps, mission.airspeed_mps
     if airspeed is None:
         commanded = wind.airspeed_mps
     elif commanded is None:
         commanded = float(np.nanmedian(airspeed))
-    elif "airspeed_tas_mps" in flight and "airspeed_ias_mps" in flight:
-        commanded *= float(np.nanmedian(flight["airspeed_tas_mps"] / flight["airspeed_ias_mps"]))
-    if mission.height_m is not None and "baro_height_m" in flight:
-        height_m = mission.height_m + float(np.nanmedian(flight["up_m"] - flight["baro_height_m"]))
     else:
-        height_m = float(np.nanmedian(flight["up_m"]))
+        commanded *= float(np.nanmedian(flight["airspeed_tas_mps"] / flight["airspeed_ias_mps"]))
     return Task(flight, mission, _first_corner(flight, mission), winds, commanded, height_m)
 
 

@@ -80,6 +80,12 @@ class LapsEnd:
         return None
 
 
+def altitude_flown_m(flight: FlownFlight, mission: FlownMission, height_m: float) -> float:
+    """Altitude above mean sea level at which a height of a log is flown anew."""
+    base_m = mission.origin.altitude_m if mission.origin and not flight.in_degrees else 0.0
+    return base_m + height_m if base_m + height_m >= LEAST_ALTITUDE_M else UNKNOWN_ALTITUDE_M
+
+
 def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
     """Returns the flight as a scenario, some keys of it replaced; `InputError` if the aircraft cannot fly it."""
     flight, mission, origin = task.flight, task.mission, task.mission.origin
@@ -87,7 +93,6 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
     bounds = (*(places.min(axis=0) - AREA_MARGIN_M).tolist(), *(places.max(axis=0) + AREA_MARGIN_M).tolist())
     start, goal = places[0], mission.corners_m[task.first]
     far = max(float(np.hypot(*(goal - start))), 2.0)
-    reached_m, altitude_m = mission.acceptance_m, task.height_m + (origin.altitude_m if origin else 0.0)
     changes = [[wind.time_s, wind.speed_mps, wind.from_deg] for wind in task.winds if wind.time_s > 0.0]
     wind = {"speed_mps": task.winds[0].speed_mps, "from_deg": task.winds[0].from_deg, "changes": changes}
     keys: dict[str, Any] = {
@@ -99,7 +104,7 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
             "course_deg": math.degrees(math.atan2(flight["ve_mps"][0], flight["vn_mps"][0])) % 360.0,
             "goal_m": goal.tolist() if far > 2.0 else [start[0], start[1] + 10.0],
             "goal_radius_m": min(0.5 * far, 10.0),
-            "altitude_m": altitude_m if altitude_m >= LEAST_ALTITUDE_M else UNKNOWN_ALTITUDE_M,
+            "altitude_m": altitude_flown_m(flight, mission, task.height_m),
             "time_limit_s": TIME_LIMIT_FACTOR * float(flight["time_s"][-1] - flight["time_s"][0]) + 60.0,
         },
         "aircraft": {
@@ -107,7 +112,7 @@ def scenario_for(task: Task, aircraft: str, overrides: Sequence[tuple[str, str]]
             "airspeed_mps": task.airspeed_mps,
             "autopilot": {"state_latency_s": 0.0, "bank_limit_deg": mission.bank_limit_deg},
         },
-        "guidance": {"kind": DEFAULT_LAW, "follow": "waypoints", "acceptance_radius_m": reached_m},
+        "guidance": {"kind": DEFAULT_LAW, "follow": "waypoints", "acceptance_radius_m": mission.acceptance_m},
         "navigation": {"kind": "gnss", **dict.fromkeys(ZERO_SIGMAS, 0.0), "latency_s": LATENCY_S},
         "environment": {"wind": wind},
     }

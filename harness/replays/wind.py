@@ -47,6 +47,11 @@ class FittedWind:
         return {"speed_mps": self.speed_mps, "from_deg": self.from_deg, "residual_mps": self.residual_mps}
 
 
+def true_over_indicated(altitude_m: float) -> float:
+    """Ratio of true to indicated airspeed in the standard atmosphere (ISO 2533), up to 11 km."""
+    return float((1.0 - 0.0065 / 288.15 * min(altitude_m, 11_000.0)) ** (0.5 - 0.5 * 5.25588))
+
+
 def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | None = None) -> FittedWind:
     """Fits one wind to a flight, or raises InputError if it hardly turns; `airspeed` (n,) takes its own's place."""
     velocity = np.array((flight["ve_mps"], flight["vn_mps"]))

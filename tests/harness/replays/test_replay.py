@@ -22,6 +22,7 @@ from tests.refusals import refused
 FLOWN = Path(__file__).parents[4] / "shared" / "flown"
 needs_flown = pytest.mark.skipif(not (FLOWN / "thor75.json").is_file(), reason="shared/flown is not here")
 SQUARE = [[0, 0], [150, 0], [150, 150], [0, 150]]
+TRUE_SHARE = math.sqrt(1.225 / 1.19011)  # true over indicated airspeed at 300 m: densities of ISO 2533
 
 
 def circles(tmp_path: Path, wind: tuple[float, float], laps: int = 4) -> tuple[Path, Path]:
@@ -47,6 +48,7 @@ def circles(tmp_path: Path, wind: tuple[float, float], laps: int = 4) -> tuple[P
     log, mission = tmp_path / "log.parquet", tmp_path / "mission.json"
     pq.write_table(pa.table(columns), log)
     keys = {"corners_east_north_m": SQUARE, "acceptance_radius_m": 45.0, "bank_limit_deg": 45.0}
+    keys["airspeed_command_ias_mps"] = air / TRUE_SHARE
     mission.write_text(json.dumps({"mission": keys, "origin": "not read"}))
     return log, mission
 
@@ -56,7 +58,8 @@ def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(
 ) -> None:
     log, mission = circles(tmp_path, (4.0, -3.0))
     monkeypatch.chdir(tmp_path)
-    found = wayproof.replay(log, "aerosonde", mission, settings={"aircraft.airspeed_mps": "18"})
+    found = wayproof.replay(log, "aerosonde", mission)
+    assert found.told["airspeed_mps"] == pytest.approx(18.0, abs=1e-3)
     assert found.folder == Path("runs/replay/log")
     told = found.told
     assert told["wind"]["speed_mps"] == pytest.approx(5.0, abs=0.01)
@@ -180,13 +183,13 @@ def test_the_mission_of_an_ardupilot_log_is_its_waypoints_between_a_jump_and_its
     for time, east, north in zip(*(flown[name] for name in ("time_s", "east_m", "north_m")), strict=True):
         time_us = int(1e6 * time) + 2
         data += row(140, "Qiif", time_us, *degrees(east, north), 300.0) + row(
-            142, "QBf", time_us, 0, math.tau * 90 / 40
+            142, "QBf", time_us, 0, math.tau * 90 / 40 / TRUE_SHARE
         )
     (tmp_path / "log.bin").write_bytes(data)
     found = wayproof.replay(tmp_path / "log.bin", "aerosonde", out=tmp_path / "out")
     assert found.corners_m == pytest.approx(np.array(SQUARE), abs=0.05)
     assert found.told["notes"][0] == "mission: items 2 to 5 of the log, reached from 45 m"
-    assert found.told["airspeed_mps"] == pytest.approx(18.0)
+    assert found.told["airspeed_mps"] == pytest.approx(18.0 * TRUE_SHARE, abs=1e-3)
     assert max(found.told["wind"][name] for name in ("speed_mps", "residual_mps")) < 0.1
     autopilot = wayproof.load_run(tmp_path / "out" / "simulated").scenario.aircraft.autopilot
     assert autopilot is not None
@@ -223,7 +226,7 @@ def test_a_log_of_positions_alone_shows_the_same_wind_and_laps(tmp_path: Path) -
         ("target_index", 50.0, 50.0, [2, 3], "1 row without target_index"),
         ("time_s", -20.0, 45.0, [3], "lap 2 is left out: it begins before the log"),
         ("autonomous", 50.0, 58.0, [3], "lap 2 is left out: it has no row flown by the autopilot for 8.0 s"),
-        ("airspeed_tas_mps", -20.0, 200.0, [2, 3], "airspeed: indicated; taken as true"),
+        ("airspeed_tas_mps", -20.0, 200.0, [2, 3], "airspeed_tas_mps from airspeed_ias_mps by the standard"),
         ("lap", 50.0, 50.0, [2, 3], "1 row without time_s, east_m, north_m or lap"),
     ],
 )
