@@ -21,8 +21,9 @@ from harness.run_files.drawn_lines import ALTITUDES, DEGREES, LOCAL
 if TYPE_CHECKING:
     import pyarrow as pa
 
+VELOCITY: Final = ("ve_mps", "vn_mps")
 OPTIONAL: Final = (
-    *("ve_mps", "vn_mps", "roll_deg", "airspeed_tas_mps", "airspeed_ias_mps"),
+    *(*VELOCITY, "roll_deg", "airspeed_tas_mps", "airspeed_ias_mps"),
     *("baro_height_m", "lap", "autonomous", "target_index"),
 )
 """Columns of a table that are read beside time, place and height, where it has them; their names give the units."""
@@ -68,19 +69,23 @@ def read_flown(path: Path, plane: LocalPlane | None = None) -> FlownFlight:
         check_kind(path)
         columns, notes = read_log(path, plane or LocalPlane(0.0, 0.0))
         in_degrees = True
-    if len(columns["time_s"]) < 3 or not (np.diff(columns["time_s"]) > 0.0).all():
+    times = columns["time_s"]
+    if len(times) < 3 or not (np.diff(times) > 0.0).all():
         raise InputError(f"{path}: time_s: must have at least 3 rows, each later than the one before")
-    if "ve_mps" not in columns or "vn_mps" not in columns:
-        notes.append("velocity over the ground: from the positions")
-        for name, position in (("ve_mps", "east_m"), ("vn_mps", "north_m")):
-            columns[name] = np.gradient(columns[position], columns["time_s"])
+    velocity = [columns.get(name, np.full_like(times, math.nan)) for name in VELOCITY]
+    unknown = ~np.isfinite(velocity).all(axis=0)
+    if unknown.any():
+        rows = "" if unknown.all() else f" in {counted(int(unknown.sum()), 'row')}"
+        notes.append(f"velocity over the ground: from the positions{rows}")
+        for name, position, each in zip(VELOCITY, ("east_m", "north_m"), velocity, strict=True):
+            columns[name] = np.where(unknown, np.gradient(columns[position], times), each)
     if "up_m" not in columns:
         notes.append("altitude: the table has none; taken to be 0 m")
-        columns["up_m"] = np.zeros_like(columns["time_s"])
+        columns["up_m"] = np.zeros_like(times)
     if not set(AIRSPEED_COLUMNS) & set(columns):
         told = f"the log has none ({', '.join(AIRSPEED_COLUMNS)}); taken to be constant where wind is fitted"
         notes.append(f"airspeed: {told}")
-    targets = columns.get("target_index", np.zeros_like(columns["time_s"]))
+    targets = columns.get("target_index", np.zeros_like(times))
     by_autopilot = columns.get("autonomous", columns.get("lap", 1.0 - (targets < 0.0))) > 0.0
     if not by_autopilot.any():
         raise InputError(f"{path}: autonomous, lap, target_index: no row is flown by the autopilot")
@@ -178,6 +183,8 @@ def _numbers(table: pa.Table, name: str, path: Path) -> FloatArray:
         return values
 
     def number(row: int, cell: Any) -> float:
+        if name == "autonomous" and isinstance(cell, str):
+            cell = {"true": "1", "false": "0"}.get(cell.strip().lower(), cell)
         empty = cell in (None, "", "nan")
         return math.nan if empty else finite(cell, f"{path}: {name}: row {row}", isinstance(cell, str))
 

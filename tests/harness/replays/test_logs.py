@@ -142,7 +142,8 @@ def test_a_damaged_dataflash_log_is_told_in_one_line(
 
 
 def test_a_row_without_a_place_is_no_row_and_told(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_bytes(b"\xef\xbb\xbftime_s, x_m, y_m\n0,0,10\n1,nan,nan\n2,10,30\n3,20,50\n")
+    rows = b"0,0,10, True\n1,nan,nan, True\n2,10,30, true\n3,20,50, True\n4,0,0, False\n"
+    (tmp_path / "a.csv").write_bytes(b"\xef\xbb\xbftime_s, x_m, y_m, autonomous\n" + rows)
     track = read_flown(tmp_path / "a.csv", PLANE)
     assert track["time_s"].tolist() == [0.0, 2.0, 3.0]
     assert (track["east_m"].tolist(), track["north_m"].tolist()) == ([0.0, 10.0, 20.0], [10.0, 30.0, 50.0])
