@@ -76,10 +76,24 @@ class FlownMission(BaseModel):
     def check_flown(self, flight: FlownFlight) -> None:
         """Raises InputError for a flight that stays away from a corner: it lies in another plane."""
         nearest_m = self.nearest_m(flight)
-        legs_m = np.hypot(*(np.roll(self.corners_m, -1, axis=0) - self.corners_m).T)
-        if nearest_m.max() > max(self.acceptance_m or 0.0, 0.5 * legs_m.max()):
+        if nearest_m.max() > self._far_m:
             told = f"comes no nearer than {nearest_m.max():.0f} m to corner {nearest_m.argmax() + 1} of its mission"
             raise InputError(f"{flight.source}: {told}; give both in one plane, or in degrees")
+
+    def check_order(self, flight: FlownFlight, legs: FloatArray, first: int) -> None:
+        """Raises InputError for a flight that comes to the corners in another order; `legs` as `legs_of` has them."""
+        rows = np.flatnonzero(np.diff(legs) > 0.0)
+        next_m = self.corners_m[((first + legs[rows]) % len(self.corners_m)).astype(np.int64)]
+        away_m = np.hypot(flight["east_m"][rows] - next_m[:, 0], flight["north_m"][rows] - next_m[:, 1])
+        if len(rows) and away_m.mean() > self._far_m:
+            told = f"target_index: changes {away_m.mean():.0f} m from the corners that are next (mean)"
+            raise InputError(f"{flight.source}: {told}; must go through the mission's corners in their order")
+
+    @property
+    def _far_m(self) -> float:
+        """Who is farther away than this has not come to a corner."""
+        legs_m = np.hypot(*(np.roll(self.corners_m, -1, axis=0) - self.corners_m).T)
+        return max(self.acceptance_m or 0.0, 0.5 * float(legs_m.max()))
 
     def corner_at(self, flight: FlownFlight, rows: NDArray[np.intp], told: int) -> tuple[int, float]:
         """Number of the corner that some rows lie at, that told unless another is half as far; and how far, m."""

@@ -161,6 +161,7 @@ def _flown(task: Task) -> tuple[Side, FloatArray]:
     flight, mission = task.flight, task.mission
     columns = dict(flight.columns)
     legs = legs_of(columns, mission.corners_m, task.first, mission.acceptance_m)
+    mission.check_order(flight, legs, task.first)
     by_corners = _laps(legs, task)
     laps = columns.get("lap", 1.0 + by_corners)
     # The log begins or ends where a lap does: as near to corner 0, in two rows, as counts as reached or as laps ended.

@@ -144,6 +144,10 @@ def test_corners_are_found_of_the_targets_alone(tmp_path: Path) -> None:
     assert np.hypot(*(found.corners_m - np.array(corners)).T).max() < 2.5
     assert found.told["notes"][0].startswith("mission: 4 corners, 10 m ahead of where target_index changes")
     assert found.told["distance_between_m"]["p50"] <= 4.0
+    mission = tmp_path / "clockwise.json"
+    mission.write_text(json.dumps({"mission": {"corners_east_north_m": SQUARE[::-1]}}))
+    with pytest.raises(wayproof.InputError, match="target_index: changes .* must go through the mission's"):
+        wayproof.replay(FLOWN / "thor75.parquet", "ultrastick25e", mission, out=tmp_path / "none")
     pq.write_table(table.drop_columns(["target_index"]), tmp_path / "none.parquet")
     with pytest.raises(wayproof.InputError, match="give --mission FILE, or a column target_index"):
         wayproof.replay(tmp_path / "none.parquet", "ultrastick25e", out=tmp_path / "none")
@@ -227,6 +231,7 @@ def test_a_log_of_positions_alone_shows_the_same_wind_and_laps(tmp_path: Path) -
         ("time_s", -20.0, 45.0, [3], "lap 2 is left out: it begins before the log"),
         ("autonomous", 50.0, 58.0, [3], "lap 2 is left out: it has no row flown by the autopilot for 8.0 s"),
         ("airspeed_tas_mps", -20.0, 200.0, [2, 3], "airspeed_tas_mps from airspeed_ias_mps by the standard"),
+        ("ve_mps", -1.0, 0.1, [2, 3], "velocity over the ground: from the positions in 56 rows"),
         ("lap", 50.0, 50.0, [2, 3], "1 row without time_s, east_m, north_m or lap"),
     ],
 )
