@@ -265,6 +265,5 @@ def averaged(values: FloatArray, track: Track, over_s: float) -> FloatArray:
     """Returns the running means of a track's values over a time; where the track is no longer, one mean of all."""
     span = float(track.time_s[-1] - track.time_s[0])
     rows = 1 + round(over_s * (len(values) - 1) / span) if span > over_s else len(values)
-    total = np.append(0.0, np.cumsum(values))
-    mean: FloatArray = (total[rows:] - total[:-rows]) / rows
-    return mean
+    total: FloatArray = np.append(0.0, np.cumsum(values))
+    return (total[rows:] - total[:-rows]) / rows

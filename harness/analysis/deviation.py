@@ -47,11 +47,20 @@ class Deviation:
 
     def figures(self) -> dict[str, float | None]:
         """95th percentile and maximum of all of them; None where nothing was flown."""
-        every = np.concatenate((self.rows_m, self.points_m))
-        every = every[np.isfinite(every)]
-        if not len(every):
-            return {"p95": None, "max": None}
-        return {"p95": float(np.percentile(every, 95)), "max": float(every.max())}
+        every = error_figures(np.concatenate((self.rows_m, self.points_m)))
+        return {name: every[name] for name in ("p95", "max")}
+
+
+def error_figures(error: FloatArray) -> dict[str, float | None]:
+    """rms, 95th percentile and maximum of an absolute error, NaN left out; None without a value."""
+    size = np.abs(error[np.isfinite(error)])
+    if not len(size):
+        return {"rms": None, "p95": None, "max": None}
+    return {
+        "rms": math.sqrt(float(np.mean(size * size))),
+        "p95": float(np.percentile(size, 95)),
+        "max": float(size.max()),
+    }
 
 
 def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: float) -> Deviation:
@@ -94,8 +103,7 @@ class Stations:
         near = self._flown[first:end]
         near = near[np.abs(self._along_m[near] - at_m) <= reach_m]
         passes = self._flown[_rows_at(self._furthest_m, at_m)] if len(self._flown) else near
-        rows: Rows = np.union1d(near, passes)
-        return rows
+        return np.union1d(near, passes)
 
     def allowed_m(self, tolerance_m: float, corners: Iterable[CutCorner]) -> FloatArray:
         """(n,) what each row may be off the path as given: the tolerance, or what a corner about it allows."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from harness.analysis.causes import saturated
+from harness.analysis.deviation import error_figures
 from harness.analysis.findings import findings
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.registry import METRICS
@@ -101,18 +102,6 @@ def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:
         "navigation_error_m": error_figures(track.navigation_error_m),
         "navigation_jump_m": float(np.nanmax(np.hypot(np.diff(east_m), np.diff(north_m)), initial=0.0)),
         "navigation_margin_m": limits.navigation_margin_m,
-    }
-
-
-def error_figures(error: FloatArray) -> dict[str, float | None]:
-    """rms, 95th percentile and maximum of an absolute error, NaN left out; None without a value."""
-    size = np.abs(error[np.isfinite(error)])
-    if not len(size):
-        return {"rms": None, "p95": None, "max": None}
-    return {
-        "rms": math.sqrt(float(np.mean(size * size))),
-        "p95": float(np.percentile(size, 95)),
-        "max": float(size.max()),
     }
 
 

@@ -75,7 +75,8 @@ def legs(
     force = InForce.of(track, limits, given.airspeed_mps if given else None)
     flown = _Flown(track, plans, limits, force, given)
     past_end = is_past_end(track, plans, limits)
-    stretches = _stretches(track, flown.leg_numbers)
+    ends_m = [corner.arc_length_m for corner in given.corners] if given else []
+    stretches = _stretches(track, track.plan_index + np.searchsorted(ends_m, track.arc_length_m))
     judged = flown.as_given(stretches) if given else [flown.leg(*rows) for rows in stretches]
     for number, (first, last) in enumerate(stretches):
         if past_end[first : last + 1].any():
@@ -87,7 +88,7 @@ def legs(
 
 
 def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
-    """First and last row of every leg; a short one joins the next, a short last one the one before."""
+    """First and last row of every leg, by its number (n,); a short one joins the next, a short last one that before."""
     flown = np.flatnonzero(track.plan_index >= 0)
     if not len(flown):
         return []
@@ -114,13 +115,6 @@ class _Flown:
     limits: FlightLimits
     force: InForce
     given: AsGiven | None
-
-    @property
-    def leg_numbers(self) -> IntArray:
-        """(n,) a number for every row, another for every plan, or between the corners of a given path."""
-        ends = [corner.arc_length_m for corner in self.given.corners] if self.given else []
-        passed = np.searchsorted(np.array(ends), self.track.arc_length_m) if ends else 0
-        return self.track.plan_index + passed
 
     def leg(self, first: int, last: int) -> Leg:
         """Judges a leg by its plan; a leg of a given path by altitude, airspeed and load factor alone."""

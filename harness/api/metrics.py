@@ -40,7 +40,6 @@ class Figures(dict[str, Any]):
         return [*super().__dir__(), *self]
 
     def __repr__(self) -> str:
-        """Its first figures, shortened."""
         told = [
             f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value!r:.40}"
             for name, value in self.items()

@@ -89,7 +89,6 @@ class FlightResult:
         return None
 
     def __repr__(self) -> str:
-        """A line for people."""
         where = f", in {self.folder}" if self.folder and self._scratch is None else ""
         name, model, seed = self.scenario.name, Path(self.scenario.aircraft.model).name, self.scenario.seed
         return f"FlightResult({name}: {self.outcome}; {self.pilot}, {model}, seed {seed}{where})"
@@ -117,7 +116,6 @@ class ComparisonResult:
         return set(self.table["outcome"].to_pylist()) <= {"reached"}
 
     def __repr__(self) -> str:
-        """A line for people."""
         reached = self.table["outcome"].to_pylist().count("reached")
         return f"ComparisonResult({len(self.table)} flights, {reached} reached; {self.folder})"
 
@@ -149,6 +147,5 @@ class CampaignResult:
         return dict(self.summary.outcomes)
 
     def __repr__(self) -> str:
-        """A line for people."""
         ends = ", ".join(f"{number} {outcome}" for outcome, number in self.outcomes.items())
         return f"CampaignResult({len(self.table)} runs: {ends}; {self.folder})"

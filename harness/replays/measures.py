@@ -67,7 +67,6 @@ class Replay:
     folder: Path
 
     def __repr__(self) -> str:
-        """A line for people."""
         between = self.told["distance_between_m"]
         return f"Replay({self.told['log']}: tracks {between['p50']:.1f} m apart (median))"
 
@@ -93,8 +92,7 @@ class Side:
         corners = self.corners_m
         shape = shapely.Polygon(corners) if len(corners) > 2 else shapely.LineString(corners)
         points = shapely.points(self.columns["east_m"], self.columns["north_m"])
-        found: FloatArray = shapely.distance(shape, points)
-        return found
+        return np.asarray(shapely.distance(shape, points))
 
     @cached_property
     def lacks(self) -> dict[int, str]:
@@ -142,8 +140,7 @@ class Side:
 
         here, there = (np.column_stack((s.columns["east_m"], s.columns["north_m"])) for s in (self, other))
         track = shapely.LineString(there[other.laps == lap])
-        found: FloatArray = shapely.distance(track, shapely.points(here[self.laps == lap]))
-        return found
+        return np.asarray(shapely.distance(track, shapely.points(here[self.laps == lap])))
 
 
 def compared(flown: Side, simulated: Side) -> dict[str, Any]:

@@ -177,7 +177,6 @@ def _planned_line(
     ground: Ground | None,
     corner_m: float | None,
 ) -> PathPlan:
-    """Plans a drawn line as it is flown."""
     frame, speed = airframe_of(scenario.aircraft), scenario.aircraft.airspeed_mps
     across_m = scenario.trackability.cross_track_m
     limit_m = across_m if corner_m is None else corner_m

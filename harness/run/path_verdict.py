@@ -14,11 +14,11 @@ import numpy as np
 from aircraft.guidance.altitude import slewed
 from aircraft.interface import FloatArray
 from harness.analysis.breaches import CONTACT, Breach, Kept, compared, crossings, inside_m
-from harness.analysis.deviation import Rows, Stations, deviation
+from harness.analysis.deviation import Rows, Stations, deviation, error_figures
 from harness.analysis.flight_limits import AsGiven, FlightLimits
 from harness.analysis.in_force import InForce, demand
 from harness.analysis.metric import CROSSED
-from harness.analysis.metrics import error_figures, metrics
+from harness.analysis.metrics import metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.wording import tallied
 from harness.flight.record import Flight, Outcome, Track
@@ -75,7 +75,7 @@ def measured(
     told = _told(check, flight, limits, asked, passing)
     figures["trackable"] &= figures["outcome"] == "reached" and all(each["kept"] for each in told["corners"])
     told["corner_m_that_would_do"], sure = _tried(told["corner_m_that_would_do"], flown_at)
-    told["ok"], told["verdict"] = verdict(figures, told, seen, limits, sure)
+    ok, sentence = verdict(figures, told, seen, limits, sure)
     return {
         **figures,
         "total_system_error_m": error_figures(found.rows_m),
@@ -86,7 +86,7 @@ def measured(
         "breaches": [dict(vars(each)) for each in seen.crossings],
         **({} if seen.height_m is None else {"height_above_ground_m": seen.height_m}),
         "deviation_from_given_m": found.figures(),
-        "check": told,
+        "check": {"ok": ok, "verdict": sentence, **told},
     }
 
 
@@ -101,8 +101,6 @@ def _told(
     line, speed = _given_line(plan), max(float(track.groundspeed_mps.mean()), 1e-3)
     corners = [passing.of(corner) for corner in passing.corners]
     found = {
-        "ok": False,
-        "verdict": "",
         "drawn": given.mission is None,
         "points": len(given.points_m),
         "given_length_m": float(np.hypot(*np.diff(line, axis=0).T).sum()),
@@ -249,9 +247,9 @@ def _given_line(plan: PathPlan) -> FloatArray:
     """(k, 2) the line that was given: of a mission with its circles."""
     if not plan.marks:
         return plan.way.waypoints_m
-    line = plan.way.given_m[:, :2]
-    every: FloatArray = line[np.append(True, np.hypot(*np.diff(line, axis=0).T) > SAME_PLACE_M)]
-    return every
+    line: FloatArray = plan.way.given_m[:, :2]
+    apart = np.hypot(*np.diff(line, axis=0).T) > SAME_PLACE_M
+    return line[np.flatnonzero(np.append(True, apart))]
 
 
 def _as_given(plan: PathPlan, passing: _Passing) -> AsGiven:

@@ -219,16 +219,13 @@ class _FlownSoFar(Observer):
         self.events: list[tuple[float, str, str]] = []  # simulated time (s), level and sentence
 
     def on_event(self, time_s: float, text: str) -> None:
-        """Keeps an event."""
         self.events.append((time_s, "warning" if isinstance(text, Caution) else "info", str(text)))
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        """Keeps a plan, and its reason as an event."""
         self._plans.append(accepted)
         self.events.append((accepted.time_s, "info", f"plan {accepted.plan_index}: {accepted.plan.reason}"))
 
     def on_block(self, block: Track) -> None:
-        """Keeps rows of the track."""
         self._blocks.append(block)
 
     def leave_in(self, folder: RunFolder) -> None:

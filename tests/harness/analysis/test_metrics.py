@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from harness.analysis.deviation import error_figures
 from harness.analysis.flight_limits import FlightLimits
-from harness.analysis.metrics import error_figures, metrics, percentiles
+from harness.analysis.metrics import metrics, percentiles
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
 from tests.harness.conftest import CIRCLE_PLAN, circle_track
 from tests.harness.conftest import STRAIGHT_PLAN as STRAIGHT
